@@ -1,0 +1,27 @@
+//! The vocabulary of armcal. No I/O and no algorithms live here, only the nouns every other crate
+//! speaks, in the order in which data flows through them:
+//!
+//! `Samples -> Dwell -> Observation -> Parameter, ErrorStats`, with [`Warning`]s collected on the way.
+//!
+//! Inside armcal everything is SI (metres, radians, seconds, newton metres) and time is `i64`
+//! nanoseconds; every name carries its unit as a suffix. Display units exist only at the edges,
+//! through [`Unit`].
+
+pub mod dwell;
+pub mod error_stats;
+pub mod frames;
+pub mod observation;
+pub mod parameter;
+pub mod robust;
+pub mod samples;
+pub mod units;
+pub mod warning;
+
+pub use dwell::{Arrival, Dwell, DwellId, TipMeasurement};
+pub use error_stats::ErrorStats;
+pub use frames::{Pose, RollPitchYaw};
+pub use observation::{Observation, Reference, Rejection};
+pub use parameter::{Parameter, Role};
+pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
+pub use units::Unit;
+pub use warning::{Severity, Stage, Warning};

@@ -1,0 +1,69 @@
+//! What the fit sees: a joint reading and a reference for where the tip was.
+
+use crate::{Arrival, DwellId};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+/// How the true position of the tip is known.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reference {
+    /// The tip is seated in a cavity of the board; the board's pose is a frame of the model.
+    Seated {
+        /// Name of the cavity on the board.
+        cavity: String,
+        /// Centre of the seated tip in the frame of the (tilted) board [m].
+        in_board_m: Vector3<f64>,
+    },
+    /// A sensor saw the tip, in the sensor's frame.
+    Tracked {
+        /// Position of the tracked body [m].
+        position_m: Vector3<f64>,
+        /// Orientation of the tracked body, where it is used.
+        orientation: Option<UnitQuaternion<f64>>,
+        /// Standard error of the orientation per axis [rad].
+        orientation_sigma_rad: f64,
+    },
+}
+
+/// One row of the calibration: `measured - predicted` [m] with its covariance and provenance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observation {
+    /// The dwell it comes from.
+    pub dwell: DwellId,
+    /// Middle of the dwell [ns], robot clock.
+    pub time_ns: i64,
+    /// Joint readings [rad].
+    pub joint_rad: Vec<f64>,
+    /// Standard error of the joint readings [rad].
+    pub joint_sigma_rad: Vec<f64>,
+    /// Direction of arrival of each joint.
+    pub arrival: Vec<Arrival>,
+    /// Measured joint effort [N m], where the recording has it.
+    pub effort_nm: Option<Vec<f64>>,
+    /// Temperature [degC], where the recording has it.
+    pub temperature_c: Option<f64>,
+    /// Load at the tip [kg].
+    pub load_kg: f64,
+    /// How the true position is known.
+    pub reference: Reference,
+    /// Covariance of the measured position [m^2]: sensor, cavity tolerance and seat clearance.
+    pub covariance_m2: Matrix3<f64>,
+}
+
+impl Observation {
+    /// The cavity, if the tip was seated.
+    pub fn cavity(&self) -> Option<&str> {
+        match &self.reference {
+            Reference::Seated { cavity, .. } => Some(cavity),
+            Reference::Tracked { .. } => None,
+        }
+    }
+}
+
+/// A dwell that does not take part in the fit. It stays visible in every output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rejection {
+    /// The dwell.
+    pub dwell: DwellId,
+    /// Why, in a sentence that says what was seen and what would be needed.
+    pub why: String,
+}

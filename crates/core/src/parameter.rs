@@ -1,0 +1,42 @@
+//! A number the fit may change.
+
+use crate::Unit;
+use serde::Serialize;
+
+/// One parameter of the model: name, unit, bounds, prior, meaning. No magic indices.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Unique name, `<part>.<quantity>`: `joint2.theta`, `base.yaw`, `board.roll.x`.
+    pub name: String,
+    /// SI unit of the value.
+    pub unit: Unit,
+    /// Value before calibration; also the centre of the prior.
+    pub nominal: f64,
+    /// Smallest value allowed; `-inf` when unbounded.
+    pub lower: f64,
+    /// Largest value allowed; `+inf` when unbounded.
+    pub upper: f64,
+    /// Standard deviation of what is known about it before the data; `None` means nothing is.
+    pub prior_sigma: Option<f64>,
+    /// Whether the fit may change it.
+    pub free: bool,
+    /// Whether it places a frame (base, tip point, board) rather than describing the robot.
+    /// Frames that nobody could know are fitted before the nominal error is judged.
+    pub role: Role,
+    /// What it means, in words.
+    pub meaning: String,
+}
+
+/// What a parameter belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Robot geometry: a DH entry or a URDF joint origin.
+    Robot,
+    /// A frame whose pose was not known beforehand and is estimated with the data.
+    EstimatedFrame,
+    /// A frame whose pose was measured or given; free only within its prior, or fixed.
+    KnownFrame,
+    /// A physical effect beyond geometry.
+    Effect,
+}

@@ -1,0 +1,49 @@
+//! Order statistics used by several crates. Non-finite values are ignored throughout.
+
+/// Scale that makes the median absolute deviation estimate a normal standard deviation.
+pub const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
+
+/// Median of the finite values; NaN when there are none.
+pub fn median(values: &[f64]) -> f64 {
+    percentile(values, 0.5)
+}
+
+/// Median absolute deviation from the median, scaled to estimate a normal standard deviation.
+pub fn mad_sigma(values: &[f64]) -> f64 {
+    let centre = median(values);
+    let deviations: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
+    MAD_TO_SIGMA * median(&deviations)
+}
+
+/// The `p`-quantile (0 to 1) of the finite values, linearly interpolated between order statistics
+/// (Hyndman and Fan 1996, type 7). NaN when there are none.
+pub fn percentile(values: &[f64], p: f64) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if sorted.is_empty() {
+        return f64::NAN;
+    }
+    sorted.sort_by(f64::total_cmp);
+    let at = p.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
+    let (below, above) = (at.floor() as usize, at.ceil() as usize);
+    sorted[below] + (at - below as f64) * (sorted[above] - sorted[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_interpolate_like_numpy() {
+        // numpy.percentile([1, 2, 3, 4], [50, 95]) = 2.5, 3.85
+        let v = [4.0, 1.0, f64::NAN, 3.0, 2.0];
+        assert!((median(&v) - 2.5).abs() < 1e-12);
+        assert!((percentile(&v, 0.95) - 3.85).abs() < 1e-12);
+        assert!(median(&[]).is_nan());
+    }
+
+    #[test]
+    fn mad_ignores_a_wild_value() {
+        // scipy.stats.median_abs_deviation([1, 2, 3, 4, 1000], scale="normal") = 1.482602...
+        assert!((mad_sigma(&[1.0, 2.0, 3.0, 4.0, 1000.0]) - MAD_TO_SIGMA).abs() < 1e-12);
+    }
+}

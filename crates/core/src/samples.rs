@@ -1,0 +1,87 @@
+//! Time series as columns. Each stream has one clock, strictly increasing in time.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Joint readings; `joint_rad[j][i]` is joint `j` at `time_ns[i]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointSamples {
+    /// Time of each row [ns].
+    pub time_ns: Vec<i64>,
+    /// Joint names in the order of the columns.
+    pub names: Vec<String>,
+    /// Angle of each joint [rad] (a prismatic joint: [m]), one column a joint.
+    pub joint_rad: Vec<Vec<f64>>,
+    /// Measured joint effort [N m], one column a joint, where the recording has it.
+    pub effort_nm: Option<Vec<Vec<f64>>>,
+}
+
+impl JointSamples {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_ns.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.time_ns.is_empty()
+    }
+
+    /// All joints at row `i` [rad].
+    pub fn row_rad(&self, i: usize) -> Vec<f64> {
+        self.joint_rad.iter().map(|column| column[i]).collect()
+    }
+}
+
+/// Poses of one tracked body in the frame of its sensor. Occluded frames are already removed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PoseSamples {
+    /// Frame the poses are expressed in, as the recording names it.
+    pub frame_id: String,
+    /// The tracked body, as the recording names it.
+    pub body: String,
+    /// Time of each row [ns].
+    pub time_ns: Vec<i64>,
+    /// Position of the body [m].
+    pub position_m: Vec<Vector3<f64>>,
+    /// Orientation of the body, where the stream has one; same length as `position_m`.
+    pub orientation: Option<Vec<UnitQuaternion<f64>>>,
+}
+
+impl PoseSamples {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time_ns.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.time_ns.is_empty()
+    }
+}
+
+/// One scalar over time, such as a temperature [degC].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ScalarSamples {
+    /// Time of each row [ns].
+    pub time_ns: Vec<i64>,
+    /// Value of each row, in the unit the stream is declared in.
+    pub value: Vec<f64>,
+}
+
+/// Everything a pipeline reads out of one recording.
+///
+/// `joints` is on the robot's clock; the tracked bodies share the sensor's clock until
+/// `armcal-dwell` has aligned them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Samples {
+    /// Encoder readings.
+    pub joints: JointSamples,
+    /// The tip (or the marker on the end effector).
+    pub tip: Option<PoseSamples>,
+    /// The robot's base.
+    pub base: Option<PoseSamples>,
+    /// The calibration table.
+    pub table: Option<PoseSamples>,
+    /// Temperature [degC].
+    pub temperature: Option<ScalarSamples>,
+}

@@ -1,0 +1,65 @@
+//! Warnings are data: collected by every stage, shown in terminal, page and MCAP alike.
+
+use serde::Serialize;
+
+/// How much a warning matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Worth knowing; the result stands.
+    Notice,
+    /// The result cannot be trusted as it is (the model or the data is inadequate): exit code 3.
+    Inadequate,
+    /// Data of the input was damaged or could not be used: exit code 3.
+    DataLost,
+}
+
+/// The stage of the story that noticed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Reading the file.
+    Recording,
+    /// Clock alignment and dwell detection.
+    Dwell,
+    /// Board and association.
+    Table,
+    /// Fit and hold-out.
+    Calibrate,
+    /// Writing results.
+    Output,
+}
+
+/// Something the user should know, with what it is about and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// How much it matters.
+    pub severity: Severity,
+    /// Who noticed.
+    pub stage: Stage,
+    /// Stable machine-readable name, `kebab-case`.
+    pub code: &'static str,
+    /// The file, channel, dwell, cavity or parameter it is about.
+    pub subject: String,
+    /// One sentence: what was seen, and what to do next.
+    pub message: String,
+}
+
+impl Warning {
+    /// A warning of the given severity.
+    pub fn new(
+        severity: Severity,
+        stage: Stage,
+        code: &'static str,
+        subject: impl Into<String>,
+        message: impl Into<String>,
+    ) -> Warning {
+        Warning { severity, stage, code, subject: subject.into(), message: message.into() }
+    }
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.subject, self.message)
+    }
+}

@@ -1,0 +1,137 @@
+//! What reading found: the facts `armcal inspect` prints and every output carries along.
+
+use armcal_core::Warning;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// How the records of a file were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// Through the file's own summary and chunk index.
+    Index,
+    /// By walking the records, because the file has no usable index (unchunked, cut off, damaged).
+    Scan,
+}
+
+/// One file of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FileReport {
+    /// Path as given.
+    pub path: PathBuf,
+    /// Size [bytes].
+    pub bytes: u64,
+    /// SHA-256 of the whole file, hexadecimal.
+    pub sha256: String,
+    /// How its records were found.
+    pub source: Source,
+    /// Profile of the MCAP header (`ros2`, `ros1`, empty).
+    pub profile: String,
+    /// Library of the MCAP header.
+    pub library: String,
+    /// Chunks in the file, good and bad.
+    pub chunks: usize,
+    /// Where the file was cut off [byte], if it was.
+    pub truncated_at: Option<u64>,
+    /// Parts that could not be used: byte offset and reason.
+    pub damaged: Vec<(u64, String)>,
+}
+
+/// One channel (same topic, schema and encoding in all files of the recording).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// Topic.
+    pub topic: String,
+    /// Schema name, such as `sensor_msgs/msg/JointState`.
+    pub schema: String,
+    /// Schema encoding (`ros2msg`, `ros1msg`, `protobuf`, `jsonschema`, ...).
+    pub schema_encoding: String,
+    /// Message encoding (`cdr`, `ros1`, `protobuf`, `json`, ...).
+    pub message_encoding: String,
+    /// Messages found.
+    pub messages: u64,
+    /// First log time [ns].
+    pub first_ns: i64,
+    /// Last log time [ns].
+    pub last_ns: i64,
+    /// What armcal can read it as (`joints`, `pose`, `temperature`), or why it cannot.
+    pub decodable: Result<String, String>,
+}
+
+/// Which stamp of a message its time was taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// The message's own header stamp.
+    Header,
+    /// MCAP publish time.
+    Publish,
+    /// MCAP log time.
+    Log,
+}
+
+/// What was read for one stream of the pipeline.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StreamReport {
+    /// Role in the pipeline: `joints`, `tip`, `base`, `table`, `temperature`.
+    pub role: String,
+    /// Topic it was read from.
+    pub topic: String,
+    /// Clock used and why.
+    pub clock: Clock,
+    /// Why that clock, in words.
+    pub clock_reason: String,
+    /// Messages read.
+    pub messages: u64,
+    /// Rows that entered the columns.
+    pub rows: usize,
+    /// Messages that could not be decoded.
+    pub undecodable: u64,
+    /// Rows with NaN or infinite values, dropped.
+    pub non_finite: u64,
+    /// Rows whose stamp equals the one before, dropped.
+    pub duplicate_stamps: u64,
+    /// Rows whose stamp goes backwards; sorted into place.
+    pub backward_stamps: u64,
+    /// Pose rows rejected as occluded, by reason.
+    pub occluded: Occlusion,
+    /// Median rate [Hz].
+    pub rate_hz: f64,
+    /// Largest gap between rows [s].
+    pub largest_gap_s: f64,
+    /// Step of the quantisation of the readings [rad], per joint, where there is one.
+    pub quantisation_rad: Vec<Option<f64>>,
+}
+
+/// Pose rows rejected because the sensor did not see the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Occlusion {
+    /// Exactly zero translation.
+    pub zero: u64,
+    /// The same pose repeated bit for bit while a live sensor would jitter.
+    pub frozen: u64,
+    /// Quaternion not of unit length.
+    pub non_unit_quaternion: u64,
+    /// Flagged as occluded by the message itself.
+    pub flagged: u64,
+}
+
+impl Occlusion {
+    /// All rejected rows.
+    pub fn total(&self) -> u64 {
+        self.zero + self.frozen + self.non_unit_quaternion + self.flagged
+    }
+}
+
+/// Everything known about one recording (which may consist of several split files).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordingReport {
+    /// Its files, in time order.
+    pub files: Vec<FileReport>,
+    /// Its channels, by topic.
+    pub channels: Vec<ChannelReport>,
+    /// Its streams, once a pipeline has named them.
+    pub streams: Vec<StreamReport>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
