@@ -1,1 +1,51 @@
-//! stub
+//! From observations to corrected parameters: the fit, what it is worth, and how it does on points it never saw.
+//!
+//! One objective, each symbol with the module that owns it:
+//!
+//! ```text
+//! min_p  sum_j rho(|L_j^-1 (y_j - f_j(p))| / s) + 1/2 sum_k ((p_k - nominal_k) / sigma_k)^2,   lower <= p <= upper
+//! ```
+//!
+//! * `y - f` and its derivative: [`problem`], for a robot [`ModelProblem`]; `L`: whitening by measurement and
+//!   encoder noise, evaluated at the start (`whitened`);
+//! * `rho`: Huber on the norm of an observation (`loss`), `s`: its robust scale (`robust`);
+//! * the minimum: `solver`; eq. 4 of the paper instead: `paper`;
+//! * covariance, intervals, rank, what the data cannot determine: `statistics`, `undetermined`, `words`;
+//! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
+//! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`].
+
+mod calibration;
+mod config;
+mod error;
+mod export;
+mod fit;
+mod fit_warnings;
+mod frames;
+mod holdout;
+mod loss;
+mod model_problem;
+mod noise;
+mod outcome;
+mod paper;
+pub mod problem;
+mod rigid_fit;
+mod robust;
+mod solver;
+mod statistics;
+mod undetermined;
+mod whitened;
+mod words;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
+mod tests;
+
+pub use calibration::calibrate;
+pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
+pub use error::CalibrateError;
+pub use export::{WhitenedProblem, whitened_problem};
+pub use fit::{fit, fit_problem};
+pub use frames::{align_frames, fit_frames};
+pub use model_problem::ModelProblem;
+pub use noise::expected_norm_m;
+pub use outcome::*;

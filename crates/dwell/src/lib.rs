@@ -1,1 +1,31 @@
-//! stub
+//! From samples to dwells: the clocks are aligned, the pauses found, each pause summarised.
+//!
+//! ```text
+//! joints, tip --align_clocks--> ClockAlignment --detect_dwells--> [Dwell] (mean, spread, standard error,
+//!                                                                          arrival direction, tip, n_eff)
+//! table, base --mean_pose-----> MeanPose (with a warning when the body moved)
+//! ```
+//!
+//! Nothing here knows a file, a board or a robot model; the caller passes the nominal model as a closure.
+
+mod align;
+mod arrival;
+mod clock;
+mod config;
+mod detect;
+mod error;
+mod pauses;
+mod series;
+mod static_pose;
+mod stats;
+mod stillness;
+mod summary;
+#[cfg(test)]
+mod testkit;
+
+pub use align::align_clocks;
+pub use clock::ClockAlignment;
+pub use config::{ClockConfig, DwellConfig};
+pub use detect::detect_dwells;
+pub use error::DwellError;
+pub use static_pose::{MeanPose, mean_pose};

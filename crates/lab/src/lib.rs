@@ -1,1 +1,136 @@
-//! stub
+//! The virtual laboratory: the paper's rig, or another arm, at work, and what a recorder saw of it.
+//!
+//! `LabConfig -> Rig -> Session (Plan, Engine) -> Log -> recording and sealed Truth`, one seed, the same bytes.
+//!
+//! | step | module | physics |
+//! |---|---|---|
+//! | build the rig | [`rig`], [`arm`], [`board`] | joint axes as lines in space, cavities off by their tolerance |
+//! | carry out the task | [`plan`], [`session`] | cavities forward, backward, at random; pauses; free poses |
+//! | move | [`engine`], [`spline`], [`servo`], [`hand`] | cubic splines, inverse kinematics, PID against inertia and gravity; a guiding hand |
+//! | hide something | [`mechanism`] | nothing yet: gaps, springs and slipping belts plug in here |
+//! | watch | [`sensors`] | counts, camera noise, occlusion, clocks, transport |
+//! | write | `record`, [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
+//!
+//! The lab shares no formula with the models that are fitted to its recordings: it lays joint axes out as
+//! lines and turns points about them, where the models multiply matrices.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout))]
+
+pub mod arm;
+pub mod board;
+pub mod config;
+pub mod engine;
+mod error;
+pub mod hand;
+pub mod mechanism;
+pub mod plan;
+pub mod random;
+mod record;
+pub mod rig;
+pub mod screw;
+pub mod sensors;
+pub mod servo;
+pub mod session;
+pub mod spline;
+pub mod trace;
+pub mod truth;
+
+pub use config::LabConfig;
+pub use error::LabError;
+pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, nothing_hidden};
+pub use trace::RestKind;
+pub use truth::{DwellTruth, RecordingTruth, Truth};
+
+use rig::Rig;
+use sensors::Log;
+use session::Session;
+use std::path::{Path, PathBuf};
+
+/// What a simulation left on disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// One file a recording, in the order of the session.
+    pub recordings: Vec<PathBuf>,
+    /// The truth file.
+    pub truth: PathBuf,
+    /// What it says.
+    pub facts: Truth,
+}
+
+/// Simulates a session with nothing hidden but geometry, and writes `<recording>.mcap` and `truth.json` into
+/// `out_dir`, made if need be. Relative paths of the configuration start at `base_dir`.
+pub fn simulate(config: &LabConfig, base_dir: &Path, out_dir: &Path) -> Result<Simulated, LabError> {
+    simulate_with(config, base_dir, out_dir, &nothing_hidden)
+}
+
+/// The same with mechanisms hidden in the rig.
+pub fn simulate_with(
+    config: &LabConfig,
+    base_dir: &Path,
+    out_dir: &Path,
+    mechanisms: &MechanismFactory<'_>,
+) -> Result<Simulated, LabError> {
+    let (truth, logs) = run(config, base_dir, mechanisms)?;
+    let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
+    std::fs::create_dir_all(out_dir).map_err(refused)?;
+    let mut recordings = Vec::new();
+    for (log, recording) in logs.iter().zip(&truth.recordings) {
+        let path = out_dir.join(&recording.file);
+        record::write(&path, &config.name, &recording.name, log)?;
+        recordings.push(path);
+    }
+    let path = out_dir.join("truth.json");
+    truth.write(&path)?;
+    Ok(Simulated { recordings, truth: path, facts: truth })
+}
+
+/// Simulates a session without writing anything: the truth, and one log a recording.
+pub fn run(
+    config: &LabConfig,
+    base_dir: &Path,
+    mechanisms: &MechanismFactory<'_>,
+) -> Result<(Truth, Vec<Log>), LabError> {
+    config.check()?;
+    let rig = Rig::build(config, base_dir)?;
+    // Recordings have random streams of their own, so the threads cannot disturb each other.
+    let made: Vec<Result<(RecordingTruth, Log), LabError>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..config.recordings.len())
+            .map(|recording| {
+                let rig = &rig;
+                scope.spawn(move || one(config, rig, recording, mechanisms(recording)))
+            })
+            .collect();
+        threads
+            .into_iter()
+            .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    });
+    let (mut truth, mut logs) = (Truth::of_rig(config, &rig), Vec::new());
+    for result in made {
+        let (recording, log) = result?;
+        truth.recordings.push(recording);
+        logs.push(log);
+    }
+    Ok((truth, logs))
+}
+
+fn one(
+    config: &LabConfig,
+    rig: &Rig,
+    recording: usize,
+    mechanisms: Vec<Box<dyn Mechanism>>,
+) -> Result<(RecordingTruth, Log), LabError> {
+    let session = Session::perform(config, rig, recording, mechanisms)?;
+    if session.trace.duration_s() > config.interval_s && recording + 1 < config.recordings.len() {
+        let took_s = session.trace.duration_s().ceil();
+        let why = format!("is {}, but a recording takes {took_s} s", config.interval_s);
+        return Err(config::value("interval_s", why));
+    }
+    let log = sensors::observe(config, recording, &session);
+    let occlusions = log.occlusions.clone();
+    let truth = RecordingTruth::of_session(config, rig, recording, &session, log.clock, occlusions);
+    Ok((truth, log))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,39 @@
-//! stub
+//! The model: where the tip should be, and how that changes with every parameter.
+//!
+//! One equation, each symbol with the module that owns it:
+//!
+//! ```text
+//! r(p) = measured(p) - B(p) * A_1(p, q_1) * ... * A_n(p, q_n) * T(p)
+//! ```
+//!
+//! * `A_i`: the rows of a [`Chain`], read from a DH table ([`Chain::from_dh_toml`]) or a URDF
+//!   ([`Chain::from_urdf`]); the formulas are in `segment`, written once and generic over the scalar;
+//! * `B`, `T`, and the board behind a seated `measured`: [`Frames`];
+//! * `r` and its exact Jacobian: [`Model::residual`], [`Model::residual_with_jacobian`].
+//!
+//! Each segment's small transform is differentiated by dual numbers; the product rule in `path`
+//! carries these derivatives to the tip, so that nothing is differentiated numerically and no
+//! derivative is written by hand.
+
+mod chain;
+mod deviation;
+mod dh_toml;
+mod error;
+mod frames;
+mod model;
+mod path;
+mod residual;
+mod rigid;
+mod segment;
+mod urdf;
+mod urdf_write;
+
+#[cfg(test)]
+mod tests;
+
+pub use chain::Chain;
+pub use deviation::Deviation;
+pub use error::ModelError;
+pub use frames::{Frame, Frames, Knowledge};
+pub use model::Model;
+pub use residual::ModelResidual;

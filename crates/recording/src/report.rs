@@ -89,10 +89,14 @@ pub struct StreamReport {
     pub undecodable: u64,
     /// Rows with NaN or infinite values, dropped.
     pub non_finite: u64,
+    /// Rows without a stamp on the clock used, dropped.
+    pub unstamped: u64,
     /// Rows whose stamp equals the one before, dropped.
     pub duplicate_stamps: u64,
     /// Rows whose stamp goes backwards; sorted into place.
     pub backward_stamps: u64,
+    /// Messages that do not hold all wanted joints (a gripper on the same topic), skipped.
+    pub other_joints: u64,
     /// Pose rows rejected as occluded, by reason.
     pub occluded: Occlusion,
     /// Median rate [Hz].

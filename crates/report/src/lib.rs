@@ -1,1 +1,30 @@
-//! stub
+//! Results of a run, for every reader: `run.mcap` for Foxglove and for programs, `summary.json` for scripts and
+//! CI, `parameters.toml` and the calibrated model for the robot, Parquet tables for Python, and a summary
+//! for the terminal.
+//!
+//! `Run -> write_all -> files`. All outputs are views of the one [`Run`]; the same run gives the same bytes,
+//! and each file appears whole or not at all.
+//!
+//! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
+//! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
+
+mod channels;
+mod error;
+mod mcap_file;
+mod model_file;
+mod parameters;
+mod points;
+mod proto;
+mod run;
+mod summary;
+mod tables;
+mod terminal;
+mod text;
+mod write;
+
+pub use error::ReportError;
+pub use run::{RecordingRun, Run, Status, VERSION};
+pub use summary::{SCHEMA, summary_json};
+pub use terminal::{TerminalStyle, terminal};
+pub use text::conclusion;
+pub use write::{InputMessages, OutputConfig, write_all};

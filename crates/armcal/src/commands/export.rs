@@ -1,0 +1,92 @@
+//! `armcal export`: the residual problem of a pipeline, to solve it with another tool.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::story;
+use armcal_calibrate::{FitConfig, ModelProblem};
+use armcal_core::{Observation, Parameter, Pose, Reference};
+use armcal_recording::atomic;
+use armcal_report::Run;
+use nalgebra::SMatrix;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Runs the pipeline and writes its least-squares problem with armcal's own answer beside it.
+pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(pipeline)?;
+    let progress = Progress::new();
+    let (run, _) = story::run(&pipeline, &progress)?;
+    progress.finish();
+    let text = format!("{:#}\n", problem(&run, &pipeline.fit)?);
+    atomic::write(out, text.as_bytes()).map_err(Error::Output)?;
+    print(&format!("{}\n", out.display()));
+    Ok(Outcome::Done)
+}
+
+/// Everything a solver needs that does not share armcal's code: the nominal arm, the observations with the
+/// covariances that whiten their residuals, the parameters with bounds and priors, and which of them were held out.
+fn problem(run: &Run, config: &FitConfig) -> Result<Value, Error> {
+    let model = &run.model;
+    let fit = &run.calibration.fit;
+    let whitened = ModelProblem::new(model, &run.observations, config)?;
+    let rows = run.observations.iter().zip(&run.calibration.residuals);
+    let observations: Vec<Value> = rows
+        .enumerate()
+        .map(|(block, (o, residual))| {
+            let mut row = observation(o);
+            row["covariance_m2"] =
+                json!(square(&whitened.position_covariance_m2(block, &run.calibration.nominal_values)));
+            row["held_out"] = json!(residual.held_out);
+            row
+        })
+        .collect();
+    Ok(json!({
+        "schema": "armcal.problem/1",
+        "pipeline": run.pipeline_name,
+        "model": run.model_text,
+        "sigma_scale": fit.sigma_scale,
+        "parameters": model.parameters().iter().zip(fit.values()).map(parameter).collect::<Vec<Value>>(),
+        "frames": frames(run),
+        "board_names": run.recordings.iter().map(|r| format!("board.{}", r.name)).collect::<Vec<String>>(),
+        "observations": observations,
+    }))
+}
+
+fn frames(run: &Run) -> Value {
+    let nominal = run.model.nominal();
+    let matrix = |pose: Pose| json!(square(&pose.to_homogeneous()));
+    let boards: Vec<Value> =
+        (0..run.recordings.len()).filter_map(|r| run.model.board_in_world(&nominal, r)).map(matrix).collect();
+    json!({
+        "world_from_base": matrix(run.model.base_in_world(&nominal)),
+        "last_link_from_tip": matrix(run.model.tip_in_last_link(&nominal)),
+        "world_from_board": boards,
+    })
+}
+
+/// A square matrix as rows.
+fn square<const N: usize>(m: &SMatrix<f64, N, N>) -> Vec<Vec<f64>> {
+    m.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+fn parameter((p, value): (&Parameter, f64)) -> Value {
+    let finite = |x: f64| if x.is_finite() { json!(x) } else { Value::Null };
+    json!({
+        "name": p.name, "unit": p.unit.symbol(), "nominal": p.nominal, "lower": finite(p.lower),
+        "upper": finite(p.upper), "prior_sigma": p.prior_sigma, "free": p.free, "value": value,
+    })
+}
+
+fn observation(o: &Observation) -> Value {
+    let reference = match &o.reference {
+        Reference::Seated { cavity, in_board_m } => {
+            json!({"cavity": cavity, "in_board_m": in_board_m.as_slice()})
+        }
+        Reference::Tracked { position_m, .. } => json!({"position_m": position_m.as_slice()}),
+    };
+    json!({
+        "recording": o.dwell.recording, "dwell": o.dwell.dwell, "joint_rad": o.joint_rad, "reference": reference,
+    })
+}

@@ -1,0 +1,163 @@
+//! `armcal inspect`: what is in a recording, and what a pipeline would use of it.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use armcal_core::Severity;
+use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport};
+use comfy_table::{Table, presets};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Inspects MCAP files as the parts of one recording, or every recording of a pipeline.
+pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
+    let reports = match inputs {
+        [only] if only.extension().is_some_and(|e| e == "toml") => of_pipeline(only)?,
+        files => vec![(name_of(files), open("the files given", files)?.report().clone())],
+    };
+    if json {
+        let value: Vec<serde_json::Value> = reports
+            .iter()
+            .map(|(name, report)| serde_json::json!({"name": name, "report": report}))
+            .collect();
+        print(&format!("{:#}\n", serde_json::Value::from(value)));
+    } else {
+        for (name, report) in &reports {
+            print(&text(name, report));
+        }
+    }
+    let lost = reports.iter().flat_map(|(_, r)| &r.warnings).any(|w| w.severity >= Severity::Inadequate);
+    Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
+}
+
+fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
+    let pipeline = Pipeline::load(path)?;
+    let entries = pipeline.recordings.iter();
+    entries
+        .map(|entry| {
+            let name = entry.name();
+            let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.resolve(p)).collect();
+            let recording = open(&name, &paths)?;
+            let (_, streams, warnings) = recording
+                .read(&pipeline.streams)
+                .map_err(|source| Error::Recording { recording: name.clone(), source })?;
+            let mut report = recording.report().clone();
+            report.streams = streams;
+            report.warnings.extend(warnings);
+            Ok((name, report))
+        })
+        .collect()
+}
+
+fn open(name: &str, paths: &[PathBuf]) -> Result<Recording, Error> {
+    Recording::open(paths).map_err(|source| Error::Recording { recording: name.to_owned(), source })
+}
+
+fn name_of(files: &[PathBuf]) -> String {
+    let stem = files.first().and_then(|f| f.file_stem());
+    stem.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn text(name: &str, report: &RecordingReport) -> String {
+    let mut out = format!("Recording {name}\n");
+    for file in &report.files {
+        let _ = writeln!(out, "  {}", file_line(file));
+    }
+    let _ = writeln!(out, "{}", channels(&report.channels));
+    if !report.streams.is_empty() {
+        let _ = writeln!(out, "{}", streams(&report.streams));
+        for stream in &report.streams {
+            let _ = writeln!(out, "  {}: {} clock, {}", stream.role, clock_name(stream), stream.clock_reason);
+        }
+    }
+    for warning in &report.warnings {
+        let _ = writeln!(out, "  warning: {warning}");
+    }
+    out.push('\n');
+    out
+}
+
+fn file_line(file: &FileReport) -> String {
+    let found = match file.source {
+        armcal_recording::Source::Index => "index",
+        armcal_recording::Source::Scan => "scan",
+    };
+    let mut line = format!(
+        "{}: {:.2} MB, {} chunks by {found}, profile {:?}, library {:?}, sha256 {}",
+        file.path.display(),
+        file.bytes as f64 / 1e6,
+        file.chunks,
+        file.profile,
+        file.library,
+        file.sha256.get(..12).unwrap_or(&file.sha256),
+    );
+    if let Some(byte) = file.truncated_at {
+        let _ = write!(line, ", cut off at byte {byte}");
+    }
+    for (offset, reason) in &file.damaged {
+        let _ = write!(line, "\n    damaged at byte {offset}: {reason}");
+    }
+    line
+}
+
+fn channels(channels: &[ChannelReport]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.set_header(["topic", "schema", "encoding", "messages", "Hz", "from [s]", "for [s]", "read as"]);
+    let start_ns = channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns).min().unwrap_or(0);
+    for c in channels {
+        let duration_s = (c.last_ns - c.first_ns) as f64 * 1e-9;
+        let rate_hz = if duration_s > 0.0 { (c.messages.saturating_sub(1)) as f64 / duration_s } else { 0.0 };
+        table.add_row([
+            c.topic.escape_debug().to_string(),
+            c.schema.escape_debug().to_string(),
+            format!("{}/{}", c.schema_encoding, c.message_encoding),
+            c.messages.to_string(),
+            format!("{rate_hz:.1}"),
+            format!("{:.2}", (c.first_ns - start_ns) as f64 * 1e-9),
+            format!("{duration_s:.2}"),
+            c.decodable.clone().unwrap_or_else(|why| format!("no: {why}")),
+        ]);
+    }
+    table
+}
+
+fn streams(streams: &[StreamReport]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.set_header([
+        "stream",
+        "topic",
+        "rows",
+        "Hz",
+        "gap [s]",
+        "occluded",
+        "NaN",
+        "same stamp",
+        "backward",
+        "bad",
+    ]);
+    for s in streams {
+        table.add_row([
+            s.role.clone(),
+            s.topic.escape_debug().to_string(),
+            format!("{}/{}", s.rows, s.messages),
+            format!("{:.1}", s.rate_hz),
+            format!("{:.3}", s.largest_gap_s),
+            s.occluded.total().to_string(),
+            s.non_finite.to_string(),
+            s.duplicate_stamps.to_string(),
+            s.backward_stamps.to_string(),
+            s.undecodable.to_string(),
+        ]);
+    }
+    table
+}
+
+fn clock_name(stream: &StreamReport) -> &'static str {
+    match stream.clock {
+        armcal_recording::Clock::Header => "header",
+        armcal_recording::Clock::Publish => "publish",
+        armcal_recording::Clock::Log => "log",
+    }
+}

@@ -1,0 +1,108 @@
+//! Everything that stops a command, in words that say what was being done and to what.
+
+use std::path::PathBuf;
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file of the pipeline could not be read.
+    #[error("reading the {what} {}: {source}", path.display())]
+    ReadFile {
+        /// `pipeline`, `board`, `DH model`, ...
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The pipeline file is not what it should be.
+    #[error("pipeline {}: {source}", path.display())]
+    PipelineSyntax {
+        /// The file.
+        path: PathBuf,
+        /// The parser's message, with the line.
+        source: Box<toml::de::Error>,
+    },
+    /// Two parts of the pipeline contradict each other.
+    #[error("pipeline {}: `{key}` {problem}", path.display())]
+    PipelineContradiction {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A stream that the pipeline relies on gave no rows.
+    #[error(
+        "recording `{recording}`: the {role} stream has no usable sample, so {consequence}; see `armcal inspect`"
+    )]
+    EmptyStream {
+        /// Name of the recording.
+        recording: String,
+        /// `tip`, `table`, `base`.
+        role: &'static str,
+        /// What cannot be done.
+        consequence: &'static str,
+    },
+    /// A body whose pose is needed is tracked by position only.
+    #[error(
+        "recording `{recording}`: the {role} stream has positions but no orientations; name a topic with poses in [streams.{role}]"
+    )]
+    NoOrientation {
+        /// Name of the recording.
+        recording: String,
+        /// `table`, `base`.
+        role: &'static str,
+    },
+    /// No dwell became an observation.
+    #[error("none of the {dwells} dwells became an observation; {hint}")]
+    NoObservations {
+        /// Dwells found.
+        dwells: usize,
+        /// What to look at.
+        hint: String,
+    },
+    /// Reading a recording.
+    #[error("recording `{recording}`: {source}")]
+    Recording {
+        /// Its name.
+        recording: String,
+        /// Why.
+        source: armcal_recording::RecordingError,
+    },
+    /// Finding dwells.
+    #[error("recording `{recording}`: {source}")]
+    Dwell {
+        /// Its name.
+        recording: String,
+        /// Why.
+        source: armcal_dwell::DwellError,
+    },
+    /// Associating dwells to cavities.
+    #[error("recording `{recording}`: {source}")]
+    Association {
+        /// Its name.
+        recording: String,
+        /// Why.
+        source: armcal_table::TableError,
+    },
+    /// The board file.
+    #[error(transparent)]
+    Board(#[from] armcal_table::TableError),
+    /// The model.
+    #[error(transparent)]
+    Model(#[from] armcal_model::ModelError),
+    /// The fit.
+    #[error(transparent)]
+    Calibrate(#[from] armcal_calibrate::CalibrateError),
+    /// Writing results.
+    #[error(transparent)]
+    Report(#[from] armcal_report::ReportError),
+    /// The simulated rig.
+    #[error(transparent)]
+    Lab(#[from] armcal_lab::LabError),
+    /// Writing a result of a small command.
+    #[error(transparent)]
+    Output(armcal_recording::RecordingError),
+}

@@ -1,0 +1,15 @@
+//! armcal calibrates a robot arm from MCAP recordings.
+//!
+//! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
+//! are what a user types.
+
+pub mod cli;
+pub mod commands;
+pub mod error;
+pub mod pipeline;
+pub mod progress;
+pub mod stages;
+pub mod story;
+
+pub use error::Error;
+pub use pipeline::Pipeline;

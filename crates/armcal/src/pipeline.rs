@@ -1,0 +1,287 @@
+//! The pipeline file: one TOML a rig or purpose, its sections in the order of the story.
+//!
+//! Paths inside the file are relative to the file. Every section belongs to the crate that acts on it;
+//! this module only puts them side by side, so a key is documented where it is used.
+
+use crate::error::Error;
+use armcal_calibrate::{FitConfig, HoldoutConfig};
+use armcal_core::RollPitchYaw;
+use armcal_dwell::{ClockConfig, DwellConfig};
+use armcal_model::Deviation;
+use armcal_recording::Streams;
+use armcal_report::OutputConfig;
+use armcal_table::{AssociationConfig, Tilt};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A pipeline, as written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pipeline {
+    /// Name shown in every output.
+    pub name: String,
+    /// The recordings, in order; a recording may consist of several split files.
+    pub recordings: Vec<RecordingEntry>,
+    /// Which channels to read, and as what.
+    pub streams: Streams,
+    /// How the sensor's clock is related to the robot's.
+    #[serde(default)]
+    pub clock: ClockConfig,
+    /// What counts as standing still.
+    #[serde(default)]
+    pub dwell: DwellConfig,
+    /// The calibration table; absent when the tip is only tracked.
+    pub table: Option<TableSection>,
+    /// The nominal arm.
+    pub model: ModelSection,
+    /// What is known about base and tip.
+    #[serde(default)]
+    pub frames: FramesSection,
+    /// Changes to single parameters, applied in order.
+    #[serde(default)]
+    pub parameters: Vec<ParameterOverride>,
+    /// Which dwells become observations.
+    #[serde(default)]
+    pub observations: ObservationsSection,
+    /// Objective and loss.
+    #[serde(default)]
+    pub fit: FitConfig,
+    /// What the fit must not see.
+    #[serde(default)]
+    pub holdout: HoldoutConfig,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputConfig,
+    /// Folder of the pipeline file.
+    #[serde(skip)]
+    pub folder: PathBuf,
+    /// The file's text, carried into the results.
+    #[serde(skip)]
+    pub text: String,
+}
+
+/// One recording.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingEntry {
+    /// Name used in parameters and outputs; the stem of the first file when absent.
+    pub name: Option<String>,
+    /// Its files: one, or the parts of a split bag.
+    pub paths: Vec<PathBuf>,
+    /// Declared tilt of the board.
+    #[serde(default)]
+    pub tilt: Tilt,
+    /// Load at the tip [kg].
+    #[serde(default)]
+    pub load_kg: f64,
+}
+
+impl RecordingEntry {
+    /// The recording's name.
+    pub fn name(&self) -> String {
+        let stem =
+            || self.paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
+        self.name.clone().or_else(stem).unwrap_or_default()
+    }
+}
+
+/// The calibration table.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableSection {
+    /// Board geometry file.
+    pub board: PathBuf,
+    /// How the board's pose is known.
+    pub pose: BoardPose,
+    /// What the table's markers are fixed to, for `pose = "measured"`.
+    #[serde(default)]
+    pub markers_on: MarkersOn,
+    /// Pose of the untilted board (`given`), or of the board relative to the tracked table subject
+    /// (`measured`; identity when absent).
+    #[serde(default)]
+    pub at: RollPitchYaw,
+    /// Standard error of a measured board pose beyond the sensor's noise [mm]; 0 takes it as exact.
+    #[serde(default)]
+    pub sigma_mm: f64,
+    /// Same for its rotation [deg].
+    #[serde(default)]
+    pub sigma_deg: f64,
+    /// How dwells are associated to cavities.
+    #[serde(default)]
+    pub association: AssociationConfig,
+}
+
+/// How the board's pose is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BoardPose {
+    /// From the `table` stream.
+    Measured,
+    /// From `at` and the declared tilt.
+    Given,
+    /// Estimated with the arm, one pose a recording (camera-free).
+    Estimated,
+}
+
+/// What the table's markers are fixed to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MarkersOn {
+    /// The board itself: the measured pose includes the tilt.
+    #[default]
+    Board,
+    /// The frame below the tilting mechanism: the declared tilt is applied on top.
+    Frame,
+}
+
+/// The nominal arm: a DH file or a URDF chain.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelSection {
+    /// DH file.
+    pub dh: Option<PathBuf>,
+    /// URDF file.
+    pub urdf: Option<PathBuf>,
+    /// First link of the chain, with `urdf`.
+    pub base_link: Option<String>,
+    /// Last link of the chain, with `urdf`.
+    pub tip_link: Option<String>,
+    /// How far a joint origin may be from nominal, with `urdf`; a DH file says it itself.
+    #[serde(default)]
+    pub deviation: Deviation,
+}
+
+/// What is known about the frames that are not the board.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FramesSection {
+    /// The robot's base in the sensor's frame; without a sensor the base is the world.
+    #[serde(default)]
+    pub base: FrameSection,
+    /// The calibrated point on the last link.
+    #[serde(default)]
+    pub tip: FrameSection,
+}
+
+/// One frame.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameSection {
+    /// How it is known.
+    #[serde(default)]
+    pub pose: FramePose,
+    /// The given pose, or where the estimate starts.
+    #[serde(default)]
+    pub at: RollPitchYaw,
+    /// Standard error of a measured frame [mm].
+    #[serde(default)]
+    pub sigma_mm: f64,
+    /// Same for its rotation [deg].
+    #[serde(default)]
+    pub sigma_deg: f64,
+}
+
+/// How a frame is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FramePose {
+    /// Exactly `at`.
+    #[default]
+    Given,
+    /// From the `base` stream, with `sigma_mm` and `sigma_deg` (for the tip: `at` with those).
+    Measured,
+    /// Estimated with the arm.
+    Estimated,
+}
+
+/// A change to parameters whose names match a pattern such as `joint*.alpha`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterOverride {
+    /// Name or glob.
+    pub name: String,
+    /// Whether the fit may change it.
+    pub free: Option<bool>,
+    /// Largest deviation from nominal, display unit of the parameter (mm or deg).
+    pub bound: Option<f64>,
+    /// Standard deviation of the prior, display unit (mm or deg).
+    pub prior: Option<f64>,
+}
+
+/// Which dwells become observations.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObservationsSection {
+    /// Dwells in a cavity.
+    pub seated: bool,
+    /// Dwells the sensor saw away from the cavities.
+    pub tracked: bool,
+    /// Standard error of a tracked position that averaging does not reduce, per axis [mm].
+    pub sensor_sigma_mm: f64,
+    /// Same for orientation [deg].
+    pub sensor_sigma_deg: f64,
+}
+
+impl Default for ObservationsSection {
+    fn default() -> Self {
+        ObservationsSection { seated: true, tracked: true, sensor_sigma_mm: 0.0, sensor_sigma_deg: 0.0 }
+    }
+}
+
+impl Pipeline {
+    /// Reads and checks a pipeline file.
+    pub fn load(path: &Path) -> Result<Pipeline, Error> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
+            what: "pipeline",
+            path: path.to_owned(),
+            source,
+        })?;
+        let mut pipeline: Pipeline = toml::from_str(&text)
+            .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
+        pipeline.folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        pipeline.text = text;
+        pipeline.check(path)?;
+        Ok(pipeline)
+    }
+
+    /// A path of the pipeline file, resolved against its folder.
+    pub fn resolve(&self, path: &Path) -> PathBuf {
+        self.folder.join(path)
+    }
+
+    /// Contradictions that serde cannot see.
+    fn check(&self, path: &Path) -> Result<(), Error> {
+        let fail = |key: &str, problem: String| {
+            Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem })
+        };
+        if self.recordings.is_empty() {
+            return fail("recordings", "names no recording; add [[recordings]] with paths = [...]".into());
+        }
+        for (i, entry) in self.recordings.iter().enumerate() {
+            let name = entry.name();
+            if entry.paths.is_empty() {
+                return fail(&format!("recordings[{i}].paths"), "is empty".into());
+            }
+            if self.recordings[..i].iter().any(|other| other.name() == name) {
+                return fail(
+                    &format!("recordings[{i}].name"),
+                    format!("`{name}` names two recordings; give one of them another name = \"...\""),
+                );
+            }
+        }
+        if self.table.as_ref().is_some_and(|t| t.pose == BoardPose::Measured) && self.streams.table.is_none()
+        {
+            return fail("table.pose", "is \"measured\" but there is no [streams.table]".into());
+        }
+        if self.frames.base.pose == FramePose::Measured && self.streams.base.is_none() {
+            return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
+        }
+        if self.table.is_none() && self.streams.tip.is_none() {
+            return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
+        }
+        match (&self.model.dh, &self.model.urdf) {
+            (Some(_), None) | (None, Some(_)) => Ok(()),
+            _ => fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into()),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The nominal model of a pipeline: chain, base, tip and one board frame a recording.
+
+use crate::error::Error;
+use crate::pipeline::{BoardPose, FramePose, FrameSection, MarkersOn, Pipeline, TableSection};
+use crate::stages::perceive::Seen;
+use armcal_core::Pose;
+use armcal_model::{Chain, Frame, Frames, Knowledge, Model};
+use armcal_table::{Association, Board, Tilt};
+use nalgebra::{UnitQuaternion, Vector3};
+use std::path::Path;
+
+/// Reads the DH or URDF file of the pipeline: its text and the chain in it.
+pub fn nominal_chain(pipeline: &Pipeline) -> Result<(String, Chain), Error> {
+    let model = &pipeline.model;
+    if let Some(dh) = &model.dh {
+        let path = pipeline.resolve(dh);
+        let text = read("DH model", &path)?;
+        let chain = Chain::from_dh_toml(&text, &path)?;
+        return Ok((text, chain));
+    }
+    let path = pipeline.resolve(model.urdf.as_deref().unwrap_or(Path::new("")));
+    let link = |name: &Option<String>| name.clone().unwrap_or_default();
+    let text = read("URDF", &path)?;
+    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?
+        .with_deviation(&model.deviation, &path)?;
+    Ok((text, chain))
+}
+
+/// Reads the board file, if the pipeline has a table.
+pub fn board(pipeline: &Pipeline) -> Result<Option<Board>, Error> {
+    let Some(table) = &pipeline.table else { return Ok(None) };
+    let path = pipeline.resolve(&table.board);
+    Ok(Some(Board::from_toml(&read("board", &path)?, &path)?))
+}
+
+/// The model before calibration, every frame where it is known or assumed to be.
+pub fn nominal_model(
+    pipeline: &Pipeline,
+    chain: &Chain,
+    board: Option<&Board>,
+    seen: &[Seen],
+) -> Result<Model, Error> {
+    let boards = match (&pipeline.table, board) {
+        (Some(table), Some(board)) => seen
+            .iter()
+            .zip(&pipeline.recordings)
+            .map(|(seen, entry)| board_frame(table, board, entry.tilt, seen))
+            .collect::<Result<Vec<Frame>, Error>>()?,
+        _ => Vec::new(),
+    };
+    let frames = Frames {
+        base: base_frame(&pipeline.frames.base, seen),
+        tip: frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation),
+        boards,
+    };
+    let mut model = Model::new(chain.clone(), frames)?;
+    for change in &pipeline.parameters {
+        model.set_parameter(&change.name, |p| {
+            let si = |display: f64| display / p.unit.to_display(1.0);
+            p.free = change.free.unwrap_or(p.free);
+            if let Some(bound) = change.bound {
+                (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));
+            }
+            p.prior_sigma = change.prior.map(si).or(p.prior_sigma);
+        })?;
+    }
+    Ok(model)
+}
+
+/// Starts every estimated board frame where the association found the board.
+pub fn start_frames(pipeline: &Pipeline, model: &mut Model, places: &[Option<Association>]) {
+    if pipeline.table.as_ref().is_none_or(|t| t.pose != BoardPose::Estimated) {
+        return;
+    }
+    for (recording, association) in places.iter().enumerate() {
+        if let Some(association) = association {
+            model.set_board_start(recording, association.board_in_world);
+        }
+    }
+}
+
+fn read(what: &'static str, path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
+}
+
+fn frame(name: &str, section: &FrameSection, free_rotation: bool) -> Frame {
+    let knowledge = match section.pose {
+        FramePose::Given => Knowledge::Given,
+        FramePose::Measured => measured(section.sigma_mm, section.sigma_deg),
+        FramePose::Estimated => Knowledge::Estimated,
+    };
+    Frame { name: name.into(), pose: section.at.into(), knowledge, free_rotation }
+}
+
+/// The base: one frame for all recordings, at the mean of what each recording measured.
+fn base_frame(section: &FrameSection, seen: &[Seen]) -> Frame {
+    let mut base = frame("base", section, true);
+    let poses: Vec<Pose> = seen.iter().filter_map(|s| s.base.as_ref().map(|b| b.pose)).collect();
+    if let Some(mean) = mean_of(&poses) {
+        base.pose = mean;
+    }
+    base
+}
+
+/// Mean of poses that differ by little: rotations are averaged in the tangent space of the first.
+fn mean_of(poses: &[Pose]) -> Option<Pose> {
+    let first = poses.first()?.rotation;
+    let n = poses.len() as f64;
+    let position_m = poses.iter().map(|p| p.translation.vector).sum::<Vector3<f64>>() / n;
+    let turn_rad =
+        poses.iter().map(|p| (first.inverse() * p.rotation).scaled_axis()).sum::<Vector3<f64>>() / n;
+    Some(Pose::from_parts(position_m.into(), first * UnitQuaternion::new(turn_rad)))
+}
+
+fn board_frame(table: &TableSection, board: &Board, tilt: Tilt, seen: &Seen) -> Result<Frame, Error> {
+    let tilted = board.tilted(tilt)?;
+    let at = Pose::from(table.at);
+    let measured_pose = seen.table.as_ref().map(|t| t.pose);
+    let (pose, knowledge) = match (table.pose, measured_pose) {
+        (BoardPose::Measured, Some(subject)) => {
+            let board = match table.markers_on {
+                MarkersOn::Board => subject * at,
+                MarkersOn::Frame => subject * at * tilted,
+            };
+            (board, measured(table.sigma_mm, table.sigma_deg))
+        }
+        (BoardPose::Estimated, _) => (at * tilted, Knowledge::Estimated),
+        (BoardPose::Given | BoardPose::Measured, _) => {
+            (at * tilted, measured(table.sigma_mm, table.sigma_deg))
+        }
+    };
+    Ok(Frame { name: format!("board.{}", seen.name), pose, knowledge, free_rotation: true })
+}
+
+/// Zero standard error means that the pose is taken as exact.
+fn measured(sigma_mm: f64, sigma_deg: f64) -> Knowledge {
+    if sigma_mm == 0.0 && sigma_deg == 0.0 {
+        return Knowledge::Given;
+    }
+    Knowledge::Measured { sigma_m: sigma_mm * 1e-3, sigma_rad: sigma_deg.to_radians() }
+}

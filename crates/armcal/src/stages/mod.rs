@@ -1,0 +1,5 @@
+//! The stages of the story that join two crates.
+
+pub mod frames;
+pub mod observe;
+pub mod perceive;

@@ -1,0 +1,180 @@
+//! From dwells to observations: where each dwell was, and what it says about the tip.
+
+use crate::error::Error;
+use crate::pipeline::{BoardPose, Pipeline};
+use crate::stages::perceive::Seen;
+use armcal_core::{Dwell, DwellId, Observation, Reference, Rejection};
+use armcal_model::Model;
+use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
+use nalgebra::{Matrix3, Vector3};
+
+/// The observations of all recordings, and the dwells that did not become one.
+pub struct Observed {
+    /// What the fit sees.
+    pub observations: Vec<Observation>,
+    /// Everything else, with the reason.
+    pub rejections: Vec<Rejection>,
+}
+
+/// Associates the dwells of every recording to the board; `None` where there is no table.
+///
+/// `values` are the model's parameters that predict the tips; nominal when absent.
+pub fn associate_all(
+    pipeline: &Pipeline,
+    board: Option<&Board>,
+    model: &Model,
+    values: Option<&[f64]>,
+    seen: &[Seen],
+) -> Result<Vec<Option<Association>>, Error> {
+    let (Some(board), Some(table)) = (board, &pipeline.table) else {
+        return Ok(seen.iter().map(|_| None).collect());
+    };
+    let nominal = model.nominal();
+    let p = values.unwrap_or(&nominal);
+    seen.iter()
+        .enumerate()
+        .map(|(recording, seen)| {
+            let tips: Vec<DwellTip> = seen.dwells.iter().map(|d| dwell_tip(model, p, d)).collect();
+            let known = table.pose != BoardPose::Estimated || values.is_some();
+            let start = match model.board_in_world(p, recording) {
+                Some(pose) if known => BoardStart::Known(pose),
+                _ => BoardStart::Unknown,
+            };
+            let in_recording = |source| Error::Association { recording: seen.name.clone(), source };
+            associate(board, &tips, &start, &table.association).map(Some).map_err(in_recording)
+        })
+        .collect()
+}
+
+/// Whether two rounds of association put every dwell in the same place.
+pub fn same_places(a: &[Option<Association>], b: &[Option<Association>]) -> bool {
+    let cavities = |all: &[Option<Association>]| -> Vec<(DwellId, Option<String>)> {
+        let assignments = all.iter().flatten().flat_map(|a| &a.assignments);
+        assignments.map(|a| (a.dwell, seated_in(&a.place).map(str::to_owned))).collect()
+    };
+    cavities(a) == cavities(b)
+}
+
+/// Turns every dwell into an observation or a rejection.
+pub fn observations(
+    pipeline: &Pipeline,
+    board: Option<&Board>,
+    model: &Model,
+    seen: &[Seen],
+    places: &[Option<Association>],
+) -> Result<Observed, Error> {
+    let mut observed = Observed { observations: Vec::new(), rejections: Vec::new() };
+    for (recording, (seen, association)) in seen.iter().zip(places).enumerate() {
+        for (i, dwell) in seen.dwells.iter().enumerate() {
+            let place = association.as_ref().and_then(|a| a.assignments.get(i)).map(|a| &a.place);
+            let outcome = match (place.and_then(seated_in), board) {
+                (Some(cavity), Some(board)) if pipeline.observations.seated => {
+                    seated(board, model, recording, cavity)
+                }
+                (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
+                (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
+            };
+            match outcome {
+                Ok((reference, covariance_m2)) => {
+                    observed.observations.push(observation(dwell, seen.load_kg, reference, covariance_m2));
+                }
+                Err(why) => observed.rejections.push(Rejection { dwell: dwell.id, why }),
+            }
+        }
+    }
+    if observed.observations.is_empty() {
+        let hint = observed.rejections.first().map_or(
+            "no dwell was found: lower [dwell] thresholds or check the joints stream".to_owned(),
+            |r| format!("the first was rejected because {}", r.why),
+        );
+        return Err(Error::NoObservations { dwells: observed.rejections.len(), hint });
+    }
+    Ok(observed)
+}
+
+fn dwell_tip(model: &Model, p: &[f64], dwell: &Dwell) -> DwellTip {
+    let tip = model.base_in_world(p) * model.tip_in_base(p, &dwell.joint_rad);
+    DwellTip {
+        dwell: dwell.id,
+        start_ns: dwell.start_ns,
+        end_ns: dwell.end_ns,
+        predicted_m: tip.translation.vector,
+        measured_m: dwell.tip.as_ref().map(|t| t.position_m),
+    }
+}
+
+fn seated_in(place: &Place) -> Option<&str> {
+    match place {
+        Place::Seated { cavity, .. } => Some(cavity),
+        _ => None,
+    }
+}
+
+type Referenced = (Reference, Matrix3<f64>);
+
+/// The tip is where the cavity is, as well as cavity and seat are made.
+fn seated(board: &Board, model: &Model, recording: usize, cavity: &str) -> Result<Referenced, String> {
+    let in_board_m = board
+        .cavity(cavity)
+        .map(|c| c.in_board_m)
+        .ok_or_else(|| format!("cavity `{cavity}` is not on the board"))?;
+    let variance_m2 = board.cavity_sigma_m.powi(2) + board.seat_sigma_m.powi(2);
+    debug_assert!(model.board_in_world(&model.nominal(), recording).is_some());
+    let reference = Reference::Seated { cavity: cavity.to_owned(), in_board_m };
+    Ok((reference, Matrix3::from_diagonal_element(variance_m2)))
+}
+
+/// The tip is where the sensor saw it.
+fn tracked(pipeline: &Pipeline, dwell: &Dwell) -> Result<Referenced, String> {
+    let settings = &pipeline.observations;
+    let Some(tip) = dwell.tip.as_ref() else {
+        return Err("the sensor did not see the tip during it".into());
+    };
+    if !settings.tracked {
+        return Err("tracked dwells are switched off in [observations]".into());
+    }
+    let floor_m2 = (settings.sensor_sigma_mm * 1e-3).powi(2);
+    let covariance_m2 = tip.covariance_m2 + Matrix3::from_diagonal(&Vector3::from_element(floor_m2));
+    let orientation_sigma_rad = tip.orientation_sigma_rad.hypot(settings.sensor_sigma_deg.to_radians());
+    let reference = Reference::Tracked {
+        position_m: tip.position_m,
+        orientation: tip.orientation,
+        orientation_sigma_rad,
+    };
+    Ok((reference, covariance_m2))
+}
+
+/// Why a dwell is neither in a cavity nor usable as a tracked pose.
+fn why_not(place: Option<&Place>, untracked: String) -> String {
+    match place {
+        Some(Place::Hovering { height_m, above }) => {
+            format!("the tip hovers {:.1} mm above `{above}` and {untracked}", height_m * 1e3)
+        }
+        Some(Place::FreeSpace) => format!("the tip is away from the board and {untracked}"),
+        Some(Place::Ambiguous { cavities }) => {
+            format!("more than one cavity explains it: {}", cavities.join(", "))
+        }
+        Some(Place::Unassigned { why }) => why.clone(),
+        Some(Place::Seated { .. }) | None => untracked,
+    }
+}
+
+fn observation(
+    dwell: &Dwell,
+    load_kg: f64,
+    reference: Reference,
+    covariance_m2: Matrix3<f64>,
+) -> Observation {
+    Observation {
+        dwell: dwell.id,
+        time_ns: dwell.mid_ns(),
+        joint_rad: dwell.joint_rad.clone(),
+        joint_sigma_rad: dwell.joint_sigma_rad.clone(),
+        arrival: dwell.arrival.clone(),
+        effort_nm: dwell.effort_nm.clone(),
+        temperature_c: dwell.temperature_c,
+        load_kg,
+        reference,
+        covariance_m2,
+    }
+}

@@ -1,0 +1,198 @@
+//! The whole calibration: fit, hold-out, errors on both sides.
+//!
+//! **Hold-out.** With one held-out set, the parameters written are those of the fit that did not see it. With sets held
+//! out in turn, every turn predicts its own set, the residuals of all turns are pooled, and the parameters written
+//! come from a last fit to everything.
+//!
+//! A held-out recording may bring a board frame that no other recording shows: a frame nobody could know without its
+//! dwells. That frame alone is then fitted on the held-out dwells, with everything else as the training left it; the
+//! nominal arm gets the same courtesy.
+//!
+//! **Nominal errors** are those of nominal robot parameters after fitting only the frames that nobody could know
+//! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
+
+use crate::frames::{self, is_of};
+use crate::holdout::{self, Holdout};
+use crate::model_problem::ModelProblem;
+use crate::noise::expected_norm_m;
+use crate::outcome::{Calibration, Fit, Residual, SideErrors};
+use crate::problem::Problem as _;
+use crate::{CalibrateError, FitConfig, HoldoutConfig, fit_problem};
+use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
+use armcal_model::Model;
+use nalgebra::Vector3;
+
+/// Calibrates `model` on `observations` and judges it on those held out.
+pub fn calibrate(
+    model: &Model,
+    observations: &[Observation],
+    config: &FitConfig,
+    holdout: &HoldoutConfig,
+) -> Result<Calibration, CalibrateError> {
+    config.check()?;
+    if observations.is_empty() {
+        return Err(CalibrateError::NoObservations { context: String::new() });
+    }
+    let frame_names = frames::frame_names(model);
+    let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
+    let judge = Judge { model, observations, config };
+    let turns =
+        holdout.turns.iter().map(|turn| judge.turn(turn)).collect::<Result<Vec<Turn>, CalibrateError>>()?;
+    let last = match (holdout.in_turn, turns.first()) {
+        (false, Some(turn)) => turn.clone(),
+        _ => judge.turn(&[])?,
+    };
+    judge.pool(&holdout, &turns, last)
+}
+
+/// A fit outside a held-out set, completed by the frames that only the held-out set shows.
+#[derive(Clone)]
+struct Turn {
+    fit: Fit,
+    nominal_values: Vec<f64>,
+    /// Index into the fit's weights of every observation it saw.
+    weight_of: Vec<Option<usize>>,
+    warnings: Vec<Warning>,
+}
+
+struct Judge<'a> {
+    model: &'a Model,
+    observations: &'a [Observation],
+    config: &'a FitConfig,
+}
+
+impl Judge<'_> {
+    /// Fits without the observations `held`.
+    fn turn(&self, held: &[usize]) -> Result<Turn, CalibrateError> {
+        let is_held = |i: usize| held.binary_search(&i).is_ok();
+        let side = |held: bool| {
+            let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
+            ModelProblem::new(self.model, chosen.map(|(_, o)| o), self.config)
+        };
+        let (train, test) = (side(false)?, side(true)?);
+        let unseen = self.frames_only_in(&test, &train);
+        let of_unseen = |p: &Parameter| unseen.iter().any(|frame| is_of(p, frame));
+        let mut nominal_values = frames::fit_on(&train, self.model, self.config)?;
+        let mut fit = fit_problem(&train, &nominal_values, &|p| p.free && !of_unseen(p), self.config)?;
+        let mut warnings = Vec::new();
+        if !unseen.is_empty() {
+            nominal_values = frames::fit_some(&test, self.model, nominal_values, self.config, &of_unseen)?;
+            let start = frames::fit_some(&test, self.model, fit.values(), self.config, &of_unseen)?;
+            let frozen = fit_problem(&test, &start, &|p| p.free && of_unseen(p), self.config)?;
+            adopt(&mut fit, &frozen, &of_unseen);
+            warnings.push(fitted_on_held_out(&unseen));
+        }
+        let mut seen = 0..;
+        let weight_of =
+            (0..self.observations.len()).map(|i| if is_held(i) { None } else { seen.next() }).collect();
+        Ok(Turn { fit, nominal_values, weight_of, warnings })
+    }
+
+    /// Estimated frames that `test` says something about and `train` does not.
+    fn frames_only_in(&self, test: &ModelProblem<'_>, train: &ModelProblem<'_>) -> Vec<String> {
+        let known = frames::touched_frames(self.model, train.observations());
+        let estimated = |frame: &String| {
+            let free = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && is_of(p, frame);
+            self.model.parameters().iter().any(free)
+        };
+        frames::touched_frames(self.model, test.observations())
+            .into_iter()
+            .filter(|frame| !known.contains(frame) && estimated(frame))
+            .collect()
+    }
+
+    /// Residuals and errors of all turns and the last fit.
+    fn pool(&self, holdout: &Holdout, turns: &[Turn], last: Turn) -> Result<Calibration, CalibrateError> {
+        let mut turn_of = vec![None; self.observations.len()];
+        for (t, held) in holdout.turns.iter().enumerate() {
+            held.iter().for_each(|&i| turn_of[i] = Some(t));
+        }
+        let all = ModelProblem::new(self.model, self.observations, self.config)?;
+        let mut residuals = Vec::with_capacity(self.observations.len());
+        let mut train = Vec::new();
+        for (i, held_in) in turn_of.iter().enumerate() {
+            let judged_by = held_in.map_or(&last, |t| &turns[t]);
+            residuals.push(self.residual(&all, i, judged_by, held_in.is_some())?);
+            // In turns, everything is training for the last fit.
+            if holdout.in_turn {
+                train.push(self.residual(&all, i, &last, false)?);
+            }
+        }
+        let held: Vec<&Residual> = residuals.iter().filter(|r| r.held_out).collect();
+        let seen: Vec<&Residual> =
+            train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
+        let judged = if held.is_empty() { &seen } else { &held };
+        let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
+        let (train, holdout_errors) = (errors(&seen), errors(&held));
+        let mut warnings = last.fit.warnings.clone();
+        let of_turns: Vec<&Warning> = turns.iter().flat_map(|t| &t.warnings).collect();
+        for warning in of_turns {
+            if !warnings.contains(warning) {
+                warnings.push(warning.clone());
+            }
+        }
+        Ok(Calibration {
+            fit: last.fit,
+            nominal_values: last.nominal_values,
+            residuals,
+            train,
+            holdout: holdout_errors,
+            noise_floor_m,
+            warnings,
+        })
+    }
+
+    fn residual(
+        &self,
+        all: &ModelProblem<'_>,
+        i: usize,
+        turn: &Turn,
+        held_out: bool,
+    ) -> Result<Residual, CalibrateError> {
+        let o = &self.observations[i];
+        let values = turn.fit.values();
+        let covariance = all.position_covariance_m2(i, &values);
+        let fitted_m = self.model.residual(&values, o).position_m;
+        let whitened = covariance
+            .cholesky()
+            .and_then(|c| c.l().solve_lower_triangular(&fitted_m))
+            .ok_or_else(|| CalibrateError::BadCovariance { observation: all.name(i) })?;
+        Ok(Residual {
+            dwell: o.dwell,
+            held_out,
+            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
+            fitted_m,
+            whitened,
+            weight: turn.weight_of[i].filter(|_| !held_out).map_or(1.0, |at| turn.fit.weights[at]),
+            expected_norm_m: expected_norm_m(&covariance),
+        })
+    }
+}
+
+/// Takes the parameters of frames fitted on the held-out set into the training fit.
+fn adopt(fit: &mut Fit, frozen: &Fit, of_unseen: &dyn Fn(&Parameter) -> bool) {
+    let taken: Vec<usize> =
+        (0..fit.estimates.len()).filter(|&k| of_unseen(&fit.estimates[k].parameter)).collect();
+    for &row in &taken {
+        fit.estimates[row] = frozen.estimates[row].clone();
+        for &column in &taken {
+            fit.covariance[(row, column)] = frozen.covariance[(row, column)];
+        }
+    }
+}
+
+fn fitted_on_held_out(unseen: &[String]) -> Warning {
+    let message = "no training dwell shows this frame: it alone was fitted on the held-out dwells, with everything else \
+                   as the training left it"
+        .to_string();
+    Warning::new(Severity::Notice, Stage::Calibrate, "frame-fitted-on-holdout", unseen.join(", "), message)
+}
+
+fn errors(residuals: &[&Residual]) -> SideErrors {
+    let norms =
+        |of: fn(&Residual) -> Vector3<f64>| -> Vec<f64> { residuals.iter().map(|r| of(r).norm()).collect() };
+    SideErrors {
+        nominal: ErrorStats::of_norms(&norms(|r| r.nominal_m)),
+        fitted: ErrorStats::of_norms(&norms(|r| r.fitted_m)),
+    }
+}

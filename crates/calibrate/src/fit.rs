@@ -1,0 +1,225 @@
+//! One fit: from start values to estimates with intervals.
+
+use crate::model_problem::ModelProblem;
+use crate::outcome::{Estimate, Fit, PaperObjective, Status};
+use crate::problem::Problem;
+use crate::robust::{RobustCost, median_scale, proposal2_scale};
+use crate::solver::{self, Settings};
+use crate::statistics::{self, Uncertainty};
+use crate::whitened::Whitened;
+use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, undetermined};
+use armcal_core::{Observation, Parameter, Role};
+use armcal_model::Model;
+use nalgebra::{DMatrix, DVector};
+
+/// A step of this many standard deviations of the estimate ends the iteration.
+const STEP_TOLERANCE: f64 = 1e-5;
+/// The same while the scale of the residuals is still being found.
+const ROUGH_STEP_TOLERANCE: f64 = 0.5;
+/// Rounds of fit and scale that only look for the scale.
+const ROUGH_ROUNDS: usize = 2;
+/// The start is judged at this many times its median residual, so that only gross outliers are in the linear part.
+const GENEROUS: f64 = 3.0;
+/// Relative change of the scale below which it is kept.
+const SCALE_TOLERANCE: f64 = 3e-3;
+/// Rounds of fit and scale.
+const SCALE_ROUNDS: usize = 30;
+/// Huber's constant whose asymptotics stand in for those of the sum of norms (its limit c -> 0 divides by zero at
+/// a point that is fitted exactly).
+const PAPER_HUBER_C: f64 = 0.25;
+
+/// Fits all free parameters of a model: frames that nobody knew first (closed form, then alone), then everything.
+pub fn fit(model: &Model, observations: &[Observation], config: &FitConfig) -> Result<Fit, CalibrateError> {
+    let problem = ModelProblem::new(model, observations, config)?;
+    let start = frames::fit_on(&problem, model, config)?;
+    fit_problem(&problem, &start, &|p| p.free, config)
+}
+
+/// Fits the parameters `free` of any problem in blocks, from `start` (all parameters).
+pub fn fit_problem(
+    problem: &dyn Problem,
+    start: &[f64],
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Fit, CalibrateError> {
+    config.check()?;
+    let white = Whitened::new(Box::new(problem), start, free, config)?;
+    enough_equations(&white)?;
+    let solved = solve(&white, config)?;
+    let (residual, jacobian) = white.linearised(&solved.x)?;
+    let cost = solved.cost(&white, config);
+    let name = |index: usize| problem.parameters()[index].name.clone();
+    let uncertainty = statistics::uncertainty(&cost, &residual, &jacobian, &name)?;
+    let fitted = statistics::fitted_directions(&uncertainty.covariance, &white.axes);
+    let weights = match solved.paper {
+        Some(_) => vec![1.0; white.blocks()],
+        None => cost.weights(&residual),
+    };
+    let mut fit = Fit {
+        objective: in_words(config).to_string(),
+        estimates: estimates(&white, &solved.x, &uncertainty),
+        covariance: full_covariance(&white, &uncertainty),
+        weights,
+        sigma_scale: proposal2_scale(&cost, &residual, fitted),
+        rank: uncertainty.rank,
+        undetermined: undetermined::directions(&uncertainty, &white.axes, problem.parameters()),
+        paper: solved.paper,
+        status: solved.status,
+        iterations: solved.iterations,
+        warnings: Vec::new(),
+    };
+    fit.warnings = fit_warnings::of(&fit, &white);
+    Ok(fit)
+}
+
+/// Where the parameters ended, and the scale the loss was judged at.
+pub(crate) struct Solved {
+    pub x: DVector<f64>,
+    pub sigma_scale: f64,
+    pub paper: Option<PaperObjective>,
+    pub status: Status,
+    pub iterations: usize,
+}
+
+impl Solved {
+    /// The cost that was minimised (for eq. 4: the one that stands in for it in the statistics).
+    pub fn cost<'a, 'p>(&self, white: &'a Whitened<'p>, config: &FitConfig) -> RobustCost<'a, 'p> {
+        let mut cost = RobustCost::new(white, config, self.sigma_scale);
+        if self.paper.is_some() {
+            cost.huber_c = Some(PAPER_HUBER_C);
+        }
+        cost
+    }
+}
+
+/// Minimises the objective asked for.
+pub(crate) fn solve(white: &Whitened<'_>, config: &FitConfig) -> Result<Solved, CalibrateError> {
+    if config.objective != Objective::Paper {
+        return solve_robust(white, config);
+    }
+    let solution = paper::minimise(white, config)?;
+    let mut solved = Solved {
+        x: solution.x,
+        sigma_scale: 1.0,
+        paper: Some(solution.objective),
+        status: solution.status,
+        iterations: solution.iterations,
+    };
+    let residual = white.residual(&solved.x)?;
+    solved.sigma_scale =
+        proposal2_scale(&solved.cost(white, config), &residual, white.axes.len() as f64).max(1.0);
+    Ok(solved)
+}
+
+/// Alternates between the fit at a scale and the scale of its residuals, never below the declared noise. The first,
+/// rough rounds begin with all but gross outliers in the square part of the loss and end with outliers in the linear
+/// one; the accurate ones confirm the scale.
+fn solve_robust(white: &Whitened<'_>, config: &FitConfig) -> Result<Solved, CalibrateError> {
+    let estimated = config.objective == Objective::Robust && config.scale == Scale::Estimated;
+    let mut x = white.start();
+    let mut sigma_scale = 1.0;
+    if estimated {
+        sigma_scale = (GENEROUS * median_scale(white, &white.residual(&x)?)).max(1.0);
+    }
+    let mut iterations = 0;
+    let mut round = 0;
+    loop {
+        round += 1;
+        let rough = estimated && round <= ROUGH_ROUNDS;
+        let step_tolerance = if rough { ROUGH_STEP_TOLERANCE } else { STEP_TOLERANCE };
+        let cost = RobustCost { exact_curvature: !rough, ..RobustCost::new(white, config, sigma_scale) };
+        let settings = Settings { max_iterations: config.max_iterations, step_tolerance };
+        let solution = solver::minimise(&cost, &x, settings)?;
+        iterations += solution.iterations;
+        let fitted = solution.fitted_directions(white);
+        x = solution.x;
+        let mut next = sigma_scale;
+        if estimated {
+            next = proposal2_scale(&cost, &white.residual(&x)?, fitted).max(1.0);
+        }
+        let settled = (next / sigma_scale - 1.0).abs() < SCALE_TOLERANCE;
+        if !rough && (settled || round >= SCALE_ROUNDS) {
+            return Ok(Solved { x, sigma_scale, paper: None, status: solution.status, iterations });
+        }
+        sigma_scale = next;
+    }
+}
+
+/// Refuses more parameters about which nothing is known than there are equations.
+fn enough_equations(white: &Whitened<'_>) -> Result<(), CalibrateError> {
+    let parameters = white.problem.parameters();
+    let unknown: Vec<&Parameter> = white
+        .axes
+        .iter()
+        .map(|a| &parameters[a.index])
+        .filter(|p| {
+            p.role != Role::EstimatedFrame && p.prior_sigma.is_none() && !(p.upper - p.lower).is_finite()
+        })
+        .collect();
+    if unknown.len() <= white.rows() {
+        return Ok(());
+    }
+    let names: Vec<&str> = unknown.iter().map(|p| p.name.as_str()).collect();
+    Err(CalibrateError::TooFewObservations {
+        rows: white.rows(),
+        observations: white.blocks(),
+        unknown: unknown.len(),
+        names: names.join(", "),
+        needed: unknown.len().div_ceil(3),
+    })
+}
+
+fn in_words(config: &FitConfig) -> &'static str {
+    match config.objective {
+        Objective::Robust => "robust least squares (Huber)",
+        Objective::LeastSquares => "least squares",
+        Objective::Paper => "sum of distances (eq. 4)",
+    }
+}
+
+/// Every parameter, free and fixed. Intervals are those without bounds, cut off at them.
+fn estimates(white: &Whitened<'_>, x: &DVector<f64>, uncertainty: &Uncertainty) -> Vec<Estimate> {
+    let values = white.parameters_at(x);
+    let mut estimates: Vec<Estimate> = white
+        .problem
+        .parameters()
+        .iter()
+        .zip(values)
+        .map(|(parameter, value)| Estimate {
+            parameter: parameter.clone(),
+            value,
+            sigma: 0.0,
+            ci95: [value, value],
+            determined: false,
+            at_bound: false,
+        })
+        .collect();
+    for (k, axis) in white.axes.iter().enumerate() {
+        let e = &mut estimates[axis.index];
+        e.sigma = axis.scale * uncertainty.covariance[(k, k)].sqrt();
+        let half = uncertainty.t95 * e.sigma;
+        e.ci95 = [(e.value - half).max(e.parameter.lower), (e.value + half).min(e.parameter.upper)];
+        e.determined = uncertainty.determined[k];
+        e.at_bound = e.value <= e.parameter.lower || e.value >= e.parameter.upper;
+    }
+    estimates
+}
+
+fn full_covariance(white: &Whitened<'_>, uncertainty: &Uncertainty) -> DMatrix<f64> {
+    let n = white.problem.parameters().len();
+    let mut covariance = DMatrix::zeros(n, n);
+    for (i, a) in white.axes.iter().enumerate() {
+        for (j, b) in white.axes.iter().enumerate() {
+            covariance[(a.index, b.index)] = a.scale * b.scale * uncertainty.covariance[(i, j)];
+        }
+    }
+    covariance
+}
+
+impl solver::Solution {
+    /// Directions fitted by the data, from the curvature of the last step.
+    fn fitted_directions(&self, white: &Whitened<'_>) -> f64 {
+        let covariance = self.hessian.clone().cholesky().map(|c| c.inverse());
+        covariance.map_or(white.axes.len() as f64, |c| statistics::fitted_directions(&c, &white.axes))
+    }
+}

@@ -1,0 +1,83 @@
+//! What the user should know about a fit.
+
+use crate::outcome::{Fit, Status};
+use crate::whitened::Whitened;
+use armcal_core::{Severity, Stage, Warning};
+
+/// Weight below which an observation is named as an outlier.
+const OUTLIER_WEIGHT: f64 = 0.25;
+/// Residual scale from which on the declared noise is questioned.
+const LARGE_SCALE: f64 = 1.5;
+/// Names listed in one message.
+const LISTED: usize = 5;
+
+pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut add = |severity, code, subject: &str, message: String| {
+        warnings.push(Warning::new(severity, Stage::Calibrate, code, subject, message));
+    };
+    if white.rows() < white.axes.len() {
+        let message = format!(
+            "{} equations from {} dwells for {} free parameters: the priors decide the rest; record more dwells or fix \
+             parameters",
+            white.rows(),
+            white.blocks(),
+            white.axes.len()
+        );
+        add(Severity::Inadequate, "too-few-dwells", "fit", message);
+    }
+    if fit.status == Status::IterationLimit {
+        let message = format!(
+            "not converged after {} iterations: the best point is given; raise fit.max_iterations or check units and \
+             start values",
+            fit.iterations
+        );
+        add(Severity::Inadequate, "not-converged", "fit", message);
+    }
+    if let Some(paper) = fit.paper.filter(|paper| !paper.feasible) {
+        let k = white.blocks() as f64;
+        let message = format!(
+            "eq. 4 is infeasible: the smallest E within the bounds is {:.3} mm (mean {:.3} mm), above k a = {:.3} mm \
+             (k = {k}, a = {:.3} mm); raise average_accuracy_mm or widen the bounds",
+            paper.sum_of_distances_m * 1e3,
+            paper.sum_of_distances_m * 1e3 / k,
+            paper.limit_m * 1e3,
+            paper.limit_m * 1e3 / k,
+        );
+        add(Severity::Inadequate, "paper-infeasible", "fit", message);
+    }
+    let at_bound: Vec<&str> =
+        fit.estimates.iter().filter(|e| e.at_bound).map(|e| e.parameter.name.as_str()).collect();
+    if !at_bound.is_empty() {
+        let message =
+            "on the bound: the true value may lie outside, or a missing effect pulls there".to_string();
+        add(Severity::Notice, "at-bound", &listed(&at_bound), message);
+    }
+    if fit.sigma_scale > LARGE_SCALE {
+        let message = format!(
+            "residuals are {:.2} times the declared noise: an effect is missing from the model or the noise is declared \
+             too small; intervals are widened accordingly",
+            fit.sigma_scale
+        );
+        add(Severity::Notice, "residuals-above-noise", "fit", message);
+    }
+    let outliers: Vec<String> = (0..fit.weights.len())
+        .filter(|&j| fit.weights[j] < OUTLIER_WEIGHT)
+        .map(|j| white.problem.name(j))
+        .collect();
+    if !outliers.is_empty() {
+        let names: Vec<&str> = outliers.iter().map(String::as_str).collect();
+        let message = format!("{} observations weigh less than {OUTLIER_WEIGHT} in the fit", names.len());
+        add(Severity::Notice, "outliers", &listed(&names), message);
+    }
+    warnings
+}
+
+/// The first few names and how many more.
+fn listed(names: &[&str]) -> String {
+    let shown = names[..names.len().min(LISTED)].join(", ");
+    match names.len().saturating_sub(LISTED) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}

@@ -1,0 +1,204 @@
+//! Which observations are held out, in which turns.
+
+use crate::{CalibrateError, HoldoutConfig, RecordingKey};
+use armcal_core::Observation;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The hold-out of a calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Holdout {
+    /// Observations held out in each turn, as indices in rising order.
+    pub turns: Vec<Vec<usize>>,
+    /// Whether the written parameters come from all observations (every one is held out in some turn) rather than
+    /// from those outside the only turn.
+    pub in_turn: bool,
+}
+
+/// Finds the observations a config means. `boards` are the names of the recordings' board frames.
+pub(crate) fn resolve(
+    config: &HoldoutConfig,
+    observations: &[Observation],
+    boards: &[String],
+) -> Result<Holdout, CalibrateError> {
+    let once = |held: BTreeSet<usize>| Holdout { turns: vec![held.into_iter().collect()], in_turn: false };
+    let holdout = match config {
+        HoldoutConfig::None => Holdout { turns: Vec::new(), in_turn: false },
+        HoldoutConfig::Cavities { names } => once(by_cavities(names, observations)?),
+        HoldoutConfig::EveryNthCavity { n, offset } => {
+            if *n < 2 || offset >= n {
+                return Err(bad(
+                    "holdout.n",
+                    format!("{n}, offset {offset}"),
+                    "n of 2 or more, offset below n",
+                ));
+            }
+            let cavities = cavities_of(observations);
+            let chosen = cavities.values().skip(*offset).step_by(*n);
+            once(chosen.flatten().copied().collect())
+        }
+        HoldoutConfig::Recordings { recordings } => once(by_recordings(recordings, observations, boards)?),
+        HoldoutConfig::EachRecording => {
+            let mut turns: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+            for (i, o) in observations.iter().enumerate() {
+                turns.entry(o.dwell.recording).or_default().push(i);
+            }
+            Holdout { turns: turns.into_values().collect(), in_turn: true }
+        }
+        HoldoutConfig::CavityFolds { k } => Holdout { turns: folds(*k, observations)?, in_turn: true },
+        HoldoutConfig::Random { share, seed } => {
+            if !(*share > 0.0 && *share < 1.0) {
+                return Err(bad("holdout.share", share.to_string(), "a number between 0 and 1"));
+            }
+            once(random(*share, *seed, observations))
+        }
+        HoldoutConfig::Dwells { dwells } => once(by_dwells(dwells, observations)?),
+    };
+    for turn in &holdout.turns {
+        if turn.len() == observations.len() {
+            let context = format!(" outside the hold-out (it takes all {} of them)", turn.len());
+            return Err(CalibrateError::NoObservations { context });
+        }
+    }
+    Ok(Holdout { turns: holdout.turns.into_iter().filter(|turn| !turn.is_empty()).collect(), ..holdout })
+}
+
+fn bad(key: &'static str, value: String, why: &str) -> CalibrateError {
+    CalibrateError::BadConfig { key, value, why: format!("give {why}") }
+}
+
+fn by_cavities(names: &[String], observations: &[Observation]) -> Result<BTreeSet<usize>, CalibrateError> {
+    let cavities = cavities_of(observations);
+    let mut held = BTreeSet::new();
+    for name in names {
+        let visits = cavities.get(&natural(name)).ok_or_else(|| {
+            let present = observations.iter().filter_map(Observation::cavity);
+            CalibrateError::UnknownHoldout {
+                kind: "cavity",
+                name: name.clone(),
+                hint: nearest(name, present),
+            }
+        })?;
+        held.extend(visits);
+    }
+    Ok(held)
+}
+
+fn by_recordings(
+    recordings: &[RecordingKey],
+    observations: &[Observation],
+    boards: &[String],
+) -> Result<BTreeSet<usize>, CalibrateError> {
+    let short = |board: &str| board.strip_prefix("board.").unwrap_or(board).to_string();
+    let mut held = BTreeSet::new();
+    for key in recordings {
+        let index = match key {
+            RecordingKey::Index(index) => Some(*index),
+            RecordingKey::Name(name) => boards.iter().position(|b| b == name || short(b) == *name),
+        };
+        let before = held.len();
+        held.extend((0..observations.len()).filter(|&i| Some(observations[i].dwell.recording) == index));
+        if held.len() == before {
+            let names: Vec<String> = boards.iter().map(|b| short(b)).collect();
+            let hint = match key {
+                RecordingKey::Name(name) if !names.is_empty() => {
+                    nearest(name, names.iter().map(String::as_str))
+                }
+                _ => "; recordings without a board are named by their index in the pipeline, from 0"
+                    .to_string(),
+            };
+            return Err(CalibrateError::UnknownHoldout { kind: "recording", name: key.to_string(), hint });
+        }
+    }
+    Ok(held)
+}
+
+fn by_dwells(dwells: &[[usize; 2]], observations: &[Observation]) -> Result<BTreeSet<usize>, CalibrateError> {
+    let mut held = BTreeSet::new();
+    for &[recording, dwell] in dwells {
+        let found =
+            observations.iter().position(|o| o.dwell.recording == recording && o.dwell.dwell == dwell);
+        held.insert(found.ok_or_else(|| CalibrateError::UnknownHoldout {
+            kind: "dwell",
+            name: format!("[{recording}, {dwell}]"),
+            hint: " (it may have been rejected or not associated)".to_string(),
+        })?);
+    }
+    Ok(held)
+}
+
+/// `k` groups of cavities, dealt out like cards in natural order, so that each group covers the whole board.
+fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, CalibrateError> {
+    let mut groups: Vec<Vec<usize>> = cavities_of(observations).into_values().collect();
+    groups.extend((0..observations.len()).filter(|&i| observations[i].cavity().is_none()).map(|i| vec![i]));
+    if k < 2 || k > groups.len() {
+        let why = format!("a number from 2 to {}, the number of cavities and tracked dwells", groups.len());
+        return Err(bad("holdout.k", k.to_string(), &why));
+    }
+    let mut turns = vec![Vec::new(); k];
+    for (g, group) in groups.into_iter().enumerate() {
+        turns[g % k].extend(group);
+    }
+    turns.iter_mut().for_each(|turn| turn.sort_unstable());
+    Ok(turns)
+}
+
+/// The dwells with the smallest hashes of (seed, recording, dwell): adding a dwell never reshuffles the others.
+fn random(share: f64, seed: u64, observations: &[Observation]) -> BTreeSet<usize> {
+    let mut ranked: Vec<(u64, usize)> = observations
+        .iter()
+        .enumerate()
+        .map(|(i, o)| (mix(mix(mix(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64), i))
+        .collect();
+    ranked.sort_unstable();
+    let count = (share * observations.len() as f64).round() as usize;
+    ranked.into_iter().take(count).map(|(_, i)| i).collect()
+}
+
+/// Finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+fn mix(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Visits of each cavity, cavities in natural order.
+fn cavities_of(observations: &[Observation]) -> BTreeMap<Vec<Chunk>, Vec<usize>> {
+    let mut visits: BTreeMap<Vec<Chunk>, Vec<usize>> = BTreeMap::new();
+    for (i, o) in observations.iter().enumerate() {
+        if let Some(cavity) = o.cavity() {
+            visits.entry(natural(cavity)).or_default().push(i);
+        }
+    }
+    visits
+}
+
+/// Part of a name: a run of digits, compared as a number (then by its text, so that `1` and `01` differ), or a letter.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Chunk {
+    Number(u64, String),
+    Letter(char),
+}
+
+fn natural(name: &str) -> Vec<Chunk> {
+    let mut chunks = Vec::new();
+    let mut digits = String::new();
+    for c in name.chars().chain(['\0']) {
+        if c.is_ascii_digit() {
+            digits.push(c);
+            continue;
+        }
+        if !digits.is_empty() {
+            chunks.push(Chunk::Number(digits.parse().unwrap_or(u64::MAX), std::mem::take(&mut digits)));
+        }
+        chunks.push(Chunk::Letter(c));
+    }
+    chunks
+}
+
+fn nearest<'a>(name: &str, present: impl Iterator<Item = &'a str>) -> String {
+    let best = present
+        .map(|p| (strsim::jaro_winkler(name, p), p))
+        .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)));
+    best.map_or_else(|| "; none is named".to_string(), |(_, p)| format!("; did you mean `{p}`?"))
+}

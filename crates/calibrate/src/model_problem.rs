@@ -1,0 +1,173 @@
+//! The calibration of a model against observations, as a [`Problem`].
+//!
+//! The covariance of an observation is what was measured plus what the encoders add:
+//! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading. Cross-covariance between
+//! position and orientation enters through the encoders only.
+
+use crate::problem::Problem;
+use crate::{CalibrateError, FitConfig};
+use armcal_core::{Observation, Parameter, Reference};
+use armcal_model::Model;
+use nalgebra::{DMatrix, DVector, Matrix3xX};
+
+/// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
+/// the fit.
+const JOINT_STEP_RAD: f64 = 1e-6;
+
+/// A model and the observations it should explain.
+pub struct ModelProblem<'a> {
+    model: &'a Model,
+    observations: Vec<&'a Observation>,
+    use_orientation: bool,
+}
+
+impl<'a> ModelProblem<'a> {
+    /// Checks that every observation is complete and finite. Orientation rows are used where
+    /// `config.use_orientation` is set and the observation has them with a standard error above zero.
+    pub fn new(
+        model: &'a Model,
+        observations: impl IntoIterator<Item = &'a Observation>,
+        config: &FitConfig,
+    ) -> Result<ModelProblem<'a>, CalibrateError> {
+        let observations: Vec<&Observation> = observations.into_iter().collect();
+        for o in &observations {
+            model.check(std::slice::from_ref(*o))?;
+            check_complete(o)?;
+        }
+        Ok(ModelProblem { model, observations, use_orientation: config.use_orientation })
+    }
+
+    /// The observations, in the order of the blocks.
+    pub fn observations(&self) -> &[&'a Observation] {
+        &self.observations
+    }
+
+    /// Covariance of measured minus predicted position of a block at parameters `p` [m^2].
+    pub fn position_covariance_m2(&self, block: usize, p: &[f64]) -> nalgebra::Matrix3<f64> {
+        let o = self.observations[block];
+        let mut jacobian = self.model.joint_jacobian(p, o);
+        for (mut column, sigma) in jacobian.column_iter_mut().zip(&o.joint_sigma_rad) {
+            column *= *sigma;
+        }
+        o.covariance_m2 + &jacobian * jacobian.transpose()
+    }
+
+    fn rows(&self, block: usize) -> usize {
+        match &self.observations[block].reference {
+            Reference::Tracked { orientation: Some(_), orientation_sigma_rad, .. }
+                if self.use_orientation && *orientation_sigma_rad > 0.0 =>
+            {
+                6
+            }
+            _ => 3,
+        }
+    }
+
+    /// d orientation of the tip in world axes / d joint reading, by central differences.
+    fn turning_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
+        let base = self.model.base_in_world(p).rotation;
+        let mut jacobian = Matrix3xX::zeros(o.joint_rad.len());
+        for joint in 0..o.joint_rad.len() {
+            let at = |step: f64| {
+                let mut q = o.joint_rad.clone();
+                q[joint] += step;
+                base * self.model.tip_in_base(p, &q).rotation
+            };
+            let turn = (at(JOINT_STEP_RAD) * at(-JOINT_STEP_RAD).inverse()).scaled_axis();
+            jacobian.set_column(joint, &(turn / (2.0 * JOINT_STEP_RAD)));
+        }
+        jacobian
+    }
+}
+
+impl Problem for ModelProblem<'_> {
+    fn parameters(&self) -> &[Parameter] {
+        self.model.parameters()
+    }
+
+    fn blocks(&self) -> usize {
+        self.observations.len()
+    }
+
+    fn name(&self, block: usize) -> String {
+        describe(self.observations[block])
+    }
+
+    fn joint_rad(&self, block: usize) -> &[f64] {
+        &self.observations[block].joint_rad
+    }
+
+    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
+        let residual = self.model.residual(p, self.observations[block]);
+        DVector::from_iterator(self.rows(block), residual.rows().take(self.rows(block)))
+    }
+
+    fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (residual, jacobian) = self.model.residual_with_jacobian(p, self.observations[block]);
+        let rows = self.rows(block);
+        let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
+        (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
+    }
+
+    fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
+        let o = self.observations[block];
+        let rows = self.rows(block);
+        let mut covariance = DMatrix::zeros(rows, rows);
+        let Reference::Tracked { orientation_sigma_rad, .. } = o.reference else {
+            covariance.copy_from(&self.position_covariance_m2(block, p));
+            return covariance;
+        };
+        let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
+        spread.rows_mut(0, 3).copy_from(&self.model.joint_jacobian(p, o));
+        covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
+        if rows == 6 {
+            spread.rows_mut(3, 3).copy_from(&self.turning_jacobian(p, o));
+            (3..6).for_each(|k| covariance[(k, k)] = orientation_sigma_rad.powi(2));
+        }
+        for (mut column, sigma) in spread.column_iter_mut().zip(&o.joint_sigma_rad) {
+            column *= *sigma;
+        }
+        covariance + &spread * spread.transpose()
+    }
+}
+
+/// `recording 0 dwell 12 (cavity circle03)`.
+pub(crate) fn describe(o: &Observation) -> String {
+    match o.cavity() {
+        Some(cavity) => format!("{} (cavity {cavity})", o.dwell),
+        None => o.dwell.to_string(),
+    }
+}
+
+fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
+    let observation = describe(o);
+    if o.joint_sigma_rad.len() != o.joint_rad.len() {
+        let why = format!(
+            "{} joint readings but {} standard errors of them: give one for each joint (0 when negligible)",
+            o.joint_rad.len(),
+            o.joint_sigma_rad.len()
+        );
+        return Err(CalibrateError::Mismatch { observation, why });
+    }
+    let (what, values): (&str, Vec<f64>) = match &o.reference {
+        Reference::Seated { in_board_m, .. } => {
+            ("the position of the cavity", in_board_m.iter().copied().collect())
+        }
+        Reference::Tracked { position_m, .. } => {
+            ("the measured position", position_m.iter().copied().collect())
+        }
+    };
+    let unusable = if !o.joint_rad.iter().all(|v| v.is_finite()) {
+        "a joint reading"
+    } else if !o.joint_sigma_rad.iter().all(|v| v.is_finite() && *v >= 0.0) {
+        "the standard error of a joint reading"
+    } else if !values.iter().all(|v| v.is_finite()) {
+        what
+    } else if !o.covariance_m2.iter().all(|v| v.is_finite()) {
+        return Err(CalibrateError::BadCovariance { observation });
+    } else {
+        return Ok(());
+    };
+    let joint_rad = o.joint_rad.clone();
+    Err(CalibrateError::NotFinite { observation, what: unusable, parameter: String::new(), joint_rad })
+}

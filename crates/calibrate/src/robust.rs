@@ -1,0 +1,145 @@
+//! The default cost and the scale of its residuals.
+//!
+//! `F(x) = sum_j rho(|e_j| / s) + 1/2 sum_k w_k x_k^2` with e_j the whitened residual of observation j, s the scale of
+//! the residuals in units of the declared noise, and w the prior precision (1 in units of its own standard deviation).
+
+use crate::loss::{Loss, chi_median};
+use crate::solver::{Cost, Quadratic};
+use crate::whitened::Whitened;
+use crate::{CalibrateError, FitConfig, Objective};
+use armcal_core::robust::median;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// The cost at a fixed scale.
+pub(crate) struct RobustCost<'a, 'p> {
+    pub white: &'a Whitened<'p>,
+    pub huber_c: Option<f64>,
+    /// s above.
+    pub sigma_scale: f64,
+    /// Whether the curvature of the loss is exact (fast near the minimum) or that of iteratively reweighted least
+    /// squares (never too small, hence no overshooting far away).
+    pub exact_curvature: bool,
+}
+
+impl<'a, 'p> RobustCost<'a, 'p> {
+    pub fn new(white: &'a Whitened<'p>, config: &FitConfig, sigma_scale: f64) -> RobustCost<'a, 'p> {
+        let huber_c = (config.objective == Objective::Robust).then_some(config.huber_c);
+        RobustCost { white, huber_c, sigma_scale, exact_curvature: true }
+    }
+
+    pub fn loss(&self, block: usize) -> Loss {
+        self.huber_c.map_or(Loss::Square, |c| Loss::huber(c, self.white.dimension(block)))
+    }
+
+    /// `|e_j| / s` of every observation.
+    pub fn norms(&self, residual: &DVector<f64>) -> Vec<f64> {
+        let norm = |j| residual.rows(self.white.offsets[j], self.white.dimension(j)).norm();
+        (0..self.white.blocks()).map(|j| norm(j) / self.sigma_scale).collect()
+    }
+
+    /// Weight of every observation, 1 = fully trusted.
+    pub fn weights(&self, residual: &DVector<f64>) -> Vec<f64> {
+        let norms = self.norms(residual);
+        norms.iter().enumerate().map(|(j, &u)| self.loss(j).weight(u)).collect()
+    }
+
+    fn of_residual(&self, x: &DVector<f64>, residual: &DVector<f64>) -> f64 {
+        let data: f64 = self.norms(residual).iter().enumerate().map(|(j, &u)| self.loss(j).rho(u)).sum();
+        let prior: f64 = self.white.axes.iter().zip(x.iter()).map(|(a, x)| a.precision * x * x).sum();
+        data + 0.5 * prior
+    }
+}
+
+impl Cost for RobustCost<'_, '_> {
+    fn value(&self, x: &DVector<f64>) -> Result<f64, CalibrateError> {
+        Ok(self.of_residual(x, &self.white.residual(x)?))
+    }
+
+    /// Gauss-Newton in the model, exact in the loss: for an outlier `w (I - u u')` instead of `w I`, because Huber's
+    /// loss has no curvature along the residual (Triggs et al. 2000, section 4.3, with rho'' from the table).
+    fn model(&self, x: &DVector<f64>) -> Result<Quadratic, CalibrateError> {
+        let (residual, mut jacobian) = self.white.linearised(x)?;
+        let n = self.white.axes.len();
+        let precision = DVector::from_iterator(n, self.white.axes.iter().map(|a| a.precision));
+        let mut weighted = residual.clone();
+        let mut removed = DMatrix::zeros(self.white.blocks(), n);
+        for (j, u) in self.norms(&residual).into_iter().enumerate() {
+            let (at, rows, weight) = (self.white.offsets[j], self.white.dimension(j), self.loss(j).weight(u));
+            let scaled = weight.sqrt() / self.sigma_scale;
+            jacobian.rows_mut(at, rows).scale_mut(scaled);
+            weighted.rows_mut(at, rows).scale_mut(scaled);
+            if weight < 1.0 && self.exact_curvature {
+                let along = residual.rows(at, rows).normalize();
+                removed.row_mut(j).copy_from(&(along.transpose() * jacobian.rows(at, rows)));
+            }
+        }
+        let gradient = jacobian.tr_mul(&weighted) + precision.component_mul(x);
+        let mut hessian = jacobian.tr_mul(&jacobian);
+        let damping = hessian.diagonal() + &precision;
+        hessian -= removed.tr_mul(&removed);
+        for k in 0..n {
+            hessian[(k, k)] += precision[k];
+        }
+        Ok(Quadratic { value: self.of_residual(x, &residual), gradient, hessian, damping })
+    }
+
+    fn lower(&self) -> DVector<f64> {
+        DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.lower))
+    }
+
+    fn upper(&self) -> DVector<f64> {
+        DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.upper))
+    }
+}
+
+/// `sum_j E |psi|^2` under the declared noise.
+fn expected_psi_square(cost: &RobustCost<'_, '_>) -> f64 {
+    let mut blocks_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for j in 0..cost.white.blocks() {
+        blocks_of.entry(cost.white.dimension(j)).or_default().push(j);
+    }
+    let of_dimension = |(&dimension, blocks): (&usize, &Vec<usize>)| {
+        cost.loss(blocks[0]).gaussian_psi_square(dimension) * (dimension * blocks.len()) as f64
+    };
+    blocks_of.iter().map(of_dimension).sum()
+}
+
+/// Scale of the residuals by the median norm: survives half of the observations being wrong.
+pub(crate) fn median_scale(white: &Whitened<'_>, residual: &DVector<f64>) -> f64 {
+    let norms: Vec<f64> = (0..white.blocks())
+        .map(|j| residual.rows(white.offsets[j], white.dimension(j)).norm() / chi_median(white.dimension(j)))
+        .collect();
+    median(&norms)
+}
+
+/// Scale of the residuals by Huber's proposal 2 (Huber and Ronchetti 2009, section 6.4), `p` fitted directions
+/// allowed for: `sum |psi(e/s)|^2 = (1 - p/N) sum_j E|psi|^2`. As efficient as the fit itself, kept within a factor of
+/// two of the median's answer, which is the more robust one.
+pub(crate) fn proposal2_scale(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, fitted: f64) -> f64 {
+    let white = cost.white;
+    let left = ((white.rows() as f64 - fitted) / white.rows() as f64).max(1.0 / white.rows() as f64);
+    let start = median_scale(white, residual) / left.sqrt();
+    let expected = expected_psi_square(cost);
+    if start <= 0.0 {
+        // Most observations are met exactly: there is no scale to refine.
+        return 0.0;
+    }
+    let mut scale = start;
+    for _ in 0..100 {
+        let at = RobustCost { sigma_scale: scale, ..*cost };
+        let norms = at.norms(residual);
+        let psi: f64 = norms.iter().enumerate().map(|(j, &u)| (at.loss(j).weight(u) * u).powi(2)).sum();
+        let next = (scale * (psi / (left * expected)).sqrt()).clamp(0.5 * start, 2.0 * start);
+        let change = (next - scale).abs();
+        scale = next;
+        if change <= 1e-10 * scale {
+            break;
+        }
+    }
+    if cost.huber_c.is_none() {
+        // Least squares: the root of the reduced chi-square itself.
+        return (residual.norm_squared() / (left * white.rows() as f64)).sqrt();
+    }
+    scale
+}

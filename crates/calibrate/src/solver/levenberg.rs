@@ -1,0 +1,99 @@
+//! Levenberg-Marquardt with bounds: every step is the exact minimiser of the damped quadratic model within the box.
+
+use super::{Cost, Quadratic, bounded_qp};
+use crate::{CalibrateError, Status};
+use nalgebra::{DMatrix, DVector};
+
+/// When to stop.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Settings {
+    /// Limit of accepted steps.
+    pub max_iterations: usize,
+    /// Converged when `sqrt(d'Hd)` falls below this: a step of that many standard deviations of the estimate.
+    pub step_tolerance: f64,
+}
+
+/// Where the iteration ended.
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    pub x: DVector<f64>,
+    /// Curvature at the last point it was computed at: the solution or one step before it.
+    pub hessian: DMatrix<f64>,
+    pub status: Status,
+    pub iterations: usize,
+}
+
+/// Minimises `cost` from `start`.
+///
+/// Marquardt's scaling by the largest curvature seen; damping by the ratio of actual to predicted decrease (Madsen,
+/// Nielsen and Tingleff 2004, with a factor of ten instead of three on the way down). The test of convergence has no
+/// unit: the step in the metric of the Hessian, that is, in standard deviations of the estimate. A trial point at
+/// which the cost is not finite counts as a failed step; at the start it is an error.
+pub(crate) fn minimise(
+    cost: &dyn Cost,
+    start: &DVector<f64>,
+    settings: Settings,
+) -> Result<Solution, CalibrateError> {
+    let (lower, upper) = (cost.lower(), cost.upper());
+    let mut x = start.clone();
+    let mut model = cost.model(&x)?;
+    let mut damping = model.damping.clone();
+    let (mut mu, mut growth) = (1e-8, 10.0);
+    for iterations in 0..settings.max_iterations {
+        damping.zip_apply(&model.damping, |d, new| *d = d.max(new));
+        loop {
+            let damped = &model.hessian + DMatrix::from_diagonal(&(&damping * mu));
+            let step = bounded_qp::minimise(&damped, &model.gradient, &(&lower - &x), &(&upper - &x));
+            let Some(step) = step.filter(|d| d.iter().all(|v| v.is_finite())) else {
+                mu *= growth;
+                if mu > 1e20 {
+                    return Ok(stopped(x, model, Status::IterationLimit, iterations));
+                }
+                continue;
+            };
+            let curvature = step.dot(&(&model.hessian * &step));
+            let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
+            let rounding = 16.0 * f64::EPSILON * model.value.abs();
+            let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;
+            let trial = snapped(&x + step, &lower, &upper);
+            let value = cost.value(&trial).unwrap_or(f64::INFINITY);
+            let gain = (model.value - value) / predicted;
+            if done {
+                let better = value <= model.value + rounding;
+                let x = if better { trial } else { x };
+                return Ok(stopped(x, model, Status::Converged, iterations + 1));
+            }
+            if gain > 1e-4 {
+                mu = if gain > 0.5 { (0.1 * mu).max(1e-15) } else { mu };
+                growth = 10.0;
+                x = trial;
+                break;
+            }
+            mu *= growth;
+            growth *= 2.0;
+            if !mu.is_finite() {
+                return Ok(stopped(x, model, Status::IterationLimit, iterations));
+            }
+        }
+        model = cost.model(&x)?;
+    }
+    Ok(stopped(x, model, Status::IterationLimit, settings.max_iterations))
+}
+
+fn stopped(x: DVector<f64>, model: Quadratic, status: Status, iterations: usize) -> Solution {
+    Solution { x, hessian: model.hessian, status, iterations }
+}
+
+/// Puts what is at a bound up to rounding onto the bound.
+fn snapped(x: DVector<f64>, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
+    DVector::from_fn(x.len(), |i, _| {
+        let near = |bound: f64| bound.is_finite() && (x[i] - bound).abs() <= 1e-13 * (1.0 + bound.abs());
+        if near(lower[i]) || x[i] < lower[i] {
+            lower[i]
+        } else if near(upper[i]) || x[i] > upper[i] {
+            upper[i]
+        } else {
+            x[i]
+        }
+    })
+}

@@ -1,0 +1,40 @@
+//! Minimisation of a smooth cost within bounds.
+//!
+//! **Why not `basin` (3.2.0), which notes/dependencies.md chose.** It was tried as planned and stays as the oracle of
+//! this crate's tests (`tests/solvers.rs`), but is not the product's solver, for three reasons. (1) Its loss is per
+//! scalar residual; a loss per 3-vector needs an outer reweighting loop, and every outer round pays for fresh
+//! Jacobians, which are most of the cost of a fit. (2) Both its bounded methods are interior: they approach a bound but
+//! never reach it, so "at its bound" would need a tolerance. (3) On 198 observations of the paper's arm with one active
+//! bound, same run, release: this module 10 ms including the search for the scale; basin, given the scale, 1.5 s by the
+//! trust-region-reflective method (a Jacobi SVD of the tall Jacobian at every iteration; same minimum to 1e-9) and 42
+//! ms by the bounded LM, which stopped 2.6e-3 above the minimum.
+
+mod bounded_qp;
+mod levenberg;
+
+pub(crate) use levenberg::{Settings, Solution, minimise};
+
+use crate::CalibrateError;
+use nalgebra::{DMatrix, DVector};
+
+/// A cost with its second-order model.
+pub(crate) trait Cost {
+    /// Value at x.
+    fn value(&self, x: &DVector<f64>) -> Result<f64, CalibrateError>;
+    /// Value, gradient and a positive semidefinite approximation of the Hessian at x.
+    fn model(&self, x: &DVector<f64>) -> Result<Quadratic, CalibrateError>;
+    /// Lower bound of every x.
+    fn lower(&self) -> DVector<f64>;
+    /// Upper bound of every x.
+    fn upper(&self) -> DVector<f64>;
+}
+
+/// Second-order model of a cost at a point.
+#[derive(Debug, Clone)]
+pub(crate) struct Quadratic {
+    pub value: f64,
+    pub gradient: DVector<f64>,
+    pub hessian: DMatrix<f64>,
+    /// Positive diagonal by which Levenberg's damping is scaled.
+    pub damping: DVector<f64>,
+}

@@ -1,0 +1,174 @@
+//! The directions the data do not determine, chosen so that they are readable.
+//!
+//! An eigenvector of a zero eigenvalue is any mixture of the physical reasons, so the weak subspace gets a basis of
+//! simple directions instead: first single parameters that lie in it, then pairs (those with a known physical reason
+//! before those of equal unit before the rest), as long as each adds something to those already chosen. What is left
+//! is turned by the varimax rotation (Kaiser 1958), which looks for few large shares. The directions are unit vectors
+//! in units of the prior; they span the weak subspace but need not be orthogonal.
+
+use crate::outcome::UndeterminedDirection;
+use crate::statistics::Uncertainty;
+use crate::whitened::Axis;
+use crate::words::{self, Simplicity};
+use armcal_core::Parameter;
+use nalgebra::{DMatrix, DVector, Matrix2};
+
+/// Shares below this (of a unit direction) are left out.
+const SMALLEST_SHARE: f64 = 0.1;
+/// A simple direction lies in the weak subspace when at least this share of its square does.
+const INSIDE: f64 = 0.98;
+/// A direction adds something when at least this share of its square is orthogonal to those chosen.
+const NEW: f64 = 0.1;
+
+/// Undetermined directions in words, in the order of their leading parameters.
+pub(crate) fn directions(
+    uncertainty: &Uncertainty,
+    axes: &[Axis],
+    parameters: &[Parameter],
+) -> Vec<UndeterminedDirection> {
+    let simplicity =
+        |i: usize, j: usize| words::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
+    let mut found: Vec<(usize, UndeterminedDirection)> = simple_basis(&uncertainty.undetermined, &simplicity)
+        .into_iter()
+        .map(|direction| {
+            let shares = shares_of(&direction);
+            let lead = shares.iter().map(|s| s.0).min().unwrap_or(usize::MAX);
+            let text = words::describe(&shares, axes, parameters, &uncertainty.information);
+            let name = |k: usize| parameters[axes[k].index].name.clone();
+            let shares = shares.iter().map(|&(k, v)| (name(k), v)).collect();
+            (lead, UndeterminedDirection { shares, text })
+        })
+        .collect();
+    found.sort_by_key(|(lead, _)| *lead);
+    found.into_iter().map(|(_, direction)| direction).collect()
+}
+
+/// The parameters that matter in a direction, largest share first and positive.
+fn shares_of(direction: &DVector<f64>) -> Vec<(usize, f64)> {
+    let mut shares: Vec<(usize, f64)> =
+        direction.iter().copied().enumerate().filter(|(_, v)| v.abs() >= SMALLEST_SHARE).collect();
+    // Ties (two equal axes) are broken by the model's order, not by rounding.
+    shares.sort_by(|a, b| ranked(b.1).cmp(&ranked(a.1)).then(a.0.cmp(&b.0)));
+    let sign = shares.first().map_or(1.0, |s| s.1.signum());
+    shares.iter_mut().for_each(|s| s.1 *= sign);
+    shares
+}
+
+/// Unit vectors spanning the columns of `weak` (orthonormal), simple ones first.
+fn simple_basis(weak: &DMatrix<f64>, simplicity: &dyn Fn(usize, usize) -> Simplicity) -> Vec<DVector<f64>> {
+    let projector = weak * weak.transpose();
+    let mut candidates = Vec::new();
+    for i in 0..weak.nrows() {
+        if projector[(i, i)] >= INSIDE {
+            candidates.push((Simplicity::Single, i, i));
+        }
+        candidates.extend((i + 1..weak.nrows()).map(|j| (simplicity(i, j), i, j)));
+    }
+    candidates.sort_unstable();
+    let (mut chosen, mut spanned): (Vec<DVector<f64>>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
+    for (_, i, j) in candidates {
+        let Some(direction) = inside(&projector, i, j) else { continue };
+        let rest = spanned.iter().fold(direction.clone(), |rest, s| &rest - s * s.dot(&rest));
+        if rest.norm_squared() >= NEW {
+            spanned.push(rest.normalize());
+            chosen.push(direction);
+        }
+    }
+    chosen.extend(remainder(weak, &spanned));
+    chosen
+}
+
+/// The direction of the weak subspace nearest to the span of two parameters (one, if i = j), if it is near enough.
+fn inside(projector: &DMatrix<f64>, i: usize, j: usize) -> Option<DVector<f64>> {
+    if i == j {
+        return Some(projector.column(i).normalize());
+    }
+    let block = Matrix2::new(projector[(i, i)], projector[(i, j)], projector[(j, i)], projector[(j, j)]);
+    let eigen = block.symmetric_eigen();
+    let best = eigen.eigenvalues.imax();
+    let direction = eigen.eigenvectors.column(best);
+    // A pair in which one partner hardly takes part is a single in disguise.
+    if eigen.eigenvalues[best] < INSIDE || direction.abs().min() < SMALLEST_SHARE {
+        return None;
+    }
+    let nearest = projector.column(i) * direction[0] + projector.column(j) * direction[1];
+    Some(nearest.normalize())
+}
+
+/// What the chosen directions leave of the weak subspace, turned to few large shares.
+fn remainder(weak: &DMatrix<f64>, spanned: &[DVector<f64>]) -> Vec<DVector<f64>> {
+    if spanned.len() >= weak.ncols() {
+        return Vec::new();
+    }
+    let mut rest = weak.clone();
+    for s in spanned {
+        rest -= s * (s.transpose() * &rest);
+    }
+    let svd = rest.svd(true, false);
+    let Some(u) = svd.u else { return Vec::new() };
+    let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
+    order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
+    order.truncate(weak.ncols() - spanned.len());
+    let basis = varimax(u.select_columns(&order));
+    basis.column_iter().map(|c| c.into_owned()).collect()
+}
+
+/// Size of a share to a millionth, so that equal ones compare equal.
+fn ranked(share: f64) -> i64 {
+    (share.abs() * 1e6).round() as i64
+}
+
+/// Rotates the columns of an orthonormal basis so that the variance of their squared entries is largest: Jacobi-like
+/// sweeps over pairs of columns with Kaiser's closed-form angle.
+fn varimax(mut basis: DMatrix<f64>) -> DMatrix<f64> {
+    let rows = basis.nrows() as f64;
+    for _sweep in 0..100 {
+        let mut largest: f64 = 0.0;
+        for i in 0..basis.ncols() {
+            for j in i + 1..basis.ncols() {
+                let (mut a, mut b, mut c, mut d) = (0.0, 0.0, 0.0, 0.0);
+                for r in 0..basis.nrows() {
+                    let (x, y) = (basis[(r, i)], basis[(r, j)]);
+                    let (u, v) = (x * x - y * y, 2.0 * x * y);
+                    a += u;
+                    b += v;
+                    c += u * u - v * v;
+                    d += 2.0 * u * v;
+                }
+                let angle = 0.25 * (d - 2.0 * a * b / rows).atan2(c - (a * a - b * b) / rows);
+                let (sin, cos) = angle.sin_cos();
+                for r in 0..basis.nrows() {
+                    let (x, y) = (basis[(r, i)], basis[(r, j)]);
+                    basis[(r, i)] = cos * x + sin * y;
+                    basis[(r, j)] = cos * y - sin * x;
+                }
+                largest = largest.max(angle.abs());
+            }
+        }
+        if largest < 1e-10 {
+            break;
+        }
+    }
+    basis
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn varimax_unmixes_sparse_directions() {
+        // Two sparse unit directions, mixed by 0.7 rad.
+        let s = 0.5_f64.sqrt();
+        let sparse =
+            DMatrix::from_row_slice(6, 2, &[s, 0.0, -s, 0.0, 0.0, 0.6, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0]);
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let mixed = &sparse * DMatrix::from_row_slice(2, 2, &[cos, -sin, sin, cos]);
+        let found = varimax(mixed);
+        let overlap = (sparse.transpose() * found).abs();
+        // Each found direction is one of the sparse ones, up to sign and order.
+        for c in 0..2 {
+            assert!((overlap.column(c).amax() - 1.0).abs() < 1e-9, "{overlap}");
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! The problem as the solvers see it: free parameters in units of their prior, residuals in units of their noise.
+//!
+//! `x_k = (p_k - c_k) / s_k`. With a prior, `c` is the nominal value and `s` the prior's standard deviation. A frame
+//! that nobody knew, or a parameter without prior or bounds, has its start for `c` and a reference size for `s` (20 mm,
+//! 4 deg: notes/diagnosis.md 4.1), so that directions through it compare like with like; the prior on it is its own
+//! (or a ridge of 1 m, 1 rad), wide enough not to be felt by anything the data see at all, and keeps directions that
+//! nothing determines where they started.
+
+use crate::problem::Problem;
+use crate::{CalibrateError, FitConfig};
+use armcal_core::{Parameter, Role, Unit};
+use nalgebra::{DMatrix, DVector};
+
+/// Standard deviation [m, rad, ...] of the ridge on a free parameter about which nothing is known: it moves a length
+/// that the data know to 1 mm by one part in a million of what it was off.
+const RIDGE_SIGMA_SI: f64 = 1.0;
+
+/// Half the width of the bounds times this is the standard deviation of the prior they stand for.
+const BOUNDS_TO_SIGMA: f64 = 0.8;
+
+/// Residual rows of one block and their derivative by x.
+pub(crate) type Linearised = (DVector<f64>, DMatrix<f64>);
+
+/// One free parameter in solver units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Axis {
+    /// Index in the full parameter vector.
+    pub index: usize,
+    /// Value at x = 0.
+    pub centre: f64,
+    /// SI per unit of x.
+    pub scale: f64,
+    /// Prior precision in units of x: 1 with a prior, less for the ridge.
+    pub precision: f64,
+    /// Bounds in units of x.
+    pub lower: f64,
+    /// Bounds in units of x.
+    pub upper: f64,
+}
+
+/// A [`Problem`] whitened at its start values, over its free parameters.
+pub(crate) struct Whitened<'a> {
+    pub problem: Box<dyn Problem + 'a>,
+    pub axes: Vec<Axis>,
+    /// Full parameter vector at the start; fixed parameters stay there.
+    start: Vec<f64>,
+    /// Inverse Cholesky factor of each block's covariance.
+    whitener: Vec<DMatrix<f64>>,
+    /// First row of each block in the stacked residual, and one past the last.
+    pub offsets: Vec<usize>,
+}
+
+impl<'a> Whitened<'a> {
+    /// Whitens `problem` at `start`, with the parameters `free` of it free.
+    pub fn new(
+        problem: Box<dyn Problem + 'a>,
+        start: &[f64],
+        free: &dyn Fn(&Parameter) -> bool,
+        config: &FitConfig,
+    ) -> Result<Whitened<'a>, CalibrateError> {
+        if problem.blocks() == 0 {
+            return Err(CalibrateError::NoObservations { context: String::new() });
+        }
+        let mut axes = Vec::new();
+        for (index, parameter) in problem.parameters().iter().enumerate().filter(|(_, p)| free(p)) {
+            axes.push(axis(index, parameter, start[index], config)?);
+        }
+        if axes.is_empty() {
+            return Err(CalibrateError::NothingFree);
+        }
+        let mut start = start.to_vec();
+        for a in &axes {
+            start[a.index] = a.centre + a.scale * clamp((start[a.index] - a.centre) / a.scale, a);
+        }
+        let (mut whitener, mut offsets) = (Vec::with_capacity(problem.blocks()), vec![0]);
+        for block in 0..problem.blocks() {
+            let inverse = inverse_cholesky(problem.covariance(block, &start))
+                .ok_or_else(|| CalibrateError::BadCovariance { observation: problem.name(block) })?;
+            offsets.push(offsets[block] + inverse.nrows());
+            whitener.push(inverse);
+        }
+        Ok(Whitened { problem, axes, start, whitener, offsets })
+    }
+
+    pub fn rows(&self) -> usize {
+        *self.offsets.last().unwrap_or(&0)
+    }
+
+    pub fn blocks(&self) -> usize {
+        self.whitener.len()
+    }
+
+    /// Rows of one block.
+    pub fn dimension(&self, block: usize) -> usize {
+        self.offsets[block + 1] - self.offsets[block]
+    }
+
+    /// Start in units of x, within the bounds.
+    pub fn start(&self) -> DVector<f64> {
+        DVector::from_iterator(
+            self.axes.len(),
+            self.axes.iter().map(|a| clamp((self.start[a.index] - a.centre) / a.scale, a)),
+        )
+    }
+
+    /// Full parameter vector at x.
+    pub fn parameters_at(&self, x: &DVector<f64>) -> Vec<f64> {
+        let mut p = self.start.clone();
+        for (a, x) in self.axes.iter().zip(x.iter()) {
+            // A bound is met exactly, not to rounding.
+            let parameter = &self.problem.parameters()[a.index];
+            p[a.index] = if *x <= a.lower {
+                parameter.lower
+            } else if *x >= a.upper {
+                parameter.upper
+            } else {
+                a.centre + a.scale * x
+            };
+        }
+        p
+    }
+
+    /// Whitened residuals of all blocks, stacked.
+    pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
+        let p = self.parameters_at(x);
+        let mut stacked = DVector::zeros(self.rows());
+        for block in 0..self.blocks() {
+            let raw = self.problem.residual(block, &p);
+            self.finite(block, raw.iter(), "the residual")?;
+            stacked.rows_mut(self.offsets[block], raw.len()).copy_from(&(&self.whitener[block] * raw));
+        }
+        Ok(stacked)
+    }
+
+    /// Position residuals [m] of all blocks and their derivative by x, neither whitened.
+    pub fn distances(&self, x: &DVector<f64>) -> Result<Vec<Linearised>, CalibrateError> {
+        let p = self.parameters_at(x);
+        let mut blocks = Vec::with_capacity(self.blocks());
+        for block in 0..self.blocks() {
+            let (raw, full) = self.problem.linearised(block, &p);
+            let rows = raw.len().min(3);
+            let jacobian = DMatrix::from_fn(rows, self.axes.len(), |r, c| {
+                full[(r, self.axes[c].index)] * self.axes[c].scale
+            });
+            self.finite(block, raw.iter(), "the residual")?;
+            self.finite(block, jacobian.iter(), "the derivative")?;
+            blocks.push((raw.rows(0, rows).into_owned(), jacobian));
+        }
+        Ok(blocks)
+    }
+
+    /// Norms of the position residuals [m].
+    pub fn distance_norms(&self, x: &DVector<f64>) -> Result<Vec<f64>, CalibrateError> {
+        let p = self.parameters_at(x);
+        let norm = |block| {
+            let raw = self.problem.residual(block, &p);
+            self.finite(block, raw.iter(), "the residual")?;
+            Ok(raw.rows(0, raw.len().min(3)).norm())
+        };
+        (0..self.blocks()).map(norm).collect()
+    }
+
+    /// Whitened residuals and their derivative by x, stacked.
+    pub fn linearised(&self, x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), CalibrateError> {
+        let p = self.parameters_at(x);
+        let (mut stacked, mut jacobian) =
+            (DVector::zeros(self.rows()), DMatrix::zeros(self.rows(), self.axes.len()));
+        for block in 0..self.blocks() {
+            let (raw, full) = self.problem.linearised(block, &p);
+            self.finite(block, raw.iter(), "the residual")?;
+            let (at, rows) = (self.offsets[block], raw.len());
+            let white = &self.whitener[block];
+            stacked.rows_mut(at, rows).copy_from(&(white * raw));
+            for (column, a) in self.axes.iter().enumerate() {
+                let raw = full.column(a.index);
+                // An observation sees few frames: most columns of a many-board model are zero.
+                if raw.iter().all(|v| *v == 0.0) {
+                    continue;
+                }
+                if !raw.iter().all(|v| v.is_finite()) {
+                    return Err(self.not_finite(block, "the derivative", Some(a.index)));
+                }
+                jacobian.column_mut(column).rows_mut(at, rows).gemv(a.scale, white, &raw, 0.0);
+            }
+        }
+        Ok((stacked, jacobian))
+    }
+
+    fn finite<'v>(
+        &self,
+        block: usize,
+        mut values: impl Iterator<Item = &'v f64>,
+        what: &'static str,
+    ) -> Result<(), CalibrateError> {
+        if values.all(|v| v.is_finite()) { Ok(()) } else { Err(self.not_finite(block, what, None)) }
+    }
+
+    fn not_finite(&self, block: usize, what: &'static str, parameter: Option<usize>) -> CalibrateError {
+        let name = |i: usize| format!(" with respect to `{}`", self.problem.parameters()[i].name);
+        CalibrateError::NotFinite {
+            observation: self.problem.name(block),
+            what,
+            parameter: parameter.map(name).unwrap_or_default(),
+            joint_rad: self.problem.joint_rad(block).to_vec(),
+        }
+    }
+}
+
+/// The prior standard deviation the fit uses, if anything is known about the parameter.
+pub(crate) fn prior_sigma(parameter: &Parameter, config: &FitConfig) -> Option<f64> {
+    let half = 0.5 * (parameter.upper - parameter.lower);
+    let from_bounds =
+        (config.bounds_as_prior && half.is_finite() && half > 0.0).then_some(BOUNDS_TO_SIGMA * half);
+    parameter.prior_sigma.or(from_bounds)
+}
+
+/// Size of a parameter about which nothing is known, when directions are compared (notes/diagnosis.md 4.1).
+fn reference_size(unit: Unit) -> f64 {
+    match unit {
+        Unit::Metre => 0.020,
+        Unit::Radian => 4.0_f64.to_radians(),
+        Unit::Second => 0.01,
+        Unit::One => 0.01,
+        Unit::RadianPerNewtonMetre => 1e-3,
+        Unit::PerKelvin => 1e-5,
+    }
+}
+
+fn axis(index: usize, parameter: &Parameter, start: f64, config: &FitConfig) -> Result<Axis, CalibrateError> {
+    let bad = |why: String| CalibrateError::BadParameter { name: parameter.name.clone(), why };
+    let Parameter { nominal, lower, upper, .. } = *parameter;
+    if !nominal.is_finite() || !start.is_finite() {
+        return Err(bad(format!("its value before the fit ({nominal}, start {start}) is not finite")));
+    }
+    if lower.is_nan() || upper.is_nan() || lower >= upper {
+        return Err(bad(format!(
+            "its bounds [{lower}, {upper}] leave no room; fix it instead (free = false)"
+        )));
+    }
+    let sigma = prior_sigma(parameter, config);
+    if let Some(sigma) = sigma.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return Err(bad(format!(
+            "prior_sigma = {sigma}: give a number above zero, or fix it (free = false)"
+        )));
+    }
+    let (centre, scale, precision) = match sigma {
+        Some(sigma) if parameter.role != Role::EstimatedFrame => (nominal, sigma, 1.0),
+        _ => {
+            let sigma = sigma.unwrap_or(RIDGE_SIGMA_SI);
+            let size = reference_size(parameter.unit).min(sigma);
+            (start, size, (size / sigma).powi(2))
+        }
+    };
+    let to_x = |value: f64| (value - centre) / scale;
+    Ok(Axis { index, centre, scale, precision, lower: to_x(lower), upper: to_x(upper) })
+}
+
+fn clamp(x: f64, axis: &Axis) -> f64 {
+    x.max(axis.lower).min(axis.upper)
+}
+
+fn inverse_cholesky(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let factor = covariance.cholesky()?.unpack();
+    factor.solve_lower_triangular(&DMatrix::identity(factor.nrows(), factor.ncols()))
+}

@@ -1,0 +1,232 @@
+//! The dwells of one recording.
+
+use armcal_core::{Arrival, Dwell, DwellId, Samples, Severity, Stage, TipMeasurement, Warning};
+use std::ops::Range;
+
+use crate::arrival::Past;
+use crate::pauses::{Encoders, Pauses, Tip, pauses};
+use crate::series::{check_joints, check_order, check_poses, seconds_between};
+use crate::summary::{effective_of, effort_means, joint_means, temperature, tip_measurement};
+use crate::{ClockAlignment, DwellConfig, DwellError};
+
+const DOING: &str = "detecting dwells";
+
+/// Looser floors than this are not proposed [deg]: that would be motion.
+const LARGEST_FLOOR_DEG: f64 = 2.0;
+
+/// Finds the pauses of the arm and summarises each.
+///
+/// A dwell is an interval in which every joint, and the tip where it was seen, stays within its own noise at
+/// rest. Joints and temperature are on the robot's clock; the tip stream is brought to it by `clock`, or
+/// taken to share it when there is none. Dwells come in order of time, numbered from 0.
+///
+/// # Errors
+/// No joint rows, columns of different length, stamps that do not increase, a senseless configuration.
+pub fn detect_dwells(
+    recording: usize,
+    samples: &Samples,
+    clock: Option<&ClockAlignment>,
+    config: &DwellConfig,
+) -> Result<(Vec<Dwell>, Vec<Warning>), DwellError> {
+    config.check()?;
+    check_joints(&samples.joints, DOING)?;
+    if let Some(tip) = &samples.tip {
+        check_poses(tip, DOING, "tip")?;
+    }
+    if let Some(temperature) = &samples.temperature {
+        check_order(&temperature.time_ns, DOING, "temperature")?;
+    }
+    let encoders = Encoders::of(&samples.joints, config);
+    let tip = samples.tip.as_ref().filter(|t| !t.is_empty());
+    let tip = tip.map(|t| Tip::of(t, clock, &samples.joints.time_ns, config));
+    let found = pauses(&encoders, tip.as_ref().filter(|_| config.use_tip), config);
+
+    let summary = Summary { samples, encoders: &encoders, tip: tip.as_ref(), clock, config };
+    let past: Vec<Past> = samples.joints.joint_rad.iter().map(|column| Past::of(column)).collect();
+    let dwells: Vec<Dwell> = found
+        .rows
+        .iter()
+        .enumerate()
+        .map(|(dwell, rows)| summary.dwell(DwellId { recording, dwell }, rows, &past))
+        .collect();
+    let warnings = summary.warnings(recording, &found, &dwells);
+    Ok((dwells, warnings))
+}
+
+struct Summary<'a> {
+    samples: &'a Samples,
+    encoders: &'a Encoders<'a>,
+    tip: Option<&'a Tip<'a>>,
+    clock: Option<&'a ClockAlignment>,
+    config: &'a DwellConfig,
+}
+
+impl Summary<'_> {
+    fn dwell(&self, id: DwellId, rows: &Range<usize>, past: &[Past]) -> Dwell {
+        let joints = &self.samples.joints;
+        let (start_ns, end_ns) = (joints.time_ns[rows.start], joints.time_ns[rows.end - 1]);
+        let means = joint_means(joints, rows, &self.encoders.step_rad);
+        let stream = self.samples.temperature.as_ref();
+        Dwell {
+            id,
+            start_ns,
+            end_ns,
+            joint_rad: means.iter().map(|m| m.mean).collect(),
+            joint_spread_rad: means.iter().map(|m| m.spread).collect(),
+            joint_sigma_rad: means.iter().map(|m| m.sigma).collect(),
+            effort_nm: effort_means(joints, rows),
+            samples: rows.len(),
+            effective_samples: effective_of(&means),
+            arrival: past
+                .iter()
+                .zip(&means)
+                .zip(&self.encoders.step_rad)
+                .map(|((past, mean), step)| self.arrival(past, rows.start, mean.mean, *step))
+                .collect(),
+            tip: self.tip_of(start_ns, end_ns),
+            temperature_c: stream
+                .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
+        }
+    }
+
+    fn arrival(&self, past: &Past, start: usize, rest_rad: f64, step_rad: f64) -> Arrival {
+        let away_rad = self
+            .config
+            .arrival_threshold_deg
+            .to_radians()
+            .max(self.config.arrival_threshold_counts * step_rad);
+        let since = self.encoders.stretches.iter().find(|s| s.contains(&start)).map_or(start, |s| s.start);
+        past.arrival(since, start, rest_rad, away_rad)
+    }
+
+    /// The tip frames whose time lies in the dwell for certain, the error of the alignment considered.
+    fn tip_of(&self, start_ns: i64, end_ns: i64) -> Option<TipMeasurement> {
+        let tip = self.tip?;
+        let margin_s = self.clock.map_or(0.0, |c| {
+            let at =
+                tip.robot_ns.partition_point(|t| *t < start_ns).min(tip.robot_ns.len().saturating_sub(1));
+            tip.samples.time_ns.get(at).map_or(0.0, |t| 2.0 * c.sigma_s(*t))
+        });
+        // A quarter of the dwell at most: a badly known clock is warned about where it was estimated.
+        let margin_s = margin_s.min(0.25 * seconds_between(start_ns, end_ns));
+        let margin_ns = (margin_s * 1e9) as i64;
+        let first = tip.robot_ns.partition_point(|t| *t < start_ns.saturating_add(margin_ns));
+        let end = tip.robot_ns.partition_point(|t| *t <= end_ns.saturating_sub(margin_ns));
+        tip_measurement(tip.samples, first..end.max(first), self.config)
+    }
+
+    fn warnings(&self, recording: usize, found: &Pauses, dwells: &[Dwell]) -> Vec<Warning> {
+        let subject = format!("recording {recording}");
+        let say =
+            |severity, code, message| Warning::new(severity, Stage::Dwell, code, subject.clone(), message);
+        let mut warnings = Vec::new();
+        if dwells.is_empty() {
+            warnings.push(say(Severity::Inadequate, "no-dwells", self.why_none(found)));
+        } else if found.too_short_s.len() > 3.max(dwells.len() / 2) {
+            let longest_s = found.too_short_s.iter().copied().fold(0.0, f64::max);
+            let message = format!(
+                "{} pauses shorter than dwell.min_duration_s = {} s were ignored (the longest {longest_s:.2} s); \
+                 {} were kept",
+                found.too_short_s.len(),
+                self.config.min_duration_s,
+                dwells.len()
+            );
+            warnings.push(say(Severity::Notice, "short-pauses", message));
+        }
+        warnings.extend(dwells.windows(2).filter_map(|pair| self.split(&pair[0], &pair[1])));
+        let few = |d: &&Dwell| d.effective_samples < self.config.min_effective_samples && d.samples > 1;
+        let varying = |d: &&Dwell| d.joint_spread_rad.iter().any(|s| *s > 0.0);
+        let poor: Vec<usize> = dwells.iter().filter(varying).filter(few).map(|d| d.id.dwell).collect();
+        if !poor.is_empty() {
+            let message = format!(
+                "{} dwells are worth fewer than {} independent readings ({}); their standard errors are rough, \
+                 hold each pose longer",
+                poor.len(),
+                self.config.min_effective_samples,
+                list(&poor)
+            );
+            warnings.push(say(Severity::Notice, "few-effective-samples", message));
+        }
+        let blind: Vec<usize> = dwells.iter().filter(|d| d.tip.is_none()).map(|d| d.id.dwell).collect();
+        if self.tip.is_some() && !blind.is_empty() {
+            let message = format!(
+                "{} of {} dwells have no tip measurement, the sensor did not see the tip then ({})",
+                blind.len(),
+                dwells.len(),
+                list(&blind)
+            );
+            warnings.push(say(Severity::Notice, "dwell-without-tip", message));
+        }
+        warnings
+    }
+
+    /// Two dwells at one pose with a broken stream between them were one.
+    fn split(&self, before: &Dwell, after: &Dwell) -> Option<Warning> {
+        let time_ns = &self.samples.joints.time_ns;
+        let of = |t: i64| {
+            let row = time_ns.partition_point(|s| *s < t);
+            self.encoders.stretches.iter().position(|s| s.contains(&row))
+        };
+        let pairs = before.joint_rad.iter().zip(&after.joint_rad).zip(&self.encoders.enter_rad);
+        let same_pose = pairs.into_iter().all(|((a, b), tolerance)| (a - b).abs() <= 2.0 * tolerance);
+        (same_pose && of(before.end_ns) != of(after.start_ns)).then(|| {
+            let message = format!(
+                "one pause was split by a gap of {:.2} s in the joint stream; it counts as two dwells, and where \
+                 the second was reached from is unknown",
+                seconds_between(before.end_ns, after.start_ns)
+            );
+            Warning::new(Severity::Notice, Stage::Dwell, "dwell-split-by-gap", after.id.to_string(), message)
+        })
+    }
+
+    /// Why there is no dwell, and which setting would find some: tried, not guessed.
+    fn why_none(&self, found: &Pauses) -> String {
+        let config = self.config;
+        let longest_s = found.too_short_s.iter().copied().fold(0.0, f64::max);
+        if longest_s >= 0.5 * config.min_duration_s {
+            return format!(
+                "no dwells found: the arm stands still {} times, but never longer than {longest_s:.3} s; lower \
+                 dwell.min_duration_s (now {} s)",
+                found.too_short_s.len(),
+                config.min_duration_s
+            );
+        }
+        if config.use_tip && self.tip.is_some() {
+            let without_tip = pauses(self.encoders, None, config).rows.len();
+            if without_tip > 0 {
+                return format!(
+                    "no dwells found: the joints stand still {without_tip} times, but the tip stream does not; \
+                     check the clock alignment, or set dwell.use_tip = false"
+                );
+            }
+        }
+        let mut joint_floor_deg = config.joint_floor_deg.max(1e-3);
+        while joint_floor_deg < LARGEST_FLOOR_DEG {
+            joint_floor_deg *= 2.0;
+            let looser = DwellConfig { joint_floor_deg, ..config.clone() };
+            let would = pauses(&Encoders::of(&self.samples.joints, &looser), None, &looser).rows.len();
+            if would > 0 {
+                return format!(
+                    "no dwells found: the joints never rest for {} s; if they are meant to, \
+                     dwell.joint_floor_deg = {joint_floor_deg} (now {}) would find {would}",
+                    config.min_duration_s, config.joint_floor_deg
+                );
+            }
+        }
+        format!(
+            "no dwells found: the arm moves all the time, or no stretch of {} s is unbroken",
+            config.min_duration_s
+        )
+    }
+}
+
+/// The first few of a list of dwells, in words.
+fn list(dwells: &[usize]) -> String {
+    let shown: Vec<String> = dwells.iter().take(8).map(|d| d.to_string()).collect();
+    let more = if dwells.len() > 8 { ", ..." } else { "" };
+    format!("dwell {}{more}", shown.join(", "))
+}
+
+#[cfg(test)]
+#[path = "detect_tests.rs"]
+mod tests;

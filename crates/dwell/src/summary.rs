@@ -1,0 +1,195 @@
+//! What a pause is worth: means, spreads, standard errors, the tip, temperature and effort.
+
+use armcal_core::robust::median;
+use armcal_core::{JointSamples, PoseSamples, ScalarSamples, TipMeasurement};
+use nalgebra::{Matrix3, Matrix4, SymmetricEigen, UnitQuaternion, Vector3, Vector4};
+use std::ops::Range;
+
+use crate::DwellConfig;
+use crate::series::seconds_between;
+use crate::stats::{HUBER_K, Mean, effective_samples, huber_mean};
+
+/// Median length of a standard normal vector in three dimensions.
+const MEDIAN_NORM_3: f64 = 1.538_172;
+
+/// Fewest frames that make a tip measurement.
+const MIN_TIP_FRAMES: usize = 3;
+
+/// Means of all joints over the rows of a pause.
+pub(crate) fn joint_means(joints: &JointSamples, rows: &Range<usize>, step_rad: &[f64]) -> Vec<Mean> {
+    let columns = joints.joint_rad.iter().zip(step_rad);
+    columns.filter_map(|(column, step)| Mean::of(&column[rows.clone()], *step)).collect()
+}
+
+/// Independent readings: the median over the joints whose readings vary; 1 when none does, because then
+/// all readings share one quantisation error.
+pub(crate) fn effective_of(means: &[Mean]) -> f64 {
+    let counts: Vec<f64> = means.iter().filter_map(|m| m.effective).collect();
+    if counts.is_empty() { 1.0 } else { median(&counts) }
+}
+
+/// Mean effort of each joint [N m]; none where any joint has no finite reading.
+pub(crate) fn effort_means(joints: &JointSamples, rows: &Range<usize>) -> Option<Vec<f64>> {
+    let columns = joints.effort_nm.as_ref()?.iter();
+    columns
+        .map(|column| {
+            let finite: Vec<f64> = column[rows.clone()].iter().copied().filter(|v| v.is_finite()).collect();
+            huber_mean(&finite, 0.0)
+        })
+        .collect()
+}
+
+/// Temperature of a pause: the mean of its readings, else the neighbours within `max_age_s` interpolated.
+pub(crate) fn temperature(stream: &ScalarSamples, start_ns: i64, end_ns: i64, max_age_s: f64) -> Option<f64> {
+    let rows = stream.time_ns.len().min(stream.value.len());
+    let (time_ns, value) = (&stream.time_ns[..rows], &stream.value[..rows]);
+    let first = time_ns.partition_point(|t| *t < start_ns);
+    let end = time_ns.partition_point(|t| *t <= end_ns).max(first);
+    let within: Vec<f64> = value[first..end].iter().copied().filter(|v| v.is_finite()).collect();
+    if let Some(mean) = huber_mean(&within, 0.0) {
+        return Some(mean);
+    }
+    let before = (0..first).rev().find(|&i| value[i].is_finite());
+    let after = (end..rows).find(|&i| value[i].is_finite());
+    let before = before.map(|i| (seconds_between(time_ns[i], start_ns), value[i]));
+    let after = after.map(|i| (seconds_between(end_ns, time_ns[i]), value[i]));
+    match (before.filter(|b| b.0 <= max_age_s), after.filter(|a| a.0 <= max_age_s)) {
+        (Some((b_s, b)), Some((a_s, a))) => Some(b + (a - b) * b_s / (b_s + a_s)),
+        (one, other) => one.or(other).map(|(_, value)| value),
+    }
+}
+
+/// The tip over the rows `frames`; none where it was seen fewer than three times.
+pub(crate) fn tip_measurement(
+    samples: &PoseSamples,
+    frames: Range<usize>,
+    config: &DwellConfig,
+) -> Option<TipMeasurement> {
+    let floor_m = config.tip_sigma_floor_mm * 1e-3;
+    let floor_rad = config.orientation_sigma_floor_deg.to_radians();
+    pose_mean(samples, frames, floor_m, floor_rad)
+}
+
+/// Robust mean pose with the covariance of that mean, never below the floors.
+pub(crate) fn pose_mean(
+    samples: &PoseSamples,
+    frames: Range<usize>,
+    floor_m: f64,
+    floor_rad: f64,
+) -> Option<TipMeasurement> {
+    let used: Vec<usize> = frames.filter(|&i| samples.position_m[i].iter().all(|v| v.is_finite())).collect();
+    if used.len() < MIN_TIP_FRAMES {
+        return None;
+    }
+    let positions_m: Vec<Vector3<f64>> = used.iter().map(|&i| samples.position_m[i]).collect();
+    let cloud = Cloud::of(&positions_m)?;
+    let covariance_m2 = at_least(cloud.covariance_of_mean(), floor_m * floor_m)?;
+    let turned: Option<(UnitQuaternion<f64>, f64)> = samples
+        .orientation
+        .as_ref()
+        .and_then(|o| orientation_mean(&used.iter().map(|&i| o[i]).collect::<Vec<_>>()));
+    covariance_m2.iter().all(|v| v.is_finite()).then(|| TipMeasurement {
+        position_m: cloud.centre,
+        covariance_m2,
+        orientation: turned.map(|(mean, _)| mean),
+        orientation_sigma_rad: turned.map_or(f64::INFINITY, |(_, sigma)| sigma.max(floor_rad)),
+        samples: used.len(),
+        effective_samples: cloud.effective,
+    })
+}
+
+/// A covariance with no direction better known than the floor.
+fn at_least(covariance: Matrix3<f64>, floor: f64) -> Option<Matrix3<f64>> {
+    let mut eigen = SymmetricEigen::try_new(covariance, f64::EPSILON, 500)?;
+    if eigen.eigenvalues.iter().all(|v| *v >= floor) {
+        return Some(covariance);
+    }
+    eigen.eigenvalues.apply(|v| *v = v.max(floor));
+    let raised = eigen.recompose();
+    Some(0.5 * (raised + raised.transpose()))
+}
+
+/// Markley's mean of unit quaternions (J. Guidance 30, 2007, eq. 12), reweighted once against outliers, and
+/// its standard error per axis [rad], autocorrelation taken into account.
+pub(crate) fn orientation_mean(orientations: &[UnitQuaternion<f64>]) -> Option<(UnitQuaternion<f64>, f64)> {
+    let finite: Vec<UnitQuaternion<f64>> =
+        orientations.iter().copied().filter(|q| q.coords.iter().all(|v| v.is_finite())).collect();
+    let first = markley(&finite, |_| 1.0)?;
+    let angles: Vec<f64> = finite.iter().map(|q| q.angle_to(&first)).collect();
+    let limit = HUBER_K * median(&angles) / MEDIAN_NORM_3 * 3f64.sqrt();
+    let mean = markley(&finite, |i| if angles[i] > limit && limit > 0.0 { limit / angles[i] } else { 1.0 })?;
+    let turns: Vec<Vector3<f64>> = finite.iter().map(|q| (mean.inverse() * q).scaled_axis()).collect();
+    let cloud = Cloud::of(&turns)?;
+    Some((mean, (cloud.covariance_of_mean().trace() / 3.0).sqrt()))
+}
+
+fn markley(
+    orientations: &[UnitQuaternion<f64>],
+    weight: impl Fn(usize) -> f64,
+) -> Option<UnitQuaternion<f64>> {
+    if orientations.is_empty() {
+        return None;
+    }
+    let sum = orientations.iter().enumerate().fold(Matrix4::zeros(), |sum: Matrix4<f64>, (i, q)| {
+        sum + weight(i) * q.coords * q.coords.transpose()
+    });
+    let eigen = SymmetricEigen::try_new(sum, f64::EPSILON, 500)?;
+    let largest = eigen.eigenvalues.imax();
+    let axis: Vector4<f64> = eigen.eigenvectors.column(largest).into();
+    // The sign of a quaternion means nothing: keep that of the first, so that outputs do not flicker.
+    let sign = if axis.dot(&orientations[0].coords) < 0.0 { -1.0 } else { 1.0 };
+    Some(UnitQuaternion::from_quaternion(nalgebra::Quaternion::from_vector(sign * axis)))
+}
+
+/// A point cloud in time: robust centre, covariance of the influence of one point on it, effective count.
+struct Cloud {
+    centre: Vector3<f64>,
+    influence: Matrix3<f64>,
+    effective: f64,
+}
+
+impl Cloud {
+    /// Weights are Huber's on the distance from the centre, so that the result turns with the axes.
+    fn of(points: &[Vector3<f64>]) -> Option<Cloud> {
+        let axis = |k: usize| points.iter().map(|p| p[k]).collect::<Vec<f64>>();
+        let mut centre = Vector3::from_fn(|k, _| median(&axis(k)));
+        let scale = |centre: &Vector3<f64>| {
+            median(&points.iter().map(|p| (p - centre).norm()).collect::<Vec<_>>()) / MEDIAN_NORM_3
+        };
+        // 1.345 sigma cuts 18 % of a normal cloud in one dimension; sqrt(3) more does about that in three.
+        let limit = HUBER_K * 3f64.sqrt() * scale(&centre);
+        let weight = |p: &Vector3<f64>, centre: &Vector3<f64>| {
+            let distance = (p - centre).norm();
+            if distance > limit && limit > 0.0 { limit / distance } else { 1.0 }
+        };
+        for _ in 0..20 {
+            let (sum, total) = points.iter().fold((Vector3::zeros(), 0.0), |(sum, total), p| {
+                let w = weight(p, &centre);
+                (sum + w * (p - centre), total + w)
+            });
+            centre += sum / total;
+        }
+        let weights: Vec<f64> = points.iter().map(|p| weight(p, &centre)).collect();
+        let clipped: Vec<Vector3<f64>> =
+            points.iter().zip(&weights).map(|(p, w)| (p - centre) * *w).collect();
+        let n = points.len() as f64;
+        let square = clipped.iter().fold(Matrix3::zeros(), |sum, d| sum + d * d.transpose()) / n;
+        // Variance of an M-estimate, E[psi psi'] / E[psi']^2 (Huber 1981, eq. 3.2.13): a shrunk point still
+        // moves along the two directions across its own.
+        let slope = weights.iter().map(|w| if *w < 1.0 { 2.0 / 3.0 * w } else { 1.0 }).sum::<f64>() / n;
+        let influence = square / (slope * slope);
+        let counts: Vec<f64> = (0..3)
+            .map(|k| clipped.iter().map(|d| d[k]).collect::<Vec<f64>>())
+            .filter(|column| column.iter().any(|v| *v != 0.0))
+            .map(|column| effective_samples(&column))
+            .collect();
+        let effective = if counts.is_empty() { 1.0 } else { median(&counts) };
+        let finite = centre.iter().chain(influence.iter()).all(|v| v.is_finite());
+        finite.then_some(Cloud { centre, influence, effective })
+    }
+
+    fn covariance_of_mean(&self) -> Matrix3<f64> {
+        // The centre is estimated from the same points, which takes 1 / n_eff of the variance away.
+        self.influence / (self.effective - 1.0).max(0.5)
+    }
+}

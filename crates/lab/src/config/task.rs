@@ -1,0 +1,208 @@
+//! What the arm does, and how the hand that seats it behaves.
+
+use super::{not_negative, positive, range, share, value};
+use crate::LabError;
+use serde::{Deserialize, Serialize};
+
+/// The task of every recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TaskConfig {
+    /// Passes over the cavities. Default: one forward, one backward.
+    pub passes: Vec<PassConfig>,
+    /// Chance that a cavity of a pass is left out. Default 0.02.
+    pub skip_share: f64,
+    /// Chance that a cavity of a pass changes places with the next. Default 0.03.
+    pub swap_share: f64,
+    /// Height of the waypoint above a cavity, where the planned motion ends [mm]. The nominal arm is tens of
+    /// millimetres off, so it must be more than that. Default 60.
+    pub transit_height_mm: f64,
+    /// Speed along planned paths near the board [m/s]. Default 0.15.
+    pub speed_m_s: f64,
+    /// Pause at home at both ends of a recording [s]. Default 2.
+    pub home_s: f64,
+    /// Free-space poses.
+    pub free: FreeConfig,
+    /// A fast path through waypoints without stopping.
+    pub sweep: SweepConfig,
+    /// Rate of the set-points [Hz]. Default 100.
+    pub set_point_hz: f64,
+}
+
+/// One pass over the cavities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PassConfig {
+    /// Order of the visits.
+    pub order: Order,
+    /// How many of the cavities are visited, 0 to 1. Default 1.
+    #[serde(default = "all")]
+    pub share: f64,
+}
+
+/// Order of the visits of a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Order {
+    /// As the board file lists the cavities.
+    Forward,
+    /// The other way round.
+    Backward,
+    /// Shuffled.
+    Random,
+}
+
+/// Free-space poses, held by the motors and seen by the cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FreeConfig {
+    /// Poses a recording. Default 24.
+    pub poses: usize,
+    /// Range of each joint [deg]: `[smallest, largest]`.
+    pub range_deg: Vec<[f64; 2]>,
+    /// How long a pose is held [s]. Default 1.6 to 2.2; settling, about half a second, is part of it.
+    pub hold_s: [f64; 2],
+    /// Speed along the paths between them [m/s]. Default 0.4.
+    pub speed_m_s: f64,
+}
+
+/// A path through random waypoints above the board, passed with non-zero velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SweepConfig {
+    /// Waypoints; 0 for none. Default 6, as the paper's second trajectory.
+    pub points: usize,
+    /// Speed along it [m/s]. Default 0.3.
+    pub speed_m_s: f64,
+}
+
+/// The person who seats the tip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HandConfig {
+    /// Height above the cavity to which the hand first brings the tip [mm]. Default 15 to 25.
+    pub hover_height_mm: [f64; 2],
+    /// Chance of a pause there, before and after seating each. Default 0.15.
+    pub hover_share: f64,
+    /// Length of that pause [s]. Default 0.6 to 1.0.
+    pub hover_s: [f64; 2],
+    /// Distance from which the tip slides over the board into the cavity [mm]. Default 6 to 14: it decides from
+    /// which side each joint arrives.
+    pub slide_mm: [f64; 2],
+    /// Spread of the direction it slides from about the direction of travel, 1 sigma [deg]. Default 60.
+    pub slide_spread_deg: f64,
+    /// Time the hand takes for each of its movements [s]. Default 0.5 to 0.8.
+    pub move_s: [f64; 2],
+    /// How long the tip rattles in the cavity before it rests [s]. Default 0.2 to 0.5.
+    pub rattle_s: [f64; 2],
+    /// How long it rests in the cavity [s]. Default 0.8 to 2.
+    pub seated_s: [f64; 2],
+    /// Tremor of the guided tip, 1 sigma per axis [mm]. Default 0.4.
+    pub tremor_mm: f64,
+    /// How far it rattles in the cavity at first, 1 sigma per axis [mm]. Default 0.1.
+    pub rattle_mm: f64,
+    /// Tremor left while the tip rests in the cavity, 1 sigma per axis [mm]. Default 0.01.
+    pub seated_tremor_mm: f64,
+    /// Correlation time of the tremor [s]. Default 0.03.
+    pub tremor_s: f64,
+}
+
+impl Default for TaskConfig {
+    fn default() -> TaskConfig {
+        let pass = |order| PassConfig { order, share: 1.0 };
+        TaskConfig {
+            passes: vec![pass(Order::Forward), pass(Order::Backward)],
+            skip_share: 0.02,
+            swap_share: 0.03,
+            transit_height_mm: 60.0,
+            speed_m_s: 0.15,
+            home_s: 2.0,
+            free: FreeConfig::default(),
+            sweep: SweepConfig::default(),
+            set_point_hz: 100.0,
+        }
+    }
+}
+
+impl Default for FreeConfig {
+    fn default() -> FreeConfig {
+        FreeConfig {
+            poses: 24,
+            range_deg: vec![[-60.0, 60.0], [-75.0, 20.0], [-60.0, 50.0]],
+            hold_s: [1.6, 2.2],
+            speed_m_s: 0.4,
+        }
+    }
+}
+
+impl Default for SweepConfig {
+    fn default() -> SweepConfig {
+        SweepConfig { points: 6, speed_m_s: 0.3 }
+    }
+}
+
+impl Default for HandConfig {
+    fn default() -> HandConfig {
+        HandConfig {
+            hover_height_mm: [15.0, 25.0],
+            hover_share: 0.15,
+            hover_s: [0.6, 1.0],
+            slide_mm: [6.0, 14.0],
+            slide_spread_deg: 60.0,
+            move_s: [0.5, 0.8],
+            rattle_s: [0.2, 0.5],
+            seated_s: [0.8, 2.0],
+            tremor_mm: 0.4,
+            rattle_mm: 0.1,
+            seated_tremor_mm: 0.01,
+            tremor_s: 0.03,
+        }
+    }
+}
+
+impl TaskConfig {
+    pub(super) fn check(&self) -> Result<(), LabError> {
+        share("task.skip_share", self.skip_share)?;
+        share("task.swap_share", self.swap_share)?;
+        self.passes.iter().try_for_each(|pass| share("task.passes.share", pass.share))?;
+        not_negative("task.transit_height_mm", self.transit_height_mm)?;
+        positive("task.speed_m_s", self.speed_m_s)?;
+        not_negative("task.home_s", self.home_s)?;
+        positive("task.free.speed_m_s", self.free.speed_m_s)?;
+        pause("task.free.hold_s", self.free.hold_s)?;
+        self.free.range_deg.iter().try_for_each(|r| range("task.free.range_deg", *r))?;
+        positive("task.sweep.speed_m_s", self.sweep.speed_m_s)?;
+        if !(1.0..=500.0).contains(&self.set_point_hz) {
+            return Err(value("task.set_point_hz", format!("must lie in 1..500, is {}", self.set_point_hz)));
+        }
+        Ok(())
+    }
+}
+
+impl HandConfig {
+    pub(super) fn check(&self) -> Result<(), LabError> {
+        range("hand.hover_height_mm", self.hover_height_mm)?;
+        share("hand.hover_share", self.hover_share)?;
+        pause("hand.hover_s", self.hover_s)?;
+        range("hand.slide_mm", self.slide_mm)?;
+        not_negative("hand.slide_spread_deg", self.slide_spread_deg)?;
+        pause("hand.move_s", self.move_s)?;
+        pause("hand.rattle_s", self.rattle_s)?;
+        pause("hand.seated_s", self.seated_s)?;
+        not_negative("hand.tremor_mm", self.tremor_mm)?;
+        not_negative("hand.rattle_mm", self.rattle_mm)?;
+        not_negative("hand.seated_tremor_mm", self.seated_tremor_mm)?;
+        positive("hand.tremor_s", self.tremor_s)
+    }
+}
+
+/// A range of durations: ordered, not negative, and short enough that a slip of the pen does not fill memory.
+fn pause(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
+    range(key, [low, high])?;
+    not_negative(key, low)?;
+    if high > 3600.0 { Err(value(key, format!("{high} s is more than an hour"))) } else { Ok(()) }
+}
+
+fn all() -> f64 {
+    1.0
+}

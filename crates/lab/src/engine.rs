@@ -1,0 +1,318 @@
+//! The rig in motion: motors drive planned paths, a hand seats the tip, every step is recorded.
+
+use crate::LabError;
+use crate::arm::AxisArm;
+use crate::config::LabConfig;
+use crate::hand::{Tremor, minimum_jerk};
+use crate::mechanism::{Body, Mechanism, Moment};
+use crate::random::{Purpose, Stream};
+use crate::rig::{BoardPlace, Rig};
+use crate::servo::{Servo, counted};
+use crate::spline::Path;
+use crate::trace::{Rest, STEP_S, Trace};
+use armcal_core::Pose;
+use nalgebra::{Point3, Vector3};
+
+/// Shortest duration of one section of a planned path [s].
+const SHORTEST_SECTION_S: f64 = 0.4;
+
+/// Waypoints between two poses far apart, so that a Cartesian path follows the arm's natural arc.
+const WAYPOINTS_BETWEEN_POSES: usize = 4;
+
+/// One recording under way.
+pub struct Engine<'a> {
+    config: &'a LabConfig,
+    rig: &'a Rig,
+    place: &'a BoardPlace,
+    recording: usize,
+    mechanisms: Vec<Box<dyn Mechanism>>,
+    servo: Servo,
+    tremor: Tremor,
+    driven_by_hand: bool,
+    link_rad: Vec<f64>,
+    reading_rad: Vec<f64>,
+    set_point_rad: Vec<f64>,
+    gravity_nm: Vec<f64>,
+    arm: AxisArm,
+    world_from_base: Pose,
+    world_from_board: Pose,
+    trace: Trace,
+    rests: Vec<Rest>,
+}
+
+impl<'a> Engine<'a> {
+    /// The arm waits at home, held by its motors.
+    pub fn new(
+        config: &'a LabConfig,
+        rig: &'a Rig,
+        place: &'a BoardPlace,
+        recording: usize,
+        mechanisms: Vec<Box<dyn Mechanism>>,
+    ) -> Engine<'a> {
+        let home: Vec<f64> = config.arm.home_deg.iter().map(|deg| deg.to_radians()).collect();
+        let hand = Stream::new(config.seed, Purpose::Hand, recording);
+        let mut engine = Engine {
+            config,
+            rig,
+            place,
+            recording,
+            mechanisms,
+            servo: Servo::new(&config.arm.drives, &home),
+            tremor: Tremor::new(hand, config.hand.tremor_s, STEP_S),
+            driven_by_hand: true,
+            link_rad: home.clone(),
+            reading_rad: home.clone(),
+            set_point_rad: home.clone(),
+            gravity_nm: vec![0.0; home.len()],
+            arm: rig.built.clone(),
+            world_from_base: rig.world_from_base,
+            world_from_board: place.world_from_board,
+            trace: Trace::default(),
+            rests: Vec::new(),
+        };
+        engine.motors_turn_links();
+        engine.record();
+        engine.motors_take_over();
+        engine
+    }
+
+    /// What happened.
+    pub fn finish(self) -> (Trace, Vec<Rest>, Vec<Box<dyn Mechanism>>) {
+        (self.trace, self.rests, self.mechanisms)
+    }
+
+    /// Drives the tip of the nominal arm through waypoints in the base frame [m] and stops at the last.
+    pub fn drive_through(
+        &mut self,
+        waypoints_m: &[Vector3<f64>],
+        speed_m_s: f64,
+        what: &str,
+    ) -> Result<(), LabError> {
+        self.motors_take_over();
+        let mut points = vec![self.rig.nominal.tip(&self.set_point_rad)];
+        points.extend_from_slice(waypoints_m);
+        let path = Path::through(&points, speed_m_s, SHORTEST_SECTION_S);
+        let steps = (path.duration_s() / STEP_S).ceil() as usize;
+        let steps_a_set_point = (1.0 / (self.config.task.set_point_hz * STEP_S)).round().max(1.0) as usize;
+        let mut planned_rad = self.set_point_rad.clone();
+        for step in 0..=steps {
+            if step % steps_a_set_point == 0 || step == steps {
+                let wanted = path.position(step as f64 * STEP_S).unwrap_or(points[0]);
+                planned_rad = self
+                    .rig
+                    .nominal
+                    .solve(&wanted, &planned_rad)
+                    .map_err(|miss| self.unreachable("nominal", what, miss.short_by_m))?;
+                self.set_point_rad = planned_rad.iter().map(|q| self.counted(*q)).collect();
+            }
+            self.motor_step();
+        }
+        Ok(())
+    }
+
+    /// Drives to joint angles [rad], along the arc the joints would take.
+    pub fn drive_to_pose(&mut self, joint_rad: &[f64], speed_m_s: f64, what: &str) -> Result<(), LabError> {
+        self.motors_take_over();
+        let from = self.set_point_rad.clone();
+        let waypoints: Vec<Vector3<f64>> = (1..=WAYPOINTS_BETWEEN_POSES)
+            .map(|i| i as f64 / WAYPOINTS_BETWEEN_POSES as f64)
+            .map(|share| from.iter().zip(joint_rad).map(|(a, b)| a + (b - a) * share).collect::<Vec<_>>())
+            .map(|pose| self.rig.nominal.tip(&pose))
+            .collect();
+        self.drive_through(&waypoints, speed_m_s, what)
+    }
+
+    /// Holds still under motor control for `duration_s`, and notes the rest if it is one.
+    pub fn hold(&mut self, duration_s: f64, rest: Option<Rest>) {
+        self.motors_take_over();
+        let first = self.trace.len();
+        for _ in 0..steps(duration_s) {
+            self.motor_step();
+        }
+        self.note(rest, first);
+    }
+
+    /// Leads the tip by hand to a point on the board [m, board frame], tremor growing or fading on the way from
+    /// one size to the other [m].
+    pub fn guide(
+        &mut self,
+        to_board_m: Vector3<f64>,
+        duration_s: f64,
+        tremor_m: [f64; 2],
+        what: &str,
+    ) -> Result<(), LabError> {
+        self.driven_by_hand = true;
+        let world_from_tip = self.world_from_base * Point3::from(self.arm.tip(&self.link_rad));
+        let from_board_m = self.world_from_board.inverse_transform_point(&world_from_tip).coords;
+        let steps = steps(duration_s).max(1);
+        for step in 1..=steps {
+            let share = step as f64 / steps as f64;
+            let way = from_board_m.lerp(&to_board_m, minimum_jerk(share));
+            // The tip is where the hand took it over: its tremor cannot begin with a jump.
+            let grip = (step as f64 * STEP_S / 0.05).min(1.0);
+            let size = tremor_m[0] + (tremor_m[1] - tremor_m[0]) * share;
+            let shake = self.tremor.sample() * (size * grip);
+            self.hand_step(&(way + shake), what)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the tip rest at a point on the board [m, board frame], and notes the rest.
+    pub fn rest_by_hand(
+        &mut self,
+        at_board_m: Vector3<f64>,
+        duration_s: f64,
+        tremor_m: f64,
+        rest: Rest,
+        what: &str,
+    ) -> Result<(), LabError> {
+        let first = self.trace.len();
+        for _ in 0..steps(duration_s).max(1) {
+            let shake = self.tremor.sample() * tremor_m;
+            self.hand_step(&(at_board_m + shake), what)?;
+        }
+        self.note(Some(rest), first);
+        Ok(())
+    }
+
+    fn note(&mut self, rest: Option<Rest>, first: usize) {
+        let last = self.trace.len() - 1;
+        self.rests.extend(rest.filter(|_| last > first).map(|rest| Rest { first, last, ..rest }));
+    }
+
+    fn motors_take_over(&mut self) {
+        if self.driven_by_hand {
+            self.driven_by_hand = false;
+            self.set_point_rad = self.reading_rad.iter().map(|q| self.counted(*q)).collect();
+            self.servo.take_over(&self.set_point_rad, &self.gravity_nm);
+        }
+    }
+
+    fn motor_step(&mut self) {
+        let reading: Vec<f64> = self.reading_rad.iter().map(|q| self.counted(*q)).collect();
+        self.servo.step(&self.set_point_rad, &reading, &self.gravity_nm, STEP_S);
+        self.motors_turn_links();
+        self.record();
+    }
+
+    fn motors_turn_links(&mut self) {
+        let mut link = self.servo.angle_rad.clone();
+        let mut mechanisms = std::mem::take(&mut self.mechanisms);
+        mechanisms.iter_mut().for_each(|m| m.motor_to_link(&self.moment(), &mut link));
+        self.mechanisms = mechanisms;
+        self.link_rad = link;
+    }
+
+    fn hand_step(&mut self, to_board_m: &Vector3<f64>, what: &str) -> Result<(), LabError> {
+        let world = self.world_from_board * Point3::from(*to_board_m);
+        let target = self.world_from_base.inverse_transform_point(&world).coords;
+        self.link_rad = self
+            .arm
+            .solve(&target, &self.link_rad)
+            .map_err(|miss| self.unreachable("true", what, miss.short_by_m))?;
+        let mut motor = self.link_rad.clone();
+        let mut mechanisms = std::mem::take(&mut self.mechanisms);
+        mechanisms.iter_mut().rev().for_each(|m| m.link_to_motor(&self.moment(), &mut motor));
+        self.mechanisms = mechanisms;
+        self.servo.follow(&motor, STEP_S);
+        self.record();
+        self.set_point_rad = self.reading_rad.clone();
+        Ok(())
+    }
+
+    fn moment(&self) -> Moment<'_> {
+        let time_s = self.trace.len() as f64 * STEP_S;
+        let session_s = time_s + self.recording as f64 * self.config.interval_s;
+        Moment {
+            time_s,
+            session_s,
+            recording: self.recording,
+            temperature_c: self.config.temperature.at(session_s),
+            load_kg: self.config.recordings[self.recording].load_kg,
+            motor_rad: &self.servo.angle_rad,
+            link_rad: &self.link_rad,
+            speed_rad_s: &self.servo.speed_rad_s,
+            gravity_nm: &self.gravity_nm,
+        }
+    }
+
+    /// Brings frames, geometry, gravity and readings up to date and adds a row to the trace.
+    fn record(&mut self) {
+        let load_kg = self.config.arm.tip_kg + self.config.recordings[self.recording].load_kg;
+        let masses: Vec<f64> = self.config.arm.drives.iter().map(|drive| drive.link_kg).collect();
+        self.gravity_nm = self.arm.gravity_torque(&self.link_rad, &self.rig.gravity_m_s2, &masses, load_kg);
+        let mut mechanisms = std::mem::take(&mut self.mechanisms);
+        if !mechanisms.is_empty() {
+            let (mut arm, mut base) = (self.rig.built.clone(), self.rig.world_from_base);
+            let mut board = self.place.world_from_board;
+            for mechanism in &mechanisms {
+                mechanism.reshape_arm(&self.moment(), &mut arm);
+                mechanism.move_base(&self.moment(), &mut base);
+                mechanism.move_board(&self.moment(), &mut board);
+            }
+            (self.arm, self.world_from_base, self.world_from_board) = (arm, base, board);
+        }
+        let mut reading = self.servo.angle_rad.clone();
+        let tip = self.world_from_base * self.arm.tip_pose(&self.link_rad);
+        let mut seen = self.bodies(&tip);
+        for mechanism in &mut mechanisms {
+            mechanism.distort_encoder(&self.moment(), &mut reading);
+            for (body, pose) in [Body::Tip, Body::Table, Body::Base].into_iter().zip(&mut seen) {
+                mechanism.distort_camera(&self.moment(), body, pose);
+            }
+        }
+        self.mechanisms = mechanisms;
+        self.reading_rad = reading;
+        self.push(tip, seen);
+    }
+
+    /// Where the marker sets of tip, table and base are in the world.
+    fn bodies(&self, world_from_tip: &Pose) -> [Pose; 3] {
+        let vicon = &self.config.vicon;
+        let offset = Vector3::from(vicon.tip_offset_mm) * 1e-3;
+        let table = match vicon.table_markers {
+            crate::config::TableMarkers::Board => self.world_from_board,
+            crate::config::TableMarkers::Frame => {
+                self.world_from_board * self.place.world_from_board.inverse() * self.rig.world_from_table
+            }
+        };
+        [
+            world_from_tip * nalgebra::Translation3::from(offset),
+            table,
+            self.world_from_base * self.rig.base_from_plate,
+        ]
+    }
+
+    fn push(&mut self, tip: Pose, [seen_tip, seen_table, seen_base]: [Pose; 3]) {
+        let temperature_c = self.moment().temperature_c;
+        let trace = &mut self.trace;
+        trace.temperature_c.push(temperature_c);
+        trace.link_rad.push(self.link_rad.clone());
+        trace.motor_rad.push(self.servo.angle_rad.clone());
+        trace.reading_rad.push(self.reading_rad.clone());
+        trace.set_point_rad.push(self.set_point_rad.clone());
+        trace.world_from_tip.push(tip);
+        trace.world_from_base.push(self.world_from_base);
+        trace.world_from_board.push(self.world_from_board);
+        trace.seen_tip.push(seen_tip);
+        trace.seen_table.push(seen_table);
+        trace.seen_base.push(seen_base);
+    }
+
+    fn counted(&self, angle_rad: f64) -> f64 {
+        counted(angle_rad, self.config.joints.count_rad())
+    }
+
+    fn unreachable(&self, arm: &'static str, what: &str, short_by_m: f64) -> LabError {
+        LabError::Unreachable {
+            recording: self.config.recordings[self.recording].name.clone(),
+            arm,
+            what: what.to_owned(),
+            short_by_mm: short_by_m * 1e3,
+        }
+    }
+}
+
+fn steps(duration_s: f64) -> usize {
+    (duration_s / STEP_S).round() as usize
+}

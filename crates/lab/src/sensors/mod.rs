@@ -1,0 +1,44 @@
+//! What the recorder gets to see of a session: encoders, cameras, a thermometer, each with its clock.
+
+mod clock;
+mod encoder;
+mod message;
+mod temperature;
+mod transport;
+mod vicon;
+
+pub use clock::SensorClock;
+pub use message::{Channel, Kind, Message, Payload};
+pub use vicon::{Occlusion, OcclusionKind};
+
+use crate::config::LabConfig;
+use crate::mechanism::Body;
+use crate::session::Session;
+
+/// Everything that reached the recorder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// The channels.
+    pub channels: Vec<Channel>,
+    /// The messages, in the order of their log times.
+    pub messages: Vec<Message>,
+    /// The sensor's clock.
+    pub clock: SensorClock,
+    /// When which subject was occluded.
+    pub occlusions: Vec<Occlusion>,
+}
+
+/// Records a session.
+pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
+    let clock = SensorClock::draw(config, recording);
+    let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
+    encoder::joint_states(config, recording, session, &mut log);
+    for body in [Body::Tip, Body::Table, Body::Base] {
+        vicon::subject(config, recording, session, body, &mut log);
+    }
+    temperature::readings(config, recording, session, &mut log);
+    encoder::set_points(config, recording, session, &mut log);
+    // Stable: messages logged in the same nanosecond keep the order of their channels.
+    log.messages.sort_by_key(|message| message.log_ns);
+    log
+}

@@ -1,0 +1,153 @@
+//! One recording from start to end, told in order: home, a fast sweep, the cavities, free poses, home.
+
+use crate::LabError;
+use crate::config::LabConfig;
+use crate::engine::Engine;
+use crate::mechanism::Mechanism;
+use crate::plan::{Plan, Visit};
+use crate::random::{Purpose, Stream};
+use crate::rig::{BoardPlace, Rig};
+use crate::trace::{Rest, RestKind, Trace};
+use nalgebra::{Point3, Vector3};
+
+/// What happened in one recording.
+#[derive(Debug)]
+pub struct Session {
+    /// Where the board was.
+    pub place: BoardPlace,
+    /// Every step.
+    pub trace: Trace,
+    /// Every rest.
+    pub rests: Vec<Rest>,
+    /// What was hidden in the rig, in its final state.
+    pub mechanisms: Vec<Box<dyn Mechanism>>,
+}
+
+impl Session {
+    /// Lets the rig carry out recording `recording`.
+    pub fn perform(
+        config: &LabConfig,
+        rig: &Rig,
+        recording: usize,
+        mechanisms: Vec<Box<dyn Mechanism>>,
+    ) -> Result<Session, LabError> {
+        let place = rig.place_board(config, recording)?;
+        let plan = Plan::draw(config, rig, &place, recording)?;
+        let mut engine = Engine::new(config, rig, &place, recording, mechanisms);
+        let home: Vec<f64> = config.arm.home_deg.iter().map(|deg| deg.to_radians()).collect();
+        let at_home = || Some(rest(RestKind::Free));
+
+        engine.hold(config.task.home_s, at_home());
+        if !plan.sweep_m.is_empty() {
+            engine.drive_through(&plan.sweep_m, config.task.sweep.speed_m_s, "the sweep")?;
+        }
+        Visits::new(config, rig, &place, recording).perform(&mut engine, &plan.visits)?;
+        let mut pauses = Stream::new(config.seed, Purpose::Pauses, 2 * recording + 1);
+        for (i, pose) in plan.free_rad.iter().enumerate() {
+            let speed = config.task.free.speed_m_s;
+            engine.drive_to_pose(pose, speed, &format!("free pose {i}"))?;
+            engine.hold(pauses.uniform(config.task.free.hold_s), Some(rest(RestKind::Free)));
+        }
+        engine.drive_to_pose(&home, config.task.free.speed_m_s, "home")?;
+        engine.hold(config.task.home_s, at_home());
+
+        let (trace, rests, mechanisms) = engine.finish();
+        Ok(Session { place, trace, rests, mechanisms })
+    }
+}
+
+/// The part with the board: hands, cavities, pauses.
+struct Visits<'a> {
+    config: &'a LabConfig,
+    rig: &'a Rig,
+    place: &'a BoardPlace,
+    pauses: Stream,
+    seats: Stream,
+}
+
+impl<'a> Visits<'a> {
+    fn new(config: &'a LabConfig, rig: &'a Rig, place: &'a BoardPlace, recording: usize) -> Visits<'a> {
+        let stream = |purpose, index| Stream::new(config.seed, purpose, index);
+        Visits {
+            config,
+            rig,
+            place,
+            pauses: stream(Purpose::Pauses, 2 * recording),
+            seats: stream(Purpose::Seat, recording),
+        }
+    }
+
+    fn perform(&mut self, engine: &mut Engine<'_>, visits: &[Visit]) -> Result<(), LabError> {
+        let mut travel = Vector3::x();
+        for (i, visit) in visits.iter().enumerate() {
+            let here = self.rig.board.cavities[visit.cavity].drawn_m;
+            if i > 0 {
+                let step = here - self.rig.board.cavities[visits[i - 1].cavity].drawn_m;
+                travel = step.try_normalize(1e-9).unwrap_or(travel);
+            }
+            self.visit(engine, visit, &travel)?;
+        }
+        Ok(())
+    }
+
+    /// One visit: drive above the cavity, guide the tip over it, slide it in, let it rest, lift it out.
+    fn visit(
+        &mut self,
+        engine: &mut Engine<'_>,
+        visit: &Visit,
+        travel: &Vector3<f64>,
+    ) -> Result<(), LabError> {
+        let (hand, task) = (&self.config.hand, &self.config.task);
+        let cavity = &self.rig.board.cavities[visit.cavity];
+        let what = format!("cavity `{}`", cavity.name);
+        let marked =
+            |kind, seat_m| Rest { cavity: Some(visit.cavity), pass: Some(visit.pass), seat_m, ..rest(kind) };
+        let above = cavity.drawn_m + Vector3::z() * (task.transit_height_mm * 1e-3);
+        let waypoint = self.place.base_from_board * Point3::from(above);
+        engine.drive_through(&[waypoint.coords], task.speed_m_s, &what)?;
+
+        let (tremor_m, rattle_m) = (hand.tremor_mm * 1e-3, hand.rattle_mm * 1e-3);
+        let turned_rad = hand.slide_spread_deg.to_radians() * self.pauses.normal();
+        let mut draw = |range| self.pauses.uniform(range);
+        let lift = |height_mm: f64, aside_m: Vector3<f64>| {
+            cavity.true_m + aside_m + Vector3::z() * (height_mm * 1e-3)
+        };
+        let hover = lift(draw(hand.hover_height_mm), -travel * (draw([0.0, 3.0]) * 1e-3));
+        engine.guide(hover, draw(hand.move_s), [tremor_m; 2], &what)?;
+        if draw([0.0, 1.0]) < hand.hover_share {
+            engine.hold(draw(hand.hover_s), Some(marked(RestKind::Hover, None)));
+        }
+
+        let behind = slide_direction(travel, turned_rad);
+        let touch = lift(1.5, behind * (draw(hand.slide_mm) * 1e-3));
+        engine.guide(touch, draw(hand.move_s), [tremor_m; 2], &what)?;
+        let seat_m = self.seats.normal3() * self.rig.board.seat_sigma_m;
+        let seated = cavity.true_m + seat_m;
+        engine.guide(seated, draw(hand.move_s), [tremor_m, rattle_m], &what)?;
+        let still_m = hand.seated_tremor_mm * 1e-3;
+        engine.guide(seated, draw(hand.rattle_s), [rattle_m, still_m], &what)?;
+        engine.rest_by_hand(
+            seated,
+            draw(hand.seated_s),
+            still_m,
+            marked(RestKind::Seated, Some(seat_m)),
+            &what,
+        )?;
+
+        let lifted = lift(draw(hand.hover_height_mm), travel * (draw([0.0, 3.0]) * 1e-3));
+        engine.guide(lifted, draw(hand.move_s), [0.0, tremor_m], &what)?;
+        if draw([0.0, 1.0]) < hand.hover_share {
+            engine.hold(draw(hand.hover_s), Some(marked(RestKind::Hover, None)));
+        }
+        Ok(())
+    }
+}
+
+fn rest(kind: RestKind) -> Rest {
+    Rest { kind, cavity: None, pass: None, seat_m: None, first: 0, last: 0 }
+}
+
+/// Where a slide begins, seen from the cavity: behind it along the direction of travel, turned on the board.
+fn slide_direction(travel: &Vector3<f64>, turned_rad: f64) -> Vector3<f64> {
+    crate::screw::turn(&Vector3::z(), &-Vector3::new(travel.x, travel.y, 0.0), turned_rad)
+}

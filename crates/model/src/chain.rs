@@ -1,0 +1,49 @@
+//! A serial arm: its segments, its joints, its parameters.
+
+use crate::dh_toml::DhTable;
+use crate::segment::Segment;
+use crate::urdf::UrdfJoint;
+use armcal_core::Parameter;
+
+/// A serial arm from base to last link, read from a DH table or a URDF.
+///
+/// Its parameters come first in the parameter vector of a [`crate::Model`], in the order of the segments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    pub(crate) name: String,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) joint_names: Vec<String>,
+    pub(crate) source: Source,
+}
+
+/// What the chain was read from, as far as writing it back needs it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Source {
+    /// A DH table.
+    Dh(DhTable),
+    /// The joints of a URDF from base to tip, fixed ones included.
+    Urdf(Vec<UrdfJoint>),
+}
+
+impl Chain {
+    /// Name of the robot, as its file gives it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The moving joints from base to tip: the order of every joint vector.
+    pub fn joint_names(&self) -> &[String] {
+        &self.joint_names
+    }
+
+    /// The geometric parameters, in the order of the chain.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// Whether the chain came from a URDF and can be written back into one.
+    pub fn is_urdf(&self) -> bool {
+        matches!(self.source, Source::Urdf(_))
+    }
+}

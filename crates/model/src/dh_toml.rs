@@ -1,0 +1,328 @@
+//! DH tables as TOML, read and written back. Millimetres and degrees in the file, SI inside.
+//!
+//! ```toml
+//! name = "two links"
+//! convention = "standard"        # default; or "modified" (Craig)
+//!
+//! [deviation]                    # optional; these are the defaults
+//! bound_mm = 5.0
+//! bound_deg = 2.0
+//! prior_sigma_mm = 4.0
+//! prior_sigma_deg = 1.6
+//!
+//! [[rows]]
+//! name = "joint1"
+//! joint = "revolute"             # default; "prismatic"; "fixed"
+//! theta_deg = 0.0                # the joint value is added to theta (prismatic: to d)
+//! d_mm = { nominal = 76.0, bound = 2.0, prior_sigma = 1.0 }   # own deviation, in the entry's unit
+//! a_mm = { nominal = 0.0, free = false }
+//! alpha_deg = 90.0
+//! beta_deg = 0.0                 # optional: Hayati's Ry(beta) at the end of the row
+//! ```
+
+use crate::chain::Source;
+use crate::deviation::{check_positive, from_display, robot_parameter};
+use crate::segment::{Geometry, Joint, Motion, Segment};
+use crate::{Chain, Deviation, ModelError};
+use armcal_core::{Parameter, Unit};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// The file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DhTable {
+    name: String,
+    #[serde(default)]
+    convention: Convention,
+    #[serde(default)]
+    deviation: Deviation,
+    rows: Vec<Row>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Convention {
+    #[default]
+    Standard,
+    Modified,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum JointKind {
+    #[default]
+    Revolute,
+    Prismatic,
+    Fixed,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    name: String,
+    #[serde(default)]
+    joint: JointKind,
+    theta_deg: Entry,
+    d_mm: Entry,
+    a_mm: Entry,
+    alpha_deg: Entry,
+    beta_deg: Option<Entry>,
+}
+
+/// A number, or a table that says more about it; in the unit of its key.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Entry {
+    nominal: f64,
+    free: bool,
+    bound: Option<f64>,
+    prior_sigma: Option<f64>,
+}
+
+/// One entry of a row with its key, its unit and its part in the name and meaning of the parameter.
+struct Field<'a> {
+    key: &'static str,
+    quantity: &'static str,
+    unit: Unit,
+    meaning: &'static str,
+    entry: &'a Entry,
+}
+
+impl Chain {
+    /// Reads a DH table; `path` is only named in errors.
+    ///
+    /// Every number of the table becomes a parameter `<row>.theta`, `.d`, `.a`, `.alpha`(, `.beta`). Errors
+    /// name the line or the key: malformed TOML, unknown keys, numbers that are not finite, deviations that
+    /// are not positive, rows without or with the same name, no moving joint.
+    pub fn from_dh_toml(text: &str, path: &Path) -> Result<Chain, ModelError> {
+        let table: DhTable = toml::from_str(text)
+            .map_err(|cause| ModelError::DhToml { path: path.to_owned(), cause: Box::new(cause) })?;
+        table.check(path)?;
+        Ok(table.into_chain())
+    }
+
+    /// The DH table with calibrated numbers, in the same format: everything else as it was read.
+    ///
+    /// `values` is a parameter vector that begins with the chain's parameters, such as a model's. Errors
+    /// when the chain came from a URDF or `values` is too short.
+    pub fn to_dh_toml(&self, values: &[f64]) -> Result<String, ModelError> {
+        let Source::Dh(table) = &self.source else {
+            return Err(ModelError::WrongFormat { model: self.name.clone(), format: "DH table" });
+        };
+        if values.len() < self.parameters.len() {
+            return Err(ModelError::ParameterCount { actual: values.len(), expected: self.parameters.len() });
+        }
+        Ok(table.with_values(&self.parameters, values).to_toml())
+    }
+}
+
+impl DhTable {
+    fn check(&self, path: &Path) -> Result<(), ModelError> {
+        self.deviation.check(path)?;
+        let mut names = BTreeSet::new();
+        for (index, row) in self.rows.iter().enumerate() {
+            if row.name.is_empty() {
+                return Err(ModelError::NamelessRow { path: path.to_owned(), index: index + 1 });
+            }
+            if !names.insert(&row.name) {
+                return Err(ModelError::DuplicateRow { path: path.to_owned(), row: row.name.clone() });
+            }
+            for field in row.fields() {
+                let key = format!("{}.{}", row.name, field.key);
+                let value = field.entry.nominal;
+                if !value.is_finite() {
+                    let expected = "a finite number";
+                    return Err(ModelError::BadValue { path: path.to_owned(), key, value, expected });
+                }
+                for (what, value) in [("bound", field.entry.bound), ("prior_sigma", field.entry.prior_sigma)]
+                {
+                    check_positive(path, &format!("{key}.{what}"), value.unwrap_or(1.0))?;
+                }
+            }
+        }
+        if self.rows.iter().all(|row| row.joint == JointKind::Fixed) {
+            return Err(ModelError::NoJoint { path: path.to_owned() });
+        }
+        Ok(())
+    }
+
+    fn into_chain(self) -> Chain {
+        let (mut segments, mut parameters, mut joint_names) = (Vec::new(), Vec::new(), Vec::new());
+        for row in &self.rows {
+            let motion = match row.joint {
+                JointKind::Revolute => Some(Motion::Revolute),
+                JointKind::Prismatic => Some(Motion::Prismatic),
+                JointKind::Fixed => None,
+            };
+            let joint = motion.map(|motion| Joint { index: joint_names.len(), motion });
+            if joint.is_some() {
+                joint_names.push(row.name.clone());
+            }
+            let hayati = row.beta_deg.is_some();
+            let geometry = match self.convention {
+                Convention::Standard => Geometry::StandardDh { hayati },
+                Convention::Modified => Geometry::ModifiedDh { hayati },
+            };
+            let first = parameters.len();
+            parameters.extend(row.fields().map(|field| field.parameter(&row.name, &self.deviation)));
+            let parameters = first..parameters.len();
+            segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters });
+        }
+        Chain { name: self.name.clone(), segments, parameters, joint_names, source: Source::Dh(self) }
+    }
+
+    /// Replaces the nominal number of every entry whose value has changed, so that the others keep every digit.
+    fn with_values(&self, parameters: &[Parameter], values: &[f64]) -> DhTable {
+        let mut table = self.clone();
+        let entries = table.rows.iter_mut().flat_map(|row| {
+            [&mut row.theta_deg, &mut row.d_mm, &mut row.a_mm, &mut row.alpha_deg]
+                .into_iter()
+                .chain(&mut row.beta_deg)
+        });
+        for ((entry, parameter), value) in entries.zip(parameters).zip(values) {
+            if *value != parameter.nominal {
+                entry.nominal = parameter.unit.to_display(*value);
+            }
+        }
+        table
+    }
+
+    fn to_toml(&self) -> String {
+        let convention = match self.convention {
+            Convention::Standard => "standard",
+            Convention::Modified => "modified",
+        };
+        let mut text = format!("name = {}\nconvention = \"{convention}\"\n", quoted(&self.name));
+        let d = &self.deviation;
+        for (key, value) in [
+            ("\n[deviation]\nbound_mm", d.bound_mm),
+            ("bound_deg", d.bound_deg),
+            ("prior_sigma_mm", d.prior_sigma_mm),
+            ("prior_sigma_deg", d.prior_sigma_deg),
+        ] {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{key} = {value:?}");
+        }
+        for row in &self.rows {
+            let joint = match row.joint {
+                JointKind::Revolute => "revolute",
+                JointKind::Prismatic => "prismatic",
+                JointKind::Fixed => "fixed",
+            };
+            let _ = write!(text, "\n[[rows]]\nname = {}\njoint = \"{joint}\"\n", quoted(&row.name));
+            for field in row.fields() {
+                let _ = writeln!(text, "{} = {}", field.key, field.entry.to_toml());
+            }
+        }
+        text
+    }
+}
+
+impl Row {
+    fn fields(&self) -> impl Iterator<Item = Field<'_>> {
+        let field = |key, quantity, unit, meaning, entry| Field { key, quantity, unit, meaning, entry };
+        let (mm, deg) = (Unit::Metre, Unit::Radian);
+        [
+            field(
+                "theta_deg",
+                "theta",
+                deg,
+                "angle about z (for a revolute joint: its zero)",
+                &self.theta_deg,
+            ),
+            field("d_mm", "d", mm, "offset along z (for a prismatic joint: its zero)", &self.d_mm),
+            field("a_mm", "a", mm, "length along x", &self.a_mm),
+            field("alpha_deg", "alpha", deg, "twist about x", &self.alpha_deg),
+        ]
+        .into_iter()
+        .chain(self.beta_deg.iter().map(move |entry| {
+            field("beta_deg", "beta", deg, "Hayati's tilt of the next axis about y", entry)
+        }))
+    }
+}
+
+impl Field<'_> {
+    fn parameter(&self, row: &str, deviation: &Deviation) -> Parameter {
+        let own = |value: Option<f64>, default: f64| value.map_or(default, |v| from_display(self.unit, v));
+        let parameter = robot_parameter(
+            format!("{row}.{}", self.quantity),
+            self.unit,
+            from_display(self.unit, self.entry.nominal),
+            own(self.entry.bound, deviation.bound(self.unit)),
+            own(self.entry.prior_sigma, deviation.prior_sigma(self.unit)),
+            format!("{row}: {}", self.meaning),
+        );
+        Parameter { free: self.entry.free, ..parameter }
+    }
+}
+
+impl Entry {
+    fn to_toml(self) -> String {
+        if self.free && self.bound.is_none() && self.prior_sigma.is_none() {
+            return format!("{:?}", self.nominal);
+        }
+        let mut text = format!("{{ nominal = {:?}", self.nominal);
+        if !self.free {
+            text.push_str(", free = false");
+        }
+        for (key, value) in [("bound", self.bound), ("prior_sigma", self.prior_sigma)] {
+            if let Some(value) = value {
+                let _ = write!(text, ", {key} = {value:?}");
+            }
+        }
+        text.push_str(" }");
+        text
+    }
+}
+
+impl<'de> Deserialize<'de> for Entry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Entry, D::Error> {
+        deserializer.deserialize_any(EntryVisitor)
+    }
+}
+
+/// Tells a number from a table without losing the position of an error inside the table.
+struct EntryVisitor;
+
+impl<'de> Visitor<'de> for EntryVisitor {
+    type Value = Entry;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a number or a table { nominal, free, bound, prior_sigma }")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, nominal: f64) -> Result<Entry, E> {
+        Ok(Entry { nominal, free: true, bound: None, prior_sigma: None })
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, nominal: i64) -> Result<Entry, E> {
+        let exact = i32::try_from(nominal).map_err(|_| E::custom("the number is out of range"))?;
+        self.visit_f64(f64::from(exact))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Entry, A::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Detailed {
+            nominal: f64,
+            free: Option<bool>,
+            bound: Option<f64>,
+            prior_sigma: Option<f64>,
+        }
+        let d = Detailed::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(Entry {
+            nominal: d.nominal,
+            free: d.free.unwrap_or(true),
+            bound: d.bound,
+            prior_sigma: d.prior_sigma,
+        })
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

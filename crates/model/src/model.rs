@@ -1,0 +1,265 @@
+//! Chain and frames together: predicted tip, residual, exact Jacobian.
+
+use crate::error::nearest;
+use crate::path::{follow, linearise};
+use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
+use crate::rigid::Rigid;
+use crate::segment::{Geometry, Segment};
+use crate::{Chain, Frames, ModelError};
+use armcal_core::{Observation, Parameter, Pose, Reference};
+use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
+use std::collections::BTreeSet;
+
+/// A robot in its surroundings.
+///
+/// The parameter vector `p` has one entry for each of [`Model::parameters`], in that order: the chain's,
+/// then base, tip and boards; every method that takes it expects that length. Joint vectors are in the
+/// order of [`Chain::joint_names`], [rad] (prismatic: [m]). What an observation lacks (a joint reading, a
+/// board) makes its numbers NaN; [`Model::check`] turns that into an error beforehand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    chain: Chain,
+    parameters: Vec<Parameter>,
+    /// World to tip: base, the rows of the chain, tip.
+    path: Vec<Segment>,
+    /// World to board, by recording.
+    boards: Vec<Segment>,
+}
+
+impl Model {
+    /// Puts a chain between its frames.
+    ///
+    /// Errors when two parameters share a name or a frame's pose or standard error is not a number.
+    pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
+        let mut parameters = chain.parameters.clone();
+        let mut place = |frame: &crate::Frame| -> Result<Segment, ModelError> {
+            let (segment, own) = frame.segment(parameters.len())?;
+            parameters.extend(own);
+            Ok(segment)
+        };
+        let base = place(&frames.base)?;
+        let tip = place(&frames.tip)?;
+        let boards = frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let mut seen = BTreeSet::new();
+        if let Some(twice) = parameters.iter().find(|parameter| !seen.insert(&parameter.name)) {
+            return Err(ModelError::DuplicateParameter { name: twice.name.clone() });
+        }
+        let path = [base].into_iter().chain(chain.segments.iter().cloned()).chain([tip]).collect();
+        Ok(Model { chain, parameters, path, boards })
+    }
+
+    /// The arm.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// Every parameter, in the order of the parameter vector.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// The parameter vector before calibration.
+    pub fn nominal(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.nominal).collect()
+    }
+
+    /// Index of a parameter by its exact name.
+    pub fn index(&self, name: &str) -> Option<usize> {
+        self.parameters.iter().position(|parameter| parameter.name == name)
+    }
+
+    /// Length of the joint vector.
+    pub fn joint_count(&self) -> usize {
+        self.chain.joint_names.len()
+    }
+
+    /// Overrides parameters by exact name or by glob (`joint*.alpha`, `board.*`); returns how many matched.
+    ///
+    /// `edit` may change value, bounds, prior and freedom. Errors when nothing matches (naming the nearest
+    /// parameter) or when an edited parameter could not be fitted; the model is unchanged then.
+    pub fn set_parameter(
+        &mut self,
+        name: &str,
+        mut edit: impl FnMut(&mut Parameter),
+    ) -> Result<usize, ModelError> {
+        let matching = self.matching(name)?;
+        let mut edited = self.parameters.clone();
+        for &index in &matching {
+            edit(&mut edited[index]);
+            edited[index].name.clone_from(&self.parameters[index].name);
+            check_parameter(&edited[index])?;
+        }
+        self.parameters = edited;
+        Ok(matching.len())
+    }
+
+    /// Moves the start of a recording's board frame (nominal value and centre of the prior) to another
+    /// world_from_board, such as the one the association found. Returns whether the recording has a board.
+    pub fn set_board_start(&mut self, recording: usize, board_in_world: Pose) -> bool {
+        let Some(board) = self.boards.get_mut(recording) else { return false };
+        if let Geometry::Origin { nominal, .. } = &mut board.geometry {
+            *nominal = Rigid::from(&board_in_world);
+        }
+        let at = board_in_world.translation.vector;
+        // Position, then the rotation vector, which is zero at nominal.
+        let start = [at.x, at.y, at.z, 0.0, 0.0, 0.0];
+        for (parameter, value) in self.parameters[board.parameters.clone()].iter_mut().zip(start) {
+            parameter.nominal = value;
+        }
+        true
+    }
+
+    /// Checks that every observation has a reading for each joint, and a board where it needs one.
+    pub fn check(&self, observations: &[Observation]) -> Result<(), ModelError> {
+        for o in observations {
+            let (actual, expected) = (o.joint_rad.len(), self.joint_count());
+            if actual != expected {
+                return Err(ModelError::JointCount { dwell: o.dwell, actual, expected });
+            }
+            if o.cavity().is_some() && o.dwell.recording >= self.boards.len() {
+                return Err(ModelError::NoBoard { dwell: o.dwell });
+            }
+        }
+        Ok(())
+    }
+
+    /// The tip in the base frame.
+    pub fn tip_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Pose {
+        Pose::from(&follow(&self.path[1..], p, joint_rad))
+    }
+
+    /// Every frame of the arm in the base frame, for drawing: base, the end of each segment (a DH row, or
+    /// a link of the URDF, fixed ones included), tip.
+    pub fn link_frames_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Vec<(String, Pose)> {
+        let mut end = Rigid::identity();
+        let mut frames = Vec::with_capacity(self.path.len());
+        for (index, segment) in self.path.iter().enumerate() {
+            if index > 0 {
+                end = end.then(&segment.transform(p, joint_rad));
+            }
+            frames.extend(segment.frame.iter().map(|name| (name.clone(), Pose::from(&end))));
+        }
+        frames
+    }
+
+    /// world_from_base.
+    pub fn base_in_world(&self, p: &[f64]) -> Pose {
+        Pose::from(&self.path[0].transform(p, &[]))
+    }
+
+    /// last link_from_tip.
+    pub fn tip_in_last_link(&self, p: &[f64]) -> Pose {
+        Pose::from(&self.tip_segment().transform(p, &[]))
+    }
+
+    /// world_from_board of a recording, if it has a board.
+    pub fn board_in_world(&self, p: &[f64], recording: usize) -> Option<Pose> {
+        self.boards.get(recording).map(|board| Pose::from(&board.transform(p, &[])))
+    }
+
+    /// Where the tip was, in the world: as the sensor saw it, or the cavity of the board [m].
+    pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        match &o.reference {
+            Reference::Tracked { position_m, .. } => *position_m,
+            Reference::Seated { in_board_m, .. } => match self.boards.get(o.dwell.recording) {
+                Some(board) => board.transform(p, &[]).point(in_board_m),
+                None => Vector3::repeat(f64::NAN),
+            },
+        }
+    }
+
+    /// Where the model puts the tip, in the world [m].
+    pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        follow(&self.path, p, &o.joint_rad).translation_m
+    }
+
+    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation.
+    pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
+        self.residual_at(p, o, &follow(&self.path, p, &o.joint_rad))
+    }
+
+    /// The residual and d residual / d p: 3 or 6 rows, one column for every parameter, free or not. Exact.
+    pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        let predicted = linearise(&self.path, p, &o.joint_rad);
+        let residual = self.residual_at(p, o, &predicted.tip);
+        let mut jacobian = DMatrix::zeros(residual.len(), self.parameters.len());
+        for (column, twist) in &predicted.parameters {
+            add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
+        }
+        if let Some(error_rad) = &residual.rotation_rad {
+            let rate = rotation_error_rate(error_rad);
+            for (column, twist) in &predicted.parameters {
+                add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
+            }
+        }
+        if let (Reference::Seated { in_board_m, .. }, Some(board)) =
+            (&o.reference, self.boards.get(o.dwell.recording))
+        {
+            let derivatives = board.derivatives(p, &[]);
+            for (column, change) in board.parameters.clone().zip(&derivatives.parameters) {
+                add_to_column(&mut jacobian, 0, column, &change.point(in_board_m));
+            }
+        }
+        (residual, jacobian)
+    }
+
+    /// d predicted tip / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
+    /// encoders' noise to the tip.
+    pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
+        let mut jacobian = Matrix3xX::zeros(self.joint_count());
+        for (column, twist) in linearise(&self.path, p, &o.joint_rad).joints {
+            jacobian.set_column(column, &twist.translation_m);
+        }
+        jacobian
+    }
+
+    pub(crate) fn tip_segment(&self) -> &Segment {
+        &self.path[self.path.len() - 1]
+    }
+
+    fn residual_at(&self, p: &[f64], o: &Observation, predicted: &Rigid<f64>) -> ModelResidual {
+        let position_m = self.measured_tip_in_world(p, o) - predicted.translation_m;
+        let rotation_rad = match &o.reference {
+            Reference::Tracked { orientation: Some(measured), .. } => {
+                let predicted: UnitQuaternion<f64> = Pose::from(predicted).rotation;
+                Some(rotation_error_rad(measured, &predicted))
+            }
+            _ => None,
+        };
+        ModelResidual { position_m, rotation_rad }
+    }
+
+    fn matching(&self, name: &str) -> Result<Vec<usize>, ModelError> {
+        if let Some(index) = self.index(name) {
+            return Ok(vec![index]);
+        }
+        let pattern = glob::Pattern::new(name)
+            .map_err(|cause| ModelError::BadPattern { pattern: name.to_owned(), cause })?;
+        let names = || self.parameters.iter().map(|parameter| parameter.name.as_str());
+        let matching: Vec<usize> =
+            names().enumerate().filter(|(_, n)| pattern.matches(n)).map(|(index, _)| index).collect();
+        if matching.is_empty() {
+            return Err(ModelError::UnknownParameter {
+                name: name.to_owned(),
+                nearest: nearest(name, names()),
+            });
+        }
+        Ok(matching)
+    }
+}
+
+fn check_parameter(parameter: &Parameter) -> Result<(), ModelError> {
+    let bad = |problem| Err(ModelError::BadParameter { name: parameter.name.clone(), problem });
+    if !parameter.nominal.is_finite() {
+        return bad("its nominal value is not a finite number");
+    }
+    if !(parameter.lower <= parameter.nominal && parameter.nominal <= parameter.upper) {
+        return bad("its nominal value must lie between its bounds");
+    }
+    if parameter.prior_sigma.is_some_and(|sigma| !(sigma > 0.0 && sigma.is_finite())) {
+        return bad(
+            "its prior standard deviation must be a positive number; fix the parameter instead of zero",
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! The product rule along the path from world to tip.
+//!
+//! With `tip = P_i A_i S_i` (everything before segment i, the segment, everything after it), a small
+//! change of segment i moves the tip by `P_i dA_i S_i`. `P_i` are the running products of the forward
+//! pass and the tip seen from behind segment i is found by going back from the tip, so one forward
+//! pass and one segment derivative per parameter give the whole Jacobian.
+
+use crate::rigid::{Rigid, rotation_rate};
+use crate::segment::Segment;
+use nalgebra::Vector3;
+
+/// Motion of the tip per unit of one quantity, in the frame the path starts in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Twist {
+    /// d position [m per unit].
+    pub translation_m: Vector3<f64>,
+    /// d rotation: `w` with `dR = [w]x R` [rad per unit].
+    pub rotation_rad: Vector3<f64>,
+}
+
+/// A path at one parameter vector and one pose: where it ends and how that changes.
+pub(crate) struct LinearisedPath {
+    /// The end of the path in the frame it starts in.
+    pub tip: Rigid<f64>,
+    /// (index in the parameter vector, motion of the tip), in the order of the path.
+    pub parameters: Vec<(usize, Twist)>,
+    /// (index in the joint vector, motion of the tip), in the order of the path.
+    pub joints: Vec<(usize, Twist)>,
+}
+
+/// The end of the path.
+pub(crate) fn follow(path: &[Segment], p: &[f64], joints: &[f64]) -> Rigid<f64> {
+    path.iter().fold(Rigid::identity(), |before, segment| before.then(&segment.transform(p, joints)))
+}
+
+/// The end of the path and its derivatives with respect to every parameter and joint on it.
+pub(crate) fn linearise(path: &[Segment], p: &[f64], joints: &[f64]) -> LinearisedPath {
+    let mut ends = Vec::with_capacity(path.len() + 1);
+    let mut end = Rigid::identity();
+    ends.push(end);
+    for segment in path {
+        end = end.then(&segment.transform(p, joints));
+        ends.push(end);
+    }
+    let tip = end;
+    let mut parameters = Vec::with_capacity(p.len());
+    let mut joint_twists = Vec::with_capacity(joints.len());
+    for (segment, pair) in path.iter().zip(ends.windows(2)) {
+        let (before, after) = (&pair[0], &pair[1]);
+        let tip_from_after_m = after.rotation.tr_mul(&(tip.translation_m - after.translation_m));
+        let own_rotation = before.rotation.tr_mul(&after.rotation);
+        let carry = |change: &Rigid<f64>| Twist {
+            translation_m: before.rotation * (change.rotation * tip_from_after_m + change.translation_m),
+            rotation_rad: before.rotation * rotation_rate(&change.rotation, &own_rotation),
+        };
+        let derivatives = segment.derivatives(p, joints);
+        let changes = derivatives.parameters.iter().take(derivatives.count);
+        parameters.extend(segment.parameters.clone().zip(changes.map(carry)));
+        if let (Some(joint), Some(change)) = (segment.joint, derivatives.joint) {
+            joint_twists.push((joint.index, carry(&change)));
+        }
+    }
+    LinearisedPath { tip, parameters, joints: joint_twists }
+}

@@ -1,0 +1,212 @@
+//! One link of the path from world to tip: a few parameters, at most one joint, one small transform.
+//!
+//! This is the only place where kinematic formulas stand. They are generic over the scalar, so the
+//! derivative of a segment with respect to each of its parameters and its joint comes from the same
+//! lines that predict.
+
+use crate::rigid::{Rigid, Scalar, product, rotation_of_vector};
+use nalgebra::{Matrix3, Vector3};
+use num_dual::Dual64;
+use std::ops::Range;
+
+/// Most parameters one segment has (x, y, z, rx, ry, rz of an origin).
+pub(crate) const MAX_PARAMETERS: usize = 6;
+
+/// How a joint moves its segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Motion {
+    /// About the joint's axis [rad].
+    Revolute,
+    /// Along the joint's axis [m].
+    Prismatic,
+}
+
+/// The joint of a segment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Joint {
+    /// Index in the joint vector.
+    pub index: usize,
+    /// How it moves.
+    pub motion: Motion,
+}
+
+/// Shape of a segment's transform, and the meaning of its parameters in order.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Geometry {
+    /// `Rz(theta + q) Tz(d) Tx(a) Rx(alpha)`, optionally `Ry(beta)`: theta, d, a, alpha(, beta).
+    StandardDh {
+        /// Whether the row ends in Hayati's `Ry(beta)`.
+        hayati: bool,
+    },
+    /// `Rx(alpha) Tx(a) Rz(theta + q) Tz(d)`, optionally `Ry(beta)`: theta, d, a, alpha(, beta).
+    ModifiedDh {
+        /// Whether the row ends in Hayati's `Ry(beta)`.
+        hayati: bool,
+    },
+    /// `T(x, y, z) R_nominal Exp(rx, ry, rz)`: a frame, or the origin of a URDF joint.
+    Origin {
+        /// The pose where nothing is free; where something is, only its rotation counts.
+        nominal: Rigid<f64>,
+        /// Which part of it are parameters.
+        freedom: Freedom,
+    },
+    /// A URDF joint about or along this unit vector.
+    Axis(Vector3<f64>),
+}
+
+/// Which parts of an origin are parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Freedom {
+    /// None: a constant.
+    Constant,
+    /// x, y, z.
+    Position,
+    /// x, y, z, rx, ry, rz.
+    Full,
+}
+
+/// One segment of the path.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Segment {
+    /// Name of the frame at its end, for drawing; none where the next segment ends the link.
+    pub frame: Option<String>,
+    /// Its formula.
+    pub geometry: Geometry,
+    /// Its joint, if it moves.
+    pub joint: Option<Joint>,
+    /// Where its parameters are in the parameter vector.
+    pub parameters: Range<usize>,
+}
+
+/// Derivatives of one segment's transform.
+pub(crate) struct SegmentDerivatives {
+    /// With respect to each parameter, in order; `count` of them are meaningful.
+    pub parameters: [Rigid<f64>; MAX_PARAMETERS],
+    /// How many parameters there are.
+    pub count: usize,
+    /// With respect to the joint value.
+    pub joint: Option<Rigid<f64>>,
+}
+
+impl Segment {
+    /// The transform from the frame before the segment to the one after it, predicted.
+    ///
+    /// `p` is the whole parameter vector and `joints` the whole joint vector; a joint that is missing is NaN.
+    pub fn transform(&self, p: &[f64], joints: &[f64]) -> Rigid<f64> {
+        self.local(&p[self.parameters.clone()], self.joint_value(joints))
+    }
+
+    /// The derivatives of [`Segment::transform`], one dual pass over this segment for each.
+    pub fn derivatives(&self, p: &[f64], joints: &[f64]) -> SegmentDerivatives {
+        let own = &p[self.parameters.clone()];
+        let q = self.joint_value(joints);
+        let mut lanes = [Dual64::from(0.0); MAX_PARAMETERS];
+        for (lane, &value) in lanes.iter_mut().zip(own) {
+            *lane = Dual64::from(value);
+        }
+        let mut parameters = [Rigid::identity(); MAX_PARAMETERS];
+        for (k, derivative) in parameters.iter_mut().enumerate().take(own.len()) {
+            lanes[k].eps = 1.0;
+            *derivative = dual_part(&self.local(&lanes[..own.len()], Dual64::from(q)));
+            lanes[k].eps = 0.0;
+        }
+        let joint = self.joint.map(|_| dual_part(&self.local(&lanes[..own.len()], Dual64::new(q, 1.0))));
+        SegmentDerivatives { parameters, count: own.len(), joint }
+    }
+
+    fn joint_value(&self, joints: &[f64]) -> f64 {
+        match self.joint {
+            Some(joint) => joints.get(joint.index).copied().unwrap_or(f64::NAN),
+            None => 0.0,
+        }
+    }
+
+    fn local<D: Scalar>(&self, own: &[D], q: D) -> Rigid<D> {
+        let motion = self.joint.map(|joint| joint.motion);
+        match &self.geometry {
+            Geometry::StandardDh { hayati } => {
+                let (theta, d) = joined(own, q, motion);
+                with_beta(standard_dh(theta, d, own[2], own[3]), own, *hayati)
+            }
+            Geometry::ModifiedDh { hayati } => {
+                let (theta, d) = joined(own, q, motion);
+                with_beta(modified_dh(theta, d, own[2], own[3]), own, *hayati)
+            }
+            Geometry::Origin { nominal, .. } => origin(nominal, own),
+            Geometry::Axis(axis) => moved(&axis.map(D::from), q, motion),
+        }
+    }
+}
+
+/// `theta` and `d` of a DH row with the joint value added to the one that moves.
+fn joined<D: Scalar>(own: &[D], q: D, motion: Option<Motion>) -> (D, D) {
+    match motion {
+        Some(Motion::Revolute) => (own[0] + q, own[1]),
+        Some(Motion::Prismatic) => (own[0], own[1] + q),
+        None => (own[0], own[1]),
+    }
+}
+
+/// `Rz(theta) Tz(d) Tx(a) Rx(alpha)`: Denavit and Hartenberg 1955; eq. 9-10 of Li et al. 2016.
+fn standard_dh<D: Scalar>(theta: D, d: D, a: D, alpha: D) -> Rigid<D> {
+    let ((st, ct), (sa, ca)) = (theta.sin_cos(), alpha.sin_cos());
+    let o = D::from(0.0);
+    #[rustfmt::skip]
+    let rotation = Matrix3::new(
+        ct, -st * ca,  st * sa,
+        st,  ct * ca, -ct * sa,
+        o,   sa,       ca,
+    );
+    Rigid { rotation, translation_m: Vector3::new(a * ct, a * st, d) }
+}
+
+/// `Rx(alpha) Tx(a) Rz(theta) Tz(d)`: Craig, Introduction to Robotics, 3rd ed., eq. 3.6.
+fn modified_dh<D: Scalar>(theta: D, d: D, a: D, alpha: D) -> Rigid<D> {
+    let ((st, ct), (sa, ca)) = (theta.sin_cos(), alpha.sin_cos());
+    let o = D::from(0.0);
+    #[rustfmt::skip]
+    let rotation = Matrix3::new(
+        ct,      -st,       o,
+        st * ca,  ct * ca, -sa,
+        st * sa,  ct * sa,  ca,
+    );
+    Rigid { rotation, translation_m: Vector3::new(a, -d * sa, d * ca) }
+}
+
+/// Hayati's extra `Ry(beta)` at the end of a row: it tilts the next axis about this row's y, the one
+/// direction that a DH row between parallel axes cannot describe (Hayati and Mirmirani 1985).
+fn with_beta<D: Scalar>(row: Rigid<D>, own: &[D], hayati: bool) -> Rigid<D> {
+    if !hayati {
+        return row;
+    }
+    let (s, c) = own[4].sin_cos();
+    let (x, y, z) = (row.rotation.column(0), row.rotation.column(1), row.rotation.column(2));
+    let rotation = Matrix3::from_columns(&[x * c - z * s, y.into_owned(), x * s + z * c]);
+    Rigid { rotation, ..row }
+}
+
+/// `T(x, y, z) R_nominal Exp(rx, ry, rz)`, as far as these are parameters.
+fn origin<D: Scalar>(nominal: &Rigid<f64>, own: &[D]) -> Rigid<D> {
+    let rotation = nominal.rotation.map(D::from);
+    match *own {
+        [x, y, z, rx, ry, rz] => Rigid {
+            rotation: product(&rotation, &rotation_of_vector(&Vector3::new(rx, ry, rz))),
+            translation_m: Vector3::new(x, y, z),
+        },
+        [x, y, z] => Rigid { rotation, translation_m: Vector3::new(x, y, z) },
+        _ => Rigid { rotation, translation_m: nominal.translation_m.map(D::from) },
+    }
+}
+
+/// About or along an axis.
+fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D> {
+    match motion {
+        Some(Motion::Prismatic) => Rigid { translation_m: axis * q, ..Rigid::identity() },
+        Some(Motion::Revolute) => Rigid { rotation: rotation_of_vector(&(axis * q)), ..Rigid::identity() },
+        None => Rigid::identity(),
+    }
+}
+
+fn dual_part(dual: &Rigid<Dual64>) -> Rigid<f64> {
+    Rigid { rotation: dual.rotation.map(|x| x.eps), translation_m: dual.translation_m.map(|x| x.eps) }
+}

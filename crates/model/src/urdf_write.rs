@@ -1,0 +1,144 @@
+//! Writing a calibrated chain back into its URDF: only the numbers that changed are replaced.
+
+use crate::chain::Source;
+use crate::urdf::{Reader, child, parse};
+use crate::{Model, ModelError};
+use armcal_core::{Pose, Severity, Stage, Warning};
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::Node;
+use std::ops::Range;
+use std::path::Path;
+
+/// A piece of the text to be replaced (an empty range: inserted).
+struct Edit {
+    at: Range<usize>,
+    text: String,
+}
+
+impl Model {
+    /// The URDF with the calibrated origins of the moving joints; every other byte stays as it was.
+    ///
+    /// `xml` is the file the chain was read from, `path` its name for errors, `p` the parameter vector. Only
+    /// `xyz` or `rpy` attributes whose value changed are replaced. If the tip frame is calibrated (any of its
+    /// parameters is free) it is written into the fixed joint that carries the tip link; where that joint
+    /// moves there is no such place, which a warning says. Errors when the chain did not come from a URDF,
+    /// when `xml` is not that URDF, or when `p` has the wrong length.
+    pub fn to_urdf(&self, xml: &str, path: &Path, p: &[f64]) -> Result<(String, Vec<Warning>), ModelError> {
+        let chain = self.chain();
+        let Source::Urdf(joints) = &chain.source else {
+            return Err(ModelError::WrongFormat { model: chain.name.clone(), format: "URDF" });
+        };
+        if p.len() != self.parameters().len() {
+            return Err(ModelError::ParameterCount { actual: p.len(), expected: self.parameters().len() });
+        }
+        let document = parse(xml, path)?;
+        let reader = Reader { document: &document, path };
+        let robot = reader.robot()?;
+        let mut edits = Vec::new();
+        let mut warnings = Vec::new();
+        let tip_is_calibrated =
+            self.parameters()[self.tip_segment().parameters.clone()].iter().any(|parameter| parameter.free);
+        for (index, joint) in joints.iter().enumerate() {
+            let carries_tip = tip_is_calibrated && index + 1 == joints.len();
+            if carries_tip && joint.moves {
+                warnings.push(tip_not_written(&joint.name));
+            }
+            if !joint.moves && !carries_tip {
+                continue;
+            }
+            let node = Reader::joints(robot)
+                .find(|node| node.attribute("name") == Some(joint.name.as_str()))
+                .ok_or_else(|| ModelError::ForeignUrdf {
+                    path: path.to_owned(),
+                    joint: joint.name.clone(),
+                })?;
+            let old = reader.origin(node, &format!("joint \"{}\"", joint.name))?;
+            let mut new = Pose::from(&chain.segments[joint.segment].transform(p, &[]));
+            if carries_tip && !joint.moves {
+                new *= self.tip_in_last_link(p);
+            }
+            edits.extend(origin_edits(node, &old, &new, xml));
+        }
+        Ok((apply(xml, edits), warnings))
+    }
+}
+
+fn tip_not_written(joint: &str) -> Warning {
+    Warning::new(
+        Severity::Notice,
+        Stage::Output,
+        "tip-not-in-urdf",
+        "tip",
+        format!(
+            "the tip link hangs on the moving joint \"{joint}\", so the calibrated tip frame is not in the URDF; \
+             add a fixed joint with a tip link and name that as tip_link"
+        ),
+    )
+}
+
+/// The edits that turn the origin of a joint from `old` into `new`.
+fn origin_edits(joint: Node<'_, '_>, old: &Pose, new: &Pose, xml: &str) -> Vec<Edit> {
+    let moved = old.translation.vector != new.translation.vector;
+    // Rotation matrices that differ by rounding only are the same numbers in the file.
+    let turned = old.rotation.angle_to(&new.rotation) > 1e-15;
+    let xyz = moved.then(|| ("xyz", numbers(&new.translation.vector)));
+    let rpy = turned.then(|| {
+        let matrix = new.rotation.to_rotation_matrix().into_inner();
+        ("rpy", numbers(&roll_pitch_yaw_rad(&matrix)))
+    });
+    let changes: Vec<(&str, String)> = xyz.into_iter().chain(rpy).collect();
+    if changes.is_empty() {
+        return Vec::new();
+    }
+    let attribute = |(name, value): &(&str, String)| format!(" {name}=\"{value}\"");
+    let Some(origin) = child(joint, "origin") else {
+        let text: String = changes.iter().map(attribute).collect();
+        let at = after_start_tag(joint, xml);
+        return vec![Edit { at: at..at, text: format!("<origin{text}/>") }];
+    };
+    let after_name = origin.range().start + 1 + qualified_name_length(origin, xml);
+    changes
+        .iter()
+        .map(|change| match origin.attribute_node(change.0) {
+            Some(present) => Edit { at: present.range_value(), text: change.1.clone() },
+            None => Edit { at: after_name..after_name, text: attribute(change) },
+        })
+        .collect()
+}
+
+/// Replaces from the end to the beginning, so that earlier positions stay valid.
+fn apply(xml: &str, mut edits: Vec<Edit>) -> String {
+    let mut text = xml.to_owned();
+    edits.sort_by_key(|edit| edit.at.start);
+    for edit in edits.iter().rev() {
+        text.replace_range(edit.at.clone(), &edit.text);
+    }
+    text
+}
+
+/// Length of the element's name with its prefix, as it stands after `<`.
+fn qualified_name_length(element: Node<'_, '_>, xml: &str) -> usize {
+    let after = &xml[element.range().start + 1..element.range().end];
+    after.find(|c: char| c.is_whitespace() || c == '/' || c == '>').unwrap_or(after.len())
+}
+
+/// Where the content of an element that has children begins.
+fn after_start_tag(element: Node<'_, '_>, xml: &str) -> usize {
+    element.first_child().map_or(element.range().end, |first| first.range().start).min(xml.len())
+}
+
+/// Shortest decimal numbers that read back as the same bits.
+fn numbers(v: &Vector3<f64>) -> String {
+    // Adding zero turns -0 into 0.
+    format!("{:?} {:?} {:?}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
+}
+
+/// Fixed-axis roll, pitch, yaw with `R = Rz(yaw) Ry(pitch) Rx(roll)`, accurate at every pitch: yaw is taken
+/// out first, and what is left is read from well-conditioned entries (Shoemake, Graphics Gems IV, 1994).
+fn roll_pitch_yaw_rad(r: &Matrix3<f64>) -> Vector3<f64> {
+    let yaw = r.m21.atan2(r.m11);
+    let (s, c) = yaw.sin_cos();
+    let pitch = (-r.m31).atan2(c * r.m11 + s * r.m21);
+    let roll = (s * r.m13 - c * r.m23).atan2(c * r.m22 - s * r.m12);
+    Vector3::new(roll, pitch, yaw)
+}

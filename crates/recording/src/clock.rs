@@ -1,0 +1,164 @@
+//! Which stamp of a message is its time.
+//!
+//! The header stamp, where it is sane: it is when the sensor measured. Publish time, where it differs from log
+//! time. Log time otherwise: in a real recording it jitters by tens of milliseconds. The choice and its reason are
+//! part of every report.
+
+use crate::Clock;
+use armcal_core::robust::percentile;
+
+/// Share of header stamps that must be set for the header clock to be used.
+const SET_SHARE: f64 = 0.99;
+/// Share of steps that may go backwards.
+const BACKWARD_SHARE: f64 = 0.05;
+/// Share of steps that may repeat the stamp before.
+const REPEATED_SHARE: f64 = 0.5;
+/// Spread of (log time - stamp) allowed at least [s]; congested recorders reach tenths.
+const SPREAD_S: f64 = 1.0;
+/// Spread allowed as a share of the recording's duration: a sensor's clock may drift.
+const SPREAD_SHARE: f64 = 0.02;
+
+/// The stamps of the rows of a stream.
+#[derive(Debug, Default, Clone)]
+pub(crate) struct Stamps {
+    pub header_ns: Vec<Option<i64>>,
+    pub publish_ns: Vec<i64>,
+    pub log_ns: Vec<i64>,
+}
+
+impl Stamps {
+    pub fn append(&mut self, other: &mut Stamps) {
+        self.header_ns.append(&mut other.header_ns);
+        self.publish_ns.append(&mut other.publish_ns);
+        self.log_ns.append(&mut other.log_ns);
+    }
+
+    /// Time of each row on the given clock; `None` for a row without it.
+    pub fn on(&self, clock: Clock) -> Vec<Option<i64>> {
+        match clock {
+            Clock::Header => self.header_ns.iter().map(|t| t.filter(|ns| *ns > 0)).collect(),
+            Clock::Publish => self.publish_ns.iter().copied().map(Some).collect(),
+            Clock::Log => self.log_ns.iter().copied().map(Some).collect(),
+        }
+    }
+}
+
+/// The clock to use and why.
+pub(crate) fn choose(stamps: &Stamps) -> (Clock, String) {
+    let why_not_header = match judge_header(stamps) {
+        Ok(why) => return (Clock::Header, why),
+        Err(why) => why,
+    };
+    match judge_publish(stamps) {
+        Ok(why) => (Clock::Publish, format!("{why_not_header}; {why}")),
+        Err(why) => (Clock::Log, format!("{why_not_header}; {why}")),
+    }
+}
+
+/// Why the header stamps can be trusted, or why not.
+pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
+    let rows = stamps.header_ns.len();
+    let mut in_log_order: Vec<usize> = (0..rows).collect();
+    in_log_order.sort_by_key(|&i| stamps.log_ns[i]);
+    let set: Vec<(i64, i64)> = in_log_order
+        .iter()
+        .filter_map(|&i| stamps.header_ns[i].filter(|ns| *ns > 0).map(|h| (h, stamps.log_ns[i])))
+        .collect();
+    if set.is_empty() {
+        let carried = stamps.header_ns.iter().any(Option::is_some);
+        return Err(if carried { "header stamps are all zero" } else { "messages carry no stamp" }.to_owned());
+    }
+    if (set.len() as f64) < SET_SHARE * rows as f64 {
+        return Err(format!("{} of {rows} header stamps are missing or zero", rows - set.len()));
+    }
+    let steps = set.windows(2);
+    let backward = steps.clone().filter(|w| w[1].0 < w[0].0).count();
+    if backward as f64 > BACKWARD_SHARE * rows as f64 {
+        return Err(format!("header stamps go backwards {backward} times in {rows} rows"));
+    }
+    let repeated = steps.filter(|w| w[1].0 == w[0].0).count();
+    if repeated as f64 > REPEATED_SHARE * rows as f64 {
+        return Err(format!("{repeated} of {rows} header stamps repeat the one before"));
+    }
+    judge_spread(&set)
+}
+
+/// Stamps must run like the log clock, whatever their offset from it.
+fn judge_spread(set: &[(i64, i64)]) -> Result<String, String> {
+    let log = || set.iter().map(|(_, log)| *log);
+    let duration_s = seconds(log().min(), log().max());
+    if duration_s == 0.0 {
+        return Ok("header stamps are set and increase; log time stands still".to_owned());
+    }
+    let latency_s: Vec<f64> = set.iter().map(|(h, log)| log.saturating_sub(*h) as f64 * 1e-9).collect();
+    let spread_s = percentile(&latency_s, 0.99) - percentile(&latency_s, 0.01);
+    if spread_s > SPREAD_S.max(SPREAD_SHARE * duration_s) {
+        return Err(format!("header stamps wander {spread_s:.3} s against log time"));
+    }
+    Ok(format!("header stamps are set, increase, and follow log time within {:.1} ms", spread_s * 1e3))
+}
+
+fn judge_publish(stamps: &Stamps) -> Result<String, String> {
+    let rows = stamps.publish_ns.len();
+    let pairs = || stamps.publish_ns.iter().zip(&stamps.log_ns);
+    let few = |n: usize| n as f64 <= (1.0 - SET_SHARE) * rows as f64;
+    if few(pairs().filter(|(publish, log)| publish != log).count()) {
+        return Err("publish time equals log time".to_owned());
+    }
+    if !few(stamps.publish_ns.iter().filter(|ns| **ns <= 0).count()) {
+        return Err("publish time is not set".to_owned());
+    }
+    let mut by_log: Vec<(i64, i64)> = pairs().map(|(publish, log)| (*log, *publish)).collect();
+    by_log.sort_by_key(|(log, _)| *log);
+    let backward = by_log.windows(2).filter(|w| w[1].1 < w[0].1).count();
+    if backward as f64 > BACKWARD_SHARE * rows as f64 {
+        return Err(format!("publish time goes backwards {backward} times in {rows} rows"));
+    }
+    Ok("publish time is set and differs from log time".to_owned())
+}
+
+fn seconds(from: Option<i64>, to: Option<i64>) -> f64 {
+    from.zip(to).map_or(0.0, |(a, b)| b.saturating_sub(a) as f64 * 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 rows at 100 Hz, with stamps as the closures say, given the log time.
+    fn stamps(header: impl Fn(i64) -> Option<i64>, publish: impl Fn(i64) -> i64) -> Stamps {
+        let log_ns: Vec<i64> = (0..1000).map(|i| 1_700_000_000_000_000_000 + i * 10_000_000).collect();
+        Stamps {
+            header_ns: log_ns.iter().map(|t| header(*t)).collect(),
+            publish_ns: log_ns.iter().map(|t| publish(*t)).collect(),
+            log_ns,
+        }
+    }
+
+    #[test]
+    fn a_sane_header_wins_whatever_its_offset() {
+        // The tracker's clock is a day off and drifts by 100 ppm.
+        let s = stamps(|t| Some((t - 86_400_000_000_000) / 10_000 * 10_001), |t| t - 5);
+        assert_eq!(choose(&s).0, Clock::Header);
+    }
+
+    #[test]
+    fn a_bad_header_gives_way_to_publish_then_log() {
+        let none = stamps(|_| None, |t| t - 3_000_000);
+        assert_eq!(
+            choose(&none),
+            (Clock::Publish, "messages carry no stamp; publish time is set and differs from log time".into())
+        );
+        let zero = stamps(|_| Some(0), |t| t);
+        let (clock, why) = choose(&zero);
+        assert_eq!(clock, Clock::Log);
+        assert!(why.contains("all zero") && why.contains("equals log time"), "{why}");
+        let stuck = stamps(|_| Some(1_700_000_000_000_000_000), |t| t);
+        assert!(choose(&stuck).1.contains("repeat"), "{:?}", choose(&stuck));
+        let slow = stamps(|t| Some(t / 2), |t| t);
+        assert!(choose(&slow).1.contains("wander"), "{:?}", choose(&slow));
+        let falling = stamps(|t| Some(3_400_000_000_000_000_000 - t), |_| 0);
+        let (clock, why) = choose(&falling);
+        assert!(clock == Clock::Log && why.contains("backwards") && why.contains("not set"), "{why}");
+    }
+}

@@ -1,0 +1,109 @@
+//! Why a channel or a message cannot be decoded.
+
+use super::Role;
+
+/// Why a channel or a message cannot be decoded. The caller adds file and topic.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// Nobody here reads this pair of encodings.
+    #[error(
+        "cannot read message encoding `{message}` with schema encoding `{schema}`; supported are cdr with ros2msg, \
+         ros1 with ros1msg, protobuf with protobuf, json with jsonschema: record or convert the channel as one of these"
+    )]
+    Encoding {
+        /// Schema encoding of the channel.
+        schema: String,
+        /// Message encoding of the channel.
+        message: String,
+    },
+    /// The schema text of the channel is unusable.
+    #[error("the schema of {schema} in the file cannot be used: {why}")]
+    Schema {
+        /// Name of the schema.
+        schema: String,
+        /// What is wrong with it, with the line where there is one.
+        why: String,
+    },
+    /// The schema is sound, but holds nothing armcal reads in any role.
+    #[error("{schema} holds no joints, pose or scalar that armcal knows (its fields: {fields})")]
+    Unknown {
+        /// Name of the schema.
+        schema: String,
+        /// Its fields at the top, comma-separated.
+        fields: String,
+    },
+    /// The schema is read in another role than the one asked for.
+    #[error("{schema} holds {found}, not {wanted}: choose another topic for the {wanted}")]
+    OtherRole {
+        /// Name of the schema.
+        schema: String,
+        /// The role asked for.
+        wanted: Role,
+        /// The role it has.
+        found: Role,
+    },
+    /// A body was asked for on a channel whose messages do not name bodies.
+    #[error("{schema} does not name the body it tracks: remove `body = \"{body}\"` from this stream")]
+    NoBodyName {
+        /// Name of the schema.
+        schema: String,
+        /// The body asked for.
+        body: String,
+    },
+    /// Several bodies in a channel, and none or an ambiguous one asked for.
+    #[error("several bodies on this channel, set `body` to one of: {}", .bodies.join(", "))]
+    SeveralBodies {
+        /// The bodies, in the order of the message.
+        bodies: Vec<String>,
+    },
+    /// The message ends before its schema does.
+    #[error("message of {bytes} bytes ends inside a field that needs {needed} bytes at byte {at}")]
+    Truncated {
+        /// Length of the message [bytes].
+        bytes: usize,
+        /// Where the field starts [byte].
+        at: usize,
+        /// What the field needs at least [bytes].
+        needed: usize,
+    },
+    /// The four bytes before a CDR message name a representation that is not read.
+    #[error(
+        "CDR encapsulation {id:#06x} is not read; supported are plain CDR, plain CDR2 and delimited CDR2"
+    )]
+    Encapsulation {
+        /// Representation identifier.
+        id: u16,
+    },
+    /// The bytes are not a message of the declared encoding.
+    #[error("not a valid {encoding} message: {why}")]
+    Malformed {
+        /// Message encoding.
+        encoding: &'static str,
+        /// What was seen.
+        why: String,
+    },
+    /// A field that is needed is absent from this message.
+    #[error("the message has no {field}")]
+    Missing {
+        /// What is missing.
+        field: String,
+    },
+    /// Two lists that belong together differ in length.
+    #[error("the message has {positions} positions but {others} {of}")]
+    Lengths {
+        /// Number of positions.
+        positions: usize,
+        /// Number of the others.
+        others: usize,
+        /// What the others are: `names` or `efforts`.
+        of: &'static str,
+    },
+    /// The rows given are of another role than the plan.
+    #[error("a plan for {plan} was given rows for {rows}")]
+    RowsOfOtherRole {
+        /// Role of the plan.
+        plan: Role,
+        /// Role of the rows.
+        rows: Role,
+    },
+}

@@ -1,0 +1,232 @@
+//! Decoders: from the bytes of a message to rows, by the schema in the file, never by topic or message name.
+//!
+//! A schema (`msg`, `protobuf`, `json`) is read into message `types`; `shapes` recognises in them the fields armcal
+//! wants; a [`Plan`] is compiled from those once per channel, and runs over the bytes of each message (`binary`,
+//! `protobuf`, `json`), handing values to a `sink`, which appends [`Rows`]. Bytes are untrusted: every length is
+//! checked against what is left of the message before anything is read or allocated.
+
+mod binary;
+mod cursor;
+mod error;
+mod joint_sink;
+mod json;
+mod msg;
+mod pose_sink;
+mod protobuf;
+mod rows;
+mod shapes;
+mod sink;
+mod slot;
+mod types;
+mod wire;
+
+pub use error::DecodeError;
+pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRow, ScalarRows};
+
+use binary::Encoding;
+use shapes::{Shape, Wanted};
+use sink::Sink;
+use slot::Slot;
+
+/// What a channel can be read as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Positions (and efforts) of named joints.
+    Joints,
+    /// Position, perhaps orientation, of a tracked body.
+    Pose,
+    /// One number; what a rig has of those is temperature.
+    Scalar,
+}
+
+impl Role {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Joints => "joints",
+            Role::Pose => "pose",
+            Role::Scalar => "temperature",
+        }
+    }
+}
+
+impl std::fmt::Display for Role {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What armcal can read messages of this schema as, or why it cannot.
+pub fn readable_as(
+    schema_name: &str,
+    schema_encoding: &str,
+    schema_data: &[u8],
+    message_encoding: &str,
+) -> Result<Role, DecodeError> {
+    let (shape, ..) = compile(schema_name, schema_encoding, schema_data, message_encoding)?;
+    Ok(shape.role)
+}
+
+/// How to decode the messages of one channel; compiled once from its schema, shared by threads.
+#[derive(Debug)]
+pub struct Plan {
+    role: Role,
+    in_millimetres: bool,
+    body: Option<Vec<u8>>,
+    code: Code,
+}
+
+#[derive(Debug)]
+enum Code {
+    Binary(binary::Code),
+    Protobuf(protobuf::Code),
+    Json(json::Code),
+}
+
+impl Plan {
+    /// Compiles the plan that reads `role` out of messages of this schema.
+    ///
+    /// `body` selects one of several bodies by the name the messages give it: `child_frame_id`, `rigid_body_name`,
+    /// `marker_name` (or `subject/marker`), the number of a marker without a name.
+    pub fn compile(
+        role: Role,
+        schema_name: &str,
+        schema_encoding: &str,
+        schema_data: &[u8],
+        message_encoding: &str,
+        body: Option<&str>,
+    ) -> Result<Plan, DecodeError> {
+        let (shape, wanted, code) = compile(schema_name, schema_encoding, schema_data, message_encoding)?;
+        if shape.role != role {
+            return Err(DecodeError::OtherRole {
+                schema: schema_name.to_owned(),
+                wanted: role,
+                found: shape.role,
+            });
+        }
+        if let Some(body) = body
+            && !wanted.has(Slot::Body)
+            && !wanted.has(Slot::BodyIndex)
+        {
+            return Err(DecodeError::NoBodyName { schema: schema_name.to_owned(), body: body.to_owned() });
+        }
+        Ok(Plan {
+            role,
+            in_millimetres: shape.in_millimetres,
+            body: body.map(|b| b.as_bytes().to_vec()),
+            code,
+        })
+    }
+
+    /// What the plan reads.
+    pub fn role(&self) -> Role {
+        self.role
+    }
+
+    /// Whether positions are in millimetres because the message type defines them so (Vicon's own types);
+    /// otherwise they are metres by convention (REP-103), or whatever the user knows better.
+    pub fn in_millimetres(&self) -> bool {
+        self.in_millimetres
+    }
+
+    /// Decodes one message, appending zero or more rows. On an error `out` holds the rows it held before.
+    ///
+    /// A message without positions, or without the body asked for, gives no rows. With several bodies in the
+    /// message and none asked for, the error names them.
+    pub fn decode(&self, data: &[u8], out: &mut Rows) -> Result<(), DecodeError> {
+        let found = out.role();
+        match (self.role, out) {
+            (Role::Joints, Rows::Joints(rows)) => {
+                let value = self.json_value(data)?;
+                let mut sink = joint_sink::JointSink::new(rows);
+                let decoded = self.run(data, &value, &mut sink);
+                sink.finish(decoded)
+            }
+            (Role::Pose, Rows::Pose(rows)) => self.decode_pose(data, self.body.as_deref(), rows),
+            (Role::Scalar, Rows::Scalar(rows)) => {
+                let value = self.json_value(data)?;
+                let mut sink = sink::ScalarSink::new(rows);
+                let decoded = self.run(data, &value, &mut sink);
+                sink.finish(decoded)
+            }
+            _ => Err(DecodeError::RowsOfOtherRole { plan: self.role, rows: found }),
+        }
+    }
+
+    /// The bodies named in one message, whichever was asked for: what to suggest when a body is never found.
+    pub fn bodies(&self, data: &[u8]) -> Result<Vec<String>, DecodeError> {
+        let mut rows = PoseRows::default();
+        match self.decode_pose(data, None, &mut rows) {
+            Ok(()) => Ok(rows.bodies().into_iter().map(str::to_owned).collect()),
+            Err(DecodeError::SeveralBodies { bodies }) => Ok(bodies),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn decode_pose(&self, data: &[u8], body: Option<&[u8]>, rows: &mut PoseRows) -> Result<(), DecodeError> {
+        let value = self.json_value(data)?;
+        let mut sink = pose_sink::PoseSink::new(rows, body);
+        let decoded = self.run(data, &value, &mut sink);
+        sink.finish(decoded)
+    }
+
+    /// The parsed text of a JSON message; null for the other encodings.
+    fn json_value(&self, data: &[u8]) -> Result<serde_json::Value, DecodeError> {
+        match &self.code {
+            Code::Json(_) => json::message(data),
+            Code::Binary(_) | Code::Protobuf(_) => Ok(serde_json::Value::Null),
+        }
+    }
+
+    fn run<'m, S: Sink<'m>>(
+        &self,
+        data: &'m [u8],
+        value: &'m serde_json::Value,
+        sink: &mut S,
+    ) -> Result<(), DecodeError> {
+        match &self.code {
+            Code::Binary(code) => code.run(data, sink),
+            Code::Protobuf(code) => code.run(data, sink),
+            Code::Json(code) => code.run(value, sink),
+        }
+    }
+}
+
+/// The shape a schema has, where its values are, and the code that reads them.
+fn compile(
+    schema: &str,
+    schema_encoding: &str,
+    data: &[u8],
+    message_encoding: &str,
+) -> Result<(&'static Shape, Wanted, Code), DecodeError> {
+    let unusable = |why: String| DecodeError::Schema { schema: schema.to_owned(), why };
+    let binary = |encoding: Encoding| {
+        let types = msg::parse(data, schema).map_err(unusable)?;
+        let (shape, wanted) = shapes::recognise(schema, &types)?;
+        let code = binary::Code::compile(&types, &wanted, encoding).map_err(unusable)?;
+        Ok((shape, wanted, Code::Binary(code)))
+    };
+    match (schema_encoding, message_encoding) {
+        ("ros2msg", "cdr") => binary(Encoding::Cdr),
+        ("ros1msg", "ros1") => binary(Encoding::Ros1),
+        ("protobuf", "protobuf") => {
+            let descriptors = protobuf::Schema::read(schema, data).map_err(unusable)?;
+            let (shape, wanted) = shapes::recognise(schema, &descriptors.types)?;
+            let code = descriptors.compile(&wanted);
+            Ok((shape, wanted, Code::Protobuf(code)))
+        }
+        ("jsonschema", "json") => {
+            let types = json::parse(data).map_err(unusable)?;
+            let (shape, wanted) = shapes::recognise(schema, &types)?;
+            let code = json::Code::compile(&types, &wanted);
+            Ok((shape, wanted, Code::Json(code)))
+        }
+        _ => Err(DecodeError::Encoding {
+            schema: schema_encoding.to_owned(),
+            message: message_encoding.to_owned(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests;

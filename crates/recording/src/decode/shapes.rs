@@ -1,0 +1,336 @@
+//! The message shapes armcal reads, recognised by the fields a schema defines, never by its name.
+//!
+//! Adding one: an entry in [`SHAPES`]. The first shape that fits a schema decides its role.
+
+use super::slot::Slot;
+use super::types::{Field, Kind, Repeat, Types};
+use super::{DecodeError, Role};
+
+/// A message shape: the fields it must and may have.
+pub(super) struct Shape {
+    /// What it is read as.
+    pub(super) role: Role,
+    /// Whether its positions are in millimetres by definition.
+    pub(super) in_millimetres: bool,
+    parts: &'static [(Need, &'static str, Part)],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Need {
+    Must,
+    May,
+}
+use Need::{May, Must};
+
+/// What a path leads to. `[]` in a path marks a list.
+#[derive(Clone, Copy)]
+enum Part {
+    /// One value, or a list of values where the path ends in `[]`.
+    Value(Slot),
+    /// A message with x, y, z.
+    Point,
+    /// A message with x, y, z, w.
+    Quaternion,
+    /// The stamp of the message at the path, wherever it keeps it.
+    Stamp,
+    /// The frame of the message at the path, wherever it keeps it.
+    Frame,
+}
+use Part::{Frame, Point, Quaternion, Stamp, Value};
+
+const fn joints(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+    Shape { role: Role::Joints, in_millimetres: false, parts }
+}
+
+const fn pose(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+    Shape { role: Role::Pose, in_millimetres: false, parts }
+}
+
+const fn scalar(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+    Shape { role: Role::Scalar, in_millimetres: false, parts }
+}
+
+/// Every shape armcal reads.
+pub(super) static SHAPES: &[Shape] = &[
+    // sensor_msgs/JointState
+    joints(&[
+        (Must, "name[]", Value(Slot::Joint)),
+        (Must, "position[]", Value(Slot::Position)),
+        (May, "effort[]", Value(Slot::Effort)),
+        (May, "", Stamp),
+    ]),
+    // foxglove.JointStates
+    joints(&[
+        (Must, "joints[].name", Value(Slot::Joint)),
+        (Must, "joints[].position", Value(Slot::Position)),
+        (May, "joints[].effort", Value(Slot::Effort)),
+        (May, "", Stamp),
+    ]),
+    // control_msgs/DynamicJointState
+    joints(&[
+        (Must, "joint_names[]", Value(Slot::Joint)),
+        (Must, "interface_values[].interface_names[]", Value(Slot::Interface)),
+        (Must, "interface_values[].values[]", Value(Slot::InterfaceValue)),
+        (May, "", Stamp),
+    ]),
+    // control_msgs/JointTrajectoryControllerState since 2023
+    joints(&[
+        (Must, "joint_names[]", Value(Slot::Joint)),
+        (Must, "feedback.positions[]", Value(Slot::Position)),
+        (May, "feedback.effort[]", Value(Slot::Effort)),
+        (May, "", Stamp),
+    ]),
+    // control_msgs/JointTrajectoryControllerState before, and in ROS 1
+    joints(&[
+        (Must, "joint_names[]", Value(Slot::Joint)),
+        (Must, "actual.positions[]", Value(Slot::Position)),
+        (May, "actual.effort[]", Value(Slot::Effort)),
+        (May, "", Stamp),
+    ]),
+    // geometry_msgs/PoseStamped, foxglove.PoseInFrame
+    pose(&[
+        (Must, "pose.position", Point),
+        (Must, "pose.orientation", Quaternion),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry
+    pose(&[
+        (Must, "pose.pose.position", Point),
+        (Must, "pose.pose.orientation", Quaternion),
+        (May, "child_frame_id", Value(Slot::Body)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // geometry_msgs/PointStamped, foxglove.Point3InFrame
+    pose(&[(Must, "point", Point), (May, "", Frame), (May, "", Stamp)]),
+    // geometry_msgs/TransformStamped
+    pose(&[
+        (Must, "transform.translation", Point),
+        (Must, "transform.rotation", Quaternion),
+        (Must, "child_frame_id", Value(Slot::Body)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // tf2_msgs/TFMessage
+    pose(&[
+        (Must, "transforms[].transform.translation", Point),
+        (Must, "transforms[].transform.rotation", Quaternion),
+        (Must, "transforms[].child_frame_id", Value(Slot::Body)),
+        (May, "transforms[]", Frame),
+        (May, "transforms[]", Stamp),
+    ]),
+    // foxglove.FrameTransform
+    pose(&[
+        (Must, "translation", Point),
+        (Must, "rotation", Quaternion),
+        (Must, "child_frame_id", Value(Slot::Body)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // foxglove.FrameTransforms
+    pose(&[
+        (Must, "transforms[].translation", Point),
+        (Must, "transforms[].rotation", Quaternion),
+        (Must, "transforms[].child_frame_id", Value(Slot::Body)),
+        (May, "transforms[]", Frame),
+        (May, "transforms[]", Stamp),
+    ]),
+    // mocap4r2_msgs/RigidBodies, mocap_msgs/RigidBodies. The header of the list is the one its drivers fill.
+    pose(&[
+        (Must, "rigidbodies[].pose.position", Point),
+        (Must, "rigidbodies[].pose.orientation", Quaternion),
+        (Must, "rigidbodies[].rigid_body_name", Value(Slot::Body)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // motion_capture_tracking_interfaces/NamedPoseArray
+    pose(&[
+        (Must, "poses[].pose.position", Point),
+        (Must, "poses[].pose.orientation", Quaternion),
+        (Must, "poses[].name", Value(Slot::Body)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // vicon_bridge/Markers passes the millimetres of the Vicon SDK on
+    // (vicon_bridge.cpp publishes `GetMarkerGlobalTranslation` unscaled).
+    Shape {
+        role: Role::Pose,
+        in_millimetres: true,
+        parts: &[
+            (Must, "markers[].translation", Point),
+            (Must, "markers[].marker_name", Value(Slot::Body)),
+            (Must, "markers[].subject_name", Value(Slot::Subject)),
+            (Must, "markers[].occluded", Value(Slot::Occluded)),
+            (May, "", Frame),
+            (May, "", Stamp),
+        ],
+    },
+    // mocap4r2_msgs/Markers
+    pose(&[
+        (Must, "markers[].translation", Point),
+        (Must, "markers[].marker_name", Value(Slot::Body)),
+        (May, "markers[].marker_index", Value(Slot::BodyIndex)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // mocap_msgs/Markers of 2021, numbered only
+    pose(&[
+        (Must, "markers[].translation", Point),
+        (Must, "markers[].index", Value(Slot::BodyIndex)),
+        (May, "", Frame),
+        (May, "", Stamp),
+    ]),
+    // vicon_receiver/Position (before version 1), millimetres of the Vicon SDK
+    Shape {
+        role: Role::Pose,
+        in_millimetres: true,
+        parts: &[
+            (Must, "x_trans", Value(Slot::X)),
+            (Must, "y_trans", Value(Slot::Y)),
+            (Must, "z_trans", Value(Slot::Z)),
+            (Must, "x_rot", Value(Slot::Qx)),
+            (Must, "y_rot", Value(Slot::Qy)),
+            (Must, "z_rot", Value(Slot::Qz)),
+            (Must, "w", Value(Slot::Qw)),
+            (Must, "segment_name", Value(Slot::Body)),
+            (May, "subject_name", Value(Slot::Subject)),
+            (May, "", Frame),
+            (May, "", Stamp),
+        ],
+    },
+    // sensor_msgs/Temperature
+    scalar(&[(Must, "temperature", Value(Slot::Value)), (May, "", Stamp)]),
+    // std_msgs/Float64 and its relatives
+    scalar(&[(Must, "data", Value(Slot::Value)), (May, "", Stamp)]),
+];
+
+/// The fields to read out of a message, in the order of their definition.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Wanted {
+    pub(super) fields: Vec<(usize, Want)>,
+}
+
+/// What to do with a field.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Want {
+    /// Read its value, or all its values if it is a list.
+    Value(Slot),
+    /// Read fields inside it; a list of messages makes one item (a joint, a body) of each.
+    Inside(Wanted),
+}
+
+impl Wanted {
+    /// Whether any field inside is read into `slot`.
+    pub(super) fn has(&self, slot: Slot) -> bool {
+        self.fields.iter().any(|(_, want)| match want {
+            Want::Value(s) => *s == slot,
+            Want::Inside(inside) => inside.has(slot),
+        })
+    }
+
+    fn insert(&mut self, index: usize, want: Want) {
+        let at = self.fields.partition_point(|(i, _)| *i < index);
+        self.fields.insert(at, (index, want));
+    }
+}
+
+/// The shape that fits these types, and where its values are.
+pub(super) fn recognise(schema: &str, types: &Types) -> Result<(&'static Shape, Wanted), DecodeError> {
+    SHAPES
+        .iter()
+        .find_map(|shape| shape.fit(types).map(|wanted| (shape, wanted)))
+        .ok_or_else(|| DecodeError::Unknown { schema: schema.to_owned(), fields: types.field_names() })
+}
+
+impl Shape {
+    /// Where the parts of this shape are in the message; `None` if one that must be there is not.
+    fn fit(&self, types: &Types) -> Option<Wanted> {
+        let mut wanted = Wanted::default();
+        for &(need, path, part) in self.parts {
+            let found = part.add(types, &mut wanted, path);
+            if !found && need == Must {
+                return None;
+            }
+        }
+        Some(wanted)
+    }
+}
+
+impl Part {
+    /// Adds this part at `path` to what is wanted; false if the message does not have it.
+    fn add(self, types: &Types, wanted: &mut Wanted, path: &str) -> bool {
+        let under = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+        let all = |wanted: &mut Wanted, parts: &[(&str, Slot)]| {
+            let mut with_all = wanted.clone();
+            let found = parts.iter().all(|&(name, slot)| add_value(types, &mut with_all, &under(name), slot));
+            if found {
+                *wanted = with_all;
+            }
+            found
+        };
+        match self {
+            Value(slot) => add_value(types, wanted, path, slot),
+            Point => all(wanted, &[("x", Slot::X), ("y", Slot::Y), ("z", Slot::Z)]),
+            Quaternion => all(wanted, &[("x", Slot::Qx), ("y", Slot::Qy), ("z", Slot::Qz), ("w", Slot::Qw)]),
+            Frame => ["header.frame_id", "frame_id", "parent_frame_id"]
+                .iter()
+                .any(|name| add_value(types, wanted, &under(name), Slot::Frame)),
+            Stamp => ["header.stamp", "timestamp", "stamp"].iter().any(|name| {
+                // ROS 2; Foxglove JSON; protobuf; ROS 1's own `time` type.
+                ["nanosec", "nsec", "nanos"].iter().any(|nanos| {
+                    ["sec", "seconds"].iter().any(|seconds| {
+                        let of = |part: &str| format!("{name}.{part}");
+                        all(wanted, &[(&of(seconds), Slot::Seconds), (&of(nanos), Slot::Nanoseconds)])
+                    })
+                }) || add_value(types, wanted, &under(name), Slot::Time)
+            }),
+        }
+    }
+}
+
+/// Adds the value at `path` to what is wanted; false if the path does not lead to a value that fits the slot.
+fn add_value(types: &Types, wanted: &mut Wanted, path: &str, slot: Slot) -> bool {
+    let mut steps = Vec::new();
+    let mut message = 0;
+    let mut segments = path.split('.').peekable();
+    while let Some(segment) = segments.next() {
+        let (name, list) = segment.strip_suffix("[]").map_or((segment, false), |name| (name, true));
+        let Some((index, field)) = types.messages[message].field(name) else { return false };
+        if list == (field.repeat == Repeat::Once) {
+            return false;
+        }
+        match (field.kind, segments.peek()) {
+            (Kind::Message(inner), Some(_)) => message = inner,
+            (_, None) if fits(field, slot) => {}
+            _ => return false,
+        }
+        steps.push(index);
+    }
+    insert_path(wanted, &steps, slot);
+    true
+}
+
+/// Whether the values of a field can go into a slot.
+fn fits(field: &Field, slot: Slot) -> bool {
+    match field.kind {
+        Kind::Number(_) => !slot.is_text() && slot != Slot::Time,
+        Kind::Text => slot.is_text(),
+        Kind::Time => slot == Slot::Time,
+        Kind::WideText | Kind::Message(_) | Kind::Other => false,
+    }
+}
+
+fn insert_path(wanted: &mut Wanted, steps: &[usize], slot: Slot) {
+    let [index, rest @ ..] = steps else { return };
+    if rest.is_empty() {
+        return wanted.insert(*index, Want::Value(slot));
+    }
+    let existing = wanted.fields.iter().position(|(i, _)| i == index);
+    if existing.is_none() {
+        wanted.insert(*index, Want::Inside(Wanted::default()));
+    }
+    if let Some((_, Want::Inside(inside))) = wanted.fields.iter_mut().find(|(i, _)| i == index) {
+        insert_path(inside, rest, slot);
+    }
+}

@@ -1,0 +1,177 @@
+//! What can go wrong with a recording, in words that say what to do next.
+
+use std::path::PathBuf;
+
+/// Why a recording could not be opened, read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// No path was given.
+    #[error("a recording needs at least one file, none was given")]
+    NoFiles,
+    /// A path was given twice.
+    #[error("{} is listed twice in one recording: list each split file once", path.display())]
+    ListedTwice {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A file could not be opened or mapped.
+    #[error("cannot open recording {}: {source}", path.display())]
+    Open {
+        /// The path.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A file is not an MCAP file.
+    #[error("{} is not an MCAP recording: {why}", path.display())]
+    NotMcap {
+        /// The path.
+        path: PathBuf,
+        /// What was found instead, and what to do.
+        why: String,
+    },
+    /// A stream names a topic that no file has.
+    #[error(
+        "stream `{role}`: no topic {topic:?} in the recording{}; present: {}",
+        did_you_mean(nearest),
+        list(present)
+    )]
+    TopicMissing {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic asked for.
+        topic: String,
+        /// Nearest topic present.
+        nearest: Option<String>,
+        /// Topics present.
+        present: Vec<String>,
+    },
+    /// No channel of the topic can be read in the role.
+    #[error("stream `{role}`: topic {topic:?} cannot be read: {why}")]
+    NotDecodable {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic.
+        topic: String,
+        /// Reason for each channel of the topic.
+        why: String,
+    },
+    /// The topic exists, but no usable row came out of it.
+    #[error("stream `{role}`: topic {topic:?} has {messages} messages, but no usable row: {why}")]
+    NoRows {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic.
+        topic: String,
+        /// Messages seen.
+        messages: u64,
+        /// What became of them, and what to do.
+        why: String,
+    },
+    /// No message names the wanted joint.
+    #[error(
+        "stream `joints`: topic {topic:?} has no joint {joint:?}{}; present: {}",
+        did_you_mean(nearest),
+        list(present)
+    )]
+    JointMissing {
+        /// Topic.
+        topic: String,
+        /// Joint asked for.
+        joint: String,
+        /// Nearest joint name present.
+        nearest: Option<String>,
+        /// Joint names present.
+        present: Vec<String>,
+    },
+    /// The wanted body is not in the stream, or several are and none was chosen.
+    #[error("stream `{role}`: topic {topic:?} {why}{}; present: {}", did_you_mean(nearest), list(present))]
+    Body {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic.
+        topic: String,
+        /// What is wrong: missing, or not chosen.
+        why: String,
+        /// Nearest body present.
+        nearest: Option<String>,
+        /// Bodies present.
+        present: Vec<String>,
+    },
+    /// The numbers of a stream cannot be in the declared unit.
+    #[error("stream `{role}`: topic {topic:?}: {why}")]
+    WrongUnit {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic.
+        topic: String,
+        /// What was seen, what it looks like, and what to set.
+        why: String,
+    },
+    /// A clock was asked for that the stream does not have.
+    #[error("stream `{role}`: topic {topic:?} cannot use clock = \"{clock}\": {why}")]
+    NoClock {
+        /// Role of the stream.
+        role: &'static str,
+        /// Topic.
+        topic: String,
+        /// Clock asked for.
+        clock: &'static str,
+        /// Why not, and what to set instead.
+        why: String,
+    },
+    /// The configuration of the streams contradicts itself.
+    #[error("configuration of stream `{role}`: {why}")]
+    Config {
+        /// Role of the stream.
+        role: &'static str,
+        /// What is wrong and what to set.
+        why: String,
+    },
+    /// A file could not be written.
+    #[error("cannot write {}: {why}; nothing was left behind", path.display())]
+    Write {
+        /// The path of the finished file.
+        path: PathBuf,
+        /// What failed.
+        why: String,
+    },
+    /// A callback of [`crate::Recording::for_each_raw`] stopped the pass.
+    #[error("{0}")]
+    Stopped(String),
+}
+
+/// ` (did you mean "x"?)`, or nothing.
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean {n:?}?)"))
+}
+
+/// At most twenty names, quoted.
+fn list(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    let mut text = names.iter().take(SHOWN).map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        text += &format!(" and {} more", names.len() - SHOWN);
+    }
+    text
+}
+
+/// The candidate most like `wanted`, when one is like it at all.
+pub(crate) fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a String>) -> Option<String> {
+    let lower = wanted.to_lowercase();
+    candidates
+        .into_iter()
+        .map(|c| (likeness(&lower, &c.to_lowercase()), c))
+        .filter(|(likeness, _)| *likeness > 0.6)
+        .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
+        .map(|(_, c)| c.clone())
+}
+
+/// Common beginnings count (Jaro-Winkler), and so do few edits with transpositions (Damerau-Levenshtein).
+fn likeness(a: &str, b: &str) -> f64 {
+    strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
+}

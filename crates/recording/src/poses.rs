@@ -1,0 +1,134 @@
+//! Pose rows to columns: body, frame, unit, occlusion, orientation.
+
+use crate::decode::PoseRows;
+use crate::error::nearest;
+use crate::occlusion::Seen;
+use crate::{LengthUnit, PoseStream, RecordingError};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::collections::BTreeSet;
+
+/// Positions beyond this are no laboratory [m].
+const ROOM_M: f64 = 100.0;
+
+/// Poses of one stream, row after row.
+#[derive(Debug, Default)]
+pub(crate) struct PoseTable {
+    pub seen: Vec<Seen>,
+    /// Frames the rows are expressed in.
+    pub frames: BTreeSet<String>,
+    /// Bodies of the rows.
+    pub bodies: BTreeSet<String>,
+}
+
+impl PoseTable {
+    /// Rows with `to_m[i]` metres in the unit of row `i`.
+    pub fn of(rows: &PoseRows, to_m: &[f64]) -> PoseTable {
+        let seen = rows.rows().zip(to_m).map(|(row, to_m)| Seen {
+            position_m: row.position.map(|x| x * to_m),
+            quaternion_xyzw: row.quaternion_xyzw,
+            flagged: row.occluded,
+        });
+        let texts = |list: Vec<&str>| list.into_iter().map(str::to_owned).collect();
+        PoseTable { seen: seen.collect(), frames: texts(rows.frames()), bodies: texts(rows.bodies()) }
+    }
+
+    /// Adds the rows of a later block.
+    pub fn append(&mut self, mut later: PoseTable) {
+        self.seen.append(&mut later.seen);
+        self.frames.append(&mut later.frames);
+        self.bodies.append(&mut later.bodies);
+    }
+
+    /// Whether all numbers of row `i` are finite.
+    pub fn is_finite(&self, i: usize) -> bool {
+        let s = &self.seen[i];
+        s.position_m.iter().chain(s.quaternion_xyzw.iter().flatten()).all(|x| x.is_finite())
+    }
+}
+
+/// Refuses a stream that mixes bodies.
+pub(crate) fn check_body(
+    role: &'static str,
+    stream: &PoseStream,
+    table: &PoseTable,
+) -> Result<(), RecordingError> {
+    if stream.body.is_some() || table.bodies.len() < 2 {
+        return Ok(());
+    }
+    Err(RecordingError::Body {
+        role,
+        topic: stream.topic.clone(),
+        why: "holds several bodies: set `body`".to_owned(),
+        nearest: None,
+        present: table.bodies.iter().cloned().collect(),
+    })
+}
+
+/// The error for a body that no message holds.
+pub(crate) fn body_missing(
+    role: &'static str,
+    stream: &PoseStream,
+    present: &BTreeSet<String>,
+) -> RecordingError {
+    let wanted = stream.body.clone().unwrap_or_default();
+    RecordingError::Body {
+        role,
+        topic: stream.topic.clone(),
+        why: format!("never shows body {wanted:?}"),
+        nearest: nearest(&wanted, present),
+        present: present.iter().cloned().collect(),
+    }
+}
+
+/// Refuses metres that cannot be metres.
+pub(crate) fn check_unit(
+    role: &'static str,
+    stream: &PoseStream,
+    position_m: &[Vector3<f64>],
+) -> Result<(), RecordingError> {
+    let mut reach_m: Vec<f64> = position_m.iter().map(|p| p.norm()).collect();
+    if reach_m.is_empty() {
+        return Ok(());
+    }
+    let k = reach_m.len() / 2;
+    let reach_m = *reach_m.select_nth_unstable_by(k, f64::total_cmp).1;
+    if reach_m <= ROOM_M {
+        return Ok(());
+    }
+    let why = match stream.unit {
+        LengthUnit::M => {
+            format!(
+                "the body is {reach_m:.0} m from the origin, which looks like millimetres: set unit = \"mm\""
+            )
+        }
+        LengthUnit::Mm => {
+            format!("the body is {reach_m:.0} m from the origin even as millimetres: not a position")
+        }
+    };
+    Err(RecordingError::WrongUnit { role, topic: stream.topic.clone(), why })
+}
+
+/// What makes millimetres look like metres, if they do.
+pub(crate) fn looks_like_metres(stream: &PoseStream, position_m: &[Vector3<f64>]) -> Option<String> {
+    let reach_m = position_m.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    (stream.unit == LengthUnit::Mm && reach_m < 0.01 && reach_m > 0.0).then(|| {
+        format!(
+            "the body stays within {:.3} mm of the origin; if that is metres, set unit = \"m\"",
+            reach_m * 1e3
+        )
+    })
+}
+
+/// Positions [m] of the given rows.
+pub(crate) fn positions(table: &PoseTable, rows: &[usize]) -> Vec<Vector3<f64>> {
+    rows.iter().map(|i| Vector3::from(table.seen[*i].position_m)).collect()
+}
+
+/// Orientations of the given rows, all of which have a quaternion of about unit length.
+pub(crate) fn orientations(table: &PoseTable, rows: &[usize]) -> Option<Vec<UnitQuaternion<f64>>> {
+    let unit = |i: &usize| {
+        let [x, y, z, w] = table.seen[*i].quaternion_xyzw?;
+        Some(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
+    };
+    rows.iter().map(unit).collect()
+}

@@ -1,0 +1,280 @@
+//! The streams of a pipeline, read into columns.
+
+use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
+use crate::clock::{choose, judge_header};
+use crate::gather::{Gathered, Kind, Request, gather};
+use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
+use crate::{Clock, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams};
+use crate::{joints, poses};
+use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
+
+impl Recording {
+    /// Reads the wanted streams: one pass over the recording, only wanted channels decoded, chunks in parallel, the
+    /// result independent of chunking, compression and number of threads.
+    ///
+    /// Each stream comes out strictly increasing in time on its own clock, in SI units, without NaN, without occluded
+    /// poses; what was dropped is counted in its [`StreamReport`] and said in the warnings. Warnings about the files
+    /// themselves are in [`Recording::report`].
+    ///
+    /// # Errors
+    /// A missing topic, joint or body (the nearest present one is named), a topic that cannot be decoded, a stream
+    /// without a usable row, numbers that cannot be in the declared unit, a clock the stream does not have.
+    pub fn read(
+        &self,
+        streams: &Streams,
+    ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {
+        joints::check_config(&streams.joints)?;
+        let requests = requests(streams);
+        let gathered = gather(self, &requests)?;
+        let (mut samples, mut reports, mut warnings) = (Samples::default(), Vec::new(), Vec::new());
+        for (request, stream) in requests.iter().zip(&gathered) {
+            let mut stage = Reading::new(request, stream, &mut warnings);
+            match request.role {
+                "joints" => samples.joints = stage.joints(streams)?,
+                "temperature" => {
+                    samples.temperature =
+                        streams.temperature.as_ref().map(|s| stage.scalars(s)).transpose()?
+                }
+                "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
+                "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
+                _ => samples.table = streams.table.as_ref().map(|s| stage.poses(s)).transpose()?,
+            }
+            reports.push(stage.report);
+        }
+        Ok((samples, reports, warnings))
+    }
+}
+
+fn requests(streams: &Streams) -> Vec<Request<'_>> {
+    let joints = Kind::Joints { wanted: &streams.joints.names };
+    let mut requests = vec![Request { role: "joints", topic: &streams.joints.topic, kind: joints }];
+    for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
+        requests.extend(stream.iter().map(|s| Request {
+            role,
+            topic: &s.topic,
+            kind: Kind::Pose { body: s.body.as_deref(), unit: s.unit },
+        }));
+    }
+    if let Some(stream) = &streams.temperature {
+        requests.push(Request { role: "temperature", topic: &stream.topic, kind: Kind::Scalar });
+    }
+    requests
+}
+
+/// One stream on its way from rows to columns.
+struct Reading<'a> {
+    gathered: &'a Gathered,
+    report: StreamReport,
+    warnings: &'a mut Vec<Warning>,
+}
+
+impl<'a> Reading<'a> {
+    fn new(request: &Request<'_>, gathered: &'a Gathered, warnings: &'a mut Vec<Warning>) -> Reading<'a> {
+        let report = StreamReport {
+            role: request.role.to_owned(),
+            topic: request.topic.to_owned(),
+            clock: Clock::Log,
+            clock_reason: String::new(),
+            messages: gathered.messages,
+            rows: 0,
+            undecodable: gathered.undecodable,
+            non_finite: 0,
+            unstamped: 0,
+            duplicate_stamps: 0,
+            backward_stamps: 0,
+            other_joints: gathered.joints.other,
+            occluded: Occlusion::default(),
+            rate_hz: 0.0,
+            largest_gap_s: 0.0,
+            quantisation_rad: Vec::new(),
+        };
+        Reading { gathered, report, warnings }
+    }
+
+    fn joints(&mut self, streams: &Streams) -> Result<JointSamples, RecordingError> {
+        let (stream, table) = (&streams.joints, &self.gathered.joints);
+        self.refuse_undecoded("joints")?;
+        if self.gathered.messages > 0 && table.position.is_empty() {
+            return Err(table.none_selected(stream, self.gathered.messages));
+        }
+        let n = stream.names.len();
+        let finite = |i: usize| table.position[i * n..(i + 1) * n].iter().all(|x| x.is_finite());
+        let (mut rows, mut counts) = in_time_order(&self.time("joints", stream.clock)?, finite);
+        drop_duplicates(&mut rows, &mut counts);
+        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        self.finish("joints", &time_ns, counts)?;
+        let joint_rad = joints::to_rad(table, &rows, stream);
+        joints::check_unit(&joint_rad, stream)?;
+        self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
+        self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
+        let effort_nm = joints::effort(table, &rows, n);
+        let partly = *effort_nm.as_ref().err().unwrap_or(&0) as u64;
+        self.counted(
+            Severity::Notice,
+            "effort-incomplete",
+            partly,
+            "rows have efforts, not all rows for all joints: not used",
+        );
+        Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm: effort_nm.ok() })
+    }
+
+    fn poses(&mut self, stream: &PoseStream) -> Result<PoseSamples, RecordingError> {
+        let role = role_name(&self.report.role);
+        let table = &self.gathered.poses;
+        self.refuse_undecoded(role)?;
+        if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
+            return Err(poses::body_missing(role, stream, &self.gathered.other_bodies));
+        }
+        poses::check_body(role, stream, table)?;
+        let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
+        let Verdict { mut occluded, oriented } = reject_unseen(&mut rows, &table.seen);
+        drop_duplicates(&mut rows, &mut counts);
+        occluded.frozen = reject_frozen(&mut rows, &table.seen);
+        self.report.occluded = occluded;
+        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        self.finish(role, &time_ns, counts)?;
+        let position_m = poses::positions(table, &rows);
+        poses::check_unit(role, stream, &position_m)?;
+        self.inadequate("unit-doubtful", poses::looks_like_metres(stream, &position_m));
+        let several = (table.frames.len() > 1).then(|| {
+            format!("poses come in several frames ({:?}) and are read as if they were one", table.frames)
+        });
+        self.inadequate("several-frames", several);
+        let unoriented =
+            table.seen.iter().filter(|s| !oriented && s.quaternion_xyzw.is_some()).count() as u64;
+        let text =
+            "rows have a quaternion, but not all of about unit length: the stream is read as positions only";
+        self.counted(Severity::Notice, "orientation-unusable", unoriented, text);
+        Ok(PoseSamples {
+            frame_id: table.frames.first().cloned().unwrap_or_default(),
+            body: stream.body.clone().or_else(|| table.bodies.first().cloned()).unwrap_or_default(),
+            time_ns,
+            position_m,
+            orientation: oriented.then(|| poses::orientations(table, &rows)).flatten(),
+        })
+    }
+
+    fn scalars(&mut self, stream: &ScalarStream) -> Result<ScalarSamples, RecordingError> {
+        let role = "temperature";
+        self.refuse_undecoded(role)?;
+        let value = &self.gathered.scalars.value;
+        let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
+        drop_duplicates(&mut rows, &mut counts);
+        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        self.finish(role, &time_ns, counts)?;
+        Ok(ScalarSamples { time_ns, value: rows.iter().map(|i| value[*i]).collect() })
+    }
+
+    /// A stream of which nothing decodes is an error with the first reason.
+    fn refuse_undecoded(&self, role: &'static str) -> Result<(), RecordingError> {
+        let g = self.gathered;
+        if g.messages > 0 && g.undecodable == g.messages {
+            let why = format!(
+                "none of its {} messages decodes: {}",
+                g.messages,
+                g.first_error.as_deref().unwrap_or("")
+            );
+            return Err(RecordingError::NotDecodable { role, topic: self.report.topic.clone(), why });
+        }
+        Ok(())
+    }
+
+    /// The time of each row on the clock asked for, or on the best one.
+    fn time(&mut self, role: &'static str, asked: Option<Clock>) -> Result<Vec<Option<i64>>, RecordingError> {
+        let stamps = &self.gathered.stamps;
+        let (clock, why) = match asked {
+            None => choose(stamps),
+            Some(clock) => (clock, "set in the pipeline".to_owned()),
+        };
+        let time = stamps.on(clock);
+        if !time.is_empty() && time.iter().all(Option::is_none) {
+            let (topic, why) = (self.report.topic.clone(), judge_header(stamps).err().unwrap_or_default());
+            let why = format!("{why}; set \"publish\" or \"log\", or remove the key");
+            return Err(RecordingError::NoClock { role, topic, clock: "header", why });
+        }
+        (self.report.clock, self.report.clock_reason) = (clock, why);
+        Ok(time)
+    }
+
+    /// Completes the report, says what was lost, and refuses an empty stream.
+    fn finish(&mut self, role: &'static str, time_ns: &[i64], counts: Counts) -> Result<(), RecordingError> {
+        let r = &mut self.report;
+        r.rows = time_ns.len();
+        r.non_finite = counts.non_finite;
+        r.unstamped = counts.unstamped;
+        r.duplicate_stamps = counts.duplicate;
+        r.backward_stamps = counts.backward;
+        (r.rate_hz, r.largest_gap_s) = rate_and_gap(time_ns);
+        if time_ns.is_empty() {
+            let why = format!(
+                "{} undecodable, {} with NaN, {} without a stamp, {} occluded; name another topic",
+                r.undecodable,
+                r.non_finite,
+                r.unstamped,
+                r.occluded.total()
+            );
+            return Err(RecordingError::NoRows { role, topic: r.topic.clone(), messages: r.messages, why });
+        }
+        self.warn_of_losses();
+        Ok(())
+    }
+
+    fn warn_of_losses(&mut self) {
+        let r = self.report.clone();
+        let first = self.gathered.first_error.as_deref().unwrap_or("");
+        let lost = Severity::DataLost;
+        let note = Severity::Notice;
+        self.counted(
+            lost,
+            "undecodable",
+            r.undecodable,
+            &format!("messages could not be decoded, the first because: {first}"),
+        );
+        self.counted(lost, "non-finite", r.non_finite, "rows with NaN or infinite values dropped");
+        self.counted(lost, "unstamped", r.unstamped, "rows without a stamp dropped");
+        self.counted(
+            note,
+            "duplicate-stamps",
+            r.duplicate_stamps,
+            "rows with the stamp of the row before dropped",
+        );
+        self.counted(
+            note,
+            "backward-stamps",
+            r.backward_stamps,
+            "rows with stamps going backwards sorted into place",
+        );
+        self.counted(note, "occluded", r.occluded.total(), "poses rejected as occluded");
+        self.counted(note, "other-joints", r.other_joints, "messages without all wanted joints skipped");
+        for why in &self.gathered.unreadable {
+            let text = format!("another channel of this topic is not read: {why}");
+            self.warnings.push(Warning::new(note, Stage::Recording, "channel-unreadable", subject(&r), text));
+        }
+    }
+
+    fn counted(&mut self, severity: Severity, code: &'static str, count: u64, what: &str) {
+        if count > 0 {
+            let text = format!("{count} {what}");
+            self.warnings.push(Warning::new(severity, Stage::Recording, code, subject(&self.report), text));
+        }
+    }
+
+    fn inadequate(&mut self, code: &'static str, text: Option<String>) {
+        if let Some(text) = text {
+            let subject = subject(&self.report);
+            self.warnings.push(Warning::new(Severity::Inadequate, Stage::Recording, code, subject, text));
+        }
+    }
+}
+
+fn subject(report: &StreamReport) -> String {
+    format!("stream {} ({})", report.role, report.topic)
+}
+
+fn role_name(role: &str) -> &'static str {
+    match role {
+        "tip" => "tip",
+        "base" => "base",
+        _ => "table",
+    }
+}

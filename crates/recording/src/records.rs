@@ -1,0 +1,160 @@
+//! Record envelopes of the MCAP format (<https://mcap.dev/spec>): opcode, length, body.
+//!
+//! Every length is checked against the bytes that are there before anything is sliced or allocated.
+
+use mcap::records::op;
+
+/// Bytes of opcode and length before the body of a record.
+pub(crate) const ENVELOPE: usize = 9;
+
+/// One record: where it starts, what it is, what it holds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RawRecord<'a> {
+    pub offset: usize,
+    pub op: u8,
+    pub body: &'a [u8],
+}
+
+/// Why a walk ended before the end of its bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// The record at this offset runs past the end of the bytes.
+    CutOff(usize),
+    /// An opcode of zero, which no record has: zero-filled or overwritten.
+    ZeroOpcode(usize),
+}
+
+/// Walks the records in `bytes[start..end]`; offsets are those in `bytes`.
+pub(crate) struct Records<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    end: usize,
+}
+
+impl<'a> Records<'a> {
+    pub fn new(bytes: &'a [u8], start: usize, end: usize) -> Records<'a> {
+        let end = end.min(bytes.len());
+        Records { bytes, at: start.min(end), end }
+    }
+}
+
+impl<'a> Iterator for Records<'a> {
+    type Item = Result<RawRecord<'a>, Stop>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (offset, end) = (self.at, self.end);
+        if offset >= end {
+            return None;
+        }
+        self.at = end;
+        let (&op, rest) = self.bytes[offset..end].split_first()?;
+        if op == 0 {
+            return Some(Err(Stop::ZeroOpcode(offset)));
+        }
+        let mut cursor = Cursor::new(rest);
+        let body = cursor.u64().and_then(|length| cursor.take(length));
+        let Some(body) = body else { return Some(Err(Stop::CutOff(offset))) };
+        self.at = offset + ENVELOPE + body.len();
+        Some(Ok(RawRecord { offset, op, body }))
+    }
+}
+
+/// Reads little-endian fields; `None` once the bytes run out.
+pub(crate) struct Cursor<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Cursor<'a> {
+    pub fn new(bytes: &'a [u8]) -> Cursor<'a> {
+        Cursor { rest: bytes }
+    }
+
+    pub fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    pub fn take(&mut self, length: u64) -> Option<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(usize::try_from(length).ok()?)?;
+        self.rest = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.rest.split_first_chunk::<N>()?;
+        self.rest = rest;
+        Some(*taken)
+    }
+
+    pub fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    pub fn string(&mut self) -> Option<String> {
+        let length = self.u32()?;
+        let bytes = self.take(u64::from(length))?;
+        String::from_utf8(bytes.to_vec()).ok()
+    }
+}
+
+/// A message record, its data borrowed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Message<'a> {
+    pub channel_id: u16,
+    pub sequence: u32,
+    pub log_ns: u64,
+    pub publish_ns: u64,
+    pub data: &'a [u8],
+}
+
+impl<'a> Message<'a> {
+    pub fn parse(body: &'a [u8]) -> Option<Message<'a>> {
+        let mut c = Cursor::new(body);
+        Some(Message {
+            channel_id: c.u16()?,
+            sequence: c.u32()?,
+            log_ns: c.u64()?,
+            publish_ns: c.u64()?,
+            data: c.rest(),
+        })
+    }
+}
+
+/// The fields of a chunk record before its data.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ChunkHeader {
+    pub start_ns: u64,
+    pub uncompressed_size: u64,
+    pub uncompressed_crc: u32,
+    pub compression: String,
+    pub compressed_size: u64,
+}
+
+impl ChunkHeader {
+    /// The header, and whatever follows it.
+    pub fn parse(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
+        let mut c = Cursor::new(body);
+        let start_ns = c.u64()?;
+        let _end_ns = c.u64()?;
+        let header = ChunkHeader {
+            start_ns,
+            uncompressed_size: c.u64()?,
+            uncompressed_crc: c.u32()?,
+            compression: c.string()?,
+            compressed_size: c.u64()?,
+        };
+        Some((header, c.rest()))
+    }
+}
+
+/// Whether the opcode defines or carries a message, in a chunk or outside.
+pub(crate) fn is_content(opcode: u8) -> bool {
+    matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
+}

@@ -1,0 +1,178 @@
+//! Which streams of a recording the pipeline uses: the `[streams]` section of a pipeline file.
+
+use crate::Clock;
+use serde::{Deserialize, Serialize};
+
+/// The streams to read. Only `joints` is required.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Streams {
+    /// Encoder readings.
+    pub joints: JointStream,
+    /// The tip, or the marker body on the end effector.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<PoseStream>,
+    /// The robot's base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<PoseStream>,
+    /// The calibration table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<PoseStream>,
+    /// Temperature [degC].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ScalarStream>,
+}
+
+/// A stream of joint readings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointStream {
+    /// Topic, such as `/joint_states`.
+    pub topic: String,
+    /// Joints in the order of the model. Found by name in messages that name them; messages without names are read
+    /// by index, their first `names.len()` values in this order.
+    #[serde(default)]
+    pub names: Vec<String>,
+    /// Unit of the readings; default `rad`.
+    #[serde(default)]
+    pub unit: JointUnit,
+    /// With `unit = "counts"`: one encoder a joint, in the order of `names`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub encoders: Vec<Encoder>,
+    /// Clock; chosen automatically, with its reason recorded, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<Clock>,
+    /// Turns from zero beyond which the unit is taken to be wrong; default 2, raise it for joints that wind.
+    #[serde(default = "default_max_turns")]
+    pub max_turns: f64,
+}
+
+impl Default for JointStream {
+    fn default() -> JointStream {
+        JointStream {
+            topic: String::new(),
+            names: Vec::new(),
+            unit: JointUnit::Rad,
+            encoders: Vec::new(),
+            clock: None,
+            max_turns: default_max_turns(),
+        }
+    }
+}
+
+fn default_max_turns() -> f64 {
+    2.0
+}
+
+/// Unit of joint readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum JointUnit {
+    /// Radians (metres for prismatic joints).
+    #[default]
+    Rad,
+    /// Degrees.
+    Deg,
+    /// Raw encoder counts: `direction * 2 pi * (counts - zero_counts) / counts_per_turn`.
+    Counts,
+}
+
+/// How one joint's encoder counts become an angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Encoder {
+    /// Counts in one turn of the joint, gear ratio included.
+    pub counts_per_turn: f64,
+    /// +1 when counts grow with the joint angle, -1 when they fall; default +1.
+    #[serde(default = "default_direction")]
+    pub direction: i8,
+    /// Count at joint angle zero; default 0.
+    #[serde(default)]
+    pub zero_counts: f64,
+}
+
+fn default_direction() -> i8 {
+    1
+}
+
+impl Encoder {
+    /// Angle [rad] of a count.
+    pub fn to_rad(&self, counts: f64) -> f64 {
+        f64::from(self.direction) * std::f64::consts::TAU * (counts - self.zero_counts) / self.counts_per_turn
+    }
+}
+
+/// A stream of poses or positions of one body.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseStream {
+    /// Topic, such as `/vicon/tip/tip`.
+    pub topic: String,
+    /// Body to read (`child_frame_id`, rigid body, marker or subject), required when messages hold several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body: Option<String>,
+    /// Unit of the positions; default `m`.
+    #[serde(default)]
+    pub unit: LengthUnit,
+    /// Clock; chosen automatically, with its reason recorded, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<Clock>,
+}
+
+/// Unit of positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Metres.
+    #[default]
+    M,
+    /// Millimetres.
+    Mm,
+}
+
+impl LengthUnit {
+    /// Metres in one of it.
+    pub fn to_m(self) -> f64 {
+        match self {
+            LengthUnit::M => 1.0,
+            LengthUnit::Mm => 1e-3,
+        }
+    }
+}
+
+/// A stream of one scalar, such as a temperature [degC].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScalarStream {
+    /// Topic.
+    pub topic: String,
+    /// Clock; chosen automatically, with its reason recorded, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<Clock>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_encoder_is_a_line_through_its_zero() {
+        let e = Encoder { counts_per_turn: 4096.0, direction: -1, zero_counts: 1024.0 };
+        assert_eq!(e.to_rad(1024.0), -0.0);
+        assert!((e.to_rad(0.0) - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert!((e.to_rad(1024.0 + 4096.0) + std::f64::consts::TAU).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_pipeline_section_reads_and_refuses_unknown_keys() {
+        let text = "[joints]\ntopic = \"/joint_states\"\nnames = [\"a\"]\nunit = \"deg\"\n[tip]\ntopic = \"/t\"\nunit = \"mm\"\nclock = \"publish\"";
+        let streams: Streams = toml::from_str(text).expect("a valid section");
+        assert_eq!(streams.joints.unit, JointUnit::Deg);
+        assert_eq!(streams.joints.max_turns, 2.0);
+        let tip = streams.tip.expect("tip is there");
+        assert_eq!((tip.unit, tip.clock), (LengthUnit::Mm, Some(Clock::Publish)));
+        let error =
+            toml::from_str::<Streams>("[joints]\ntopic = \"/j\"\nunits = \"deg\"").expect_err("unknown key");
+        assert!(error.to_string().contains("units"), "{error}");
+    }
+}

@@ -1,0 +1,239 @@
+//! The facts as protobuf messages of `proto/armcal.proto`.
+
+use super::{Messages, run_start_ns, start_ns, to_sensor_ns, unsigned};
+use crate::points::Point;
+use crate::proto;
+use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
+use crate::text::conclusion;
+use armcal_calibrate::{Estimate, SideErrors};
+use armcal_core::{Dwell, DwellId, ErrorStats, TipMeasurement};
+use armcal_dwell::ClockAlignment;
+use armcal_table::Place;
+use nalgebra::Vector3;
+
+pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
+    let begin_ns = run_start_ns(run);
+    out.put("/armcal/parameters", begin_ns, &parameters(run, begin_ns));
+    out.put("/armcal/report", begin_ns, &calibration(run, begin_ns));
+    for (index, recording) in run.recordings.iter().enumerate() {
+        let start_ns = start_ns(recording);
+        if let Some(clock) = &recording.clock {
+            let message = clock_alignment(clock, &recording.name, index, start_ns);
+            out.put("/armcal/clock", start_ns, &message);
+        }
+        for dwell in &recording.dwells {
+            let time_ns = dwell.mid_ns();
+            let seen = recording.clock.as_ref().filter(|_| dwell.tip.is_some());
+            let publish_ns = seen.map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
+            out.put_published("/armcal/dwells", time_ns, publish_ns, &dwell_message(recording, dwell));
+            let used = points.iter().any(|p| p.observation.dwell == dwell.id);
+            out.put("/armcal/assignments", time_ns, &assignment(recording, dwell, used));
+        }
+    }
+    for point in points {
+        out.put("/armcal/residuals", point.observation.time_ns, &residual(run, point));
+    }
+}
+
+fn dwell_message(recording: &RecordingRun, d: &Dwell) -> proto::Dwell {
+    proto::Dwell {
+        timestamp: time(d.mid_ns()),
+        recording: recording.name.clone(),
+        recording_index: count(d.id.recording),
+        dwell: count(d.id.dwell),
+        start: time(d.start_ns),
+        end: time(d.end_ns),
+        duration_s: d.duration_s(),
+        joint_rad: d.joint_rad.clone(),
+        joint_deg: d.joint_rad.iter().map(|q| q.to_degrees()).collect(),
+        joint_spread_rad: d.joint_spread_rad.clone(),
+        joint_sigma_rad: d.joint_sigma_rad.clone(),
+        effort_nm: d.effort_nm.clone().unwrap_or_default(),
+        arrival_sign: d.arrival.iter().map(|a| a.sign() as i32).collect(),
+        samples: count(d.samples),
+        effective_samples: d.effective_samples,
+        tip: d.tip.as_ref().map(tip),
+        temperature_c: d.temperature_c,
+    }
+}
+
+fn tip(t: &TipMeasurement) -> proto::TipMeasurement {
+    let q = t.orientation.map(|q| proto::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w });
+    proto::TipMeasurement {
+        position_m: Some(vector(&t.position_m)),
+        position_sigma_mm: Some(vector(&t.covariance_m2.diagonal().map(|v| v.sqrt() * 1e3))),
+        orientation: q,
+        orientation_sigma_rad: t.orientation.map(|_| t.orientation_sigma_rad),
+        samples: count(t.samples),
+        effective_samples: t.effective_samples,
+    }
+}
+
+fn assignment(recording: &RecordingRun, dwell: &Dwell, used: bool) -> proto::Assignment {
+    use proto::assignment::Place as P;
+    let assigned = recording.assignments().iter().find(|a| a.dwell == dwell.id);
+    let rejection = recording.rejections.iter().find(|r| r.dwell == dwell.id);
+    let mut message = proto::Assignment {
+        timestamp: time(dwell.mid_ns()),
+        recording: recording.name.clone(),
+        recording_index: count(dwell.id.recording),
+        dwell: count(dwell.id.dwell),
+        distance_mm: assigned.map(|a| a.distance_m * 1e3).filter(|d| d.is_finite()),
+        used,
+        why: rejection.map(|r| r.why.clone()).unwrap_or_default(),
+        ..Default::default()
+    };
+    match assigned.map(|a| &a.place) {
+        None => message.set_place(P::None),
+        Some(Place::Seated { cavity, confidence }) => {
+            message.set_place(P::Seated);
+            message.cavity.clone_from(cavity);
+            message.confidence = Some(*confidence);
+        }
+        Some(Place::Hovering { height_m, above }) => {
+            message.set_place(P::Hovering);
+            message.cavity.clone_from(above);
+            message.height_mm = Some(height_m * 1e3);
+        }
+        Some(Place::FreeSpace) => message.set_place(P::FreeSpace),
+        Some(Place::Ambiguous { cavities }) => {
+            message.set_place(P::Ambiguous);
+            message.candidates.clone_from(cavities);
+        }
+        Some(Place::Unassigned { why }) => {
+            message.set_place(P::Unassigned);
+            if message.why.is_empty() {
+                message.why.clone_from(why);
+            }
+        }
+    }
+    message
+}
+
+fn residual(run: &Run, point: &Point) -> proto::Residual {
+    let (o, r) = (point.observation, point.residual);
+    let DwellId { recording, dwell } = o.dwell;
+    proto::Residual {
+        timestamp: time(o.time_ns),
+        recording: run.recording_name(o.dwell).to_owned(),
+        recording_index: count(recording),
+        dwell: count(dwell),
+        cavity: o.cavity().unwrap_or_default().to_owned(),
+        held_out: r.held_out,
+        nominal_mm: Some(vector(&(r.nominal_m * 1e3))),
+        nominal_norm_mm: r.nominal_m.norm() * 1e3,
+        fitted_mm: Some(vector(&(r.fitted_m * 1e3))),
+        fitted_norm_mm: r.fitted_m.norm() * 1e3,
+        whitened: Some(vector(&r.whitened)),
+        weight: r.weight,
+        expected_norm_mm: r.expected_norm_m * 1e3,
+        measured_m: Some(vector(&point.measured_m)),
+        predicted_m: Some(vector(&point.predicted_m)),
+    }
+}
+
+fn parameters(run: &Run, time_ns: i64) -> proto::Parameters {
+    let fit = &run.calibration.fit;
+    proto::Parameters {
+        timestamp: time(time_ns),
+        parameters: fit.estimates.iter().map(parameter).collect(),
+        undetermined: fit.undetermined.iter().map(|u| u.text.clone()).collect(),
+    }
+}
+
+fn parameter(e: &Estimate) -> proto::Parameter {
+    let p = &e.parameter;
+    let shown = |si: f64| p.unit.to_display(si);
+    proto::Parameter {
+        name: p.name.clone(),
+        unit: p.unit.symbol().into(),
+        nominal: p.nominal,
+        value: e.value,
+        sigma: e.sigma,
+        ci95_low: e.ci95[0],
+        ci95_high: e.ci95[1],
+        lower: p.lower,
+        upper: p.upper,
+        display_unit: p.unit.display_symbol().into(),
+        display_nominal: shown(p.nominal),
+        display_value: shown(e.value),
+        display_change: shown(e.value - p.nominal),
+        display_ci95_half: shown((e.ci95[1] - e.ci95[0]) / 2.0),
+        free: p.free,
+        determined: e.determined,
+        at_bound: e.at_bound,
+        role: role_word(p.role).into(),
+        meaning: p.meaning.clone(),
+    }
+}
+
+fn calibration(run: &Run, time_ns: i64) -> proto::Calibration {
+    let c = &run.calibration;
+    proto::Calibration {
+        timestamp: time(time_ns),
+        pipeline: run.pipeline_name.clone(),
+        version: VERSION.into(),
+        objective: c.fit.objective.clone(),
+        effects: effects(c).into_iter().map(str::to_owned).collect(),
+        status: status_word(c.fit.status).into(),
+        iterations: count(c.fit.iterations),
+        noise_floor_mm: c.noise_floor_m * 1e3,
+        train: Some(side(&c.train)),
+        holdout: Some(side(&c.holdout)),
+        rank: count(c.fit.rank),
+        undetermined: c.fit.undetermined.iter().map(|u| u.text.clone()).collect(),
+        sigma_scale: c.fit.sigma_scale,
+        sum_of_distances: c.fit.paper.map(|p| proto::SumOfDistances {
+            sum_mm: p.sum_of_distances_m * 1e3,
+            limit_mm: p.limit_m * 1e3,
+            feasible: p.feasible,
+        }),
+        conclusion: conclusion(c),
+    }
+}
+
+fn side(s: &SideErrors) -> proto::Side {
+    proto::Side {
+        observations: count(s.fitted.n),
+        nominal: Some(errors(&s.nominal)),
+        fitted: Some(errors(&s.fitted)),
+    }
+}
+
+fn errors(s: &ErrorStats) -> proto::Errors {
+    proto::Errors {
+        mean_mm: s.mean_m * 1e3,
+        rms_mm: s.rms_m * 1e3,
+        p95_mm: s.p95_m * 1e3,
+        max_mm: s.max_m * 1e3,
+    }
+}
+
+fn clock_alignment(c: &ClockAlignment, recording: &str, index: usize, time_ns: i64) -> proto::ClockAlignment {
+    proto::ClockAlignment {
+        timestamp: time(time_ns),
+        recording: recording.to_owned(),
+        recording_index: count(index),
+        offset_ms: c.offset_s * 1e3,
+        offset_sigma_ms: c.offset_sigma_s * 1e3,
+        drift_ppm: c.drift * 1e6,
+        drift_sigma_ppm: c.drift_sigma * 1e6,
+        reference: time(c.reference_ns),
+        correlation: c.correlation,
+        displacement_ratio: c.displacement_ratio,
+    }
+}
+
+fn vector(v: &Vector3<f64>) -> proto::Vector {
+    proto::Vector { x: v.x, y: v.y, z: v.z }
+}
+
+fn time(time_ns: i64) -> Option<prost_types::Timestamp> {
+    let time_ns = unsigned(time_ns);
+    let seconds = i64::try_from(time_ns / 1_000_000_000).unwrap_or(i64::MAX);
+    Some(prost_types::Timestamp { seconds, nanos: (time_ns % 1_000_000_000) as i32 })
+}
+
+fn count(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
+}

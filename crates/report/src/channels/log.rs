@@ -1,0 +1,70 @@
+//! Milestones and warnings as `foxglove.Log`.
+
+use super::{Messages, run_end_ns, run_start_ns, start_ns, timestamp};
+use crate::run::{Run, VERSION};
+use crate::text::conclusion;
+use armcal_core::{Severity, Stage, Warning};
+use foxglove::messages as fox;
+use foxglove::messages::log::Level;
+
+const TOPIC: &str = "/armcal/log";
+
+pub(super) fn milestones(run: &Run, out: &mut Messages) {
+    let begin_ns = run_start_ns(run);
+    let opening = format!("armcal {VERSION}, pipeline {}", run.pipeline_name);
+    put(out, begin_ns, Level::Info, "armcal", &run.pipeline_name, opening);
+    for warning in run.overall_warnings() {
+        put_warning(out, begin_ns, &warning);
+    }
+    for recording in &run.recordings {
+        let start_ns = start_ns(recording);
+        let found = format!(
+            "{}: {} dwells, {} associated, {} rejected",
+            recording.name,
+            recording.dwells.len(),
+            run.associated(recording),
+            recording.rejections.len()
+        );
+        put(out, start_ns, Level::Info, "armcal.dwell", &recording.name, found);
+        for warning in recording.all_warnings() {
+            put_warning(out, start_ns, warning);
+        }
+        for rejection in &recording.rejections {
+            let dwell = recording.dwells.iter().find(|d| d.id == rejection.dwell);
+            let time_ns = dwell.map_or(start_ns, |d| d.mid_ns());
+            let why = format!("dwell {} not used: {}", rejection.dwell.dwell, rejection.why);
+            put(out, time_ns, Level::Debug, "armcal.dwell", &recording.name, why);
+        }
+    }
+    put(out, run_end_ns(run), Level::Info, "armcal.calibrate", "", conclusion(&run.calibration));
+}
+
+fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
+    let level = match warning.severity {
+        Severity::Notice => Level::Info,
+        Severity::Inadequate => Level::Warning,
+        Severity::DataLost => Level::Error,
+    };
+    let name = match warning.stage {
+        Stage::Recording => "armcal.recording",
+        Stage::Dwell => "armcal.dwell",
+        Stage::Table => "armcal.table",
+        Stage::Calibrate => "armcal.calibrate",
+        Stage::Output => "armcal.report",
+    };
+    let message = format!("{warning} [{}]", warning.code);
+    put(out, time_ns, level, name, &warning.subject, message);
+}
+
+/// `subject` goes where a log has its source file: the thing the message is about.
+fn put(out: &mut Messages, time_ns: i64, level: Level, name: &str, subject: &str, message: String) {
+    let log = fox::Log {
+        timestamp: Some(timestamp(time_ns)),
+        level: level as i32,
+        message,
+        name: name.into(),
+        file: subject.into(),
+        line: 0,
+    };
+    out.put(TOPIC, time_ns, &log);
+}

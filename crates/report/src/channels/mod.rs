@@ -1,0 +1,161 @@
+//! The result channels of `run.mcap`: everything under `/armcal/`.
+//!
+//! | topic | schema | messages |
+//! |---|---|---|
+//! | `/armcal/scene` | `foxglove.SceneUpdate` | one a recording: board, points, error arrows, their scale |
+//! | `/armcal/arms` | `foxglove.SceneUpdate` | one a dwell: nominal and calibrated arm, measured tip |
+//! | `/armcal/tf` | `foxglove.FrameTransforms` | one a dwell: both arms link by link, the board |
+//! | `/armcal/path_measured`, `_nominal`, `_calibrated` | `foxglove.PosesInFrame` | one a recording |
+//! | `/armcal/tip_measured` | `foxglove.PoseInFrame` | one an observation |
+//! | `/armcal/dwells` | `armcal.Dwell` | one a dwell |
+//! | `/armcal/assignments` | `armcal.Assignment` | one a dwell |
+//! | `/armcal/residuals` | `armcal.Residual` | one an observation |
+//! | `/armcal/parameters` | `armcal.Parameters` | one a run |
+//! | `/armcal/report` | `armcal.Calibration` | one a run |
+//! | `/armcal/clock` | `armcal.ClockAlignment` | one a recording with a sensor clock |
+//! | `/armcal/log` | `foxglove.Log` | warnings and milestones |
+//!
+//! A viewer that seeks shows the latest message of each topic and nothing before it. So every message
+//! is complete by itself, which is why the standing scene and the moving arms are two topics.
+//!
+//! The log time is that of the dwell on the robot's clock, and what is true of a whole recording or
+//! run is logged at its beginning. The publish time is the same, except where the position sensor saw
+//! the tip: there it is the sensor's own stamp.
+
+mod facts;
+mod frames;
+mod log;
+mod paths;
+mod scene;
+mod shapes;
+
+use crate::points::Point;
+use crate::run::{RecordingRun, Run};
+use armcal_dwell::ClockAlignment;
+use foxglove::messages::Timestamp;
+use foxglove::{Encode, Schema};
+
+/// Beginning of every topic, attachment name and metadata name of armcal's own.
+pub(crate) const PREFIX: &str = "/armcal/";
+/// The frame in which positions are measured.
+pub(crate) const WORLD: &str = "world";
+
+/// One message, ready to be written.
+pub(crate) struct ResultMessage {
+    pub topic: &'static str,
+    pub schema: Schema,
+    pub message_encoding: String,
+    pub log_ns: u64,
+    pub publish_ns: u64,
+    pub data: Vec<u8>,
+}
+
+/// All result messages in the order of their log times.
+pub(crate) fn messages(run: &Run, points: &[Point]) -> Vec<ResultMessage> {
+    let mut out = Messages::default();
+    log::milestones(run, &mut out);
+    facts::put(run, points, &mut out);
+    for (index, recording) in run.recordings.iter().enumerate() {
+        let of_recording: Vec<&Point> =
+            points.iter().filter(|p| p.observation.dwell.recording == index).collect();
+        paths::put(recording, &of_recording, &mut out);
+        scene::standing(run, index, &of_recording, points, &mut out);
+        for dwell in &recording.dwells {
+            frames::put(run, index, dwell, &mut out);
+            scene::arms(run, dwell, &of_recording, &mut out);
+        }
+    }
+    out.messages.sort_by_key(|m| m.log_ns);
+    out.messages
+}
+
+/// When a recording's first dwell begins [ns]; without dwells, its first message.
+pub(crate) fn start_ns(recording: &RecordingRun) -> i64 {
+    let dwells = recording.dwells.iter().map(|d| d.start_ns).min();
+    dwells.or_else(|| recording.report.channels.iter().map(|c| c.first_ns).min()).unwrap_or(0)
+}
+
+/// When the first recording begins [ns].
+pub(crate) fn run_start_ns(run: &Run) -> i64 {
+    run.recordings.iter().map(start_ns).min().unwrap_or(0)
+}
+
+/// When the last dwell of the run ends [ns].
+pub(crate) fn run_end_ns(run: &Run) -> i64 {
+    let ends = run.recordings.iter().flat_map(|r| &r.dwells).map(|d| d.end_ns);
+    ends.max().unwrap_or_else(|| run_start_ns(run))
+}
+
+/// Collects messages.
+#[derive(Default)]
+struct Messages {
+    messages: Vec<ResultMessage>,
+}
+
+impl Messages {
+    fn put<T: Encode>(&mut self, topic: &'static str, time_ns: i64, message: &T) {
+        self.put_published(topic, time_ns, time_ns, message);
+    }
+
+    fn put_published<T: Encode>(&mut self, topic: &'static str, log_ns: i64, publish_ns: i64, message: &T) {
+        let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(0));
+        message.encode(&mut data).expect("a vector grows to any length");
+        self.messages.push(ResultMessage {
+            topic,
+            schema: T::get_schema().expect("protobuf messages have a schema"),
+            message_encoding: T::get_message_encoding(),
+            log_ns: unsigned(log_ns),
+            publish_ns: unsigned(publish_ns),
+            data,
+        });
+    }
+}
+
+/// MCAP has no time before 1970.
+fn unsigned(time_ns: i64) -> u64 {
+    u64::try_from(time_ns).unwrap_or(0)
+}
+
+/// The time as Foxglove's messages carry it.
+fn timestamp(time_ns: i64) -> Timestamp {
+    let time_ns = unsigned(time_ns);
+    let seconds = u32::try_from(time_ns / 1_000_000_000).unwrap_or(u32::MAX);
+    Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
+}
+
+/// Robot time -> sensor time [ns]: the inverse of [`ClockAlignment::to_robot_ns`].
+fn to_sensor_ns(clock: &ClockAlignment, robot_ns: i64) -> i64 {
+    let since_reference_s = robot_ns.saturating_sub(clock.reference_ns) as f64 * 1e-9;
+    let offset_s = (clock.offset_s + clock.drift * since_reference_s) / (1.0 - clock.drift);
+    robot_ns.saturating_add((offset_s * 1e9).round() as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensor_time_inverts_robot_time() {
+        let clock = ClockAlignment {
+            offset_s: 0.0123,
+            offset_sigma_s: 0.0,
+            drift: 5e-5,
+            drift_sigma: 0.0,
+            reference_ns: 1_700_000_000_000_000_000,
+            correlation: 1.0,
+            displacement_ratio: 1.0,
+        };
+        for sensor_ns in [1_700_000_000_000_000_000, 1_700_000_600_123_456_789, 1_699_999_000_000_000_000] {
+            let there_and_back = to_sensor_ns(&clock, clock.to_robot_ns(sensor_ns));
+            assert!((there_and_back - sensor_ns).abs() <= 1, "{there_and_back} {sensor_ns}");
+        }
+    }
+
+    #[test]
+    fn times_outside_the_formats_range_saturate() {
+        assert_eq!(unsigned(-5), 0);
+        assert_eq!(timestamp(-5), Timestamp::new(0, 0));
+        assert_eq!(timestamp(1_500_000_000), Timestamp::new(1, 500_000_000));
+        assert_eq!(timestamp(i64::MAX).sec(), u32::MAX);
+    }
+}

@@ -1,0 +1,162 @@
+//! `run.mcap`: the input's messages untouched, the result channels, attachments and metadata.
+
+use crate::channels::{PREFIX, messages, run_end_ns};
+use crate::points::Point;
+use crate::run::{Run, VERSION};
+use armcal_core::{Severity, Stage, Warning};
+use armcal_recording::output::McapOutput;
+use armcal_recording::{RawChannel, Recording, RecordingError};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Beginning of the names of armcal's attachments and metadata records.
+const OWN: &str = "armcal/";
+
+/// A result file attached to the recording.
+pub(crate) struct Attachment<'a> {
+    pub name: &'a str,
+    pub media_type: &'a str,
+    pub text: &'a str,
+}
+
+/// Writes the file; it appears when everything is in it. Attachments carry the time of the last dwell, and nothing
+/// carries the time of day: the same run gives the same bytes.
+pub(crate) fn write_mcap(
+    run: &Run,
+    points: &[Point],
+    inputs: &[Recording],
+    attachments: &[Attachment],
+    path: &Path,
+) -> Result<(), RecordingError> {
+    // Neither `ros2` nor any other profile: those promise one encoding for all channels.
+    let mut out = McapOutput::create(path, "")?;
+    for input in inputs {
+        copy_messages(input, &mut out)?;
+    }
+    put_results(run, points, &mut out)?;
+    for input in inputs {
+        copy_extras(input, &mut out)?;
+    }
+    let end_ns = u64::try_from(run_end_ns(run)).unwrap_or(0);
+    for Attachment { name, media_type, text } in attachments {
+        out.attach(&format!("{OWN}{name}"), media_type, end_ns, 0, text.as_bytes())?;
+    }
+    out.metadata("armcal/run", &about_run(run))?;
+    out.metadata("armcal/input", &about_input(run))?;
+    out.finish()
+}
+
+/// Messages of the input that are left out because armcal itself wrote them, one warning a recording.
+pub(crate) fn earlier_results(run: &Run) -> Vec<Warning> {
+    let of_recording = |r: &crate::RecordingRun| {
+        let own = r.report.channels.iter().filter(|c| c.topic.starts_with(PREFIX));
+        let count: u64 = own.map(|c| c.messages).sum();
+        (count > 0).then(|| {
+            let (messages, are) =
+                if count == 1 { ("message", "is a result") } else { ("messages", "are results") };
+            let message =
+                format!("{count} {messages} under {PREFIX} {are} of an earlier run, left out of run.mcap");
+            Warning::new(Severity::Notice, Stage::Output, "earlier-results-left-out", &r.name, message)
+        })
+    };
+    run.recordings.iter().filter_map(of_recording).collect()
+}
+
+fn copy_messages(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingError> {
+    // Channels by topic, so that a schema is hashed once and not with every message.
+    let mut known: BTreeMap<String, Vec<(RawChannel, u16)>> = BTreeMap::new();
+    input.for_each_raw(&mut |message| {
+        let channel = message.channel;
+        if channel.topic.starts_with(PREFIX) {
+            return Ok(());
+        }
+        let seen = known.get(&channel.topic).and_then(|all| all.iter().find(|(c, _)| c == channel));
+        let id = match seen {
+            Some((_, id)) => *id,
+            None => {
+                let id = add_channel(channel, out)?;
+                known.entry(channel.topic.clone()).or_default().push((channel.clone(), id));
+                id
+            }
+        };
+        out.put(id, message.sequence, message.log_ns, message.publish_ns, message.data)
+    })
+}
+
+fn add_channel(channel: &RawChannel, out: &mut McapOutput) -> Result<u16, RecordingError> {
+    let schema = channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice()));
+    out.add_channel(&channel.topic, schema, &channel.message_encoding, &channel.metadata)
+}
+
+/// Attachments and metadata of the input, without those of an earlier run.
+fn copy_extras(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingError> {
+    for a in input.attachments() {
+        if !a.name.starts_with(OWN) {
+            out.attach(a.name, a.media_type, a.log_ns, a.create_ns, a.data)?;
+        }
+    }
+    for (name, entries) in input.metadata() {
+        if !name.starts_with(OWN) {
+            out.metadata(&name, &entries)?;
+        }
+    }
+    Ok(())
+}
+
+fn put_results(run: &Run, points: &[Point], out: &mut McapOutput) -> Result<(), RecordingError> {
+    let mut sequences: BTreeMap<&str, u32> = BTreeMap::new();
+    for m in messages(run, points) {
+        let schema = (m.schema.name.as_str(), m.schema.encoding.as_str(), m.schema.data.as_ref());
+        let id = out.add_channel(m.topic, Some(schema), &m.message_encoding, &BTreeMap::new())?;
+        let sequence = sequences.entry(m.topic).or_insert(0);
+        out.put(id, *sequence, m.log_ns, m.publish_ns, &m.data)?;
+        *sequence += 1;
+    }
+    Ok(())
+}
+
+/// What was run, and the seeds of everything random in it.
+fn about_run(run: &Run) -> BTreeMap<String, String> {
+    let mut entries = BTreeMap::from([
+        ("version".to_owned(), VERSION.to_owned()),
+        ("pipeline".to_owned(), run.pipeline_name.clone()),
+        ("model".to_owned(), run.model.chain().name().to_owned()),
+        ("objective".to_owned(), run.calibration.fit.objective.clone()),
+        ("summary_schema".to_owned(), crate::SCHEMA.to_owned()),
+    ]);
+    if let Ok(pipeline) = run.pipeline_text.parse::<toml::Table>() {
+        seeds("", &pipeline, &mut entries);
+    }
+    entries
+}
+
+/// Every key `seed` of the pipeline, by its dotted path.
+fn seeds(path: &str, table: &toml::Table, entries: &mut BTreeMap<String, String>) {
+    for (key, value) in table {
+        let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match value {
+            toml::Value::Table(inner) => seeds(&path, inner, entries),
+            toml::Value::Integer(seed) if key == "seed" => {
+                entries.insert(path, seed.to_string());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Names and hashes of the input files.
+fn about_input(run: &Run) -> BTreeMap<String, String> {
+    let mut entries = BTreeMap::new();
+    for (i, recording) in run.recordings.iter().enumerate() {
+        entries.insert(format!("recording{i}.name"), recording.name.clone());
+        for (j, file) in recording.report.files.iter().enumerate() {
+            let prefix = format!("recording{i}.file{j}");
+            let path = recording.given_path(file).to_string_lossy().into_owned();
+            entries.insert(format!("{prefix}.path"), path);
+            entries.insert(format!("{prefix}.sha256"), file.sha256.clone());
+            entries.insert(format!("{prefix}.bytes"), file.bytes.to_string());
+            entries.insert(format!("{prefix}.profile"), file.profile.clone());
+        }
+    }
+    entries
+}

@@ -1,0 +1,97 @@
+//! `parameters.toml`: what the calibration says about every parameter and frame, for programs and people.
+
+use crate::ReportError;
+use crate::run::{Run, VERSION, role_word};
+use armcal_calibrate::Estimate;
+use armcal_core::{Pose, RollPitchYaw};
+use serde::Serialize;
+
+const HEADER: &str = "\
+# Parameters of the calibrated arm. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
+# determined = false: the data say nothing about it and the prior keeps it near nominal.
+# at_bound = true: it wants to go further than its bounds allow.
+# Frames: where `frame` lies in `parent`; roll, pitch, yaw about the fixed x, y, z of the parent.
+
+";
+
+#[derive(Serialize)]
+struct File<'a> {
+    pipeline: &'a str,
+    version: &'static str,
+    conclusion: String,
+    undetermined: Vec<&'a str>,
+    parameters: Vec<Entry<'a>>,
+    frames: Vec<FrameEntry>,
+}
+
+#[derive(Serialize)]
+struct Entry<'a> {
+    name: &'a str,
+    unit: &'static str,
+    nominal: f64,
+    value: f64,
+    sigma: f64,
+    ci95: [f64; 2],
+    free: bool,
+    determined: bool,
+    at_bound: bool,
+    role: &'static str,
+    meaning: &'a str,
+}
+
+#[derive(Serialize)]
+struct FrameEntry {
+    frame: String,
+    parent: String,
+    xyz_m: [f64; 3],
+    rpy_deg: [f64; 3],
+}
+
+/// The text of the file.
+pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
+    let fit = &run.calibration.fit;
+    let file = File {
+        pipeline: &run.pipeline_name,
+        version: VERSION,
+        conclusion: crate::conclusion(&run.calibration),
+        undetermined: fit.undetermined.iter().map(|u| u.text.as_str()).collect(),
+        parameters: fit.estimates.iter().map(entry).collect(),
+        frames: frames(run),
+    };
+    Ok(format!("{HEADER}{}", toml::to_string(&file)?))
+}
+
+fn entry(e: &Estimate) -> Entry<'_> {
+    Entry {
+        name: &e.parameter.name,
+        unit: e.parameter.unit.symbol(),
+        nominal: e.parameter.nominal,
+        value: e.value,
+        sigma: e.sigma,
+        ci95: e.ci95,
+        free: e.parameter.free,
+        determined: e.determined,
+        at_bound: e.at_bound,
+        role: role_word(e.parameter.role),
+        meaning: &e.parameter.meaning,
+    }
+}
+
+/// Base, tip, and the board of every recording that has one, as calibrated.
+fn frames(run: &Run) -> Vec<FrameEntry> {
+    let p = run.calibration.fit.values();
+    let entry = |frame: String, parent: &str, pose: &Pose| {
+        let RollPitchYaw { xyz_m, rpy_deg } = pose.into();
+        FrameEntry { frame, parent: parent.into(), xyz_m, rpy_deg }
+    };
+    let mut frames = vec![
+        entry("base".into(), "world", &run.model.base_in_world(&p)),
+        entry("tip".into(), "last link", &run.model.tip_in_last_link(&p)),
+    ];
+    for (index, recording) in run.recordings.iter().enumerate() {
+        if let Some(board) = run.model.board_in_world(&p, index) {
+            frames.push(entry(format!("board.{}", recording.name), "world", &board));
+        }
+    }
+    frames
+}

@@ -1,0 +1,67 @@
+//! Every observation with its positions before and after: what arrows, paths and tables are drawn from.
+
+use crate::{ReportError, Run};
+use armcal_calibrate::Residual;
+use armcal_core::Observation;
+use nalgebra::Vector3;
+
+/// One observation, all positions in the world frame [m].
+pub(crate) struct Point<'a> {
+    pub observation: &'a Observation,
+    pub residual: &'a Residual,
+    /// Where the tip was, frames as calibrated.
+    pub measured_m: Vector3<f64>,
+    /// Where the calibrated model puts it; for a held-out point, the fit that never saw it.
+    pub predicted_m: Vector3<f64>,
+    /// Where the tip was, estimated frames as fitted with the nominal robot.
+    pub nominal_measured_m: Vector3<f64>,
+    /// Where the nominal robot puts it.
+    pub nominal_predicted_m: Vector3<f64>,
+}
+
+/// The points of a run, in the order of its observations.
+pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
+    check(run)?;
+    let fitted = run.calibration.fit.values();
+    let nominal = &run.calibration.nominal_values;
+    let pairs = run.observations.iter().zip(&run.calibration.residuals);
+    Ok(pairs
+        .map(|(observation, residual)| {
+            let measured_m = run.model.measured_tip_in_world(&fitted, observation);
+            let nominal_measured_m = run.model.measured_tip_in_world(nominal, observation);
+            Point {
+                observation,
+                residual,
+                measured_m,
+                predicted_m: measured_m - residual.fitted_m,
+                nominal_measured_m,
+                nominal_predicted_m: nominal_measured_m - residual.nominal_m,
+            }
+        })
+        .collect())
+}
+
+/// Lengths and dwells that belong together do.
+fn check(run: &Run) -> Result<(), ReportError> {
+    let (observations, residuals) = (&run.observations, &run.calibration.residuals);
+    let inconsistent = |what: String| Err(ReportError::Inconsistent(what));
+    if observations.len() != residuals.len() {
+        return inconsistent(format!("{} observations, {} residuals", observations.len(), residuals.len()));
+    }
+    if let Some((o, r)) = observations.iter().zip(residuals).find(|(o, r)| o.dwell != r.dwell) {
+        return inconsistent(format!("the residual of {} stands where that of {} belongs", r.dwell, o.dwell));
+    }
+    if let Some(o) = observations.iter().find(|o| o.dwell.recording >= run.recordings.len()) {
+        return inconsistent(format!("{} is of no recording", o.dwell));
+    }
+    let parameters = run.model.parameters().len();
+    for (what, values) in
+        [("fitted", run.calibration.fit.estimates.len()), ("nominal", run.calibration.nominal_values.len())]
+    {
+        if values != parameters {
+            return inconsistent(format!("{values} {what} values for {parameters} parameters"));
+        }
+    }
+    run.model.check(observations)?;
+    Ok(())
+}

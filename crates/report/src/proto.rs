@@ -1,0 +1,36 @@
+//! Messages of `proto/armcal.proto`, which Foxglove has no schema for.
+//!
+//! The code and the descriptor set are generated from the .proto and checked in; a test keeps the three
+//! together, so building armcal needs no code generator.
+
+#![allow(missing_docs)] // The .proto documents the fields whose names do not.
+
+use foxglove::{Encode, Schema};
+use prost::bytes::BufMut;
+
+include!("../proto/armcal.rs");
+
+/// `google.protobuf.FileDescriptorSet` of the messages and what they import.
+const DESCRIPTORS: &[u8] = include_bytes!("../proto/armcal.binpb");
+
+macro_rules! impl_encode {
+    ($($message:ident),+) => {
+        $(impl Encode for $message {
+            type Error = prost::EncodeError;
+
+            fn get_schema() -> Option<Schema> {
+                Some(Schema::new(concat!("armcal.", stringify!($message)), "protobuf", DESCRIPTORS))
+            }
+
+            fn get_message_encoding() -> String {
+                "protobuf".into()
+            }
+
+            fn encode(&self, buffer: &mut impl BufMut) -> Result<(), prost::EncodeError> {
+                prost::Message::encode(self, buffer)
+            }
+        })+
+    };
+}
+
+impl_encode!(Dwell, Assignment, Residual, Parameters, Calibration, ClockAlignment);

@@ -1,0 +1,193 @@
+//! Everything a finished run knows. All outputs are views of this one value.
+
+use armcal_calibrate::Calibration;
+use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, Severity, Warning};
+use armcal_dwell::ClockAlignment;
+use armcal_model::Model;
+use armcal_recording::{FileReport, RecordingReport};
+use armcal_table::{Assignment, Association, Board, Place};
+use serde::Serialize;
+use sha2::{Digest as _, Sha256};
+use std::path::{Path, PathBuf};
+
+/// Version of the tool, as every output states it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A finished run.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Name of the pipeline.
+    pub pipeline_name: String,
+    /// Text of the pipeline, so that the result can be reproduced from itself.
+    pub pipeline_text: String,
+    /// Text of the model file (DH table or URDF), which the calibrated model is written in the form of.
+    pub model_text: String,
+    /// Recordings in the order of the pipeline; the index is [`DwellId::recording`].
+    pub recordings: Vec<RecordingRun>,
+    /// The calibration board, where the rig has one.
+    pub board: Option<Board>,
+    /// The model with its nominal parameters.
+    pub model: Model,
+    /// What the fit saw, and the dwells held out of it.
+    pub observations: Vec<Observation>,
+    /// The calibration; its residuals are in the order of `observations`.
+    pub calibration: Calibration,
+    /// What concerns the run as a whole.
+    pub warnings: Vec<Warning>,
+}
+
+/// One recording and what every stage made of it.
+#[derive(Debug, Clone)]
+pub struct RecordingRun {
+    /// Its name in the pipeline; also names its board frame, `board.<name>`.
+    pub name: String,
+    /// Its files as given.
+    pub paths: Vec<PathBuf>,
+    /// What reading found.
+    pub report: RecordingReport,
+    /// Relation of the sensor's clock to the robot's, where both were needed.
+    pub clock: Option<ClockAlignment>,
+    /// Pauses of the arm, in the order of time.
+    pub dwells: Vec<Dwell>,
+    /// Where the tip was during each dwell; `None` without a board.
+    pub association: Option<Association>,
+    /// Dwells that do not take part in the fit, and why.
+    pub rejections: Vec<Rejection>,
+    /// What the stages after reading want the user to know about this recording.
+    pub warnings: Vec<Warning>,
+}
+
+/// Whether the result can be relied upon; decides between exit codes 0 and 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Nothing speaks against the result.
+    Ok,
+    /// The model or the data are inadequate.
+    Inadequate,
+    /// Data of the input were damaged or could not be used.
+    DataLost,
+}
+
+impl Run {
+    /// The gravest thing any warning says.
+    pub fn status(&self) -> Status {
+        let of_recordings = self.recordings.iter().flat_map(RecordingRun::all_warnings).map(|w| w.severity);
+        let overall = self.overall_warnings();
+        match of_recordings.chain(overall.iter().map(|w| w.severity)).max() {
+            None | Some(Severity::Notice) => Status::Ok,
+            Some(Severity::Inadequate) => Status::Inadequate,
+            Some(Severity::DataLost) => Status::DataLost,
+        }
+    }
+
+    /// Warnings that are not about one recording: pipeline, fit, hold-out, outputs; each once.
+    pub fn overall_warnings(&self) -> Vec<Warning> {
+        let of_recordings: Vec<&Warning> =
+            self.recordings.iter().flat_map(RecordingRun::all_warnings).collect();
+        let outputs = output_warnings(self);
+        let all =
+            self.warnings.iter().chain(&self.calibration.warnings).chain(&self.calibration.fit.warnings);
+        let mut own = without_repeats(all.chain(&outputs));
+        own.retain(|w| !of_recordings.contains(w));
+        own.into_iter().cloned().collect()
+    }
+
+    /// Dwells of a recording that were seated in a cavity; without a board, those the fit could use.
+    pub fn associated(&self, recording: &RecordingRun) -> usize {
+        if self.board.is_some() {
+            return recording
+                .assignments()
+                .iter()
+                .filter(|a| matches!(a.place, Place::Seated { .. }))
+                .count();
+        }
+        recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
+    }
+
+    /// Name of the recording a dwell belongs to.
+    pub(crate) fn recording_name(&self, dwell: DwellId) -> &str {
+        self.recordings.get(dwell.recording).map_or("", |r| r.name.as_str())
+    }
+}
+
+impl RecordingRun {
+    /// Warnings of reading and of the stages after it, each once.
+    pub fn all_warnings(&self) -> Vec<&Warning> {
+        let of_association = self.association.iter().flat_map(|a| &a.warnings);
+        without_repeats(self.report.warnings.iter().chain(&self.warnings).chain(of_association))
+    }
+
+    /// Where the tip was during each dwell; empty without a board.
+    pub fn assignments(&self) -> &[Assignment] {
+        self.association.as_ref().map_or(&[], |a| &a.assignments)
+    }
+
+    /// Path of a file as the pipeline gives it; results do not depend on where the pipeline lies.
+    pub(crate) fn given_path<'a>(&'a self, file: &'a FileReport) -> &'a Path {
+        self.paths.iter().find(|given| file.path.ends_with(given)).unwrap_or(&file.path)
+    }
+
+    /// SHA-256 of the file; of the hexadecimal digests of all files, one a line, for a split recording.
+    pub fn sha256(&self) -> String {
+        match self.report.files.as_slice() {
+            [] => String::new(),
+            [file] => file.sha256.clone(),
+            files => {
+                let mut hasher = Sha256::new();
+                for file in files {
+                    hasher.update(format!("{}\n", file.sha256));
+                }
+                hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+            }
+        }
+    }
+}
+
+/// Names of the physical effects in the model: the parts that own [`Role::Effect`] parameters.
+pub(crate) fn effects(calibration: &Calibration) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for estimate in &calibration.fit.estimates {
+        let part = estimate.parameter.name.rsplit_once('.').map_or("", |(part, _)| part);
+        if estimate.parameter.role == Role::Effect && !names.contains(&part) {
+            names.push(part);
+        }
+    }
+    names
+}
+
+/// How the iteration ended, as machine-readable output spells it.
+pub(crate) fn status_word(status: armcal_calibrate::Status) -> &'static str {
+    match status {
+        armcal_calibrate::Status::Converged => "converged",
+        armcal_calibrate::Status::IterationLimit => "iteration_limit",
+    }
+}
+
+/// What a parameter belongs to, as machine-readable output spells it.
+pub(crate) fn role_word(role: Role) -> &'static str {
+    match role {
+        Role::Robot => "robot",
+        Role::EstimatedFrame => "estimated_frame",
+        Role::KnownFrame => "known_frame",
+        Role::Effect => "effect",
+    }
+}
+
+/// What the outputs cannot hold.
+fn output_warnings(run: &Run) -> Vec<Warning> {
+    let mut warnings = crate::mcap_file::earlier_results(run);
+    // A model that cannot be written at all is an error of `write_all`, which says why.
+    warnings.extend(crate::model_file::model_file(run).into_iter().flat_map(|m| m.warnings));
+    warnings
+}
+
+fn without_repeats<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Vec<&'a Warning> {
+    let mut seen: Vec<&Warning> = Vec::new();
+    for warning in warnings {
+        if !seen.contains(&warning) {
+            seen.push(warning);
+        }
+    }
+    seen
+}

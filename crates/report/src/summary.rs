@@ -1,0 +1,214 @@
+//! `summary.json`: what a script, a CI job or a campaign table needs to know about a run.
+//!
+//! The names are a contract (`armcal.summary/1`): fields are added, never renamed. Every number is
+//! finite or `null`; a length is in millimetres where the name says `_mm`, a parameter in its `unit`.
+//!
+//! `nominal_mm` is the error with nominal robot parameters after fitting only the frames that nobody
+//! could know beforehand (base, tool, a board whose pose is estimated); `fitted_mm` is the error with
+//! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
+
+use crate::run::{RecordingRun, Run, Status, VERSION};
+use crate::text::conclusion;
+use armcal_calibrate::{Calibration, Estimate, SideErrors};
+use armcal_core::{ErrorStats, Unit, Warning};
+use serde::Serialize;
+use std::path::Path;
+
+/// Version of the contract.
+pub const SCHEMA: &str = "armcal.summary/1";
+
+/// The summary of a run: indented JSON with a final newline.
+pub fn summary_json(run: &Run) -> String {
+    let json = serde_json::to_string_pretty(&Summary::of(run));
+    json.expect("strings, numbers and lists under literal names always serialise") + "\n"
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Summary<'a> {
+    schema: &'static str,
+    version: &'static str,
+    pipeline: &'a str,
+    status: Status,
+    recordings: Vec<RecordingSummary<'a>>,
+    fit: FitSummary<'a>,
+    /// Filled by a run that diagnoses; `null` otherwise.
+    diagnosis: Option<()>,
+    conclusion: String,
+    warnings: Vec<Warning>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct RecordingSummary<'a> {
+    name: &'a str,
+    path: String,
+    sha256: String,
+    files: Vec<FileSummary<'a>>,
+    dwells: usize,
+    associated: usize,
+    rejected: Vec<RejectedDwell<'a>>,
+    clock_offset_ms: Option<f64>,
+    clock_offset_sigma_ms: Option<f64>,
+    clock_drift_ppm: Option<f64>,
+    clock_drift_sigma_ppm: Option<f64>,
+    warnings: Vec<&'a Warning>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct FileSummary<'a> {
+    path: String,
+    sha256: &'a str,
+    bytes: u64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct RejectedDwell<'a> {
+    dwell: usize,
+    why: &'a str,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct FitSummary<'a> {
+    objective: &'a str,
+    effects: Vec<&'a str>,
+    status: &'static str,
+    iterations: usize,
+    noise_floor_mm: f64,
+    sigma_scale: f64,
+    rank: usize,
+    train: SideSummary,
+    holdout: SideSummary,
+    parameters: Vec<ParameterSummary<'a>>,
+    undetermined: Vec<&'a str>,
+    paper: Option<PaperSummary>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct SideSummary {
+    n: usize,
+    nominal_mm: ErrorSummary,
+    fitted_mm: ErrorSummary,
+}
+
+/// `null` throughout when there is nothing to summarise: zero would read as a perfect result.
+#[derive(Debug, Clone, Serialize)]
+struct ErrorSummary {
+    mean: Option<f64>,
+    rms: Option<f64>,
+    p95: Option<f64>,
+    max: Option<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ParameterSummary<'a> {
+    name: &'a str,
+    unit: Unit,
+    nominal: f64,
+    value: f64,
+    sigma: f64,
+    ci95: [f64; 2],
+    determined: bool,
+    at_bound: bool,
+    free: bool,
+    role: &'static str,
+}
+
+/// Eq. 4 of the paper, when that objective was asked for.
+#[derive(Debug, Clone, Serialize)]
+struct PaperSummary {
+    sum_of_distances_mm: f64,
+    limit_mm: f64,
+    feasible: bool,
+}
+
+impl<'a> Summary<'a> {
+    fn of(run: &'a Run) -> Summary<'a> {
+        Summary {
+            schema: SCHEMA,
+            version: VERSION,
+            pipeline: &run.pipeline_name,
+            status: run.status(),
+            recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
+            fit: fit(&run.calibration),
+            diagnosis: None,
+            conclusion: conclusion(&run.calibration),
+            warnings: run.overall_warnings(),
+        }
+    }
+}
+
+fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
+    let clock = r.clock.as_ref();
+    RecordingSummary {
+        name: &r.name,
+        path: r.paths.first().map(|p| path_text(p)).unwrap_or_default(),
+        sha256: r.sha256(),
+        files: r
+            .report
+            .files
+            .iter()
+            .map(|f| FileSummary { path: path_text(r.given_path(f)), sha256: &f.sha256, bytes: f.bytes })
+            .collect(),
+        dwells: r.dwells.len(),
+        associated: run.associated(r),
+        rejected: r.rejections.iter().map(|x| RejectedDwell { dwell: x.dwell.dwell, why: &x.why }).collect(),
+        clock_offset_ms: clock.map(|c| c.offset_s * 1e3),
+        clock_offset_sigma_ms: clock.map(|c| c.offset_sigma_s * 1e3),
+        clock_drift_ppm: clock.map(|c| c.drift * 1e6),
+        clock_drift_sigma_ppm: clock.map(|c| c.drift_sigma * 1e6),
+        warnings: r.all_warnings(),
+    }
+}
+
+fn fit(c: &Calibration) -> FitSummary<'_> {
+    FitSummary {
+        objective: &c.fit.objective,
+        effects: crate::run::effects(c),
+        status: crate::run::status_word(c.fit.status),
+        iterations: c.fit.iterations,
+        noise_floor_mm: c.noise_floor_m * 1e3,
+        sigma_scale: c.fit.sigma_scale,
+        rank: c.fit.rank,
+        train: side(&c.train),
+        holdout: side(&c.holdout),
+        parameters: c.fit.estimates.iter().map(parameter).collect(),
+        undetermined: c.fit.undetermined.iter().map(|u| u.text.as_str()).collect(),
+        paper: c.fit.paper.map(|p| PaperSummary {
+            sum_of_distances_mm: p.sum_of_distances_m * 1e3,
+            limit_mm: p.limit_m * 1e3,
+            feasible: p.feasible,
+        }),
+    }
+}
+
+fn side(errors: &SideErrors) -> SideSummary {
+    SideSummary {
+        n: errors.fitted.n,
+        nominal_mm: error_summary(&errors.nominal),
+        fitted_mm: error_summary(&errors.fitted),
+    }
+}
+
+fn error_summary(stats: &ErrorStats) -> ErrorSummary {
+    let mm = |value_m: f64| (stats.n > 0).then_some(value_m * 1e3);
+    ErrorSummary { mean: mm(stats.mean_m), rms: mm(stats.rms_m), p95: mm(stats.p95_m), max: mm(stats.max_m) }
+}
+
+fn parameter(e: &Estimate) -> ParameterSummary<'_> {
+    ParameterSummary {
+        name: &e.parameter.name,
+        unit: e.parameter.unit,
+        nominal: e.parameter.nominal,
+        value: e.value,
+        sigma: e.sigma,
+        ci95: e.ci95,
+        determined: e.determined,
+        at_bound: e.at_bound,
+        free: e.parameter.free,
+        role: crate::run::role_word(e.parameter.role),
+    }
+}
+
+/// A path as text; bytes that are not Unicode become U+FFFD so that the document stays valid JSON.
+fn path_text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}

@@ -1,0 +1,116 @@
+//! How numbers and names are written for people.
+
+use armcal_calibrate::{Calibration, SideErrors};
+use armcal_core::Unit;
+
+/// The result in one sentence, about held-out points where there are any.
+pub fn conclusion(calibration: &Calibration) -> String {
+    let floor = match calibration.noise_floor_m {
+        floor if floor.is_finite() => format!("; the noise floor is {} mm.", millimetres(floor)),
+        _ => ".".into(),
+    };
+    let points = |side: &SideErrors| match side.fitted.n {
+        1 => "1 point".to_owned(),
+        n => format!("{n} points"),
+    };
+    if calibration.holdout.fitted.n > 0 {
+        let side = &calibration.holdout;
+        let held_out = points(side).replacen(' ', " held-out ", 1);
+        return format!("On {held_out} the mean error {}{floor}", change(side));
+    }
+    if calibration.train.fitted.n > 0 {
+        let side = &calibration.train;
+        return format!(
+            "Nothing was held out: on the {} the fit saw, the mean error {}{floor}",
+            points(side),
+            change(side)
+        );
+    }
+    "No observation took part, so there is no error to state.".into()
+}
+
+/// "falls from 21.30 to 0.31 mm (98.5 %)".
+fn change(side: &SideErrors) -> String {
+    let (before_m, after_m) = (side.nominal.mean_m, side.fitted.mean_m);
+    if !(before_m.is_finite() && after_m.is_finite()) {
+        return "is not a number".into();
+    }
+    let (before, after) = (millimetres(before_m), millimetres(after_m));
+    let percent = 100.0 * (before_m - after_m) / before_m;
+    match before_m.total_cmp(&after_m) {
+        std::cmp::Ordering::Greater => format!("falls from {before} to {after} mm ({percent:.1} %)"),
+        std::cmp::Ordering::Less if before_m > 0.0 => {
+            format!("rises from {before} to {after} mm ({:.1} % worse)", -percent)
+        }
+        std::cmp::Ordering::Less => format!("rises from {before} to {after} mm"),
+        std::cmp::Ordering::Equal => format!("stays at {after} mm"),
+    }
+}
+
+/// A length in millimetres: two decimals, more where two would hide the digits that matter.
+pub(crate) fn millimetres(metres: f64) -> String {
+    let mm = metres * 1e3;
+    match mm.abs() {
+        a if a >= 0.095 || a < 1e-9 => format!("{mm:.2}"),
+        a if a >= 0.0095 => format!("{mm:.3}"),
+        a if a >= 0.00095 => format!("{mm:.4}"),
+        _ => format!("{mm:.1e}"),
+    }
+}
+
+/// An SI value in the unit shown to people, without the symbol.
+pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
+    let shown = unit.to_display(si);
+    if !shown.is_finite() {
+        return "-".into();
+    }
+    match shown.abs() {
+        a if a != 0.0 && a < 5e-5 => format!("{shown:.1e}"),
+        a if a >= 1e5 => format!("{shown:.3e}"),
+        _ => format!("{shown:.4}"),
+    }
+}
+
+/// A name from outside, on one line and without control characters (a terminal would obey them).
+pub(crate) fn printable(name: &str) -> String {
+    name.chars()
+        .flat_map(|c| {
+            let escaped: Box<dyn Iterator<Item = char>> =
+                if c.is_control() { Box::new(c.escape_default()) } else { Box::new(std::iter::once(c)) };
+            escaped
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::ErrorStats;
+
+    fn side(n: usize, before_m: f64, after_m: f64) -> SideErrors {
+        let stats = |mean_m| ErrorStats { n, mean_m, ..ErrorStats::default() };
+        SideErrors { nominal: stats(before_m), fitted: stats(after_m) }
+    }
+
+    #[test]
+    fn a_change_is_called_by_its_direction() {
+        assert_eq!(change(&side(3, 0.0213, 0.00031)), "falls from 21.30 to 0.31 mm (98.5 %)");
+        assert_eq!(change(&side(3, 0.001, 0.0015)), "rises from 1.00 to 1.50 mm (50.0 % worse)");
+        assert_eq!(change(&side(3, 0.001, 0.001)), "stays at 1.00 mm");
+        assert_eq!(change(&side(3, 0.0, 0.001)), "rises from 0.00 to 1.00 mm");
+        assert_eq!(change(&side(3, f64::NAN, 0.001)), "is not a number");
+    }
+
+    #[test]
+    fn small_lengths_keep_two_digits() {
+        assert_eq!(millimetres(0.123_456), "123.46");
+        assert_eq!(millimetres(0.000_034_2), "0.034");
+        assert_eq!(millimetres(0.000_003_42), "0.0034");
+        assert_eq!(millimetres(0.0), "0.00");
+    }
+
+    #[test]
+    fn control_characters_do_not_reach_the_terminal() {
+        assert_eq!(printable("a\u{1b}[31m\nb\u{9b}ü"), "a\\u{1b}[31m\\nb\\u{9b}ü");
+    }
+}

@@ -1,0 +1,103 @@
+//! All files of a run, in one folder.
+
+use crate::mcap_file::{Attachment, write_mcap};
+use crate::model_file::model_file;
+use crate::parameters::parameters_toml;
+use crate::points::points;
+use crate::tables::parquet_files;
+use crate::{ReportError, Run, summary_json};
+use armcal_recording::atomic::AtomicFile;
+use armcal_recording::{Recording, RecordingError};
+use serde::{Deserialize, Serialize};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The `[output]` section of a pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputConfig {
+    /// What `run.mcap` holds of the input; default `"copy"`.
+    pub input: InputMessages,
+}
+
+/// What `run.mcap` holds of the input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum InputMessages {
+    /// Every sound message, attachment and metadata record, untouched.
+    #[default]
+    Copy,
+    /// Only the files' names and hashes.
+    Reference,
+}
+
+/// Writes `run.mcap`, `summary.json`, `parameters.toml`, the calibrated model and the Parquet tables into
+/// `out_dir`, which is made if need be; returns their paths.
+///
+/// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
+/// [`InputMessages::Copy`]. Files of an earlier run are replaced, each at once.
+///
+/// # Errors
+/// A folder or file that cannot be written, an input that cannot be read again, or a run whose parts do not
+/// belong together. Nothing but complete files is left behind: all are made before the first one appears.
+pub fn write_all(
+    run: &Run,
+    recordings: &[Recording],
+    out_dir: &Path,
+    config: &OutputConfig,
+) -> Result<Vec<PathBuf>, ReportError> {
+    if config.input == InputMessages::Copy && recordings.len() != run.recordings.len() {
+        let (opened, named) = (recordings.len(), run.recordings.len());
+        return Err(ReportError::Inconsistent(format!("{opened} recordings opened for {named} in the run")));
+    }
+    let points = points(run)?;
+    let model = model_file(run)?;
+    let parameters = parameters_toml(run)?;
+    let summary = summary_json(run);
+    let tables = parquet_files(run, &points)?;
+
+    std::fs::create_dir_all(out_dir)
+        .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
+    let mut staged = Vec::new();
+    let texts = [("summary.json", &summary), ("parameters.toml", &parameters), (model.name, &model.text)];
+    for (name, text) in texts {
+        staged.push(stage(&out_dir.join(name), text.as_bytes())?);
+    }
+    for (name, bytes) in &tables {
+        staged.push(stage(&out_dir.join(name), bytes)?);
+    }
+
+    let attachments = [
+        Attachment { name: "pipeline.toml", media_type: "application/toml", text: &run.pipeline_text },
+        Attachment { name: "summary.json", media_type: "application/json", text: &summary },
+        Attachment { name: "parameters.toml", media_type: "application/toml", text: &parameters },
+        Attachment { name: model.name, media_type: model.media_type, text: &model.text },
+    ];
+    let to_copy = match config.input {
+        InputMessages::Copy => recordings,
+        InputMessages::Reference => &[],
+    };
+    let mcap_path = out_dir.join("run.mcap");
+    write_mcap(run, &points, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
+
+    let mut written = vec![mcap_path];
+    for file in staged {
+        let path = file.target().to_owned();
+        file.commit().map_err(at(&path))?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// A complete file that has no name yet.
+fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
+    let mut file = AtomicFile::create(path).map_err(at(path))?;
+    file.write_all(bytes)
+        .map_err(|e| at(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() }))?;
+    Ok(file)
+}
+
+fn at(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
+    let path = path.to_owned();
+    move |source| ReportError::Write { path, source }
+}

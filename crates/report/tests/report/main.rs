@@ -1,0 +1,23 @@
+//! What the written files say, read back by other means than they were written with.
+
+#![allow(clippy::unwrap_used)] // A test that cannot go on may stop.
+
+mod synthetic;
+
+/// The checked-in protobuf code is current.
+mod proto_is_current;
+
+/// `run.mcap`: input untouched, every message decodable, pictures in the right place.
+mod recording;
+
+/// `summary.json` keeps its contract and its numbers.
+mod summary;
+
+/// Parquet tables, parameters, the calibrated model.
+mod tables;
+
+/// What a person reads.
+mod terminal;
+
+/// Hostile names, folders that cannot be written, runs that contradict themselves.
+mod trouble;

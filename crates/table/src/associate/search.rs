@@ -1,0 +1,246 @@
+//! Rough alignments of tips and cavities, all that come into question, best first.
+//!
+//! A board of given pose: shifts and turns on a grid as wide as the model may be wrong. A board of unknown
+//! pose: triplets and pairs of places matched with triplets and pairs of cavities by their distances.
+//! Places are drawn by a low-discrepancy sequence (Roberts 2018), the same for the same input.
+
+use super::field::Field;
+use super::problem::{Problem, Site};
+use armcal_core::Pose;
+use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+
+/// Alignments kept.
+const KEEP: usize = 48;
+/// Alignments looked at to find that many different ones.
+const LOOK: usize = 6000;
+/// Alignments with less than this share of the best one's support are not kept.
+const WORTH: f64 = 0.5;
+/// A place further from every cavity than this share of their spacing does not support an alignment.
+const REACH: f64 = 0.4;
+/// Steps of the grid [m], [rad], and how many standard deviations it spans.
+const GRID_M: f64 = 0.006;
+const GRID_RAD: f64 = 0.05;
+const GRID_SPAN: f64 = 3.0;
+/// Triplets and pairs of places that are matched, and drawn at most.
+const TRIPLETS: usize = 160;
+const PAIRS: usize = 80;
+const DRAWS: usize = 6000;
+/// Alignments by triplets and pairs at most.
+const MOST: usize = 80_000;
+/// Distances of places match distances of cavities within a share of them, and a share of the spacing.
+const STRETCH: f64 = 0.04;
+const SLACK: f64 = 0.2;
+
+/// Rough alignments in the pose given.
+pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
+    let board_from_world = world_from_board.inverse();
+    let middle_m = problem.middle_m(&board_from_world);
+    let supposed = Field::none(board_from_world, middle_m);
+    let sites: Vec<(Vector3<f64>, f64)> =
+        problem.sites.iter().map(|s| (supposed.supposed_m(&s.at_m) - middle_m, s.weight)).collect();
+    let shifts = steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
+    let mut scored = Vec::new();
+    for turn_rad in steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD) {
+        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad);
+        let turned: Vec<_> = sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect();
+        for (x, y) in shifts.iter().flat_map(|&x| shifts.iter().map(move |&y| (x, y))) {
+            let shift = Vector3::new(x, y, 0.0);
+            let support: f64 = turned.iter().map(|(p, w)| w * support(problem, &(p + shift), false).1).sum();
+            let far = (x * x + y * y) / problem.prior.offset_m.powi(2);
+            scored.push((support - 0.1 * far, (turn_rad, shift)));
+        }
+    }
+    let field = |&(turn_rad, shift): &(f64, Vector3<f64>)| {
+        let mut field = supposed.clone();
+        field.turn_and_shift(turn_rad, shift);
+        field
+    };
+    different(problem, scored, field, false)
+}
+
+/// Rough alignments without a pose.
+pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
+    let up = Unit::new_normalize(Vector3::from(problem.config.normal_in_world));
+    let mut poses = by_triplets(problem, &up);
+    poses.extend(by_pairs(problem, &up));
+    let sites = &problem.sites;
+    let score = |board_from_world: &Pose| -> f64 {
+        let at = |s: &Site| board_from_world.transform_point(&s.at_m.into()).coords;
+        sites.iter().map(|s| s.weight * support(problem, &at(s), true).1).sum()
+    };
+    let scored = poses.into_iter().map(|pose| (score(&pose), pose)).collect();
+    let n = problem.layout.len() as f64;
+    let centre_m = problem.layout.points_m.iter().sum::<Vector3<f64>>() / n;
+    different(problem, scored, |pose| Field::none(*pose, centre_m), true)
+}
+
+/// How many places an alignment brings to a cavity, seen along the board's normal.
+pub(super) fn supporters(problem: &Problem, field: &Field) -> usize {
+    let supports = |s: &&Site| support(problem, &field.aligned_m(&s.at_m), false).1 > 0.0;
+    problem.sites.iter().filter(supports).count()
+}
+
+/// The cavity that supports a place, and how much, from 0 to 1.
+fn support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64) {
+    let Some(&k) = problem.layout.near(at_m).first() else { return (u32::MAX, 0.0) };
+    let gap = at_m - problem.layout.points_m[k as usize];
+    let square = if in_space { gap.norm_squared() } else { gap.x * gap.x + gap.y * gap.y };
+    let reach_m = REACH * problem.layout.spacing_m;
+    let support = 1.0 - square / (reach_m * reach_m);
+    if support > 0.0 { (k, support) } else { (u32::MAX, 0.0) }
+}
+
+/// The best alignments of which each puts at least some places into other cavities than those before it.
+fn different<T>(
+    problem: &Problem,
+    mut scored: Vec<(f64, T)>,
+    field_of: impl Fn(&T) -> Field,
+    in_space: bool,
+) -> Vec<Field> {
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = WORTH * scored.first().map_or(0.0, |s| s.0);
+    let enough = (problem.sites.len() / 8).max(1);
+    let mut kept: Vec<(Field, Vec<u32>)> = Vec::new();
+    for (_, rough) in scored.iter().take(LOOK).take_while(|s| s.0 >= least) {
+        let field = field_of(rough);
+        let cavity = |s: &Site| support(problem, &field.aligned_m(&s.at_m), in_space).0;
+        let cavities: Vec<u32> = problem.sites.iter().map(cavity).collect();
+        let differs = |other: &Vec<u32>| cavities.iter().zip(other).filter(|(a, b)| a != b).count() >= enough;
+        if kept.iter().all(|(_, other)| differs(other)) {
+            kept.push((field, cavities));
+            if kept.len() == KEEP {
+                break;
+            }
+        }
+    }
+    kept.into_iter().map(|(field, _)| field).collect()
+}
+
+fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
+    let pairs = Pairs::of(&problem.layout.points_m);
+    let (cavities, sites) = (&problem.layout.points_m, &problem.sites);
+    let cos_limit = problem.config.max_normal_deg.min(180.0).to_radians().cos();
+    let far_m = 1.5 * problem.layout.spacing_m;
+    let mut poses = Vec::new();
+    let mut matched = 0;
+    for draw in 0..DRAWS {
+        let [a, b, c] = draw3(draw, sites.len()).map(|i| sites[i].at_m);
+        let [ab, ac, bc] = [(b - a).norm(), (c - a).norm(), (c - b).norm()];
+        let height = (b - a).cross(&(c - a)).norm() / ab.max(ac).max(bc).max(1e-9);
+        if ab.min(ac).min(bc) < far_m || height < 0.5 * far_m {
+            continue;
+        }
+        let Some(in_world) = frame(&a, &b, &c) else { continue };
+        let before = poses.len();
+        for &(_, i, j) in pairs.like(ab, tolerance(problem, ab)) {
+            for (k, third) in cavities.iter().enumerate() {
+                let fits = k != i
+                    && k != j
+                    && ((third - cavities[i]).norm() - ac).abs() < tolerance(problem, ac)
+                    && ((third - cavities[j]).norm() - bc).abs() < tolerance(problem, bc);
+                if !fits {
+                    continue;
+                }
+                if let Some(on_board) = frame(&cavities[i], &cavities[j], third) {
+                    let world_from_board = in_world * on_board.inverse();
+                    if (world_from_board.rotation * Vector3::z()).dot(up) >= cos_limit {
+                        poses.push(world_from_board.inverse());
+                    }
+                }
+            }
+        }
+        matched += usize::from(poses.len() > before);
+        if matched == TRIPLETS || poses.len() > MOST {
+            break;
+        }
+    }
+    poses
+}
+
+/// Pairs leave the turn about their line open: the board's normal is as near to `up` as it can be.
+fn by_pairs(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
+    let pairs = Pairs::of(&problem.layout.points_m);
+    let (cavities, sites) = (&problem.layout.points_m, &problem.sites);
+    let far_m = 0.6 * problem.layout.spacing_m;
+    let mut poses = Vec::new();
+    let mut matched = 0;
+    for draw in 0..DRAWS {
+        let [a, b, _] = draw3(draw, sites.len()).map(|i| sites[i].at_m);
+        let ab = (b - a).norm();
+        if ab < far_m {
+            continue;
+        }
+        let in_world = upright(&a, &b, up);
+        let before = poses.len();
+        for &(_, i, j) in pairs.like(ab, tolerance(problem, ab)) {
+            let on_board = upright(&cavities[i], &cavities[j], &Vector3::z_axis());
+            let world_from_board = in_world * on_board.inverse();
+            poses.push(world_from_board.inverse());
+        }
+        matched += usize::from(poses.len() > before);
+        if matched == PAIRS || poses.len() > MOST {
+            break;
+        }
+    }
+    poses
+}
+
+fn tolerance(problem: &Problem, distance_m: f64) -> f64 {
+    STRETCH * distance_m + SLACK * problem.layout.spacing_m
+}
+
+/// Ordered pairs of cavities by their distance.
+struct Pairs(Vec<(f64, usize, usize)>);
+
+impl Pairs {
+    fn of(points: &[Vector3<f64>]) -> Pairs {
+        let all = (0..points.len()).flat_map(|i| (0..points.len()).map(move |j| (i, j)));
+        let mut pairs: Vec<(f64, usize, usize)> =
+            all.filter(|(i, j)| i != j).map(|(i, j)| ((points[i] - points[j]).norm(), i, j)).collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        Pairs(pairs)
+    }
+
+    fn like(&self, distance_m: f64, tolerance_m: f64) -> &[(f64, usize, usize)] {
+        let from = self.0.partition_point(|p| p.0 < distance_m - tolerance_m);
+        let to = self.0.partition_point(|p| p.0 <= distance_m + tolerance_m);
+        &self.0[from..to.max(from)]
+    }
+}
+
+/// The frame with origin `a`, x towards `b`, and `c` in the upper half of the xy plane.
+fn frame(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>) -> Option<Pose> {
+    let x = (b - a).try_normalize(1e-9)?;
+    let z = x.cross(&(c - a)).try_normalize(1e-9)?;
+    Some(pose_of(a, &x, &z))
+}
+
+/// The frame with origin `a`, x towards `b`, and z as near to `up` as that allows.
+fn upright(a: &Vector3<f64>, b: &Vector3<f64>, up: &Unit<Vector3<f64>>) -> Pose {
+    let x = (b - a).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+    let beside = |v: &Vector3<f64>| (v - x * x.dot(v)).try_normalize(0.05);
+    let z = beside(up).or_else(|| beside(&Vector3::x())).or_else(|| beside(&Vector3::y()));
+    pose_of(a, &x, &z.unwrap_or_else(Vector3::z))
+}
+
+fn pose_of(origin: &Vector3<f64>, x: &Vector3<f64>, z: &Vector3<f64>) -> Pose {
+    let matrix = Matrix3::from_columns(&[*x, z.cross(x), *z]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    Pose::from_parts(Translation3::from(*origin), rotation)
+}
+
+/// Three indices below `n`, evenly spread over all of them as `draw` counts up (R3 sequence, with the inverse
+/// powers of the root of x^4 = x + 1).
+fn draw3(draw: usize, n: usize) -> [usize; 3] {
+    const STEP: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
+    STEP.map(|step| {
+        let at = (0.5 + step * (draw + 1) as f64).fract();
+        ((at * n as f64) as usize).min(n.saturating_sub(1))
+    })
+}
+
+/// From `-span` to `span` in steps, zero among them.
+fn steps(span: f64, step: f64) -> Vec<f64> {
+    let half = (span / step).round() as i32;
+    (-half..=half).map(|i| f64::from(i) * step).collect()
+}

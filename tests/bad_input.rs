@@ -1,0 +1,217 @@
+use crate::support::{armcal, read_json, root};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use tempfile::TempDir;
+
+/// A folder with a copy of the shipped recordings and pipeline, to be damaged.
+struct Bench {
+    folder: TempDir,
+    pipeline: String,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        for name in ["normal.mcap", "roll.mcap", "pitch.mcap"] {
+            let from = root().join("fixtures/paper").join(name);
+            std::fs::copy(&from, folder.path().join(name)).expect("copying a fixture");
+        }
+        let pipelines = root().join("pipelines");
+        let pipeline = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
+        let pipeline = pipeline
+            .replace("\"../fixtures/paper/", "\"")
+            .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
+            .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+        Bench { folder, pipeline }
+    }
+
+    /// Changes the pipeline's text; the text to replace must be there.
+    fn edit(mut self, from: &str, to: &str) -> Bench {
+        assert!(self.pipeline.contains(from), "the pipeline has no {from}");
+        self.pipeline = self.pipeline.replace(from, to);
+        self
+    }
+
+    /// Changes the bytes of a recording.
+    fn damage(self, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> Bench {
+        let path = self.folder.path().join(name);
+        let mut bytes = std::fs::read(&path).expect("recording");
+        change(&mut bytes);
+        std::fs::write(&path, bytes).expect("damaged recording");
+        self
+    }
+
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("out")
+    }
+
+    fn run(&self) -> Output {
+        let pipeline = self.folder.path().join("pipeline.toml");
+        std::fs::write(&pipeline, &self.pipeline).expect("writing the pipeline");
+        armcal([Path::new("run"), &pipeline, Path::new("--out"), &self.out()])
+    }
+
+    /// Runs, expects a failure, and returns its words; nothing may have been written.
+    fn fails(&self) -> String {
+        let output = self.run();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(!said.contains("panicked"), "{said}");
+        let left = std::fs::read_dir(self.out()).map(|d| d.count()).unwrap_or(0);
+        assert_eq!(left, 0, "a failed run left {left} files");
+        println!("{said}");
+        said
+    }
+}
+
+#[test]
+fn a_recording_that_was_cut_off_gives_what_is_sound_and_exit_3() {
+    let bench = Bench::new().damage("roll.mcap", |bytes| bytes.truncate(bytes.len() * 6 / 10));
+    let output = bench.run();
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary = read_json(&bench.out().join("summary.json"));
+    let dwells = |i: usize| summary["recordings"][i]["dwells"].as_u64().expect("dwells");
+    assert!(dwells(1) > 0 && dwells(1) < dwells(0), "{} of {} dwells", dwells(1), dwells(0));
+    let warnings = summary["recordings"][1]["warnings"].to_string();
+    assert!(warnings.contains("cut off") || warnings.contains("truncated"), "{warnings}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("roll"), "the terminal says which recording");
+}
+
+#[test]
+fn a_flipped_bit_costs_one_chunk_and_is_said() {
+    let bench = Bench::new().damage("normal.mcap", |bytes| {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+    });
+    let output = bench.run();
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary = read_json(&bench.out().join("summary.json"));
+    assert!(!summary["recordings"][0]["warnings"].as_array().expect("warnings").is_empty());
+    assert!(summary["fit"]["holdout"]["n"].as_u64().is_some_and(|n| n > 0));
+}
+
+#[test]
+fn garbage_and_emptiness_are_errors_that_name_the_file() {
+    let bench = Bench::new().damage("pitch.mcap", |bytes| bytes.clear());
+    assert!(bench.fails().contains("pitch.mcap"));
+    let bench = Bench::new().damage("pitch.mcap", |bytes| bytes.iter_mut().for_each(|b| *b = 0x55));
+    assert!(bench.fails().contains("pitch.mcap"));
+}
+
+#[test]
+fn a_misspelt_channel_names_the_nearest() {
+    let said = Bench::new().edit("\"/joint_states\"", "\"/joint_sates\"").fails();
+    assert!(said.contains("/joint_sates") && said.contains("/joint_states"), "{said}");
+}
+
+#[test]
+fn a_misspelt_joint_names_the_nearest() {
+    let said = Bench::new().edit("\"joint2\"", "\"join2\"").fails();
+    assert!(said.contains("join2") && said.contains("joint2"), "{said}");
+}
+
+#[test]
+fn a_misspelt_key_of_the_pipeline_names_itself_and_the_file() {
+    let said = Bench::new().edit("pose = \"measured\"                        # Vicon sees markers on the board", "poze = \"measured\" #").fails();
+    assert!(said.contains("poze") && said.contains("pipeline.toml"), "{said}");
+}
+
+#[test]
+fn metres_declared_as_millimetres_are_detected() {
+    let bench = Bench::new().edit("topic = \"/vicon/tip/tip\"", "topic = \"/vicon/tip/tip\"\nunit = \"mm\"");
+    let output = bench.run();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    assert_ne!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("mm") && said.contains("unit"), "{said}");
+}
+
+#[test]
+fn radians_declared_as_degrees_are_detected() {
+    let bench = Bench::new().edit("topic = \"/joint_states\"", "topic = \"/joint_states\"\nunit = \"deg\"");
+    let output = bench.run();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    assert_ne!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("deg") && said.contains("unit"), "{said}");
+}
+
+#[test]
+fn a_board_that_does_not_fit_the_dwells_is_said() {
+    let mut bench = Bench::new();
+    let board = std::fs::read_to_string(root().join("pipelines/boards/paper.toml")).expect("board");
+    // The same board, twice as large.
+    let scaled: String = board
+        .lines()
+        .map(|line| match line.strip_prefix("xyz_mm = [") {
+            Some(rest) => {
+                let numbers: Vec<String> = rest
+                    .split(']')
+                    .next()
+                    .unwrap_or_default()
+                    .split(',')
+                    .filter_map(|n| n.trim().parse::<f64>().ok())
+                    .map(|n| (2.0 * n).to_string())
+                    .collect();
+                format!("xyz_mm = [{}]\n", numbers.join(", "))
+            }
+            None => format!("{line}\n"),
+        })
+        .collect();
+    let path = bench.folder.path().join("twice.toml");
+    std::fs::write(&path, scaled).expect("writing the board");
+    let shipped = format!("\"{}/boards/paper.toml\"", root().join("pipelines").display());
+    bench = bench.edit(&shipped, "\"twice.toml\"");
+    let output = bench.run();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    println!("{said}");
+    assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
+    assert!(said.contains("board"), "{said}");
+}
+
+#[test]
+fn too_few_dwells_for_the_free_parameters_is_said() {
+    let bench = Bench::new()
+        .edit("kind = \"every-nth-cavity\"", "kind = \"random\"")
+        .edit("n = 4", "share = 0.96");
+    let output = bench.run();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
+    assert!(said.contains("parameter"), "{said}");
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_made_is_an_error_that_names_it() {
+    let bench = Bench::new();
+    std::fs::write(bench.out(), "a file where the folder should be").expect("blocking file");
+    let output = bench.run();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains(&*bench.out().to_string_lossy()), "{said}");
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_half_written() {
+    // /dev/full accepts the open and refuses the bytes; a folder on it cannot exist, so the disk is a tiny tmpfs where
+    // the machine lets tests mount one.
+    let bench = Bench::new();
+    std::fs::create_dir(bench.out()).expect("output folder");
+    let mounted = std::process::Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=64k", "tmpfs"])
+        .arg(bench.out())
+        .status()
+        .is_ok_and(|s| s.success());
+    if !mounted {
+        eprintln!("SKIPPED: this machine lets nobody mount a tmpfs, so a full disk was not tested");
+        return;
+    }
+    let output = bench.run();
+    let left: Vec<String> = std::fs::read_dir(bench.out())
+        .expect("output folder")
+        .filter_map(|e| Some(e.ok()?.file_name().to_string_lossy().into_owned()))
+        .collect();
+    let unmounted = std::process::Command::new("umount").arg(bench.out()).status();
+    assert!(unmounted.is_ok_and(|s| s.success()), "unmounting the test's own tmpfs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(!left.iter().any(|name| name == "run.mcap"), "a half-written run.mcap was left among {left:?}");
+    assert!(!left.iter().any(|name| name.contains("tmp")), "temporary files were left: {left:?}");
+}

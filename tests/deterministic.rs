@@ -1,0 +1,59 @@
+use crate::support::root;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+/// Every file of a folder.
+fn bytes_of(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).expect("results folder");
+    entries
+        .map(|entry| {
+            let path = entry.expect("entry").path();
+            let name = path.file_name().expect("name").to_string_lossy().into_owned();
+            (name, std::fs::read(path).expect("result file"))
+        })
+        .collect()
+}
+
+fn run_with_threads(threads: &str) -> BTreeMap<String, Vec<u8>> {
+    let out = tempfile::tempdir().expect("temporary folder");
+    let status = Command::new(env!("CARGO_BIN_EXE_armcal"))
+        .env("RAYON_NUM_THREADS", threads)
+        .arg("run")
+        .arg(root().join("pipelines/paper.toml"))
+        .arg("--out")
+        .arg(out.path())
+        .output()
+        .expect("starting armcal")
+        .status;
+    assert!(status.success(), "exit {status}");
+    bytes_of(out.path())
+}
+
+#[test]
+fn one_thread_and_five_give_the_same_bytes() {
+    let (one, five) = (run_with_threads("1"), run_with_threads("5"));
+    assert_eq!(one.keys().collect::<Vec<_>>(), five.keys().collect::<Vec<_>>());
+    for (name, bytes) in &one {
+        assert!(bytes == &five[name], "{name} differs between 1 and 5 threads");
+    }
+}
+
+#[test]
+fn the_shipped_fixtures_are_what_their_seed_gives() {
+    let out = tempfile::tempdir().expect("temporary folder");
+    let status = Command::new(env!("CARGO_BIN_EXE_armcal"))
+        .arg("simulate")
+        .arg(root().join("pipelines/lab/paper-small.toml"))
+        .arg("--out")
+        .arg(out.path())
+        .output()
+        .expect("starting armcal")
+        .status;
+    assert!(status.success(), "exit {status}");
+    let made = bytes_of(out.path());
+    for name in ["normal.mcap", "roll.mcap", "pitch.mcap"] {
+        let shipped = std::fs::read(root().join("fixtures/paper").join(name)).expect("shipped fixture");
+        assert!(made[name] == shipped, "fixtures/paper/{name} is not what pipelines/lab/paper-small.toml makes");
+    }
+}

@@ -1,0 +1,27 @@
+//! End to end, one question a file. Every test drives the `armcal` program as a user would.
+
+mod support;
+
+/// Does the main job on the shipped fixtures give the paper's picture, and points the fit never saw?
+mod paper_rig;
+
+/// Does geometry alone bring real robots as far as independent solvers bring them?
+mod real_robots;
+
+/// Does `summary.json` keep its contract?
+mod summary_contract;
+
+/// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
+mod mcap_conformance;
+
+/// Does bad input give a clear error or a counted warning, and never half a file?
+mod bad_input;
+
+/// Do the outputs open in the Python `mcap` package, and does scipy find the same optimum?
+mod python_agrees;
+
+/// Does the same input give the same bytes, whatever the number of threads?
+mod deterministic;
+
+/// Are all dwells of fresh simulated rigs associated rightly, and intervals honest?
+mod many_rigs;

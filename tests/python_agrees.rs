@@ -1,0 +1,54 @@
+use crate::support::{armcal, number, python, root, run_pipeline};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+/// Runs a script of `tests/python` and returns the JSON line it prints.
+fn script(python: &Path, name: &str, argument: &Path) -> Value {
+    let output = Command::new(python)
+        .arg(root().join("tests/python").join(name))
+        .arg(argument)
+        .output()
+        .expect("starting python");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name}: {said}");
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{name}: {e}\n{said}"))
+}
+
+#[test]
+fn scipy_finds_the_same_optimum_with_kinematics_of_its_own() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let pipelines = root().join("pipelines");
+    let paper = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
+    // Plain least squares, because scipy's robust losses act on single rows; paths made absolute.
+    let text = paper
+        .replace("\"../fixtures/", &format!("\"{}/fixtures/", root().display()))
+        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
+        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let pipeline = folder.path().join("least-squares.toml");
+    std::fs::write(&pipeline, text + "\n[fit]\nobjective = \"least-squares\"\n").expect("writing the pipeline");
+    let problem = folder.path().join("problem.json");
+    let output = armcal(["export".as_ref(), pipeline.as_os_str(), "--out".as_ref(), problem.as_os_str()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+
+    let verdict = script(&python, "solve_problem.py", &problem);
+    println!("{verdict}");
+    let (scipy, ours) = (number(&verdict, "/cost_scipy"), number(&verdict, "/cost_armcal"));
+    assert!((ours - scipy).abs() <= 1e-6 * scipy, "cost {ours} against scipy's {scipy}");
+    assert!(number(&verdict, "/worst_sigmas") < 0.01, "parameters differ: {verdict}");
+}
+
+#[test]
+fn python_decodes_every_message_of_the_output() {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    let summary = run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
+    let decoded = script(&python, "decode_output.py", &out.path().join("run.mcap"));
+    println!("{decoded}");
+    for topic in ["/joint_states", "/vicon/tip/tip", "/armcal/scene", "/armcal/residual", "/armcal/parameters"] {
+        assert!(decoded["counts"][topic].as_u64().is_some_and(|n| n > 0), "no {topic}");
+    }
+    let observations = number(&summary, "/fit/train/n") + number(&summary, "/fit/holdout/n");
+    assert_eq!(number(&decoded["counts"], "/~1armcal~1residual"), observations);
+}

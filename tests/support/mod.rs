@@ -1,0 +1,65 @@
+//! What several end-to-end tests share.
+
+pub mod conformance;
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The repository.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the repository's root")
+}
+
+/// The folder of real recordings beside the repository, if this machine has it; says so loudly if not.
+pub fn real_recordings() -> Option<PathBuf> {
+    let shared = root().join("../shared/real");
+    if shared.is_dir() {
+        return Some(shared);
+    }
+    eprintln!("SKIPPED: no {} on this machine, so nothing was tested on real recordings", shared.display());
+    None
+}
+
+/// A Python with the packages of `tests/requirements.txt`: `$ARMCAL_PYTHON`, else `python3`; says so loudly if
+/// there is none.
+pub fn python() -> Option<PathBuf> {
+    let python = PathBuf::from(std::env::var_os("ARMCAL_PYTHON").unwrap_or_else(|| "python3".into()));
+    let imports = "import scipy, numpy, mcap, mcap_ros2, mcap_protobuf";
+    let ok = Command::new(&python).args(["-c", imports]).output().is_ok_and(|o| o.status.success());
+    if ok {
+        return Some(python);
+    }
+    eprintln!("SKIPPED: {} lacks tests/requirements.txt; set ARMCAL_PYTHON", python.display());
+    None
+}
+
+/// Runs `armcal` and returns what it said.
+pub fn armcal<I: IntoIterator<Item = S>, S: AsRef<std::ffi::OsStr>>(args: I) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_armcal")).args(args).output().expect("starting armcal")
+}
+
+/// Runs a pipeline; panics with its words unless it exits with one of `codes`. Returns `summary.json`.
+pub fn run_pipeline(pipeline: &Path, out: &Path, codes: &[i32]) -> Value {
+    let output = armcal([Path::new("run"), pipeline, Path::new("--out"), out]);
+    let code = output.status.code().unwrap_or(-1);
+    assert!(
+        codes.contains(&code),
+        "armcal run {} exited with {code}\n{}\n{}",
+        pipeline.display(),
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    read_json(&out.join("summary.json"))
+}
+
+/// Reads a JSON file.
+pub fn read_json(path: &Path) -> Value {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// A number at a JSON pointer.
+pub fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
+}
