@@ -112,7 +112,12 @@ fn a_misspelt_joint_names_the_nearest() {
 
 #[test]
 fn a_misspelt_key_of_the_pipeline_names_itself_and_the_file() {
-    let said = Bench::new().edit("pose = \"measured\"                        # Vicon sees markers on the board", "poze = \"measured\" #").fails();
+    let said = Bench::new()
+        .edit(
+            "pose = \"measured\"                        # Vicon sees markers on the board",
+            "poze = \"measured\" #",
+        )
+        .fails();
     assert!(said.contains("poze") && said.contains("pipeline.toml"), "{said}");
 }
 
@@ -120,7 +125,8 @@ fn a_misspelt_key_of_the_pipeline_names_itself_and_the_file() {
 fn metres_declared_as_millimetres_are_detected() {
     let bench = Bench::new().edit("topic = \"/vicon/tip/tip\"", "topic = \"/vicon/tip/tip\"\nunit = \"mm\"");
     let output = bench.run();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    let said =
+        String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
     assert_ne!(output.status.code(), Some(0), "{said}");
     assert!(said.contains("mm") && said.contains("unit"), "{said}");
 }
@@ -129,7 +135,8 @@ fn metres_declared_as_millimetres_are_detected() {
 fn radians_declared_as_degrees_are_detected() {
     let bench = Bench::new().edit("topic = \"/joint_states\"", "topic = \"/joint_states\"\nunit = \"deg\"");
     let output = bench.run();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    let said =
+        String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
     assert_ne!(output.status.code(), Some(0), "{said}");
     assert!(said.contains("deg") && said.contains("unit"), "{said}");
 }
@@ -161,7 +168,8 @@ fn a_board_that_does_not_fit_the_dwells_is_said() {
     let shipped = format!("\"{}/boards/paper.toml\"", root().join("pipelines").display());
     bench = bench.edit(&shipped, "\"twice.toml\"");
     let output = bench.run();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    let said =
+        String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
     println!("{said}");
     assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
     assert!(said.contains("board"), "{said}");
@@ -169,11 +177,11 @@ fn a_board_that_does_not_fit_the_dwells_is_said() {
 
 #[test]
 fn too_few_dwells_for_the_free_parameters_is_said() {
-    let bench = Bench::new()
-        .edit("kind = \"every-nth-cavity\"", "kind = \"random\"")
-        .edit("n = 4", "share = 0.96");
+    let bench =
+        Bench::new().edit("kind = \"every-nth-cavity\"", "kind = \"random\"").edit("n = 4", "share = 0.96");
     let output = bench.run();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    let said =
+        String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
     assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
     assert!(said.contains("parameter"), "{said}");
 }

@@ -54,6 +54,9 @@ fn the_shipped_fixtures_are_what_their_seed_gives() {
     let made = bytes_of(out.path());
     for name in ["normal.mcap", "roll.mcap", "pitch.mcap"] {
         let shipped = std::fs::read(root().join("fixtures/paper").join(name)).expect("shipped fixture");
-        assert!(made[name] == shipped, "fixtures/paper/{name} is not what pipelines/lab/paper-small.toml makes");
+        assert!(
+            made[name] == shipped,
+            "fixtures/paper/{name} is not what pipelines/lab/paper-small.toml makes"
+        );
     }
 }

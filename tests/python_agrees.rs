@@ -27,7 +27,8 @@ fn scipy_finds_the_same_optimum_with_kinematics_of_its_own() {
         .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
         .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
     let pipeline = folder.path().join("least-squares.toml");
-    std::fs::write(&pipeline, text + "\n[fit]\nobjective = \"least-squares\"\n").expect("writing the pipeline");
+    std::fs::write(&pipeline, text + "\n[fit]\nobjective = \"least-squares\"\n")
+        .expect("writing the pipeline");
     let problem = folder.path().join("problem.json");
     let output = armcal(["export".as_ref(), pipeline.as_os_str(), "--out".as_ref(), problem.as_os_str()]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -46,9 +47,11 @@ fn python_decodes_every_message_of_the_output() {
     let summary = run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
     let decoded = script(&python, "decode_output.py", &out.path().join("run.mcap"));
     println!("{decoded}");
-    for topic in ["/joint_states", "/vicon/tip/tip", "/armcal/scene", "/armcal/residual", "/armcal/parameters"] {
+    for topic in
+        ["/joint_states", "/vicon/tip/tip", "/armcal/scene", "/armcal/residuals", "/armcal/parameters"]
+    {
         assert!(decoded["counts"][topic].as_u64().is_some_and(|n| n > 0), "no {topic}");
     }
     let observations = number(&summary, "/fit/train/n") + number(&summary, "/fit/holdout/n");
-    assert_eq!(number(&decoded["counts"], "/~1armcal~1residual"), observations);
+    assert_eq!(number(&decoded["counts"], "/~1armcal~1residuals"), observations);
 }

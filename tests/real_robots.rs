@@ -46,8 +46,7 @@ fn every_dwell_of_the_sockets_is_found_and_in_the_right_one() {
         [("mukca-panda", "mukca_panda"), ("mukca-panda4", "mukca_panda4"), ("mukca-iiwa14", "mukca_iiwa14")]
     {
         let out = tempfile::tempdir().expect("temporary folder");
-        let summary =
-            run_pipeline(&root().join(format!("pipelines/{pipeline}.toml")), out.path(), &[0, 3]);
+        let summary = run_pipeline(&root().join(format!("pipelines/{pipeline}.toml")), out.path(), &[0, 3]);
         for recording in summary["recordings"].as_array().expect("recordings") {
             let name = std::path::Path::new(recording["path"].as_str().expect("path"));
             let truth = real.join(folder).join(name.with_extension("truth.csv").file_name().expect("file"));

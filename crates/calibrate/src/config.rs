@@ -133,7 +133,7 @@ pub enum HoldoutConfig {
     },
     /// Each recording in turn; the residuals of all turns are pooled.
     EachRecording,
-    /// `k` groups of cavities, each held out in turn; a tracked dwell is a group member of its own.
+    /// `k` groups of cavities, dealt out by hash, each held out in turn; a tracked dwell is dealt on its own.
     CavityFolds {
         /// 2 or more.
         k: usize,

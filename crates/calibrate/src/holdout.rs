@@ -134,6 +134,8 @@ fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, Cali
         let why = format!("a number from 2 to {}, the number of cavities and tracked dwells", groups.len());
         return Err(bad("holdout.k", k.to_string(), &why));
     }
+    // Dealt out in the order of their hashes: a round of poses repeated in the recording must not fill one turn.
+    groups.sort_by_key(|group| group.first().map(|&i| dwell_hash(0, &observations[i])));
     let mut turns = vec![Vec::new(); k];
     for (g, group) in groups.into_iter().enumerate() {
         turns[g % k].extend(group);
@@ -142,13 +144,15 @@ fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, Cali
     Ok(turns)
 }
 
+/// A hash of seed, recording and dwell, the same on every machine.
+fn dwell_hash(seed: u64, o: &Observation) -> u64 {
+    mix(mix(mix(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64)
+}
+
 /// The dwells with the smallest hashes of (seed, recording, dwell): adding a dwell never reshuffles the others.
 fn random(share: f64, seed: u64, observations: &[Observation]) -> BTreeSet<usize> {
-    let mut ranked: Vec<(u64, usize)> = observations
-        .iter()
-        .enumerate()
-        .map(|(i, o)| (mix(mix(mix(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64), i))
-        .collect();
+    let mut ranked: Vec<(u64, usize)> =
+        observations.iter().enumerate().map(|(i, o)| (dwell_hash(seed, o), i)).collect();
     ranked.sort_unstable();
     let count = (share * observations.len() as f64).round() as usize;
     ranked.into_iter().take(count).map(|(_, i)| i).collect()

@@ -14,10 +14,9 @@
 //! model is worse than declared; smaller ones may as well come from errors shared between dwells (a cavity visited
 //! twice), so they do not earn narrower intervals. Intervals use Student's t with N - p degrees of freedom.
 //!
-//! A parameter is **determined** when doubling the standard deviation of every prior would widen its interval by less
-//! than 1.109 (the square root of 4/3.25). For a parameter on its own that is exactly "the data at least halve what
-//! the prior leaves open"; unlike that rule it also sees through partners: the yaw of a base that is tied to the zero
-//! of joint 1 gets its width from joint 1's prior, and says so.
+//! A parameter is **determined** when its posterior standard deviation is less than half of what the prior left open
+//! (of 20 mm or 4 deg for a frame about which nothing was known). Its interval is honest about its partners all the
+//! same: the zero of joint 1 is as wide as the yaw of a measured base leaves it.
 
 use crate::CalibrateError;
 use crate::robust::RobustCost;
@@ -25,8 +24,8 @@ use crate::whitened::Axis;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Widening of an interval under doubled priors from which on the prior, not the data, decides.
-const PRIOR_DECIDES: f64 = 1.109_400_392_450_458_4;
+/// Posterior standard deviation, in units of the prior's, from which on the prior decides.
+const PRIOR_DECIDES: f64 = 0.5;
 
 /// Uncertainty of the free parameters, in units of x.
 #[derive(Debug, Clone)]
@@ -53,14 +52,12 @@ pub(crate) fn uncertainty(
 ) -> Result<Uncertainty, CalibrateError> {
     let axes = &cost.white.axes;
     let gram = jacobian.tr_mul(jacobian);
-    let declared = posterior(&gram, axes, cost.sigma_scale.powi(2).recip(), 1.0, name)?;
+    let declared = posterior(&gram, axes, cost.sigma_scale.powi(2).recip(), name)?;
     let fitted = fitted_directions(&declared, axes);
     let freedom = (cost.white.rows() as f64 - fitted).max(1.0);
     let variance = residual_variance(cost, residual, freedom);
-    let covariance = posterior(&gram, axes, variance.recip(), 1.0, name)?;
-    let wider = posterior(&gram, axes, variance.recip(), 0.25, name)?;
-    let determined =
-        (0..axes.len()).map(|k| (wider[(k, k)] / covariance[(k, k)]).sqrt() < PRIOR_DECIDES).collect();
+    let covariance = posterior(&gram, axes, variance.recip(), name)?;
+    let determined = (0..axes.len()).map(|k| covariance[(k, k)].sqrt() < PRIOR_DECIDES).collect();
     let information = gram / variance;
     let (rank, undetermined) = split(&information);
     Ok(Uncertainty { covariance, information, t95: t95(freedom), determined, rank, undetermined })
@@ -88,17 +85,16 @@ fn residual_variance(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, freedom
     (cost.sigma_scale.powi(2) * psi_square / freedom / mean_curvature.powi(2)).max(1.0)
 }
 
-/// `(gram * data + P * prior)^-1`.
+/// `(gram * data + P)^-1`.
 fn posterior(
     gram: &DMatrix<f64>,
     axes: &[Axis],
     data: f64,
-    prior: f64,
     name: &dyn Fn(usize) -> String,
 ) -> Result<DMatrix<f64>, CalibrateError> {
     let mut hessian = gram * data;
     for (k, a) in axes.iter().enumerate() {
-        hessian[(k, k)] += a.precision * prior;
+        hessian[(k, k)] += a.precision;
     }
     let diagonal = hessian.diagonal();
     hessian.cholesky().map(|c| c.inverse()).ok_or_else(|| CalibrateError::Singular {
@@ -127,13 +123,6 @@ mod tests {
         for (freedom, expected) in [(1.0, 12.706_204_7), (10.0, 2.228_138_9), (500.0, 1.964_719_8)] {
             assert!((t95(freedom) - expected).abs() < 1e-6, "{freedom}: {}", t95(freedom));
         }
-    }
-
-    #[test]
-    fn threshold_is_half_the_prior_for_a_single_parameter() {
-        // Data information 3 against prior information 1: posterior sd exactly half the prior's.
-        let widening = ((3.0_f64 + 1.0) / (3.0 + 0.25)).sqrt();
-        assert!((widening - PRIOR_DECIDES).abs() < 1e-15);
     }
 
     #[test]

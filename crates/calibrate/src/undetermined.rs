@@ -13,8 +13,11 @@ use crate::words::{self, Simplicity};
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector, Matrix2};
 
-/// Shares below this (of a unit direction) are left out.
+/// Shares below this (of a unit direction) are left out, unless they are needed to cancel a larger one.
 const SMALLEST_SHARE: f64 = 0.1;
+/// A parameter takes part, however small its share, when it moves the residuals by at least this share of what the
+/// most visible one does: a base known to 0.3 mm and a link known to 4 mm cancel each other one to one.
+const SMALLEST_EFFECT: f64 = 0.3;
 /// A simple direction lies in the weak subspace when at least this share of its square does.
 const INSIDE: f64 = 0.98;
 /// A direction adds something when at least this share of its square is orthogonal to those chosen.
@@ -31,7 +34,7 @@ pub(crate) fn directions(
     let mut found: Vec<(usize, UndeterminedDirection)> = simple_basis(&uncertainty.undetermined, &simplicity)
         .into_iter()
         .map(|direction| {
-            let shares = shares_of(&direction);
+            let shares = shares_of(&direction, &uncertainty.information);
             let lead = shares.iter().map(|s| s.0).min().unwrap_or(usize::MAX);
             let text = words::describe(&shares, axes, parameters, &uncertainty.information);
             let name = |k: usize| parameters[axes[k].index].name.clone();
@@ -44,9 +47,15 @@ pub(crate) fn directions(
 }
 
 /// The parameters that matter in a direction, largest share first and positive.
-fn shares_of(direction: &DVector<f64>) -> Vec<(usize, f64)> {
+fn shares_of(direction: &DVector<f64>, information: &DMatrix<f64>) -> Vec<(usize, f64)> {
+    // What each parameter alone would do to the whitened residuals; below 1 nobody would see it.
+    let effect = |k: usize| direction[k].abs() * information[(k, k)].max(0.0).sqrt();
+    let largest = (0..direction.len()).map(effect).fold(0.0, f64::max);
+    let takes_part = |k: usize| {
+        direction[k].abs() >= SMALLEST_SHARE || (largest > 1.0 && effect(k) >= SMALLEST_EFFECT * largest)
+    };
     let mut shares: Vec<(usize, f64)> =
-        direction.iter().copied().enumerate().filter(|(_, v)| v.abs() >= SMALLEST_SHARE).collect();
+        (0..direction.len()).filter(|&k| takes_part(k)).map(|k| (k, direction[k])).collect();
     // Ties (two equal axes) are broken by the model's order, not by rounding.
     shares.sort_by(|a, b| ranked(b.1).cmp(&ranked(a.1)).then(a.0.cmp(&b.0)));
     let sign = shares.first().map_or(1.0, |s| s.1.signum());

@@ -121,7 +121,8 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
         return "no observation depends on it".to_string();
     }
     if let [only] = terms {
-        return format!("these dwells move the tip by less than their noise when {} changes", only.part);
+        let name = &only.parameter.name;
+        return format!("these dwells move the tip by less than their noise when {name} changes");
     }
     if pair_with_base && terms.iter().all(Term::turns_about_axis) {
         let joint = other_than(&parts, "base");

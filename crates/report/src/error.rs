@@ -20,7 +20,7 @@ pub enum ReportError {
         /// The result file.
         path: PathBuf,
         /// What went wrong.
-        source: armcal_recording::RecordingError,
+        source: Box<armcal_recording::RecordingError>,
     },
     /// A table cannot be encoded as Parquet.
     #[error("encoding the table {table} as Parquet: {source}")]
@@ -35,8 +35,14 @@ pub enum ReportError {
     Toml(#[from] toml::ser::Error),
     /// The calibrated model cannot be written.
     #[error("writing the calibrated model: {0}")]
-    Model(#[from] armcal_model::ModelError),
+    Model(#[source] Box<armcal_model::ModelError>),
     /// The run contradicts itself; a bug of whoever put it together.
     #[error("the run is inconsistent: {0}")]
     Inconsistent(String),
+}
+
+impl From<armcal_model::ModelError> for ReportError {
+    fn from(source: armcal_model::ModelError) -> ReportError {
+        ReportError::Model(Box::new(source))
+    }
 }

@@ -10,7 +10,8 @@
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
-use armcal_core::{ErrorStats, Unit, Warning};
+use armcal_core::{Dwell, ErrorStats, Unit, Warning};
+use armcal_table::{Assignment, Place};
 use serde::Serialize;
 use std::path::Path;
 
@@ -46,10 +47,14 @@ struct RecordingSummary<'a> {
     dwells: usize,
     associated: usize,
     rejected: Vec<RejectedDwell<'a>>,
-    clock_offset_ms: Option<f64>,
+    places: Vec<DwellPlace<'a>>,
+    /// 0 when the recording has only the robot's clock; then there is no standard error either.
+    clock_offset_ms: f64,
     clock_offset_sigma_ms: Option<f64>,
     clock_drift_ppm: Option<f64>,
     clock_drift_sigma_ppm: Option<f64>,
+    /// Sensor time at which the offset holds.
+    clock_reference_ns: Option<i64>,
     warnings: Vec<&'a Warning>,
 }
 
@@ -64,6 +69,17 @@ struct FileSummary<'a> {
 struct RejectedDwell<'a> {
     dwell: usize,
     why: &'a str,
+}
+
+/// Where the tip was during a dwell.
+#[derive(Debug, Clone, Serialize)]
+struct DwellPlace<'a> {
+    dwell: usize,
+    start_ns: i64,
+    end_ns: i64,
+    place: &'static str,
+    cavity: Option<&'a str>,
+    confidence: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -151,11 +167,32 @@ fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
         dwells: r.dwells.len(),
         associated: run.associated(r),
         rejected: r.rejections.iter().map(|x| RejectedDwell { dwell: x.dwell.dwell, why: &x.why }).collect(),
-        clock_offset_ms: clock.map(|c| c.offset_s * 1e3),
+        places: r.dwells.iter().enumerate().map(|(i, d)| place(d, r.assignments().get(i))).collect(),
+        clock_offset_ms: clock.map_or(0.0, |c| c.offset_s * 1e3),
         clock_offset_sigma_ms: clock.map(|c| c.offset_sigma_s * 1e3),
         clock_drift_ppm: clock.map(|c| c.drift * 1e6),
         clock_drift_sigma_ppm: clock.map(|c| c.drift_sigma * 1e6),
+        clock_reference_ns: clock.map(|c| c.reference_ns),
         warnings: r.all_warnings(),
+    }
+}
+
+fn place<'a>(dwell: &Dwell, assignment: Option<&'a Assignment>) -> DwellPlace<'a> {
+    let (place, cavity, confidence) = match assignment.map(|a| &a.place) {
+        None => ("no_board", None, None),
+        Some(Place::Seated { cavity, confidence }) => ("seated", Some(cavity.as_str()), Some(*confidence)),
+        Some(Place::Hovering { .. }) => ("hovering", None, None),
+        Some(Place::FreeSpace) => ("free_space", None, None),
+        Some(Place::Ambiguous { .. }) => ("ambiguous", None, None),
+        Some(Place::Unassigned { .. }) => ("unassigned", None, None),
+    };
+    DwellPlace {
+        dwell: dwell.id.dwell,
+        start_ns: dwell.start_ns,
+        end_ns: dwell.end_ns,
+        place,
+        cavity,
+        confidence,
     }
 }
 

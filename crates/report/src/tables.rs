@@ -187,7 +187,7 @@ impl Columns {
     }
 }
 
-fn cavity<'a>(a: &'a Assignment) -> Option<&'a str> {
+fn cavity(a: &Assignment) -> Option<&str> {
     match &a.place {
         Place::Seated { cavity, .. } => Some(cavity),
         Place::Hovering { above, .. } => Some(above),

@@ -99,5 +99,5 @@ fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
 
 fn at(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
     let path = path.to_owned();
-    move |source| ReportError::Write { path, source }
+    move |source| ReportError::Write { path, source: Box::new(source) }
 }

@@ -97,7 +97,8 @@ impl Scale {
         if measured.is_nan() || measured < least {
             return Err(DwellError::NoMotion {
                 seen: still("tip stream", measured),
-                advice: "the arm does move: check that the stream shows the tip, not a static body",
+                advice: "the arm does move: check the unit of the tip stream (\"m\" or \"mm\"), and that it shows the \
+                         tip, not a static body",
             });
         }
         let moving_above = (MOVING_SHARE * measured).max(0.5 * least);

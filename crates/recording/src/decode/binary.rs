@@ -303,7 +303,7 @@ impl<'m, S: Sink<'m>> Machine<'_, 'm, S> {
                 return self.cursor.finish_at(end);
             }
         }
-        if let (What::Text, Some(slot), Repeat::Sequence) = (step.what, step.slot) {
+        if let (What::Text, Some(slot), Repeat::Sequence) = (step.what, step.slot, step.repeat) {
             return self.texts(slot);
         }
         let min_bytes = element_bytes(self.programs, step.what);

@@ -131,6 +131,10 @@ impl<'r, 'm> PoseSink<'r, 'm> {
         if self.filter.is_some_and(|wanted| wanted != &name[..] && wanted != &name[own_name..]) {
             return None;
         }
+        if self.by_item && name.is_empty() {
+            // Vicon's unlabelled markers: nobody knows which is which from one frame to the next.
+            return None;
+        }
         Some(self.rows.bodies.id(name))
     }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // A test that cannot go on may stop.
 
+mod input;
 mod synthetic;
 
 /// The checked-in protobuf code is current.

@@ -19,7 +19,7 @@ struct Recording {
     dwells: usize,
     associated: usize,
     rejected: Vec<Rejected>,
-    clock_offset_ms: Option<f64>,
+    clock_offset_ms: f64,
     warnings: Vec<serde_json::Value>,
 }
 
@@ -80,7 +80,7 @@ fn the_contract_holds() {
     let bytes = std::fs::read(&s.paths[0]).unwrap();
     assert_eq!(first.sha256, sha256(&bytes));
     assert_eq!((first.dwells, first.associated), (6, 4));
-    assert!((first.clock_offset_ms.unwrap() - 12.3).abs() < 1e-9 && second.clock_offset_ms.is_none());
+    assert!((first.clock_offset_ms - 12.3).abs() < 1e-9 && second.clock_offset_ms == 0.0);
     assert_eq!(second.rejected.iter().map(|r| r.dwell).collect::<Vec<_>>(), [4, 5]);
     assert!(second.rejected[0].why.contains("hovers"));
     assert_eq!((second.warnings.len(), third.warnings.len()), (1, 0));
@@ -135,6 +135,31 @@ fn the_status_is_that_of_the_gravest_warning() {
 fn status(run: &armcal_report::Run) -> String {
     let summary: serde_json::Value = serde_json::from_str(&summary_json(run)).unwrap();
     summary["status"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_split_recording_has_one_hash_and_all_its_files() {
+    let mut s = synthetic();
+    let second = s.run.recordings[1].report.files[0].clone();
+    let first = &mut s.run.recordings[0];
+    first.report.files.push(second);
+    first.paths = vec!["input0.mcap".into(), "input1.mcap".into()];
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let recording = &summary["recordings"][0];
+    assert_eq!(recording["files"][1]["path"], "input1.mcap");
+    let digests: String =
+        s.run.recordings[0].report.files.iter().map(|f| format!("{}\n", f.sha256)).collect();
+    assert_eq!(recording["sha256"].as_str().unwrap(), sha256(digests.as_bytes()));
+}
+
+#[test]
+fn without_a_board_a_dwell_the_fit_uses_is_an_associated_one() {
+    let mut s = synthetic();
+    s.run.board = None;
+    s.run.recordings.iter_mut().for_each(|r| r.association = None);
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    assert_eq!(summary["recordings"][0]["associated"], 5);
+    assert_eq!(summary["recordings"][2]["associated"], 4);
 }
 
 fn assert_same(written: &Errors, stats: &ErrorStats) {

@@ -1,7 +1,7 @@
-use crate::synthetic::{HOSTILE, synthetic};
-use armcal_core::RollPitchYaw;
-use armcal_model::Chain;
-use armcal_report::{OutputConfig, write_all};
+use crate::synthetic::{HOSTILE, Synthetic, synthetic};
+use armcal_core::{Pose, RollPitchYaw};
+use armcal_model::{Chain, Frame, Frames, Model};
+use armcal_report::{OutputConfig, summary_json, write_all};
 use polars::prelude::{DataFrame, ParquetReader, SerReader as _};
 use std::path::Path;
 
@@ -88,4 +88,64 @@ fn the_calibrated_model_predicts_like_the_calibration() {
     for (written, value) in chain.parameters().iter().zip(&p) {
         assert!((written.nominal - value).abs() < 1e-12, "{}", written.name);
     }
+}
+
+const URDF: &str = r#"<?xml version="1.0"?>
+<robot name="arm"> <!-- kept -->
+  <link name="base_link"/> <link name="l1"/> <link name="l2"/> <link name="l3"/>
+  <joint name="a" type="revolute"><origin xyz="0 0 0.076" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <parent link="base_link"/><child link="l1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="b" type="revolute"><origin xyz="0 0 0" rpy="1.57 0 0"/><axis xyz="0 0 1"/>
+    <parent link="l1"/><child link="l2"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="c" type="revolute"><origin xyz="0.4 0 0" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <parent link="l2"/><child link="l3"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+</robot>
+"#;
+
+/// The synthetic run with its arm given as a URDF, every free parameter a little off.
+fn with_urdf(tip: Frame) -> Synthetic {
+    let mut s = synthetic();
+    let chain = Chain::from_urdf(URDF, "base_link", "l3", Path::new("arm.urdf")).unwrap();
+    let boards = (0..3).map(|i| Frame::given(format!("board.{i}"), Pose::identity())).collect();
+    let model =
+        Model::new(chain, Frames { base: Frame::given("base", Pose::identity()), tip, boards }).unwrap();
+    let template = s.run.calibration.fit.estimates[0].clone();
+    let estimates = model.parameters().iter().enumerate().map(|(i, parameter)| {
+        let slip = if parameter.free { 1e-3 * (1.0 + i as f64) } else { 0.0 };
+        let (parameter, value) = (parameter.clone(), parameter.nominal + slip);
+        armcal_calibrate::Estimate { parameter, value, ..template.clone() }
+    });
+    s.run.calibration.fit.estimates = estimates.collect();
+    s.run.calibration.nominal_values = model.nominal();
+    s.run.model_text = URDF.into();
+    s.run.model = model;
+    s
+}
+
+#[test]
+fn a_calibrated_urdf_predicts_like_the_calibration() {
+    let s = with_urdf(Frame::given("tip", Pose::identity()));
+    let out = s.folder.path().join("out");
+    let written = write_all(&s.run, &s.recordings, &out, &OutputConfig::default()).unwrap();
+    let path = out.join("calibrated.urdf");
+    assert!(written.contains(&path) && !out.join("calibrated.toml").exists());
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("<!-- kept -->") && text != URDF);
+    let chain = Chain::from_urdf(&text, "base_link", "l3", &path).unwrap();
+    let calibrated = Model::new(chain, Frames::of_bare_arm()).unwrap();
+    let q = [0.3, -0.7, 1.1];
+    let expected = s.run.model.tip_in_base(&s.run.calibration.fit.values(), &q).to_homogeneous();
+    let nominal = s.run.model.tip_in_base(&s.run.model.nominal(), &q).to_homogeneous();
+    let predicted = calibrated.tip_in_base(&calibrated.nominal(), &q).to_homogeneous();
+    assert!((predicted - expected).norm() < 1e-9, "{predicted} {expected}");
+    assert!((nominal - expected).norm() > 1e-3);
+}
+
+#[test]
+fn what_the_urdf_cannot_hold_is_said() {
+    let s = with_urdf(Frame::estimated("tip", Pose::identity()));
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let codes: Vec<&str> =
+        summary["warnings"].as_array().unwrap().iter().map(|w| w["code"].as_str().unwrap()).collect();
+    assert_eq!(codes.iter().filter(|c| **c == "tip-not-in-urdf").count(), 1);
 }

@@ -54,6 +54,24 @@ fn poses_through_references() {
     assert!(matches!(cut, DecodeError::Malformed { encoding: "json", .. }), "{cut}");
 }
 
+/// vicon_bridge appends the markers that no subject owns, without names.
+#[test]
+fn unlabelled_markers_are_not_a_body() {
+    let schema = r#"{"type":"object","properties":{"markers":{"type":"array","items":{"type":"object","properties":{
+        "marker_name":{"type":"string"},"subject_name":{"type":"string"},"occluded":{"type":"boolean"},
+        "translation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},
+        "z":{"type":"number"}}}}}}}}"#;
+    let marker = |name: &str, subject: &str| {
+        format!(
+            r#"{{"marker_name":"{name}","subject_name":"{subject}","occluded":false,"translation":{{"x":1,"y":2,"z":3}}}}"#
+        )
+    };
+    let plan = plan(Role::Pose, schema);
+    let message = format!(r#"{{"markers":[{},{},{}]}}"#, marker("", ""), marker("m1", "arm"), marker("", ""));
+    let rows = poses(decode(&plan, message.as_bytes()));
+    assert_eq!((rows.len(), rows.row(0).body, rows.bodies()), (1, "arm/m1", vec!["arm/m1"]));
+}
+
 #[test]
 fn schemas_that_go_in_circles_are_refused() {
     let list = r##"{"type":"object","properties":{"a":{"$ref":"#/$defs/a"}},
