@@ -178,7 +178,7 @@ fn a_board_that_does_not_fit_the_dwells_is_said() {
 #[test]
 fn too_few_dwells_for_the_free_parameters_is_said() {
     let bench =
-        Bench::new().edit("kind = \"every-nth-cavity\"", "kind = \"random\"").edit("n = 4", "share = 0.96");
+        Bench::new().edit("kind = \"cavity-folds\"", "kind = \"random\"").edit("k = 5", "share = 0.96");
     let output = bench.run();
     let said =
         String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);

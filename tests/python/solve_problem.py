@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 problem = json.load(open(sys.argv[1]))
 rows = tomllib.loads(problem["model"])["rows"]
-observations = [o for o in problem["observations"] if not o["held_out"]]
+observations = [o for o in problem["observations"] if o["in_fit"]]
 parameters = problem["parameters"]
 names = [p["name"] for p in parameters]
 nominal = np.array([p["nominal"] for p in parameters])

@@ -26,11 +26,13 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
 }
 
 /// Everything a solver needs that does not share armcal's code: the nominal arm, the observations with the
-/// covariances that whiten their residuals, the parameters with bounds and priors, and which of them were held out.
+/// covariances that whiten their residuals, the parameters with bounds and priors, and which of them the fit saw.
 fn problem(run: &Run, config: &FitConfig) -> Result<Value, Error> {
     let model = &run.model;
     let fit = &run.calibration.fit;
     let whitened = ModelProblem::new(model, &run.observations, config)?;
+    // Held out in turn, every observation takes part in the fit whose parameters are written.
+    let in_turn = run.calibration.train.fitted.n == run.observations.len();
     let rows = run.observations.iter().zip(&run.calibration.residuals);
     let observations: Vec<Value> = rows
         .enumerate()
@@ -38,7 +40,7 @@ fn problem(run: &Run, config: &FitConfig) -> Result<Value, Error> {
             let mut row = observation(o);
             row["covariance_m2"] =
                 json!(square(&whitened.position_covariance_m2(block, &run.calibration.nominal_values)));
-            row["held_out"] = json!(residual.held_out);
+            row["in_fit"] = json!(!residual.held_out || in_turn);
             row
         })
         .collect();
