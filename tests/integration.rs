@@ -1,5 +1,11 @@
 //! End to end, one question a file. Every test drives the `armcal` program as a user would.
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test says what it measured and what it skipped"
+)]
+
 mod support;
 
 /// Does the main job on the shipped fixtures give the paper's picture, and points the fit never saw?
