@@ -1,4 +1,4 @@
-use crate::support::{armcal, read_json, root};
+use crate::support::{armcal, paper_pipeline, read_json, root};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use tempfile::TempDir;
@@ -16,12 +16,7 @@ impl Bench {
             let from = root().join("fixtures/paper").join(name);
             std::fs::copy(&from, folder.path().join(name)).expect("copying a fixture");
         }
-        let pipelines = root().join("pipelines");
-        let pipeline = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
-        let pipeline = pipeline
-            .replace("\"../fixtures/paper/", "\"")
-            .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-            .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+        let pipeline = paper_pipeline(folder.path());
         Bench { folder, pipeline }
     }
 

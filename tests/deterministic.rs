@@ -1,33 +1,12 @@
-use crate::support::root;
+use crate::support::{files_made, root};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::process::Command;
-
-/// Every file of a folder.
-fn bytes_of(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = std::fs::read_dir(folder).expect("results folder");
-    entries
-        .map(|entry| {
-            let path = entry.expect("entry").path();
-            let name = path.file_name().expect("name").to_string_lossy().into_owned();
-            (name, std::fs::read(path).expect("result file"))
-        })
-        .collect()
-}
 
 fn run_with_threads(threads: &str) -> BTreeMap<String, Vec<u8>> {
     let out = tempfile::tempdir().expect("temporary folder");
-    let status = Command::new(env!("CARGO_BIN_EXE_armcal"))
-        .env("RAYON_NUM_THREADS", threads)
-        .arg("run")
-        .arg(root().join("pipelines/paper.toml"))
-        .arg("--out")
-        .arg(out.path())
-        .output()
-        .expect("starting armcal")
-        .status;
-    assert!(status.success(), "exit {status}");
-    bytes_of(out.path())
+    let mut command = Command::new(env!("CARGO_BIN_EXE_armcal"));
+    command.env("RAYON_NUM_THREADS", threads).arg("run").arg(root().join("pipelines/paper.toml"));
+    files_made(&mut command, out.path())
 }
 
 #[test]
@@ -42,16 +21,9 @@ fn one_thread_and_five_give_the_same_bytes() {
 #[test]
 fn the_shipped_fixtures_are_what_their_seed_gives() {
     let out = tempfile::tempdir().expect("temporary folder");
-    let status = Command::new(env!("CARGO_BIN_EXE_armcal"))
-        .arg("simulate")
-        .arg(root().join("pipelines/lab/paper-small.toml"))
-        .arg("--out")
-        .arg(out.path())
-        .output()
-        .expect("starting armcal")
-        .status;
-    assert!(status.success(), "exit {status}");
-    let made = bytes_of(out.path());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_armcal"));
+    command.arg("simulate").arg(root().join("pipelines/lab/paper-small.toml"));
+    let made = files_made(&mut command, out.path());
     for name in ["normal.mcap", "roll.mcap", "pitch.mcap"] {
         let shipped = std::fs::read(root().join("fixtures/paper").join(name)).expect("shipped fixture");
         assert!(

@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, read_json, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
 use serde_json::Value;
 use std::path::Path;
 
@@ -25,14 +25,8 @@ fn rig(seed: u64, edit: fn(String) -> String) -> Rig {
         seed_text.as_ref(),
     ]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let pipelines = root().join("pipelines");
-    let pipeline = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
-    let pipeline = pipeline
-        .replace("\"../fixtures/paper/", "\"")
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
     let path = folder.path().join("pipeline.toml");
-    std::fs::write(&path, edit(pipeline)).expect("writing the pipeline");
+    std::fs::write(&path, edit(paper_pipeline(folder.path()))).expect("writing the pipeline");
     let summary = run_pipeline(&path, &folder.path().join("out"), &[0, 3]);
     Rig { seed, truth: read_json(&folder.path().join("truth.json")), summary }
 }

@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, python, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, python, root, run_pipeline};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -19,13 +19,8 @@ fn script(python: &Path, name: &str, argument: &Path) -> Value {
 fn scipy_finds_the_same_optimum_with_kinematics_of_its_own() {
     let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("temporary folder");
-    let pipelines = root().join("pipelines");
-    let paper = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
-    // Plain least squares, because scipy's robust losses act on single rows; paths made absolute.
-    let text = paper
-        .replace("\"../fixtures/", &format!("\"{}/fixtures/", root().display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    // Plain least squares, because scipy's robust losses act on single rows.
+    let text = paper_pipeline(&root().join("fixtures/paper"));
     let pipeline = folder.path().join("least-squares.toml");
     std::fs::write(&pipeline, text + "\n[fit]\nobjective = \"least-squares\"\n")
         .expect("writing the pipeline");

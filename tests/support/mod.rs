@@ -3,6 +3,7 @@
 pub mod conformance;
 
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -37,6 +38,29 @@ pub fn python() -> Option<PathBuf> {
 /// Runs `armcal` and returns what it said.
 pub fn armcal<I: IntoIterator<Item = S>, S: AsRef<std::ffi::OsStr>>(args: I) -> Output {
     Command::new(env!("CARGO_BIN_EXE_armcal")).args(args).output().expect("starting armcal")
+}
+
+/// Runs `armcal`, expects success, and returns every file it left in `out`, by name.
+pub fn files_made(command: &mut Command, out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let output = command.arg("--out").arg(out).output().expect("starting armcal");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let entries = std::fs::read_dir(out).expect("results folder");
+    entries
+        .map(|entry| {
+            let path = entry.expect("entry").path();
+            let name = path.file_name().expect("name").to_string_lossy().into_owned();
+            (name, std::fs::read(path).expect("result file"))
+        })
+        .collect()
+}
+
+/// The text of `pipelines/paper.toml`, usable from any folder, its recordings looked for in `recordings`.
+pub fn paper_pipeline(recordings: &Path) -> String {
+    let pipelines = root().join("pipelines");
+    let text = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
+    text.replace("\"../fixtures/paper/", &format!("\"{}/", recordings.display()))
+        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
+        .replace("\"models/", &format!("\"{}/models/", pipelines.display()))
 }
 
 /// Runs a pipeline; panics with its words unless it exits with one of `codes`. Returns `summary.json`.

@@ -1,7 +1,6 @@
 //! Summary of position errors, the way every output states them.
 
 use crate::robust::percentile;
-use serde::Serialize;
 
 /// Statistics of the norms of position errors [m].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,18 +31,5 @@ impl ErrorStats {
             p95_m: percentile(norms_m, 0.95),
             max_m: norms_m.iter().fold(0.0, |a: f64, &b| a.max(b)),
         }
-    }
-}
-
-impl Serialize for ErrorStats {
-    /// In millimetres, under the names of the `summary.json` contract.
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        use serde::ser::SerializeStruct as _;
-        let mut s = serializer.serialize_struct("ErrorStats", 4)?;
-        s.serialize_field("mean", &(self.mean_m * 1e3))?;
-        s.serialize_field("rms", &(self.rms_m * 1e3))?;
-        s.serialize_field("p95", &(self.p95_m * 1e3))?;
-        s.serialize_field("max", &(self.max_m * 1e3))?;
-        s.end()
     }
 }

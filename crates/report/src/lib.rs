@@ -25,6 +25,6 @@ mod write;
 pub use error::ReportError;
 pub use run::{RecordingRun, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
-pub use terminal::{TerminalStyle, terminal};
-pub use text::conclusion;
+pub use terminal::{RULED, TerminalStyle, terminal};
+pub use text::{conclusion, printable};
 pub use write::{InputMessages, OutputConfig, write_all};

@@ -10,7 +10,7 @@ use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, Lin
 const COLUMNS: u16 = 100;
 
 /// A thin rule below the header and nothing else: the numbers are the table.
-const RULED: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
+pub const RULED: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// Whether colour codes may be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

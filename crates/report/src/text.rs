@@ -74,7 +74,7 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
 }
 
 /// A name from outside, on one line and without control characters (a terminal would obey them).
-pub(crate) fn printable(name: &str) -> String {
+pub fn printable(name: &str) -> String {
     name.chars()
         .flat_map(|c| {
             let escaped: Box<dyn Iterator<Item = char>> =

@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use armcal_core::Severity;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport};
-use comfy_table::{Table, presets};
+use armcal_report::{RULED, printable};
+use comfy_table::Table;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -102,15 +103,15 @@ fn file_line(file: &FileReport) -> String {
 
 fn channels(channels: &[ChannelReport]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(RULED);
     table.set_header(["topic", "schema", "encoding", "messages", "Hz", "from [s]", "for [s]", "read as"]);
     let start_ns = channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns).min().unwrap_or(0);
     for c in channels {
         let duration_s = (c.last_ns - c.first_ns) as f64 * 1e-9;
         let rate_hz = if duration_s > 0.0 { (c.messages.saturating_sub(1)) as f64 / duration_s } else { 0.0 };
         table.add_row([
-            c.topic.escape_debug().to_string(),
-            c.schema.escape_debug().to_string(),
+            printable(&c.topic),
+            printable(&c.schema),
             format!("{}/{}", c.schema_encoding, c.message_encoding),
             c.messages.to_string(),
             format!("{rate_hz:.1}"),
@@ -124,7 +125,7 @@ fn channels(channels: &[ChannelReport]) -> Table {
 
 fn streams(streams: &[StreamReport]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(RULED);
     table.set_header([
         "stream",
         "topic",
@@ -140,7 +141,7 @@ fn streams(streams: &[StreamReport]) -> Table {
     for s in streams {
         table.add_row([
             s.role.clone(),
-            s.topic.escape_debug().to_string(),
+            printable(&s.topic),
             format!("{}/{}", s.rows, s.messages),
             format!("{:.1}", s.rate_hz),
             format!("{:.3}", s.largest_gap_s),
