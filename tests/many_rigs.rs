@@ -99,8 +99,8 @@ fn geometry_only_rigs_are_associated_calibrated_and_judged_rightly() {
         }
     }
     println!("{inside} of {determined} determined parameters inside their 95 % intervals");
-    assert!(determined >= 40, "only {determined} parameters were determined over {} rigs", SEEDS.len());
-    // 95 % of 40 to 60: fewer than 86 % would happen by chance about once in a hundred.
+    assert!(determined >= 30, "only {determined} parameters were determined over {} rigs", SEEDS.len());
+    // 95 % of 30 to 50: fewer than 86 % would happen by chance about once in a hundred.
     assert!(inside as f64 >= 0.86 * determined as f64, "{inside} of {determined}");
 }
 

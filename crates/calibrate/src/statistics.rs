@@ -14,7 +14,7 @@
 //! model is worse than declared; smaller ones may as well come from errors shared between dwells (a cavity visited
 //! twice), so they do not earn narrower intervals. Intervals use Student's t with N - p degrees of freedom.
 //!
-//! A parameter is **determined** when its posterior standard deviation is less than half of what the prior left open
+//! A parameter is **determined** when its posterior standard deviation is less than a quarter of what the prior left open
 //! (of 20 mm or 4 deg for a frame about which nothing was known). Its interval is honest about its partners all the
 //! same: the zero of joint 1 is as wide as the yaw of a measured base leaves it.
 
@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Posterior standard deviation, in units of the prior's, from which on the prior decides.
-const PRIOR_DECIDES: f64 = 0.5;
+const PRIOR_DECIDES: f64 = 0.25;
 
 /// Uncertainty of the free parameters, in units of x.
 #[derive(Debug, Clone)]
