@@ -51,7 +51,8 @@ fn the_true_tip_sits_in_the_true_cavity_of_the_true_board() {
             let by_arm = pose(&truth.world_from_base) * Point3::from(arm.tip(&dwell.link_rad));
             assert!((by_arm - world).norm() < 25e-6, "{name}: {:.1} um off", 1e6 * (by_arm - world).norm());
             assert!((Vector3::from(dwell.tip_world_m) - by_arm.coords).norm() < 1e-6);
-            assert!(Vector3::from(dwell.seat_m.unwrap()).norm() < 5.0 * 0.05e-3);
+            // Five sigma of the clearance that the board file declares.
+            assert!(Vector3::from(dwell.seat_m.unwrap()).norm() < 5.0 * 0.1e-3);
             seated += 1;
         }
     }
