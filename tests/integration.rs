@@ -31,3 +31,6 @@ mod deterministic;
 
 /// Are all dwells of fresh simulated rigs associated rightly, and intervals honest?
 mod many_rigs;
+
+/// Is what the documentation lists what the program knows?
+mod docs;

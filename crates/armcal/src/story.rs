@@ -28,7 +28,7 @@ pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recordi
         rounds += 1;
         progress.step(&format!("calibrating (round {rounds})"));
         frames::start_frames(pipeline, &mut model, &places);
-        let observed = observe::observations(pipeline, board.as_ref(), &model, &seen, &places)?;
+        let observed = observe::observations(pipeline, board.as_ref(), &seen, &places)?;
         let calibration = calibrate(&model, &observed.observations, &pipeline.fit, &pipeline.holdout)?;
         let again =
             observe::associate_all(pipeline, board.as_ref(), &model, Some(&calibration.fit.values()), &seen)?;

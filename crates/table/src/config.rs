@@ -3,11 +3,11 @@
 
 use crate::keys::nearest;
 use crate::{Board, TableError};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Settings of [`associate`](crate::associate). All are priors or limits; the defaults suit an arm
 /// whose Denavit-Hartenberg parameters are off by some 5 mm and 2 deg.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AssociationConfig {
     /// Mean error of the predicted tip over the board, per axis, one standard deviation [mm]. Default 30.

@@ -59,18 +59,15 @@ pub fn same_places(a: &[Option<Association>], b: &[Option<Association>]) -> bool
 pub fn observations(
     pipeline: &Pipeline,
     board: Option<&Board>,
-    model: &Model,
     seen: &[Seen],
     places: &[Option<Association>],
 ) -> Result<Observed, Error> {
     let mut observed = Observed { observations: Vec::new(), rejections: Vec::new() };
-    for (recording, (seen, association)) in seen.iter().zip(places).enumerate() {
+    for (seen, association) in seen.iter().zip(places) {
         for (i, dwell) in seen.dwells.iter().enumerate() {
             let place = association.as_ref().and_then(|a| a.assignments.get(i)).map(|a| &a.place);
             let outcome = match (place.and_then(seated_in), board) {
-                (Some(cavity), Some(board)) if pipeline.observations.seated => {
-                    seated(board, model, recording, cavity)
-                }
+                (Some(cavity), Some(board)) if pipeline.observations.seated => seated(board, cavity),
                 (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
                 (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
             };
@@ -113,15 +110,10 @@ fn seated_in(place: &Place) -> Option<&str> {
 type Referenced = (Reference, Matrix3<f64>);
 
 /// The tip is where the cavity is, as well as cavity and seat are made.
-fn seated(board: &Board, model: &Model, recording: usize, cavity: &str) -> Result<Referenced, String> {
-    let in_board_m = board
-        .cavity(cavity)
-        .map(|c| c.in_board_m)
-        .ok_or_else(|| format!("cavity `{cavity}` is not on the board"))?;
-    let variance_m2 = board.cavity_sigma_m.powi(2) + board.seat_sigma_m.powi(2);
-    debug_assert!(model.board_in_world(&model.nominal(), recording).is_some());
-    let reference = Reference::Seated { cavity: cavity.to_owned(), in_board_m };
-    Ok((reference, Matrix3::from_diagonal_element(variance_m2)))
+fn seated(board: &Board, cavity: &str) -> Result<Referenced, String> {
+    let found = board.cavity(cavity).ok_or_else(|| format!("cavity `{cavity}` is not on the board"))?;
+    let reference = Reference::Seated { cavity: cavity.to_owned(), in_board_m: found.in_board_m };
+    Ok((reference, board.seat_covariance_m2()))
 }
 
 /// The tip is where the sensor saw it.

@@ -1,0 +1,33 @@
+use crate::support::root;
+use serde::Serialize;
+
+/// Every key of the sections that have defaults, as the program itself spells them.
+fn keys<T: Serialize>(section: &T) -> Vec<String> {
+    let value = serde_json::to_value(section).expect("a section is a table");
+    value.as_object().expect("a section is a table").keys().cloned().collect()
+}
+
+#[test]
+fn the_reference_lists_every_key_with_a_default() {
+    let reference = std::fs::read_to_string(root().join("docs/pipeline-reference.md")).expect("reference");
+    let sections = [
+        keys(&armcal_dwell::ClockConfig::default()),
+        keys(&armcal_dwell::DwellConfig::default()),
+        keys(&armcal_table::AssociationConfig::default()),
+        keys(&armcal_calibrate::FitConfig::default()),
+        keys(&armcal_model::Deviation::default()),
+    ];
+    for key in sections.concat() {
+        assert!(reference.contains(&format!("`{key}`")), "docs/pipeline-reference.md does not list `{key}`");
+    }
+}
+
+#[test]
+fn every_shipped_pipeline_is_valid() {
+    for entry in std::fs::read_dir(root().join("pipelines")).expect("pipelines") {
+        let path = entry.expect("entry").path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            armcal::Pipeline::load(&path).unwrap_or_else(|e| panic!("{e}"));
+        }
+    }
+}
