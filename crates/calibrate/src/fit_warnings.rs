@@ -8,6 +8,10 @@ use armcal_core::{Severity, Stage, Warning};
 const OUTLIER_WEIGHT: f64 = 0.25;
 /// Residual scale from which on the declared noise is questioned.
 const LARGE_SCALE: f64 = 1.5;
+/// Residual scale from which on the model cannot be called adequate.
+const INADEQUATE_SCALE: f64 = 5.0;
+/// Share of outliers from which on they are no exceptions.
+const INADEQUATE_OUTLIERS: f64 = 0.25;
 /// Names listed in one message.
 const LISTED: usize = 5;
 
@@ -59,7 +63,9 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
              too small; intervals are widened accordingly",
             fit.sigma_scale
         );
-        add(Severity::Notice, "residuals-above-noise", "fit", message);
+        let inadequate = fit.sigma_scale > INADEQUATE_SCALE;
+        let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
+        add(severity, "residuals-above-noise", "fit", message);
     }
     let outliers: Vec<String> = (0..fit.weights.len())
         .filter(|&j| fit.weights[j] < OUTLIER_WEIGHT)
@@ -67,8 +73,15 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         .collect();
     if !outliers.is_empty() {
         let names: Vec<&str> = outliers.iter().map(String::as_str).collect();
-        let message = format!("{} observations weigh less than {OUTLIER_WEIGHT} in the fit", names.len());
-        add(Severity::Notice, "outliers", &listed(&names), message);
+        let of_all = format!("{} of {} observations", names.len(), fit.weights.len());
+        let mut message = format!("{of_all} weigh less than {OUTLIER_WEIGHT} in the fit");
+        let many = names.len() as f64 > INADEQUATE_OUTLIERS * fit.weights.len() as f64;
+        if many {
+            message += ": so many are no exceptions; check the order, sign and unit of the joints, the board, and \
+                        whether something moved during a recording";
+        }
+        let severity = if many { Severity::Inadequate } else { Severity::Notice };
+        add(severity, "outliers", &listed(&names), message);
     }
     warnings
 }

@@ -49,7 +49,7 @@ pub fn detect_dwells(
         .enumerate()
         .map(|(dwell, rows)| summary.dwell(DwellId { recording, dwell }, rows, &past))
         .collect();
-    let warnings = summary.warnings(recording, &found, &dwells);
+    let warnings = summary.warnings(&found, &dwells);
     Ok((dwells, warnings))
 }
 
@@ -115,8 +115,8 @@ impl Summary<'_> {
         tip_measurement(tip.samples, first..end.max(first), self.config)
     }
 
-    fn warnings(&self, recording: usize, found: &Pauses, dwells: &[Dwell]) -> Vec<Warning> {
-        let subject = format!("recording {recording}");
+    fn warnings(&self, found: &Pauses, dwells: &[Dwell]) -> Vec<Warning> {
+        let subject = "dwells".to_owned();
         let say =
             |severity, code, message| Warning::new(severity, Stage::Dwell, code, subject.clone(), message);
         let mut warnings = Vec::new();

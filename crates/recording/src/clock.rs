@@ -18,6 +18,9 @@ const SPREAD_S: f64 = 1.0;
 /// Spread allowed as a share of the recording's duration: a sensor's clock may drift.
 const SPREAD_SHARE: f64 = 0.02;
 
+/// A stamp must be this many times the spread allowed away from its neighbours before it is called stray.
+const STRAY_SPREADS: f64 = 10.0;
+
 /// The stamps of the rows of a stream.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Stamps {
@@ -41,6 +44,34 @@ impl Stamps {
             Clock::Log => self.log_ns.iter().copied().map(Some).collect(),
         }
     }
+}
+
+/// Takes away single header stamps that cannot be right (1970, 2038, a flipped bit), and counts them.
+///
+/// A stamp is stray when it lies far outside the bulk of the header stamps and does not follow log time as they do:
+/// a recorder that stalls, log times that are wrong, or a second session in the same file break only one of the two.
+pub(crate) fn drop_stray(time_ns: &mut [Option<i64>], log_ns: &[i64]) -> u64 {
+    let set: Vec<f64> = time_ns.iter().flatten().map(|t| *t as f64 * 1e-9).collect();
+    let latency_s = |time: &Option<i64>, log: &i64| time.map(|t| log.saturating_sub(t) as f64 * 1e-9);
+    let late: Vec<f64> = time_ns.iter().zip(log_ns).filter_map(|(t, log)| latency_s(t, log)).collect();
+    if set.is_empty() {
+        return 0;
+    }
+    let (first_s, last_s) = (percentile(&set, 0.01), percentile(&set, 0.99));
+    let usual_s = percentile(&late, 0.5);
+    let margin_s = STRAY_SPREADS * SPREAD_S.max(SPREAD_SHARE * (last_s - first_s));
+    let mut strays = 0;
+    for (time, log) in time_ns.iter_mut().zip(log_ns) {
+        let outside = time.is_some_and(|t| {
+            let t_s = t as f64 * 1e-9;
+            t_s < first_s - margin_s || t_s > last_s + margin_s
+        });
+        if outside && latency_s(time, log).is_some_and(|s| (s - usual_s).abs() > margin_s) {
+            *time = None;
+            strays += 1;
+        }
+    }
+    strays
 }
 
 /// The clock to use and why.
@@ -140,6 +171,28 @@ mod tests {
         // The tracker's clock is a day off and drifts by 100 ppm.
         let s = stamps(|t| Some((t - 86_400_000_000_000) / 10_000 * 10_001), |t| t - 5);
         assert_eq!(choose(&s).0, Clock::Header);
+    }
+
+    #[test]
+    fn only_stamps_that_fit_neither_their_neighbours_nor_log_time_are_stray() {
+        let log_ns: Vec<i64> = (0..1000).map(|i| 1_700_000_000_000_000_000 + i * 10_000_000).collect();
+        let mut time: Vec<Option<i64>> = log_ns.iter().map(|t| Some(t - 86_400_000_000_000)).collect();
+        time[400] = Some(2_147_483_647_000_000_000);
+        time[401] = Some(1);
+        time[402] = None;
+        assert_eq!(drop_stray(&mut time, &log_ns), 2);
+        assert_eq!((time[400], time[401], time[399].is_some()), (None, None, true));
+        // A recorder that stalls for a minute, and a log clock that is wrong for a row.
+        let mut log_late = log_ns.clone();
+        log_late[995..].iter_mut().for_each(|t| *t += 60_000_000_000);
+        log_late[3] = i64::MAX;
+        let mut time: Vec<Option<i64>> = log_ns.iter().copied().map(Some).collect();
+        assert_eq!(drop_stray(&mut time, &log_late), 0);
+        // A short session an hour earlier in the same file.
+        let mut log_two = log_ns.clone();
+        log_two[..5].iter_mut().for_each(|t| *t -= 3_600_000_000_000);
+        let mut time: Vec<Option<i64>> = log_two.iter().copied().map(Some).collect();
+        assert_eq!(drop_stray(&mut time, &log_two), 0);
     }
 
     #[test]

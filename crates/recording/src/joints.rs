@@ -198,6 +198,11 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
     Err(RecordingError::WrongUnit { role: ROLE, topic: stream.topic.clone(), why })
 }
 
+/// Whether the readings of row `i` are ones that a joint can have; a flipped bit gives the others.
+pub(crate) fn is_possible(joint_rad: &[Vec<f64>], i: usize, stream: &JointStream) -> bool {
+    joint_rad.iter().all(|column| column[i].abs() <= 10.0 * stream.max_turns * TAU)
+}
+
 /// What makes degrees look like radians, if they do: every joint stays within a turn's worth of radians.
 pub(crate) fn looks_like_radians(joint_rad: &[Vec<f64>], stream: &JointStream) -> Option<String> {
     let largest_deg = joint_rad.iter().flatten().map(|q| q.to_degrees().abs()).fold(0.0, f64::max);

@@ -86,7 +86,8 @@ pub(crate) fn check_unit(
     stream: &PoseStream,
     position_m: &[Vector3<f64>],
 ) -> Result<(), RecordingError> {
-    let mut reach_m: Vec<f64> = position_m.iter().map(|p| p.norm()).collect();
+    // Rows of exactly zero are occluded, and in every unit.
+    let mut reach_m: Vec<f64> = position_m.iter().map(|p| p.norm()).filter(|r| *r > 0.0).collect();
     if reach_m.is_empty() {
         return Ok(());
     }
@@ -106,6 +107,11 @@ pub(crate) fn check_unit(
         }
     };
     Err(RecordingError::WrongUnit { role, topic: stream.topic.clone(), why })
+}
+
+/// Whether a position is one that a laboratory can hold; a flipped bit gives the others.
+pub(crate) fn is_possible(position_m: &Vector3<f64>) -> bool {
+    position_m.norm() <= 10.0 * ROOM_M
 }
 
 /// What makes millimetres look like metres, if they do.

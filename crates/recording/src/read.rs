@@ -1,7 +1,7 @@
 //! The streams of a pipeline, read into columns.
 
 use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
-use crate::clock::{choose, judge_header};
+use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::{Clock, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams};
@@ -79,7 +79,9 @@ impl<'a> Reading<'a> {
             rows: 0,
             undecodable: gathered.undecodable,
             non_finite: 0,
+            impossible: 0,
             unstamped: 0,
+            stray_stamps: 0,
             duplicate_stamps: 0,
             backward_stamps: 0,
             other_joints: gathered.joints.other,
@@ -101,10 +103,15 @@ impl<'a> Reading<'a> {
         let finite = |i: usize| table.position[i * n..(i + 1) * n].iter().all(|x| x.is_finite());
         let (mut rows, mut counts) = in_time_order(&self.time("joints", stream.clock)?, finite);
         drop_duplicates(&mut rows, &mut counts);
+        let readings = |rows: &[(i64, usize)]| {
+            joints::to_rad(table, &rows.iter().map(|(_, i)| *i).collect::<Vec<_>>(), stream)
+        };
+        let joint_rad = readings(&rows);
+        joints::check_unit(&joint_rad, stream)?;
+        self.drop_impossible(&mut rows, |i| joints::is_possible(&joint_rad, i, stream));
+        let joint_rad = if self.report.impossible > 0 { readings(&rows) } else { joint_rad };
         let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
         self.finish("joints", &time_ns, counts)?;
-        let joint_rad = joints::to_rad(table, &rows, stream);
-        joints::check_unit(&joint_rad, stream)?;
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
         let effort_nm = joints::effort(table, &rows, n);
@@ -127,6 +134,9 @@ impl<'a> Reading<'a> {
         }
         poses::check_body(role, stream, table)?;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
+        let position_m = poses::positions(table, &rows.iter().map(|(_, i)| *i).collect::<Vec<_>>());
+        poses::check_unit(role, stream, &position_m)?;
+        self.drop_impossible(&mut rows, |i| poses::is_possible(&position_m[i]));
         let Verdict { mut occluded, oriented } = reject_unseen(&mut rows, &table.seen);
         drop_duplicates(&mut rows, &mut counts);
         occluded.frozen = reject_frozen(&mut rows, &table.seen);
@@ -134,7 +144,6 @@ impl<'a> Reading<'a> {
         let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
         self.finish(role, &time_ns, counts)?;
         let position_m = poses::positions(table, &rows);
-        poses::check_unit(role, stream, &position_m)?;
         self.inadequate("unit-doubtful", poses::looks_like_metres(stream, &position_m));
         let several = (table.frames.len() > 1).then(|| {
             format!("poses come in several frames ({:?}) and are read as if they were one", table.frames)
@@ -186,14 +195,25 @@ impl<'a> Reading<'a> {
             None => choose(stamps),
             Some(clock) => (clock, "set in the pipeline".to_owned()),
         };
-        let time = stamps.on(clock);
+        let mut time = stamps.on(clock);
         if !time.is_empty() && time.iter().all(Option::is_none) {
             let (topic, why) = (self.report.topic.clone(), judge_header(stamps).err().unwrap_or_default());
             let why = format!("{why}; set \"publish\" or \"log\", or remove the key");
             return Err(RecordingError::NoClock { role, topic, clock: "header", why });
         }
+        if clock == Clock::Header {
+            self.report.stray_stamps = drop_stray(&mut time, &stamps.log_ns);
+        }
         (self.report.clock, self.report.clock_reason) = (clock, why);
         Ok(time)
+    }
+
+    /// Removes the rows at whose place in `rows` the numbers are none a sensor can mean.
+    fn drop_impossible(&mut self, rows: &mut Vec<(i64, usize)>, possible: impl Fn(usize) -> bool) {
+        let mut place = 0..;
+        let before = rows.len();
+        rows.retain(|_| place.next().is_some_and(&possible));
+        self.report.impossible = (before - rows.len()) as u64;
     }
 
     /// Completes the report, says what was lost, and refuses an empty stream.
@@ -201,19 +221,34 @@ impl<'a> Reading<'a> {
         let r = &mut self.report;
         r.rows = time_ns.len();
         r.non_finite = counts.non_finite;
-        r.unstamped = counts.unstamped;
+        r.unstamped = counts.unstamped.saturating_sub(r.stray_stamps);
         r.duplicate_stamps = counts.duplicate;
         r.backward_stamps = counts.backward;
         (r.rate_hz, r.largest_gap_s) = rate_and_gap(time_ns);
+        let of_topic = |why: &str| RecordingError::NoRows {
+            role,
+            topic: r.topic.clone(),
+            messages: r.messages,
+            why: why.to_owned(),
+        };
+        if r.messages == 0 {
+            return Err(of_topic("the channel is empty; name another topic, or record it again"));
+        }
+        if time_ns.len() == 1 && r.duplicate_stamps > 0 {
+            return Err(of_topic("all of them have the same stamp; set another `clock` for this stream"));
+        }
         if time_ns.is_empty() {
             let why = format!(
-                "{} undecodable, {} with NaN, {} without a stamp, {} occluded; name another topic",
+                "{} undecodable, {} with NaN, {} without a stamp, {} with a stray one, {} with impossible values, \
+                 {} occluded; name another topic",
                 r.undecodable,
                 r.non_finite,
                 r.unstamped,
+                r.stray_stamps,
+                r.impossible,
                 r.occluded.total()
             );
-            return Err(RecordingError::NoRows { role, topic: r.topic.clone(), messages: r.messages, why });
+            return Err(of_topic(&why));
         }
         self.warn_of_losses();
         Ok(())
@@ -231,6 +266,18 @@ impl<'a> Reading<'a> {
             &format!("messages could not be decoded, the first because: {first}"),
         );
         self.counted(lost, "non-finite", r.non_finite, "rows with NaN or infinite values dropped");
+        self.counted(
+            lost,
+            "impossible",
+            r.impossible,
+            "rows dropped with values no joint or laboratory can have: look for damage or a faulty driver",
+        );
+        self.counted(
+            lost,
+            "stray-stamps",
+            r.stray_stamps,
+            "rows dropped whose header stamp is far from all others: look for damage or a clock that was set",
+        );
         self.counted(lost, "unstamped", r.unstamped, "rows without a stamp dropped");
         self.counted(
             note,
@@ -244,7 +291,8 @@ impl<'a> Reading<'a> {
             r.backward_stamps,
             "rows with stamps going backwards sorted into place",
         );
-        self.counted(note, "occluded", r.occluded.total(), "poses rejected as occluded");
+        let of_all = format!("of {} poses rejected as occluded", r.messages);
+        self.counted(note, "occluded", r.occluded.total(), &of_all);
         self.counted(note, "other-joints", r.other_joints, "messages without all wanted joints skipped");
         for why in &self.gathered.unreadable {
             let text = format!("another channel of this topic is not read: {why}");

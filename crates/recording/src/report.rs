@@ -89,8 +89,12 @@ pub struct StreamReport {
     pub undecodable: u64,
     /// Rows with NaN or infinite values, dropped.
     pub non_finite: u64,
+    /// Rows with finite numbers that no joint or laboratory can have, dropped.
+    pub impossible: u64,
     /// Rows without a stamp on the clock used, dropped.
     pub unstamped: u64,
+    /// Rows whose header stamp is far from all others and from log time, dropped.
+    pub stray_stamps: u64,
     /// Rows whose stamp equals the one before, dropped.
     pub duplicate_stamps: u64,
     /// Rows whose stamp goes backwards; sorted into place.

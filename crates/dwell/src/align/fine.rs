@@ -5,12 +5,14 @@
 //! ```
 //! `m` is the measured and `p` the predicted speed (or the logarithm of either), `g` and `c` a gain and a
 //! level without meaning of their own. The nominal model is wrong by some percent, so the residuals are not
-//! noise but smooth, and correlated for as long as a movement lasts: the errors come from leaving out one
+//! noise but smooth, and repeat wherever a path is repeated. A wrong zero of joint j changes the predicted speed
+//! by `dp/dq_j`, of which a part looks like a shift in time; so the last step estimates those zeros along with
+//! the clocks. What is left is correlated for as long as a movement lasts: the errors come from leaving out one
 //! movement at a time (cluster jackknife, CR3; MacKinnon, Nielsen and Webb, J. Appl. Econometrics 38, 2023,
 //! eq. 10), not from the residuals one by one.
 
 use armcal_core::robust::mad_sigma;
-use nalgebra::{Matrix2, Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector4};
 
 use super::profile::SpeedProfile;
 use crate::stats::HUBER_K;
@@ -26,6 +28,13 @@ const CONVERGED_S: f64 = 1e-9;
 
 /// Largest step of an iteration [s]: beyond a peak of the speed the linearisation means nothing.
 const LONGEST_STEP_S: f64 = 0.1;
+
+/// Angle by which each joint is bent to see how its zero changes the speed [rad].
+pub(crate) const BEND_RAD: f64 = 0.01;
+
+/// Zeros of joints further off than this are not expected [rad]; it decides only where the motion does not
+/// tell (the first joint of an arm that stands upright turns the whole path and changes no speed).
+const ZERO_SIGMA_RAD: f64 = 0.05;
 
 /// Where the iteration starts.
 #[derive(Debug, Clone, Copy)]
@@ -65,9 +74,14 @@ struct Row {
     weight: f64,
 }
 
+/// Normal equations of one movement, or of all.
+type Sums = (DMatrix<f64>, DVector<f64>);
+
 /// The problem: points grouped in movements, and where drift is measured from.
 pub(crate) struct Problem<'a> {
     robot: &'a SpeedProfile,
+    /// The same with each joint bent by [`BEND_RAD`] in turn.
+    bent: &'a [SpeedProfile],
     points: &'a [Point],
     reference_s: f64,
     half_s: f64,
@@ -77,12 +91,13 @@ pub(crate) struct Problem<'a> {
 impl<'a> Problem<'a> {
     pub(crate) fn new(
         robot: &'a SpeedProfile,
+        bent: &'a [SpeedProfile],
         points: &'a [Point],
         reference_s: f64,
         with_drift: bool,
     ) -> Problem<'a> {
         let half_s = points.iter().map(|p| (p.t_s - reference_s).abs()).fold(1e-3, f64::max);
-        Problem { robot, points, reference_s, half_s, with_drift }
+        Problem { robot, bent, points, reference_s, half_s, with_drift }
     }
 
     /// Iterates from the start; `None` when the normal equations are singular or the movements too few.
@@ -174,29 +189,86 @@ impl<'a> Problem<'a> {
         (normal, gradient)
     }
 
+    /// One more step with the zeros of the joints, where there are movements enough to tell them; then the
+    /// jackknife.
     fn finish(&self, state: Vector4<f64>, rows: &[Row]) -> Option<Fine> {
         let by_movement: Vec<&[Row]> = rows.chunk_by(|a, b| a.point.movement == b.point.movement).collect();
         let groups = by_movement.len();
         if groups < MIN_MOVEMENTS {
             return None;
         }
-        let (whole, _) = self.normal(rows);
-        let mut covariance = Matrix4::zeros();
-        for group in &by_movement {
-            let (without, gradient) = sums(group);
-            let change = (whole - without).lu().solve(&gradient)?;
-            covariance += change * change.transpose();
-        }
-        let free = groups as f64 - if self.with_drift { 4.0 } else { 3.0 };
-        covariance *= (groups as f64 - 1.0) / groups as f64 * student_widening(free).powi(2);
+        let enough = groups >= 2 * (4 + self.bent.len());
+        let with_zeros = enough.then(|| self.jackknife(&state, &by_movement, self.bent)).flatten();
+        let (step, covariance) = match with_zeros {
+            Some(found) => found,
+            None => self.jackknife(&state, &by_movement, &[])?,
+        };
         let scale = Matrix2::new(1.0, 0.0, 0.0, 1.0 / self.half_s);
         Some(Fine {
-            offset_s: state.x,
-            drift: state.y / self.half_s,
+            offset_s: state.x + step[0],
+            drift: (state.y + step[1]) / self.half_s,
             with_drift: self.with_drift,
-            covariance: scale * covariance.fixed_view::<2, 2>(0, 0) * scale,
+            covariance: scale * covariance * scale,
             windows: windows(&by_movement),
         })
+    }
+
+    /// The last step from `state` and the covariance of offset and scaled drift after it. None when the step
+    /// is too long for the linearisation, or the equations are singular.
+    fn jackknife(
+        &self,
+        state: &Vector4<f64>,
+        by_movement: &[&[Row]],
+        bent: &[SpeedProfile],
+    ) -> Option<(DVector<f64>, Matrix2<f64>)> {
+        let groups = by_movement.len() as f64;
+        let parts: Vec<Sums> = by_movement.iter().map(|rows| self.wide_sums(state, rows, bent)).collect();
+        let size = 4 + bent.len();
+        let (mut whole, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for (normal, pull) in &parts {
+            whole += normal;
+            gradient += pull;
+        }
+        if !self.with_drift {
+            whole[(1, 1)] = 1.0;
+        }
+        let moving = by_movement.iter().flat_map(|rows| rows.iter()).filter(|r| r.point.moving);
+        let scale = mad_sigma(&moving.map(|r| r.residual).collect::<Vec<_>>());
+        for zero in 4..size {
+            whole[(zero, zero)] += (scale / ZERO_SIGMA_RAD).powi(2).max(f64::MIN_POSITIVE);
+        }
+        let step = whole.clone().lu().solve(&gradient)?;
+        if step[0].hypot(step[1]) > LONGEST_STEP_S {
+            return None;
+        }
+        let mut covariance = Matrix2::zeros();
+        for (normal, pull) in &parts {
+            let change = (&whole - normal).lu().solve(&(pull - normal * &step))?;
+            let change = change.fixed_rows::<2>(0);
+            covariance += change * change.transpose();
+        }
+        let free = groups - (if self.with_drift { 4.0 } else { 3.0 }) - bent.len() as f64;
+        covariance *= (groups - 1.0) / groups * student_widening(free).powi(2);
+        // Lengths and twists are wrong as well and not estimated here; they shift about as much as the zeros did.
+        let shift = step.fixed_rows::<2>(0);
+        Some((step.clone(), covariance + shift * shift.transpose()))
+    }
+
+    /// [`sums`] with a column for the zero of each bent joint.
+    fn wide_sums(&self, state: &Vector4<f64>, rows: &[Row], bent: &[SpeedProfile]) -> Sums {
+        let size = 4 + bent.len();
+        let (mut normal, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for r in rows {
+            let robot_s = self.robot_s(state, r.point.t_s);
+            let by_zero = bent.iter().map(|b| {
+                let bent = b.at(robot_s).map_or(r.jacobian.z, |(speed, _)| speed);
+                state.z * (bent - r.jacobian.z) / BEND_RAD
+            });
+            let jacobian = DVector::from_iterator(size, r.jacobian.iter().copied().chain(by_zero));
+            normal.ger(r.weight, &jacobian, &jacobian, 1.0);
+            gradient.axpy(r.weight * r.residual, &jacobian, 1.0);
+        }
+        (normal, gradient)
     }
 }
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
 use coarse::Coarse;
-use fine::{Fine, Start};
+use fine::{BEND_RAD, Fine, Start};
 use scale::{Scale, Track};
 
 const DOING: &str = "aligning the clocks";
@@ -105,13 +105,23 @@ impl<'a> Streams<'a> {
     ) -> Result<Streams<'a>, DwellError> {
         let origin_ns = tip.time_ns[0];
         let robot_origin_ns = shifted(origin_ns, -config.initial_offset_s);
-        let predicted_m: Vec<Vector3<f64>> =
-            (0..joints.len()).into_par_iter().map(|i| tip_from_joints(&joints.row_rad(i))).collect();
+        let predict = |bent: Option<usize>| -> Track {
+            let tip_m = |row: usize| {
+                let mut joint_rad = joints.row_rad(row);
+                if let Some(joint) = bent {
+                    joint_rad[joint] += BEND_RAD;
+                }
+                tip_from_joints(&joint_rad)
+            };
+            let predicted_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
+            Track::of(&joints.time_ns, robot_origin_ns, predicted_m, config)
+        };
         let sensor = Track::of(&tip.time_ns, origin_ns, tip.position_m.clone(), config);
-        let robot = Track::of(&joints.time_ns, robot_origin_ns, predicted_m, config);
+        let robot = predict(None);
+        let bent: Vec<Track> = (0..joints.joint_rad.len()).map(|joint| predict(Some(joint))).collect();
         // Two samples in each half of the kernel, or a slow stream would be smoothed differently.
         let h_s = (0.5 * config.smoothing_s).max(2.0 * sensor.period_s).max(2.0 * robot.period_s);
-        let tried = KERNELS.map(|times| Scale::of(&sensor, &robot, times * h_s, config));
+        let tried = KERNELS.map(|times| Scale::of(&sensor, &robot, &bent, times * h_s, config));
         let reference_s = 0.5 * seconds_between(origin_ns, tip.time_ns[tip.len() - 1]);
         let mut first_reason = None;
         let mut scales = Vec::new();

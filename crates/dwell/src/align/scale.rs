@@ -1,6 +1,7 @@
 //! The two streams seen through one smoothing kernel.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::ops::Range;
 
 use super::fine::{Fine, MIN_MOVEMENTS, Problem, Start, movements};
@@ -64,6 +65,8 @@ pub(crate) struct Scale {
     pub h_s: f64,
     pub sensor: SpeedProfile,
     pub robot: SpeedProfile,
+    /// The robot's with each joint bent a little in turn.
+    bent: Vec<SpeedProfile>,
     /// Measured value above which the tip moves, in the unit of the profile.
     moving_above: f64,
     /// Shortest length of a movement [s].
@@ -75,10 +78,12 @@ impl Scale {
     pub(crate) fn of(
         sensor: &Track,
         robot: &Track,
+        bent: &[Track],
         h_s: f64,
         config: &ClockConfig,
     ) -> Result<Scale, DwellError> {
         let (sensor, robot) = (sensor.speeds(h_s), robot.speeds(h_s));
+        let bent = bent.par_iter().map(|track| track.speeds(h_s)).collect();
         let (measured, predicted) = (sensor.quantile_m_s(0.99), robot.quantile_m_s(0.99));
         let least = config.min_speed_mm_s * 1e-3;
         let still = |what: &str, speed: f64| {
@@ -116,7 +121,7 @@ impl Scale {
         let seen_s = points.last().map_or(0.0, |p| p.0) - points.first().map_or(0.0, |p| p.0);
         let shortest_s =
             (moving_s / 12.0).min(SHORTEST_MOVEMENT_S).max(4.0 * h_s).max(seen_s / MOST_MOVEMENTS);
-        Ok(Scale { h_s, sensor, robot, moving_above, shortest_s })
+        Ok(Scale { h_s, sensor, robot, bent, moving_above, shortest_s })
     }
 
     /// The same in logarithms. When something moves is then told by its beginning and end, however fast it
@@ -129,6 +134,7 @@ impl Scale {
             h_s: self.h_s,
             sensor: self.sensor.logarithm(still_m_s),
             robot: self.robot.logarithm(still_m_s / ratio),
+            bent: self.bent.iter().map(|b| b.logarithm(still_m_s / ratio)).collect(),
             moving_above: 1.0,
             shortest_s: self.shortest_s,
         }
@@ -138,7 +144,7 @@ impl Scale {
     pub(crate) fn solve(&self, start: Start, reference_s: f64, max_drift: f64) -> Result<Fine, DwellError> {
         let points = movements(&self.sensor.points(2), self.moving_above, self.shortest_s);
         let solve = |with_drift: bool| {
-            let problem = Problem::new(&self.robot, &points, reference_s, with_drift);
+            let problem = Problem::new(&self.robot, &self.bent, &points, reference_s, with_drift);
             problem.solve(start).ok_or_else(|| DwellError::NoMotion {
                 seen: format!(
                     "there are {} separate movements, errors cannot be told from fewer than {MIN_MOVEMENTS}",
