@@ -16,6 +16,7 @@ fn the_reference_lists_every_key_with_a_default() {
         keys(&armcal_table::AssociationConfig::default()),
         keys(&armcal_calibrate::FitConfig::default()),
         keys(&armcal_model::Deviation::default()),
+        keys(&armcal_diagnose::DiagnosisConfig::default()),
     ];
     for key in sections.concat() {
         assert!(reference.contains(&format!("`{key}`")), "docs/pipeline-reference.md does not list `{key}`");
@@ -29,5 +30,17 @@ fn every_shipped_pipeline_is_valid() {
         if path.extension().is_some_and(|e| e == "toml") {
             armcal::Pipeline::load(&path).unwrap_or_else(|e| panic!("{e}"));
         }
+    }
+}
+
+/// The catalogue is printed by the program; the guide to the diagnosis must not name effects that do not exist.
+#[test]
+fn effects_named_in_the_guide_to_the_diagnosis_exist() {
+    let guide = std::fs::read_to_string(root().join("docs/diagnosis.md")).expect("guide");
+    let known: Vec<&str> = armcal_model::catalogue().iter().map(|kind| kind.name).collect();
+    let rows = guide.lines().filter(|line| line.starts_with("| `"));
+    for row in rows {
+        let name = row.trim_start_matches("| `").split(['`', ':', '@', ',']).next().unwrap_or_default();
+        assert!(known.contains(&name), "docs/diagnosis.md: `{name}` is not in the catalogue");
     }
 }

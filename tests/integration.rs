@@ -32,5 +32,17 @@ mod deterministic;
 /// Are all dwells of fresh simulated rigs associated rightly, and intervals honest?
 mod many_rigs;
 
+/// Does the tool learn from a recording which effect is missing, and does adding it help on unseen points?
+mod missing_effect;
+
+/// How often is the diagnosis right on scenarios whose truth it cannot see?
+mod sealed_scenarios;
+
+/// Does comparing two results say what changed, on the same dwells?
+mod compare;
+
 /// Is what the documentation lists what the program knows?
 mod docs;
+
+/// Does the plan propose dwells that, recorded, settle what the recording at hand leaves open?
+mod plan;

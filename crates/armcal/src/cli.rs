@@ -38,6 +38,97 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Where the model fails, which physical effect is missing, what to record next.
+    Diagnose {
+        /// Pipeline file, or the result of an earlier run (run.mcap or its folder).
+        input: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Adds effects to a pipeline: refits, compares on held-out points, diagnoses what remains, writes the new pipeline.
+    Add {
+        /// Effects such as backlash:1 (see `armcal effects`), or `suggested` for what the diagnosis found.
+        #[arg(required = true)]
+        effects: Vec<String>,
+        /// Pipeline file to extend.
+        pipeline: PathBuf,
+        /// File for the extended pipeline; beside the original when absent.
+        #[arg(long)]
+        write: Option<PathBuf>,
+        /// Folder for the results of the extended pipeline.
+        #[arg(long, default_value = "out")]
+        out: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Which dwells to record next, to tell apart what the diagnosis leaves open; or which sensor, where no motion will.
+    Plan {
+        /// Pipeline file.
+        pipeline: PathBuf,
+        /// Most dwells to propose.
+        #[arg(long, default_value_t = 6)]
+        dwells: usize,
+        /// Effects to tell apart, such as compliance:2,belt_coupling; one alone is told from nothing. What the diagnosis
+        /// leaves open when absent.
+        #[arg(long)]
+        effects: Option<String>,
+        /// A load at hand [kg]; may be given again.
+        #[arg(long = "load", value_name = "KG")]
+        loads: Vec<f64>,
+        /// How far free poses may go beyond the recorded range of a joint [deg].
+        #[arg(long, default_value_t = 30.0, value_name = "DEG")]
+        margin: f64,
+        /// Range of one joint instead of that, such as 2=-75..20 [deg]; may be given again.
+        #[arg(long = "range", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+        ranges: Vec<String>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// The catalogue of physical effects: meaning, equation, signature, confusions, source.
+    Effects {
+        /// One of them.
+        name: Option<String>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Two results on the same dwells, paired: what got better, what got worse, what moved.
+    Compare {
+        /// Result before: a run.mcap or the folder it is in.
+        before: PathBuf,
+        /// Result after.
+        after: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// How often the diagnosis is right: sealed scenarios, diagnosed without their truth, then judged by it.
+    Score {
+        /// Families, or `catalogue`, `nothing`, `outside`; several hidden at once are joined by +.
+        #[arg(default_values = ["catalogue", "nothing", "outside"])]
+        families: Vec<String>,
+        /// Designs of motion.
+        #[arg(long = "design", default_values = ["free-poses"])]
+        designs: Vec<String>,
+        /// Size of what is hidden: small, medium, large, drawn.
+        #[arg(long, default_value = "drawn")]
+        size: String,
+        /// Seeds for each family and design.
+        #[arg(long, default_value_t = 10)]
+        seeds: u64,
+        /// First seed.
+        #[arg(long, default_value_t = 1)]
+        from: u64,
+        /// Write recordings to disk and run the whole pipeline on them, instead of handing over observations.
+        #[arg(long)]
+        sealed: bool,
+        /// Print JSON, every scenario with its answer.
+        #[arg(long)]
+        json: bool,
+    },
     /// The simulated rig: recordings with known errors, and their truth in a separate file.
     Simulate {
         /// LAB.toml.

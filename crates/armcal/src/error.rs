@@ -102,6 +102,43 @@ pub enum Error {
     /// The simulated rig.
     #[error(transparent)]
     Lab(#[from] armcal_lab::LabError),
+    /// Reading back the result of an earlier run.
+    #[error(transparent)]
+    PastRun(#[from] armcal_report::PastRunError),
+    /// Looking for the missing effect.
+    #[error(transparent)]
+    Diagnose(#[from] armcal_diagnose::DiagnoseError),
+    /// A number that a plan cannot use.
+    #[error("{option} {value}: {problem}")]
+    BadPlan {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        value: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A sealed scenario's pipeline switches the diagnosis off.
+    #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
+    NotDiagnosed,
+    /// `armcal add suggested` where nothing is.
+    #[error("the diagnosis of `{pipeline}` suggests no effect; name one (see `armcal effects`)")]
+    NothingSuggested {
+        /// Name of the pipeline.
+        pipeline: String,
+    },
+    /// A pipeline file of another content is in the way.
+    #[error("{} exists and says something else; choose another file with --write", path.display())]
+    WouldOverwrite {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Writing an effect as TOML.
+    #[error("writing the effect as TOML: {0}")]
+    Toml(toml::ser::Error),
+    /// Printing a result as JSON.
+    #[error("writing the result as JSON: {0}")]
+    Json(serde_json::Error),
     /// Writing a result of a small command.
     #[error(transparent)]
     Output(armcal_recording::RecordingError),

@@ -7,7 +7,9 @@ pub mod cli;
 pub mod commands;
 pub mod error;
 pub mod pipeline;
+pub mod plan;
 pub mod progress;
+pub mod score;
 pub mod stages;
 pub mod story;
 

@@ -6,8 +6,9 @@
 use crate::error::Error;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
+use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
-use armcal_model::Deviation;
+use armcal_model::{Deviation, EffectTable};
 use armcal_recording::Streams;
 use armcal_report::OutputConfig;
 use armcal_table::{AssociationConfig, Tilt};
@@ -40,6 +41,9 @@ pub struct Pipeline {
     /// Changes to single parameters, applied in order.
     #[serde(default)]
     pub parameters: Vec<ParameterOverride>,
+    /// Physical effects beyond geometry, in the order they were added.
+    #[serde(default)]
+    pub effects: Vec<EffectTable>,
     /// Which dwells become observations.
     #[serde(default)]
     pub observations: ObservationsSection,
@@ -49,6 +53,9 @@ pub struct Pipeline {
     /// What the fit must not see.
     #[serde(default)]
     pub holdout: HoldoutConfig,
+    /// How the missing effect is looked for.
+    #[serde(default)]
+    pub diagnosis: DiagnosisConfig,
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,
@@ -161,6 +168,20 @@ pub struct FramesSection {
     /// The calibrated point on the last link.
     #[serde(default)]
     pub tip: FrameSection,
+    /// Which frame's z axis is vertical; gravity bends the arm along it.
+    #[serde(default)]
+    pub vertical: Vertical,
+}
+
+/// Which frame's z axis points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Vertical {
+    /// The sensor's frame, levelled.
+    #[default]
+    World,
+    /// The robot's base, standing upright; for a sensor whose frame lies anyhow.
+    Base,
 }
 
 /// One frame.
@@ -236,9 +257,14 @@ impl Pipeline {
             path: path.to_owned(),
             source,
         })?;
+        Pipeline::parse(path, text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// Reads and checks the text of a pipeline whose relative paths start in `folder`.
+    pub fn parse(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
         let mut pipeline: Pipeline = toml::from_str(&text)
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
-        pipeline.folder = path.parent().map(Path::to_owned).unwrap_or_default();
+        pipeline.folder = folder.to_owned();
         pipeline.text = text;
         pipeline.check(path)?;
         Ok(pipeline)

@@ -1,13 +1,17 @@
-//! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> run.
+//! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> diagnosis -> run.
 
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
+use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate};
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Observation, Rejection, Severity, Stage, Warning};
+use armcal_diagnose::{Diagnosis, diagnose};
+use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
 use armcal_report::Run;
+use armcal_table::{Association, Board};
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
 const MAX_ROUNDS: usize = 4;
@@ -16,44 +20,143 @@ const MAX_ROUNDS: usize = 4;
 ///
 /// Returns the run and the opened recordings, which the writers pass through to the output.
 pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recording>), Error> {
+    let settled = settle(pipeline, progress)?;
+    let diagnosis = settled.diagnose(pipeline, progress)?;
+    Ok(settled.into_run(pipeline, diagnosis))
+}
+
+/// Recordings whose dwells have found their places, and the calibration on them.
+pub struct Settled {
+    /// The opened recordings.
+    pub recordings: Vec<Recording>,
+    /// The calibration table, if there is one.
+    pub board: Option<Board>,
+    /// Text of the nominal model file.
+    pub model_text: String,
+    /// The nominal arm in its frames, without effects.
+    pub geometry: Model,
+    /// The same with the pipeline's effects: what was calibrated.
+    pub model: Model,
+    /// What the fit saw.
+    pub observations: Vec<Observation>,
+    /// The calibration.
+    pub calibration: Calibration,
+    /// What each recording showed by itself.
+    pub seen: Vec<Seen>,
+    places: Vec<Option<Association>>,
+    rejections: Vec<Rejection>,
+    rounds: usize,
+}
+
+/// Reads the recordings, and associates and calibrates in turn until every dwell stays in its place.
+pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
     let (model_text, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress)?;
 
-    let mut model = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
-    let mut places = observe::associate_all(pipeline, board.as_ref(), &model, None, &seen)?;
+    let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
+    let effects = frames::effect_specs(pipeline, &geometry)?;
+    let mut places = observe::associate_all(pipeline, board.as_ref(), &geometry, None, &seen)?;
     let mut rounds = 0;
-    let (observed, calibration) = loop {
+    loop {
         rounds += 1;
         progress.step(&format!("calibrating (round {rounds})"));
-        frames::start_frames(pipeline, &mut model, &places);
+        frames::start_frames(pipeline, &mut geometry, &places);
         let observed = observe::observations(pipeline, board.as_ref(), &seen, &places)?;
-        let calibration = calibrate(&model, &observed.observations, &pipeline.fit, &pipeline.holdout)?;
-        let again =
-            observe::associate_all(pipeline, board.as_ref(), &model, Some(&calibration.fit.values()), &seen)?;
+        let (observations, rejections) = (observed.observations, observed.rejections);
+        let model = with_effects(pipeline, &geometry, &effects, &observations)?;
+        let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
+        let values = calibration.fit.values();
+        let again = observe::associate_all(pipeline, board.as_ref(), &model, Some(&values), &seen)?;
         if observe::same_places(&again, &places) || rounds == MAX_ROUNDS {
-            break (observed, calibration);
+            return Ok(Settled {
+                recordings,
+                board,
+                model_text,
+                geometry,
+                model,
+                observations,
+                calibration,
+                seen,
+                places,
+                rejections,
+                rounds,
+            });
         }
         places = again;
-    };
+    }
+}
 
-    let warnings = closing_warnings(rounds, &calibration);
-    let recording_runs = perceive::recording_runs(pipeline, seen, places, &observed.rejections);
-    Ok((
-        Run {
+impl Settled {
+    /// Looks for the effect that the calibrated model is missing, if the pipeline wants to know.
+    pub fn diagnose(&self, pipeline: &Pipeline, progress: &Progress) -> Result<Option<Diagnosis>, Error> {
+        diagnosis(pipeline, &self.model, &self.calibration, &self.observations, progress)
+    }
+
+    /// Everything for the report.
+    pub fn into_run(self, pipeline: &Pipeline, diagnosis: Option<Diagnosis>) -> (Run, Vec<Recording>) {
+        let warnings = closing_warnings(self.rounds, &self.calibration);
+        let run = Run {
             pipeline_name: pipeline.name.clone(),
             pipeline_text: pipeline.text.clone(),
-            model_text,
-            recordings: recording_runs,
-            board,
-            model,
-            observations: observed.observations,
-            calibration,
+            model_text: self.model_text,
+            recordings: perceive::recording_runs(pipeline, self.seen, self.places, &self.rejections),
+            board: self.board,
+            model: self.model,
+            observations: self.observations,
+            calibration: self.calibration,
+            diagnosis,
             warnings,
-        },
-        recordings,
-    ))
+        };
+        (run, self.recordings)
+    }
+}
+
+/// Calibrates and diagnoses a run again, on the same observations, with these effects instead of its own.
+pub fn recalibrate(
+    run: &mut Run,
+    pipeline: &Pipeline,
+    geometry: &Model,
+    effects: &[EffectSpec],
+    progress: &Progress,
+) -> Result<(), Error> {
+    run.model = with_effects(pipeline, geometry, effects, &run.observations)?;
+    run.calibration = calibrate(&run.model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
+    run.diagnosis = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress)?;
+    run.warnings.retain(|w| w.code != HOLDOUT_WORSE);
+    run.warnings.extend(holdout_worse(&run.calibration));
+    run.pipeline_name.clone_from(&pipeline.name);
+    run.pipeline_text.clone_from(&pipeline.text);
+    Ok(())
+}
+
+fn diagnosis(
+    pipeline: &Pipeline,
+    model: &Model,
+    calibration: &Calibration,
+    observations: &[Observation],
+    progress: &Progress,
+) -> Result<Option<Diagnosis>, Error> {
+    if !pipeline.diagnosis.enabled {
+        return Ok(None);
+    }
+    progress.step("diagnosing");
+    let session = frames::session(pipeline, observations);
+    let found = diagnose(model, calibration, observations, &session, &pipeline.fit, &pipeline.diagnosis)?;
+    Ok(Some(found))
+}
+
+fn with_effects(
+    pipeline: &Pipeline,
+    geometry: &Model,
+    effects: &[EffectSpec],
+    observations: &[Observation],
+) -> Result<Model, Error> {
+    if effects.is_empty() {
+        return Ok(geometry.clone());
+    }
+    Ok(geometry.with_effects(effects, &frames::session(pipeline, observations))?)
 }
 
 fn closing_warnings(rounds: usize, calibration: &Calibration) -> Vec<Warning> {
@@ -70,19 +173,26 @@ fn closing_warnings(rounds: usize, calibration: &Calibration) -> Vec<Warning> {
             ),
         ));
     }
+    warnings.extend(holdout_worse(calibration));
+    warnings
+}
+
+/// Code of the warning about a fit that does not generalise.
+const HOLDOUT_WORSE: &str = "holdout-worse";
+
+fn holdout_worse(calibration: &Calibration) -> Option<Warning> {
     let fitted_mm = calibration.holdout.fitted.mean_m * 1e3;
     let nominal_mm = calibration.holdout.nominal.mean_m * 1e3;
-    if calibration.holdout.fitted.n > 0 && fitted_mm > nominal_mm {
-        warnings.push(Warning::new(
+    (calibration.holdout.fitted.n > 0 && fitted_mm > nominal_mm).then(|| {
+        Warning::new(
             Severity::Inadequate,
             Stage::Calibrate,
-            "holdout-worse",
+            HOLDOUT_WORSE,
             "hold-out",
             format!(
                 "on held-out points the fit is worse than nominal ({fitted_mm:.3} against {nominal_mm:.3} mm): \
                  it does not generalise; free fewer parameters or record more varied dwells"
             ),
-        ));
-    }
-    warnings
+        )
+    })
 }

@@ -82,6 +82,11 @@ impl<'a> Whitened<'a> {
         Ok(Whitened { problem, axes, start, whitener, offsets })
     }
 
+    /// Inverse Cholesky factor of each block's covariance.
+    pub fn into_whitener(self) -> Vec<DMatrix<f64>> {
+        self.whitener
+    }
+
     pub fn rows(&self) -> usize {
         *self.offsets.last().unwrap_or(&0)
     }
@@ -223,6 +228,10 @@ fn reference_size(unit: Unit) -> f64 {
         Unit::One => 0.01,
         Unit::RadianPerNewtonMetre => 1e-3,
         Unit::PerKelvin => 1e-5,
+        Unit::Kilogram | Unit::Kelvin | Unit::NewtonMetre => 1.0,
+        Unit::MetrePerNewtonMetre | Unit::MetrePerKelvin | Unit::MetrePerKilogram => 1e-3,
+        Unit::RadianPerKelvin | Unit::RadianPerKilogram => 1e-3,
+        Unit::RadianPerSecond | Unit::MetrePerSecond => 1e-5,
     }
 }
 

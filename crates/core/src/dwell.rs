@@ -81,6 +81,11 @@ pub struct Dwell {
     pub effective_samples: f64,
     /// Direction of arrival of each joint.
     pub arrival: Vec<Arrival>,
+    /// Turning points of each joint's path that a gap in its gear still remembers, oldest first, the last being the
+    /// rest itself [rad].
+    pub path_memory_rad: Vec<Vec<f64>>,
+    /// The same of the sum and of the difference `q_(k+1) + q_k`, `q_(k+1) - q_k` of every two neighbours [rad].
+    pub pair_memory_rad: Vec<[Vec<f64>; 2]>,
     /// The tip as the position sensor saw it.
     pub tip: Option<TipMeasurement>,
     /// Mean temperature [degC].

@@ -37,6 +37,15 @@ pub struct Observation {
     pub joint_sigma_rad: Vec<f64>,
     /// Direction of arrival of each joint.
     pub arrival: Vec<Arrival>,
+    /// What each joint's encoder went through before it came to rest [rad]: the extrema of its path that still
+    /// matter to a hysteresis, oldest first, the reading at rest last; empty for a joint whose past is not
+    /// recorded. `None` where nobody worked it out.
+    pub path_memory_rad: Option<Vec<Vec<f64>>>,
+    /// The same of the sum and of the difference `q_(k+1) + q_k`, `q_(k+1) - q_k` of every two neighbours, for gaps
+    /// that lie in a belt which passes a joint. `None` where nobody worked it out.
+    pub pair_memory_rad: Option<Vec<[Vec<f64>; 2]>>,
+    /// Joint velocities [rad/s] of an observation of the moving arm; `None` in a dwell, where they are zero.
+    pub joint_velocity_radps: Option<Vec<f64>>,
     /// Measured joint effort [N m], where the recording has it.
     pub effort_nm: Option<Vec<f64>>,
     /// Temperature [degC], where the recording has it.

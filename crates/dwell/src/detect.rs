@@ -4,8 +4,10 @@ use armcal_core::{Arrival, Dwell, DwellId, Samples, Severity, Stage, TipMeasurem
 use std::ops::Range;
 
 use crate::arrival::Past;
+use crate::memory::path_memory;
 use crate::pauses::{Encoders, Pauses, Tip, pauses};
 use crate::series::{check_joints, check_order, check_poses, seconds_between};
+use crate::stats::Mean;
 use crate::summary::{effective_of, effort_means, joint_means, temperature, tip_measurement};
 use crate::{ClockAlignment, DwellConfig, DwellError};
 
@@ -83,6 +85,16 @@ impl Summary<'_> {
                 .zip(&self.encoders.step_rad)
                 .map(|((past, mean), step)| self.arrival(past, rows.start, mean.mean, *step))
                 .collect(),
+            path_memory_rad: joints
+                .joint_rad
+                .iter()
+                .zip(&means)
+                .zip(&self.encoders.step_rad)
+                .map(|((column, mean), step)| self.path_memory(column, rows.start, mean.mean, *step))
+                .collect(),
+            pair_memory_rad: (1..means.len())
+                .map(|joint| self.pair_memory(joint, rows.start, &means))
+                .collect(),
             tip: self.tip_of(start_ns, end_ns),
             temperature_c: stream
                 .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
@@ -95,8 +107,38 @@ impl Summary<'_> {
             .arrival_threshold_deg
             .to_radians()
             .max(self.config.arrival_threshold_counts * step_rad);
-        let since = self.encoders.stretches.iter().find(|s| s.contains(&start)).map_or(start, |s| s.start);
-        past.arrival(since, start, rest_rad, away_rad)
+        past.arrival(self.unbroken_since(start), start, rest_rad, away_rad)
+    }
+
+    fn path_memory(&self, column: &[f64], start: usize, rest_rad: f64, step_rad: f64) -> Vec<f64> {
+        path_memory(
+            column[self.unbroken_since(start)..start].iter().copied(),
+            rest_rad,
+            self.deadband_rad(step_rad),
+        )
+    }
+
+    /// Sum and difference of a joint and the one before it.
+    fn pair_memory(&self, joint: usize, start: usize, means: &[Mean]) -> [Vec<f64>; 2] {
+        let columns = [&self.samples.joints.joint_rad[joint - 1], &self.samples.joints.joint_rad[joint]];
+        let past = self.unbroken_since(start)..start;
+        let step_rad = self.encoders.step_rad[joint - 1] + self.encoders.step_rad[joint];
+        [1.0, -1.0].map(|sense| {
+            let together = past.clone().map(|row| columns[1][row] + sense * columns[0][row]);
+            let rest_rad = means[joint].mean + sense * means[joint - 1].mean;
+            path_memory(together, rest_rad, self.deadband_rad(step_rad))
+        })
+    }
+
+    /// Tremor and quantisation at rest are no turning points [rad].
+    fn deadband_rad(&self, step_rad: f64) -> f64 {
+        (0.1 * self.config.arrival_threshold_deg.to_radians())
+            .max(self.config.arrival_threshold_counts * step_rad)
+    }
+
+    /// First row of the stretch without gaps that a row is in.
+    fn unbroken_since(&self, row: usize) -> usize {
+        self.encoders.stretches.iter().find(|s| s.contains(&row)).map_or(row, |s| s.start)
     }
 
     /// The tip frames whose time lies in the dwell for certain, the error of the alignment considered.

@@ -303,6 +303,9 @@ proptest! {
             a.joint_spread_rad.rotate_left(1);
             a.joint_sigma_rad.rotate_left(1);
             a.arrival.rotate_left(1);
+            a.path_memory_rad.rotate_left(1);
+            // Other joints are neighbours now.
+            a.pair_memory_rad.clone_from(&b.pair_memory_rad);
             prop_assert_eq!(a, b);
         }
     }

@@ -14,6 +14,7 @@ mod clock;
 mod config;
 mod detect;
 mod error;
+mod memory;
 mod pauses;
 mod series;
 mod static_pose;

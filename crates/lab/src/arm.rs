@@ -85,6 +85,31 @@ impl AxisArm {
             .collect()
     }
 
+    /// Turns everything beyond the end of link `link` about `line`, all in the zero position. No angle, no change.
+    pub fn turn_beyond(&mut self, link: usize, line: &Line, angle_rad: f64) {
+        if angle_rad == 0.0 {
+            return;
+        }
+        self.axes.iter_mut().skip(link + 1).for_each(|axis| *axis = line.turn_line(axis, angle_rad));
+        let centres = self.mass_centres_m.iter_mut().skip(link + 1);
+        centres.for_each(|centre| *centre = line.turn_point(centre, angle_rad));
+        self.tip_m = line.turn_point(&self.tip_m, angle_rad);
+        self.tip_axes = self.tip_axes.map(|axis| turn(&line.direction, &axis, angle_rad));
+    }
+
+    /// Shifts everything beyond the end of link `link` [m], all in the zero position.
+    pub fn shift_beyond(&mut self, link: usize, by_m: &Vector3<f64>) {
+        self.axes.iter_mut().skip(link + 1).for_each(|axis| axis.point_m += by_m);
+        self.mass_centres_m.iter_mut().skip(link + 1).for_each(|centre| *centre += by_m);
+        self.tip_m += by_m;
+    }
+
+    /// The link of joint `link` in the zero position: from its own axis to the next one, or to the tip [m].
+    pub fn link_m(&self, link: usize) -> Vector3<f64> {
+        let end = self.axes.get(link + 1).map_or(self.tip_m, |next| next.point_m);
+        end - self.axes[link].point_m
+    }
+
     /// Gravity's torque on each joint, `> 0` pushing towards `+q` [N m].
     ///
     /// `gravity_m_s2` is in the base frame; `masses_kg` one a link, `tip_kg` at the tip.

@@ -15,6 +15,8 @@ pub struct Board {
     pub cavities: Vec<Cavity>,
     /// Clearance of the tip in a cavity, per visit and axis, 1 sigma [m].
     pub seat_sigma_m: f64,
+    /// Tolerance of a cavity's position that the file declares, per axis, 1 sigma [m].
+    pub declared_sigma_m: f64,
     mechanism: Option<TiltMechanism>,
 }
 
@@ -64,13 +66,9 @@ struct CavityTable {
 }
 
 impl Board {
-    /// Reads a board file and machines one such board: every cavity off by its tolerance.
-    pub fn machine(path: &Path, seed: u64) -> Result<Board, LabError> {
-        let text = std::fs::read_to_string(path).map_err(|source| LabError::Read {
-            what: "board file",
-            path: path.to_owned(),
-            source,
-        })?;
+    /// Reads a board file and machines one such board: every cavity off by its tolerance, the file's or `true_mm`.
+    pub fn machine(path: &Path, seed: u64, true_mm: Option<f64>) -> Result<Board, LabError> {
+        let text = drawing(path)?;
         let file: BoardFile = toml::from_str(&text).map_err(|source| LabError::Parse {
             what: "board file",
             path: path.to_owned(),
@@ -81,18 +79,24 @@ impl Board {
         if file.cavities.is_empty() {
             return Err(config::value("cavities", format!("{} has none", path.display())));
         }
+        let tolerance_mm = true_mm.unwrap_or(file.cavity_sigma_mm);
         let mut tolerance = Stream::new(seed, Purpose::Board, 0);
         let cavities = file
             .cavities
             .into_iter()
             .map(|cavity| {
                 let drawn_m = Vector3::from(cavity.xyz_mm) * 1e-3;
-                let true_m = drawn_m + tolerance.normal3() * (file.cavity_sigma_mm * 1e-3);
+                let true_m = drawn_m + tolerance.normal3() * (tolerance_mm * 1e-3);
                 Cavity { name: cavity.name, drawn_m, true_m }
             })
             .collect();
         let mechanism = file.mechanism.map(TiltMechanism::new).transpose()?;
-        Ok(Board { cavities, seat_sigma_m: file.seat_sigma_mm * 1e-3, mechanism })
+        Ok(Board {
+            cavities,
+            seat_sigma_m: file.seat_sigma_mm * 1e-3,
+            declared_sigma_m: file.cavity_sigma_mm * 1e-3,
+            mechanism,
+        })
     }
 
     /// The tilted board in the frame in which it lies flat at zero tilt: first rolled, then pitched, about the
@@ -130,6 +134,21 @@ impl Board {
         }
         Ok(())
     }
+}
+
+/// Name of the board that the lab knows without a file.
+pub const BUILTIN: &str = "builtin:paper";
+
+/// The paper's board, as `pipelines/boards/paper.toml` has it.
+pub const PAPER: &str = include_str!("../../../pipelines/boards/paper.toml");
+
+/// The text of a board file.
+pub fn drawing(path: &Path) -> Result<String, LabError> {
+    if path.ends_with(BUILTIN) {
+        return Ok(PAPER.to_owned());
+    }
+    let refused = |source| LabError::Read { what: "board file", path: path.to_owned(), source };
+    std::fs::read_to_string(path).map_err(refused)
 }
 
 impl TiltMechanism {
@@ -171,7 +190,12 @@ mod tests {
             max_roll_deg: 20.0,
             max_pitch_deg: 45.0,
         });
-        Board { cavities: Vec::new(), seat_sigma_m: 0.0, mechanism: Some(mechanism.unwrap()) }
+        Board {
+            cavities: Vec::new(),
+            seat_sigma_m: 0.0,
+            declared_sigma_m: 0.0,
+            mechanism: Some(mechanism.unwrap()),
+        }
     }
 
     #[test]

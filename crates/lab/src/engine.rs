@@ -1,9 +1,12 @@
 //! The rig in motion: motors drive planned paths, a hand seats the tip, every step is recorded.
 
+mod by_hand;
+mod quickly;
+
 use crate::LabError;
 use crate::arm::AxisArm;
 use crate::config::LabConfig;
-use crate::hand::{Tremor, minimum_jerk};
+use crate::hand::Tremor;
 use crate::mechanism::{Body, Mechanism, Moment};
 use crate::random::{Purpose, Stream};
 use crate::rig::{BoardPlace, Rig};
@@ -11,7 +14,7 @@ use crate::servo::{Servo, counted};
 use crate::spline::Path;
 use crate::trace::{Rest, STEP_S, Trace};
 use armcal_core::Pose;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 /// Shortest duration of one section of a planned path [s].
 const SHORTEST_SECTION_S: f64 = 0.4;
@@ -19,16 +22,35 @@ const SHORTEST_SECTION_S: f64 = 0.4;
 /// Waypoints between two poses far apart, so that a Cartesian path follows the arm's natural arc.
 const WAYPOINTS_BETWEEN_POSES: usize = 4;
 
+/// How closely motion is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// Every [`STEP_S`], with inertia and control.
+    Full,
+    /// As far as hysteresis needs it: a few positions along each movement, motors exactly on their plan.
+    Quick,
+}
+
+/// Time between two positions of a movement on the quick path [s].
+const QUICK_STEP_S: f64 = 0.1;
+
+/// Steps of a rest on the quick path: enough for gravity and springs to agree.
+const QUICK_REST_STEPS: usize = 3;
+
 /// One recording under way.
 pub struct Engine<'a> {
     config: &'a LabConfig,
     rig: &'a Rig,
     place: &'a BoardPlace,
     recording: usize,
+    pace: Pace,
+    time_s: f64,
     mechanisms: Vec<Box<dyn Mechanism>>,
     servo: Servo,
     tremor: Tremor,
     driven_by_hand: bool,
+    /// On the quick path: whether the motors' own dynamics are followed.
+    swinging: bool,
     link_rad: Vec<f64>,
     reading_rad: Vec<f64>,
     set_point_rad: Vec<f64>,
@@ -48,6 +70,7 @@ impl<'a> Engine<'a> {
         place: &'a BoardPlace,
         recording: usize,
         mechanisms: Vec<Box<dyn Mechanism>>,
+        pace: Pace,
     ) -> Engine<'a> {
         let home: Vec<f64> = config.arm.home_deg.iter().map(|deg| deg.to_radians()).collect();
         let hand = Stream::new(config.seed, Purpose::Hand, recording);
@@ -56,10 +79,17 @@ impl<'a> Engine<'a> {
             rig,
             place,
             recording,
+            pace,
+            time_s: 0.0,
             mechanisms,
             servo: Servo::new(&config.arm.drives, &home),
-            tremor: Tremor::new(hand, config.hand.tremor_s, STEP_S),
+            tremor: Tremor::new(
+                hand,
+                config.hand.tremor_s,
+                if pace == Pace::Full { STEP_S } else { QUICK_STEP_S },
+            ),
             driven_by_hand: true,
+            swinging: false,
             link_rad: home.clone(),
             reading_rad: home.clone(),
             set_point_rad: home.clone(),
@@ -92,6 +122,9 @@ impl<'a> Engine<'a> {
         let mut points = vec![self.rig.nominal.tip(&self.set_point_rad)];
         points.extend_from_slice(waypoints_m);
         let path = Path::through(&points, speed_m_s, SHORTEST_SECTION_S);
+        if self.pace == Pace::Quick {
+            return self.follow(&path, what);
+        }
         let steps = (path.duration_s() / STEP_S).ceil() as usize;
         let steps_a_set_point = (1.0 / (self.config.task.set_point_hz * STEP_S)).round().max(1.0) as usize;
         let mut planned_rad = self.set_point_rad.clone();
@@ -119,60 +152,21 @@ impl<'a> Engine<'a> {
             .map(|share| from.iter().zip(joint_rad).map(|(a, b)| a + (b - a) * share).collect::<Vec<_>>())
             .map(|pose| self.rig.nominal.tip(&pose))
             .collect();
+        // How far a joint swings beyond its target decides on which flank of a gap it comes to rest.
+        self.swinging = true;
         self.drive_through(&waypoints, speed_m_s, what)
     }
 
     /// Holds still under motor control for `duration_s`, and notes the rest if it is one.
     pub fn hold(&mut self, duration_s: f64, rest: Option<Rest>) {
         self.motors_take_over();
-        let first = self.trace.len();
-        for _ in 0..steps(duration_s) {
-            self.motor_step();
+        let mut first = self.trace.len();
+        if self.pace == Pace::Quick {
+            first = self.quick_hold(duration_s);
+        } else {
+            (0..steps(duration_s)).for_each(|_| self.motor_step());
         }
         self.note(rest, first);
-    }
-
-    /// Leads the tip by hand to a point on the board [m, board frame], tremor growing or fading on the way from
-    /// one size to the other [m].
-    pub fn guide(
-        &mut self,
-        to_board_m: Vector3<f64>,
-        duration_s: f64,
-        tremor_m: [f64; 2],
-        what: &str,
-    ) -> Result<(), LabError> {
-        self.driven_by_hand = true;
-        let world_from_tip = self.world_from_base * Point3::from(self.arm.tip(&self.link_rad));
-        let from_board_m = self.world_from_board.inverse_transform_point(&world_from_tip).coords;
-        let steps = steps(duration_s).max(1);
-        for step in 1..=steps {
-            let share = step as f64 / steps as f64;
-            let way = from_board_m.lerp(&to_board_m, minimum_jerk(share));
-            // The tip is where the hand took it over: its tremor cannot begin with a jump.
-            let grip = (step as f64 * STEP_S / 0.05).min(1.0);
-            let size = tremor_m[0] + (tremor_m[1] - tremor_m[0]) * share;
-            let shake = self.tremor.sample() * (size * grip);
-            self.hand_step(&(way + shake), what)?;
-        }
-        Ok(())
-    }
-
-    /// Lets the tip rest at a point on the board [m, board frame], and notes the rest.
-    pub fn rest_by_hand(
-        &mut self,
-        at_board_m: Vector3<f64>,
-        duration_s: f64,
-        tremor_m: f64,
-        rest: Rest,
-        what: &str,
-    ) -> Result<(), LabError> {
-        let first = self.trace.len();
-        for _ in 0..steps(duration_s).max(1) {
-            let shake = self.tremor.sample() * tremor_m;
-            self.hand_step(&(at_board_m + shake), what)?;
-        }
-        self.note(Some(rest), first);
-        Ok(())
     }
 
     fn note(&mut self, rest: Option<Rest>, first: usize) {
@@ -183,16 +177,26 @@ impl<'a> Engine<'a> {
     fn motors_take_over(&mut self) {
         if self.driven_by_hand {
             self.driven_by_hand = false;
+            self.swinging = false;
             self.set_point_rad = self.reading_rad.iter().map(|q| self.counted(*q)).collect();
             self.servo.take_over(&self.set_point_rad, &self.gravity_nm);
         }
     }
 
     fn motor_step(&mut self) {
+        self.pass(STEP_S);
         let reading: Vec<f64> = self.reading_rad.iter().map(|q| self.counted(*q)).collect();
         self.servo.step(&self.set_point_rad, &reading, &self.gravity_nm, STEP_S);
         self.motors_turn_links();
         self.record();
+    }
+
+    /// Lets time pass; at full pace it is the number of steps that counts, so that no rounding adds up.
+    fn pass(&mut self, step_s: f64) {
+        self.time_s = match self.pace {
+            Pace::Full => self.trace.len() as f64 * STEP_S,
+            Pace::Quick => self.time_s + step_s,
+        };
     }
 
     fn motors_turn_links(&mut self) {
@@ -203,32 +207,21 @@ impl<'a> Engine<'a> {
         self.link_rad = link;
     }
 
-    fn hand_step(&mut self, to_board_m: &Vector3<f64>, what: &str) -> Result<(), LabError> {
-        let world = self.world_from_board * Point3::from(*to_board_m);
-        let target = self.world_from_base.inverse_transform_point(&world).coords;
-        self.link_rad = self
-            .arm
-            .solve(&target, &self.link_rad)
-            .map_err(|miss| self.unreachable("true", what, miss.short_by_m))?;
-        let mut motor = self.link_rad.clone();
-        let mut mechanisms = std::mem::take(&mut self.mechanisms);
-        mechanisms.iter_mut().rev().for_each(|m| m.link_to_motor(&self.moment(), &mut motor));
-        self.mechanisms = mechanisms;
-        self.servo.follow(&motor, STEP_S);
-        self.record();
-        self.set_point_rad = self.reading_rad.clone();
-        Ok(())
-    }
-
     fn moment(&self) -> Moment<'_> {
-        let time_s = self.trace.len() as f64 * STEP_S;
+        let time_s = self.time_s;
         let session_s = time_s + self.recording as f64 * self.config.interval_s;
         Moment {
             time_s,
             session_s,
             recording: self.recording,
             temperature_c: self.config.temperature.at(session_s),
+            warmer_k: self.config.temperature.at(session_s) - self.config.temperature.start_c,
+            motors_lead: self.config.hand.motors_lead,
             load_kg: self.config.recordings[self.recording].load_kg,
+            arm: &self.arm,
+            masses_kg: &self.rig.masses_kg,
+            tip_kg: self.tip_kg(),
+            gravity_m_s2: &self.rig.gravity_m_s2,
             motor_rad: &self.servo.angle_rad,
             link_rad: &self.link_rad,
             speed_rad_s: &self.servo.speed_rad_s,
@@ -236,11 +229,15 @@ impl<'a> Engine<'a> {
         }
     }
 
+    /// Mass at the tip: the tool and what it carries [kg].
+    fn tip_kg(&self) -> f64 {
+        self.rig.tip_kg + self.config.recordings[self.recording].load_kg
+    }
+
     /// Brings frames, geometry, gravity and readings up to date and adds a row to the trace.
     fn record(&mut self) {
-        let load_kg = self.config.arm.tip_kg + self.config.recordings[self.recording].load_kg;
-        let masses: Vec<f64> = self.config.arm.drives.iter().map(|drive| drive.link_kg).collect();
-        self.gravity_nm = self.arm.gravity_torque(&self.link_rad, &self.rig.gravity_m_s2, &masses, load_kg);
+        let (gravity, masses) = (&self.rig.gravity_m_s2, &self.rig.masses_kg);
+        self.gravity_nm = self.arm.gravity_torque(&self.link_rad, gravity, masses, self.tip_kg());
         let mut mechanisms = std::mem::take(&mut self.mechanisms);
         if !mechanisms.is_empty() {
             let (mut arm, mut base) = (self.rig.built.clone(), self.rig.world_from_base);
@@ -286,6 +283,7 @@ impl<'a> Engine<'a> {
     fn push(&mut self, tip: Pose, [seen_tip, seen_table, seen_base]: [Pose; 3]) {
         let temperature_c = self.moment().temperature_c;
         let trace = &mut self.trace;
+        trace.time_s.push(self.time_s);
         trace.temperature_c.push(temperature_c);
         trace.link_rad.push(self.link_rad.clone());
         trace.motor_rad.push(self.servo.angle_rad.clone());

@@ -7,9 +7,12 @@
 //! | build the rig | [`rig`], [`arm`], [`board`] | joint axes as lines in space, cavities off by their tolerance |
 //! | carry out the task | [`plan`], [`session`] | cavities forward, backward, at random; pauses; free poses |
 //! | move | [`engine`], [`spline`], [`servo`], [`hand`] | cubic splines, inverse kinematics, PID against inertia and gravity; a guiding hand |
-//! | hide something | [`mechanism`] | nothing yet: gaps, springs and slipping belts plug in here |
+//! | hide something | [`mechanism`], [`mechanisms`] | gaps, springs, growing links, slipping pulleys: `[[mechanisms]]` |
 //! | watch | [`sensors`] | counts, camera noise, occlusion, clocks, transport |
 //! | write | `record`, [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
+//!
+//! [`observe`] goes the same way without streams, one reading a dwell, in milliseconds. [`scenario`] draws rigs with
+//! one thing hidden, and seals them: recordings in one folder, the truth in another.
 //!
 //! The lab shares no formula with the models that are fitted to its recordings: it lays joint axes out as
 //! lines and turns points about them, where the models multiply matrices.
@@ -23,10 +26,13 @@ pub mod engine;
 mod error;
 pub mod hand;
 pub mod mechanism;
+pub mod mechanisms;
 pub mod plan;
+pub mod quick;
 pub mod random;
 mod record;
 pub mod rig;
+pub mod scenario;
 pub mod screw;
 pub mod sensors;
 pub mod servo;
@@ -38,9 +44,11 @@ pub mod truth;
 pub use config::LabConfig;
 pub use error::LabError;
 pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, nothing_hidden};
+pub use quick::{Nominal, NominalBoard, Observed, observe, observe_from};
 pub use trace::RestKind;
 pub use truth::{DwellTruth, RecordingTruth, Truth};
 
+use engine::Pace;
 use rig::Rig;
 use sensors::Log;
 use session::Session;
@@ -57,13 +65,13 @@ pub struct Simulated {
     pub facts: Truth,
 }
 
-/// Simulates a session with nothing hidden but geometry, and writes `<recording>.mcap` and `truth.json` into
+/// Simulates a session with what `[[mechanisms]]` hides in it, and writes `<recording>.mcap` and `truth.json` into
 /// `out_dir`, made if need be. Relative paths of the configuration start at `base_dir`.
 pub fn simulate(config: &LabConfig, base_dir: &Path, out_dir: &Path) -> Result<Simulated, LabError> {
     simulate_with(config, base_dir, out_dir, &nothing_hidden)
 }
 
-/// The same with mechanisms hidden in the rig.
+/// The same with more mechanisms hidden in the rig.
 pub fn simulate_with(
     config: &LabConfig,
     base_dir: &Path,
@@ -97,7 +105,10 @@ pub fn run(
         let threads: Vec<_> = (0..config.recordings.len())
             .map(|recording| {
                 let rig = &rig;
-                scope.spawn(move || one(config, rig, recording, mechanisms(recording)))
+                scope.spawn(move || {
+                    let hidden = hidden_in(config).chain(mechanisms(recording)).collect();
+                    one(config, rig, recording, hidden)
+                })
             })
             .collect();
         threads
@@ -114,13 +125,18 @@ pub fn run(
     Ok((truth, logs))
 }
 
+/// The mechanisms of the configuration, in their initial state.
+fn hidden_in(config: &LabConfig) -> impl Iterator<Item = Box<dyn Mechanism>> {
+    config.mechanisms.iter().map(|m| m.hidden().mechanism())
+}
+
 fn one(
     config: &LabConfig,
     rig: &Rig,
     recording: usize,
     mechanisms: Vec<Box<dyn Mechanism>>,
 ) -> Result<(RecordingTruth, Log), LabError> {
-    let session = Session::perform(config, rig, recording, mechanisms)?;
+    let session = Session::perform(config, rig, recording, mechanisms, Pace::Full)?;
     if session.trace.duration_s() > config.interval_s && recording + 1 < config.recordings.len() {
         let took_s = session.trace.duration_s().ceil();
         let why = format!("is {}, but a recording takes {took_s} s", config.interval_s);

@@ -27,8 +27,20 @@ pub struct Moment<'a> {
     pub recording: usize,
     /// Temperature of the arm [degC].
     pub temperature_c: f64,
+    /// How much warmer that is than at the start of the session [K].
+    pub warmer_k: f64,
+    /// Whether a path that is given on the link side is driven by the motors: they lead, and the links follow.
+    pub motors_lead: bool,
     /// Load at the tip [kg].
     pub load_kg: f64,
+    /// The arm as it is at this moment.
+    pub arm: &'a AxisArm,
+    /// True mass of each link [kg].
+    pub masses_kg: &'a [f64],
+    /// True mass at the tip, tool and load [kg].
+    pub tip_kg: f64,
+    /// Gravity in the base frame [m/s^2].
+    pub gravity_m_s2: &'a nalgebra::Vector3<f64>,
     /// Motor-side joint angles [rad].
     pub motor_rad: &'a [f64],
     /// Link-side joint angles [rad].
@@ -63,7 +75,8 @@ pub trait Mechanism: std::fmt::Debug + Send {
     /// The motor drives: turns motor-side angles into link-side angles, in place.
     fn motor_to_link(&mut self, _now: &Moment<'_>, _joint_rad: &mut [f64]) {}
 
-    /// The hand drives: turns link-side angles into motor-side angles, in place.
+    /// The hand drives: turns link-side angles into motor-side angles, in place. With [`Moment::motors_lead`] it is
+    /// the motors that take the links there.
     fn link_to_motor(&mut self, _now: &Moment<'_>, _joint_rad: &mut [f64]) {}
 
     /// Changes the arm's geometry.

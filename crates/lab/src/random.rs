@@ -52,6 +52,16 @@ pub enum Purpose {
     Mounting = 19,
     /// Lengths and heights of the hand's movements and pauses.
     Pauses = 20,
+    /// Masses of links and tool.
+    Masses = 21,
+    /// Heavy tails of noise.
+    Tails = 22,
+    /// Swaps of markers.
+    Swaps = 23,
+    /// Readings of the quick path.
+    Quick = 24,
+    /// What a scenario is made of.
+    Scenario = 25,
 }
 
 /// One stream of random numbers.
@@ -84,6 +94,13 @@ impl Stream {
     /// Exponential with the given mean.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         -mean * (1.0 - self.0.random::<f64>()).ln()
+    }
+
+    /// Factor that turns a normal number into one of Student's t with `degrees` degrees of freedom, scaled to the
+    /// same variance: `sqrt((n - 2) / chi^2_n)`.
+    pub fn tail(&mut self, degrees: f64) -> f64 {
+        let chi = rand_distr::ChiSquared::new(degrees).map_or(degrees, |chi| chi.sample(&mut self.0));
+        ((degrees - 2.0) / chi).sqrt()
     }
 
     /// True with probability `p`.

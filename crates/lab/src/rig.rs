@@ -30,6 +30,10 @@ pub struct Rig {
     pub world_from_table: Pose,
     /// Gravity in the base frame [m/s^2].
     pub gravity_m_s2: Vector3<f64>,
+    /// True mass of each link [kg].
+    pub masses_kg: Vec<f64>,
+    /// True mass of the tool at the tip [kg].
+    pub tip_kg: f64,
 }
 
 /// The board in one recording.
@@ -54,16 +58,22 @@ impl Rig {
         let base_from_plate = small_motion(&mut mounting, plate);
         let placement = [config.board.placement_sigma_mm, config.board.placement_sigma_deg];
         let placed = base_from_table * small_motion(&mut mounting, placement);
+        let tolerance_mm = config.board.true_cavity_sigma_mm;
+        let mut board = Board::machine(&base_dir.join(&config.board.file), config.seed, tolerance_mm)?;
+        config.mechanisms.iter().for_each(|m| m.hidden().machine_board(&mut board));
+        let (masses_kg, tip_kg) = true_masses(&config.arm, config.seed);
         Ok(Rig {
             nominal: AxisArm::from_rows(&config.arm.rows),
             built: AxisArm::from_rows(&built_rows),
             built_rows,
             world_from_base,
             base_from_plate,
-            board: Board::machine(&base_dir.join(&config.board.file), config.seed)?,
+            board,
             base_from_table,
             world_from_table: world_from_base * placed,
             gravity_m_s2: world_from_base.rotation.inverse() * Vector3::new(0.0, 0.0, -9.81),
+            masses_kg,
+            tip_kg,
         })
     }
 
@@ -99,6 +109,15 @@ fn build_rows(arm: &ArmConfig, seed: u64) -> Vec<DhRow> {
         ..row.clone()
     };
     arm.rows.iter().map(deviate).collect()
+}
+
+/// Masses of the built arm's links and tool, each uniform within its bound.
+fn true_masses(arm: &ArmConfig, seed: u64) -> (Vec<f64>, f64) {
+    let mut draw = Stream::new(seed, Purpose::Masses, 0);
+    let half = arm.deviation.mass_percent / 100.0;
+    let mut made = |drawn_kg: f64| drawn_kg * (1.0 + draw.uniform([-half, half]));
+    let links = arm.drives.iter().map(|drive| made(drive.link_kg)).collect();
+    (links, made(arm.tip_kg))
 }
 
 /// A small random displacement: each coordinate and each rotation about an axis normally distributed.

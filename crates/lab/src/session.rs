@@ -1,8 +1,8 @@
 //! One recording from start to end, told in order: home, a fast sweep, the cavities, free poses, home.
 
 use crate::LabError;
-use crate::config::LabConfig;
-use crate::engine::Engine;
+use crate::config::{LabConfig, StopConfig, value};
+use crate::engine::{Engine, Pace};
 use crate::mechanism::Mechanism;
 use crate::plan::{Plan, Visit};
 use crate::random::{Purpose, Stream};
@@ -30,10 +30,11 @@ impl Session {
         rig: &Rig,
         recording: usize,
         mechanisms: Vec<Box<dyn Mechanism>>,
+        pace: Pace,
     ) -> Result<Session, LabError> {
         let place = rig.place_board(config, recording)?;
         let plan = Plan::draw(config, rig, &place, recording)?;
-        let mut engine = Engine::new(config, rig, &place, recording, mechanisms);
+        let mut engine = Engine::new(config, rig, &place, recording, mechanisms, pace);
         let home: Vec<f64> = config.arm.home_deg.iter().map(|deg| deg.to_radians()).collect();
         let at_home = || Some(rest(RestKind::Free));
 
@@ -41,12 +42,17 @@ impl Session {
         if !plan.sweep_m.is_empty() {
             engine.drive_through(&plan.sweep_m, config.task.sweep.speed_m_s, "the sweep")?;
         }
-        Visits::new(config, rig, &place, recording).perform(&mut engine, &plan.visits)?;
+        let name = &config.recordings[recording].name;
+        let mut visits = Visits::new(config, rig, &place, recording);
         let mut pauses = Stream::new(config.seed, Purpose::Pauses, 2 * recording + 1);
-        for (i, pose) in plan.free_rad.iter().enumerate() {
-            let speed = config.task.free.speed_m_s;
-            engine.drive_to_pose(pose, speed, &format!("free pose {i}"))?;
-            engine.hold(pauses.uniform(config.task.free.hold_s), Some(rest(RestKind::Free)));
+        if let Some(tour) = config.task.tours.iter().find(|tour| tour.recording == *name) {
+            visits.tour(&mut engine, &tour.stops, &mut pauses)?;
+        } else {
+            visits.perform(&mut engine, &plan.visits)?;
+            for (i, pose) in plan.free_rad.iter().enumerate() {
+                let hold_s = pauses.uniform(config.task.free.hold_s);
+                hold_free(config, &mut engine, pose, hold_s, &format!("free pose {i}"))?;
+            }
         }
         engine.drive_to_pose(&home, config.task.free.speed_m_s, "home")?;
         engine.hold(config.task.home_s, at_home());
@@ -63,6 +69,8 @@ struct Visits<'a> {
     place: &'a BoardPlace,
     pauses: Stream,
     seats: Stream,
+    tails: Stream,
+    seat: Vector3<f64>,
 }
 
 impl<'a> Visits<'a> {
@@ -74,6 +82,8 @@ impl<'a> Visits<'a> {
             place,
             pauses: stream(Purpose::Pauses, 2 * recording),
             seats: stream(Purpose::Seat, recording),
+            tails: stream(Purpose::Tails, 2 * recording),
+            seat: Vector3::zeros(),
         }
     }
 
@@ -85,9 +95,52 @@ impl<'a> Visits<'a> {
                 let step = here - self.rig.board.cavities[visits[i - 1].cavity].drawn_m;
                 travel = step.try_normalize(1e-9).unwrap_or(travel);
             }
-            self.visit(engine, visit, &travel)?;
+            if self.config.hand.plunge {
+                travel = Vector3::x();
+            }
+            let turned_rad = self.config.hand.slide_spread_deg.to_radians() * self.pauses.normal();
+            self.visit(engine, visit, &travel, if self.config.hand.plunge { 0.0 } else { turned_rad })?;
         }
         Ok(())
+    }
+
+    /// Visits given places, each exactly from the side that is asked for.
+    fn tour(
+        &mut self,
+        engine: &mut Engine<'_>,
+        stops: &[StopConfig],
+        pauses: &mut Stream,
+    ) -> Result<(), LabError> {
+        let radians = |deg: &[f64]| deg.iter().map(|q| q.to_radians()).collect::<Vec<_>>();
+        for (i, stop) in stops.iter().enumerate() {
+            match stop {
+                StopConfig::Cavity { name, slide_from_deg } => {
+                    let found = self.rig.board.cavities.iter().position(|cavity| cavity.name == *name);
+                    let cavity = found.ok_or_else(|| {
+                        value("task.tours.stops", format!("cavity `{name}` is not on the board"))
+                    })?;
+                    let side = slide_from_deg.map(f64::to_radians);
+                    let travel = side.map_or(Vector3::zeros(), |s| -Vector3::new(s.cos(), s.sin(), 0.0));
+                    self.visit(engine, &Visit { cavity, pass: 0 }, &travel, 0.0)?;
+                }
+                StopConfig::Pose { joint_deg, from_deg } => {
+                    let hold_s = pauses.uniform(self.config.task.free.hold_s);
+                    let what = format!("stop {i}");
+                    hold_free(self.config, engine, &radians(from_deg), PASSING_S, &what)?;
+                    hold_free(self.config, engine, &radians(joint_deg), hold_s, &what)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where in the clearance the tip comes to sit [m, board frame].
+    fn seat_m(&mut self) -> Vector3<f64> {
+        let hand = &self.config.hand;
+        let (fresh, keep) = (self.seats.normal3(), hand.seat_correlation);
+        self.seat = if keep == 0.0 { fresh } else { self.seat * keep + fresh * (1.0 - keep * keep).sqrt() };
+        let tail = if hand.seat_tail_degrees == 0.0 { 1.0 } else { self.tails.tail(hand.seat_tail_degrees) };
+        self.seat * self.rig.board.seat_sigma_m * tail
     }
 
     /// One visit: drive above the cavity, guide the tip over it, slide it in, let it rest, lift it out.
@@ -96,6 +149,7 @@ impl<'a> Visits<'a> {
         engine: &mut Engine<'_>,
         visit: &Visit,
         travel: &Vector3<f64>,
+        turned_rad: f64,
     ) -> Result<(), LabError> {
         let (hand, task) = (&self.config.hand, &self.config.task);
         let cavity = &self.rig.board.cavities[visit.cavity];
@@ -107,7 +161,7 @@ impl<'a> Visits<'a> {
         engine.drive_through(&[waypoint.coords], task.speed_m_s, &what)?;
 
         let (tremor_m, rattle_m) = (hand.tremor_mm * 1e-3, hand.rattle_mm * 1e-3);
-        let turned_rad = hand.slide_spread_deg.to_radians() * self.pauses.normal();
+        let seat_m = self.seat_m();
         let mut draw = |range| self.pauses.uniform(range);
         let lift = |height_mm: f64, aside_m: Vector3<f64>| {
             cavity.true_m + aside_m + Vector3::z() * (height_mm * 1e-3)
@@ -121,7 +175,6 @@ impl<'a> Visits<'a> {
         let behind = slide_direction(travel, turned_rad);
         let touch = lift(1.5, behind * (draw(hand.slide_mm) * 1e-3));
         engine.guide(touch, draw(hand.move_s), [tremor_m; 2], &what)?;
-        let seat_m = self.seats.normal3() * self.rig.board.seat_sigma_m;
         let seated = cavity.true_m + seat_m;
         engine.guide(seated, draw(hand.move_s), [tremor_m, rattle_m], &what)?;
         let still_m = hand.seated_tremor_mm * 1e-3;
@@ -141,6 +194,27 @@ impl<'a> Visits<'a> {
         }
         Ok(())
     }
+}
+
+/// How long a pose is held that is only passed through [s].
+const PASSING_S: f64 = 0.1;
+
+/// Goes to a free pose, as the configuration has it, and holds it.
+fn hold_free(
+    config: &LabConfig,
+    engine: &mut Engine<'_>,
+    joint_rad: &[f64],
+    hold_s: f64,
+    what: &str,
+) -> Result<(), LabError> {
+    let speed_m_s = config.task.free.speed_m_s;
+    if config.task.free.by_hand {
+        engine.lead_to_pose(joint_rad, speed_m_s, hold_s, rest(RestKind::Free));
+    } else {
+        engine.drive_to_pose(joint_rad, speed_m_s, what)?;
+        engine.hold(hold_s, Some(rest(RestKind::Free)));
+    }
+    Ok(())
 }
 
 fn rest(kind: RestKind) -> Rest {

@@ -13,6 +13,8 @@ pub const STEP_NS: i64 = 2_000_000;
 /// One column a quantity, one row a step.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
+    /// Time since the start of the recording [s]: [`STEP_S`] apart, or further on the quick path.
+    pub time_s: Vec<f64>,
     /// Link-side joint angles [rad].
     pub link_rad: Vec<Vec<f64>>,
     /// Motor-side joint angles [rad].
@@ -79,7 +81,7 @@ impl Trace {
 
     /// Duration [s].
     pub fn duration_s(&self) -> f64 {
-        self.len().saturating_sub(1) as f64 * STEP_S
+        self.time_s.last().copied().unwrap_or(0.0)
     }
 
     /// The poses of a body as the cameras see it.

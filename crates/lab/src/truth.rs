@@ -2,9 +2,10 @@
 
 use crate::config::{DhRow, LabConfig};
 use crate::rig::Rig;
+use crate::scenario::{Hidden, Scenario};
 use crate::sensors::{Occlusion, SensorClock};
 use crate::session::Session;
-use crate::trace::{Rest, RestKind, STEP_NS, Trace};
+use crate::trace::{Rest, RestKind, Trace};
 use crate::{LabError, Mechanism};
 use armcal_core::Pose;
 use nalgebra::{Point3, Vector3};
@@ -40,6 +41,12 @@ pub struct Truth {
     pub vicon_sigma_m: f64,
     /// One count of the encoders [rad].
     pub count_rad: f64,
+    /// The scenario it comes from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<Scenario>,
+    /// What a scenario hides, as a scorer needs to know it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hidden: Vec<Hidden>,
     /// The recordings.
     pub recordings: Vec<RecordingTruth>,
 }
@@ -167,6 +174,8 @@ impl Truth {
                 .collect(),
             vicon_sigma_m: config.vicon.sigma_m(),
             count_rad: config.joints.count_rad(),
+            scenario: None,
+            hidden: Vec::new(),
             recordings: Vec::new(),
         }
     }
@@ -221,7 +230,7 @@ impl DwellTruth {
             |i: usize| trace.world_from_base[i].inverse_transform_point(&Point3::from(tip_at(i))).coords;
         let names = |cavity: usize| rig.board.cavities[cavity].name.clone();
         let nominal = rig.nominal.tip(&mean_row(&trace.reading_rad[rows.clone()]));
-        let time_ns = |step: usize| recording_start_ns + step as i64 * STEP_NS;
+        let time_ns = |step: usize| recording_start_ns + (trace.time_s[step] * 1e9).round() as i64;
         DwellTruth {
             start_ns: time_ns(first),
             end_ns: time_ns(rest.last),

@@ -167,6 +167,24 @@ pub enum ModelError {
         /// Joints of the chain.
         expected: usize,
     },
+    /// No entry of the catalogue has the name.
+    #[error("there is no effect \"{kind}\"{}; the effects are: {known}", did_you_mean(nearest))]
+    UnknownEffect {
+        /// What was asked for.
+        kind: String,
+        /// The most similar entry.
+        nearest: Option<String>,
+        /// All of them.
+        known: String,
+    },
+    /// An effect cannot be read or placed.
+    #[error("effect \"{effect}\": {problem}")]
+    BadEffect {
+        /// Its spec.
+        effect: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
     /// A seated observation whose recording has no board.
     #[error("{dwell}: the tip is seated in a cavity, but the model has no board frame for this recording")]
     NoBoard {

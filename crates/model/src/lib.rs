@@ -9,6 +9,7 @@
 //! * `A_i`: the rows of a [`Chain`], read from a DH table ([`Chain::from_dh_toml`]) or a URDF
 //!   ([`Chain::from_urdf`]); the formulas are in `segment`, written once and generic over the scalar;
 //! * `B`, `T`, and the board behind a seated `measured`: [`Frames`];
+//! * what makes the arm differ from these rigid frames (play, compliance, ...): [`catalogue`], in `effects`;
 //! * `r` and its exact Jacobian: [`Model::residual`], [`Model::residual_with_jacobian`].
 //!
 //! Each segment's small transform is differentiated by dual numbers; the product rule in `path`
@@ -18,6 +19,7 @@
 mod chain;
 mod deviation;
 mod dh_toml;
+mod effects;
 mod error;
 mod frames;
 mod model;
@@ -33,6 +35,10 @@ mod tests;
 
 pub use chain::Chain;
 pub use deviation::Deviation;
+pub use effects::{
+    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Extra, Family, Offered, Override, PlacedEffect,
+    Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, find,
+};
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge};
 pub use model::Model;

@@ -1,7 +1,8 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+use crate::effects::{Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
-use crate::path::{follow, linearise};
+use crate::path::{Twist, follow, linearise};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
@@ -13,7 +14,7 @@ use std::collections::BTreeSet;
 /// A robot in its surroundings.
 ///
 /// The parameter vector `p` has one entry for each of [`Model::parameters`], in that order: the chain's,
-/// then base, tip and boards; every method that takes it expects that length. Joint vectors are in the
+/// then base, tip and boards, then those of the effects; every method that takes it expects that length. Joint vectors are in the
 /// order of [`Chain::joint_names`], [rad] (prismatic: [m]). What an observation lacks (a joint reading, a
 /// board) makes its numbers NaN; [`Model::check`] turns that into an error beforehand.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +25,14 @@ pub struct Model {
     path: Vec<Segment>,
     /// World to board, by recording.
     boards: Vec<Segment>,
+    /// What makes the arm differ from the path; nothing, where it is rigid.
+    effects: Option<Effects>,
+}
+
+/// What is measured and what is predicted of one observation.
+struct Sides {
+    measured_m: Vector3<f64>,
+    predicted: Rigid<f64>,
 }
 
 impl Model {
@@ -40,12 +49,9 @@ impl Model {
         let base = place(&frames.base)?;
         let tip = place(&frames.tip)?;
         let boards = frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let mut seen = BTreeSet::new();
-        if let Some(twice) = parameters.iter().find(|parameter| !seen.insert(&parameter.name)) {
-            return Err(ModelError::DuplicateParameter { name: twice.name.clone() });
-        }
+        check_names(&parameters)?;
         let path = [base].into_iter().chain(chain.segments.iter().cloned()).chain([tip]).collect();
-        Ok(Model { chain, parameters, path, boards })
+        Ok(Model { chain, parameters, path, boards, effects: None })
     }
 
     /// The arm.
@@ -159,45 +165,52 @@ impl Model {
 
     /// Where the tip was, in the world: as the sensor saw it, or the cavity of the board [m].
     pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
-        match &o.reference {
-            Reference::Tracked { position_m, .. } => *position_m,
-            Reference::Seated { in_board_m, .. } => match self.boards.get(o.dwell.recording) {
-                Some(board) => board.transform(p, &[]).point(in_board_m),
-                None => Vector3::repeat(f64::NAN),
-            },
-        }
+        self.sides(p, o).measured_m
     }
 
-    /// Where the model puts the tip, in the world [m].
+    /// Where the model puts the tip, in the world [m], effects included.
     pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
-        follow(&self.path, p, &o.joint_rad).translation_m
+        self.sides(p, o).predicted.translation_m
     }
 
     /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation.
     pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
-        self.residual_at(p, o, &follow(&self.path, p, &o.joint_rad))
+        self.sides(p, o).residual(o)
     }
 
     /// The residual and d residual / d p: 3 or 6 rows, one column for every parameter, free or not. Exact.
     pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
-        let predicted = linearise(&self.path, p, &o.joint_rad);
-        let residual = self.residual_at(p, o, &predicted.tip);
+        let (predicted, in_board_m, columns, seats) = match &self.effects {
+            None => {
+                let path = linearise(&self.path, p, &o.joint_rad);
+                (path.tip, seated_m(o), path.parameters, Vec::new())
+            }
+            Some(effects) => {
+                let arm = effects.linearise(p, &effects.drivers(self, o));
+                (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
+            }
+        };
+        let residual = Sides { measured_m: self.measured_m(p, o, &in_board_m), predicted }.residual(o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.parameters.len());
-        for (column, twist) in &predicted.parameters {
+        for (column, twist) in &columns {
             add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
         }
         if let Some(error_rad) = &residual.rotation_rad {
             let rate = rotation_error_rate(error_rad);
-            for (column, twist) in &predicted.parameters {
+            for (column, twist) in &columns {
                 add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
             }
         }
-        if let (Reference::Seated { in_board_m, .. }, Some(board)) =
-            (&o.reference, self.boards.get(o.dwell.recording))
-        {
+        if let (Reference::Seated { .. }, Some(board)) = (&o.reference, self.boards.get(o.dwell.recording)) {
             let derivatives = board.derivatives(p, &[]);
             for (column, change) in board.parameters.clone().zip(&derivatives.parameters) {
-                add_to_column(&mut jacobian, 0, column, &change.point(in_board_m));
+                add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
+            }
+            if !seats.is_empty() {
+                let rotation = board.transform(p, &[]).rotation;
+                for (column, change_m) in &seats {
+                    add_to_column(&mut jacobian, 0, *column, &(rotation * change_m));
+                }
             }
         }
         (residual, jacobian)
@@ -206,8 +219,12 @@ impl Model {
     /// d predicted tip / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
     /// encoders' noise to the tip.
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
+        let joints: Vec<(usize, Twist)> = match &self.effects {
+            None => linearise(&self.path, p, &o.joint_rad).joints,
+            Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
+        };
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
-        for (column, twist) in linearise(&self.path, p, &o.joint_rad).joints {
+        for (column, twist) in joints {
             jacobian.set_column(column, &twist.translation_m);
         }
         jacobian
@@ -217,16 +234,62 @@ impl Model {
         &self.path[self.path.len() - 1]
     }
 
-    fn residual_at(&self, p: &[f64], o: &Observation, predicted: &Rigid<f64>) -> ModelResidual {
-        let position_m = self.measured_tip_in_world(p, o) - predicted.translation_m;
-        let rotation_rad = match &o.reference {
-            Reference::Tracked { orientation: Some(measured), .. } => {
-                let predicted: UnitQuaternion<f64> = Pose::from(predicted).rotation;
-                Some(rotation_error_rad(measured, &predicted))
+    /// The segment that ends at a slot of the path.
+    pub(crate) fn segment_before(&self, slot: usize) -> Option<&Segment> {
+        self.path.get(slot.checked_sub(1)?)
+    }
+
+    /// The effects, if there are any.
+    pub(crate) fn placed_effects(&self) -> Option<&Effects> {
+        self.effects.as_ref()
+    }
+
+    /// The parameters of the path (chain, base, tip), which effects may act on.
+    pub(crate) fn is_on_path(&self, index: usize) -> bool {
+        self.path.iter().any(|segment| segment.parameters.contains(&index))
+    }
+
+    /// The nominal arm in a pose.
+    pub(crate) fn nominal_pose(&self, nominal: &[f64], joint_rad: &[f64]) -> NominalPose {
+        NominalPose::of(&self.path, nominal, joint_rad)
+    }
+
+    /// The nominal arm with all joints at zero.
+    pub(crate) fn zero_pose(&self) -> NominalPose {
+        self.nominal_pose(&self.nominal(), &vec![0.0; self.joint_count()])
+    }
+
+    /// The same model with these effects; `parameters` are all of its parameters.
+    pub(crate) fn with_placed(
+        &self,
+        placed: Vec<PlacedEffect>,
+        session: Session,
+        parameters: Vec<Parameter>,
+    ) -> Result<Model, ModelError> {
+        check_names(&parameters)?;
+        let effects = Some(Effects::new(placed, session, &self.path, parameters.len()));
+        Ok(Model { parameters, effects, ..self.clone() })
+    }
+
+    fn sides(&self, p: &[f64], o: &Observation) -> Sides {
+        let (predicted, in_board_m) = match &self.effects {
+            None => (follow(&self.path, p, &o.joint_rad), seated_m(o)),
+            Some(effects) => {
+                let at = effects.evaluate(p, &effects.drivers(self, o));
+                (at.tip, at.in_board_m)
             }
-            _ => None,
         };
-        ModelResidual { position_m, rotation_rad }
+        Sides { measured_m: self.measured_m(p, o, &in_board_m), predicted }
+    }
+
+    fn measured_m(&self, p: &[f64], o: &Observation, in_board_m: &Vector3<f64>) -> Vector3<f64> {
+        match &o.reference {
+            Reference::Tracked { position_m, .. } => *position_m,
+            Reference::Seated { .. } => match self.boards.get(o.dwell.recording) {
+                Some(board) => board.transform(p, &[]).point(in_board_m),
+                None => Vector3::repeat(f64::NAN),
+            },
+        }
     }
 
     fn matching(&self, name: &str) -> Result<Vec<usize>, ModelError> {
@@ -245,6 +308,36 @@ impl Model {
             });
         }
         Ok(matching)
+    }
+}
+
+impl Sides {
+    fn residual(&self, o: &Observation) -> ModelResidual {
+        let position_m = self.measured_m - self.predicted.translation_m;
+        let rotation_rad = match &o.reference {
+            Reference::Tracked { orientation: Some(measured), .. } => {
+                let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
+                Some(rotation_error_rad(measured, &predicted))
+            }
+            _ => None,
+        };
+        ModelResidual { position_m, rotation_rad }
+    }
+}
+
+/// The seated point as the board's file gives it [m]; zero for a tracked tip.
+fn seated_m(o: &Observation) -> Vector3<f64> {
+    match &o.reference {
+        Reference::Seated { in_board_m, .. } => *in_board_m,
+        Reference::Tracked { .. } => Vector3::zeros(),
+    }
+}
+
+fn check_names(parameters: &[Parameter]) -> Result<(), ModelError> {
+    let mut seen = BTreeSet::new();
+    match parameters.iter().find(|parameter| !seen.insert(&parameter.name)) {
+        Some(twice) => Err(ModelError::DuplicateParameter { name: twice.name.clone() }),
+        None => Ok(()),
     }
 }
 

@@ -18,6 +18,36 @@ pub(crate) struct Twist {
     pub rotation_rad: Vector3<f64>,
 }
 
+impl Twist {
+    /// No motion.
+    pub fn none() -> Twist {
+        Twist { translation_m: Vector3::zeros(), rotation_rad: Vector3::zeros() }
+    }
+
+    /// Adds `factor` of another motion.
+    pub fn add(&mut self, other: &Twist, factor: f64) {
+        self.translation_m += other.translation_m * factor;
+        self.rotation_rad += other.rotation_rad * factor;
+    }
+}
+
+/// The frame before the first segment and behind every one of them.
+pub(crate) struct Ends(pub Vec<Rigid<f64>>);
+
+impl Ends {
+    /// Follows the path from the identity.
+    pub fn of(path: &[Segment], p: &[f64], joints: &[f64]) -> Ends {
+        let mut ends = Vec::with_capacity(path.len() + 1);
+        let mut end = Rigid::identity();
+        ends.push(end);
+        for segment in path {
+            end = end.then(&segment.transform(p, joints));
+            ends.push(end);
+        }
+        Ends(ends)
+    }
+}
+
 /// A path at one parameter vector and one pose: where it ends and how that changes.
 pub(crate) struct LinearisedPath {
     /// The end of the path in the frame it starts in.
@@ -35,14 +65,8 @@ pub(crate) fn follow(path: &[Segment], p: &[f64], joints: &[f64]) -> Rigid<f64> 
 
 /// The end of the path and its derivatives with respect to every parameter and joint on it.
 pub(crate) fn linearise(path: &[Segment], p: &[f64], joints: &[f64]) -> LinearisedPath {
-    let mut ends = Vec::with_capacity(path.len() + 1);
-    let mut end = Rigid::identity();
-    ends.push(end);
-    for segment in path {
-        end = end.then(&segment.transform(p, joints));
-        ends.push(end);
-    }
-    let tip = end;
+    let Ends(ends) = Ends::of(path, p, joints);
+    let tip = ends.last().copied().unwrap_or_else(Rigid::identity);
     let mut parameters = Vec::with_capacity(p.len());
     let mut joint_twists = Vec::with_capacity(joints.len());
     for (segment, pair) in path.iter().zip(ends.windows(2)) {

@@ -9,10 +9,14 @@
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
 
 mod channels;
+mod comparison;
+mod diagnosis_summary;
+mod diagnosis_text;
 mod error;
 mod mcap_file;
 mod model_file;
 mod parameters;
+mod past_run;
 mod points;
 mod proto;
 mod run;
@@ -22,7 +26,10 @@ mod terminal;
 mod text;
 mod write;
 
+pub use comparison::{Comparison, Difference, DwellChange, Moved};
+pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis};
 pub use error::ReportError;
+pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
 pub use run::{RecordingRun, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, terminal};

@@ -2,6 +2,7 @@
 
 use armcal_calibrate::Calibration;
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, Severity, Warning};
+use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
 use armcal_model::Model;
 use armcal_recording::{FileReport, RecordingReport};
@@ -32,6 +33,8 @@ pub struct Run {
     pub observations: Vec<Observation>,
     /// The calibration; its residuals are in the order of `observations`.
     pub calibration: Calibration,
+    /// Which effect the calibrated model is missing; `None` when nobody asked.
+    pub diagnosis: Option<Diagnosis>,
     /// What concerns the run as a whole.
     pub warnings: Vec<Warning>,
 }
@@ -86,8 +89,10 @@ impl Run {
         let of_recordings: Vec<&Warning> =
             self.recordings.iter().flat_map(RecordingRun::all_warnings).collect();
         let outputs = output_warnings(self);
-        let all =
-            self.warnings.iter().chain(&self.calibration.warnings).chain(&self.calibration.fit.warnings);
+        let of_diagnosis = self.diagnosis.iter().flat_map(|d| &d.warnings);
+        let calibration = &self.calibration;
+        let all = self.warnings.iter().chain(&calibration.warnings).chain(&calibration.fit.warnings);
+        let all = all.chain(of_diagnosis);
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));
         own.into_iter().cloned().collect()
@@ -103,6 +108,11 @@ impl Run {
                 .count();
         }
         recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
+    }
+
+    /// The cavity an observation was seated in.
+    pub(crate) fn cavity_of(&self, dwell: DwellId) -> Option<&str> {
+        self.observations.iter().find(|o| o.dwell == dwell).and_then(Observation::cavity)
     }
 
     /// Name of the recording a dwell belongs to.

@@ -7,6 +7,7 @@
 //! could know beforehand (base, tool, a board whose pose is estimated); `fitted_mm` is the error with
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
+use crate::diagnosis_summary::DiagnosisSummary;
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
@@ -32,8 +33,8 @@ struct Summary<'a> {
     status: Status,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
-    /// Filled by a run that diagnoses; `null` otherwise.
-    diagnosis: Option<()>,
+    /// `null` when the pipeline asks for no diagnosis.
+    diagnosis: Option<DiagnosisSummary<'a>>,
     conclusion: String,
     warnings: Vec<Warning>,
 }
@@ -145,7 +146,7 @@ impl<'a> Summary<'a> {
             status: run.status(),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
-            diagnosis: None,
+            diagnosis: run.diagnosis.as_ref().map(DiagnosisSummary::of),
             conclusion: conclusion(&run.calibration),
             warnings: run.overall_warnings(),
         }

@@ -1,5 +1,6 @@
 //! The summary a person reads in the terminal, at most 100 columns wide.
 
+use crate::diagnosis_text::brief;
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::text::{conclusion, in_display_unit, millimetres, printable};
 use armcal_calibrate::{Calibration, Estimate};
@@ -29,6 +30,7 @@ pub fn terminal(run: &Run, style: TerminalStyle) -> String {
     sections.push(pen.section("Position errors [mm]", errors(&pen, &run.calibration)));
     sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
     sections.extend(undetermined(&pen, &run.calibration));
+    sections.extend(run.diagnosis.iter().map(|d| brief(&pen, d)));
     sections.extend(warnings(&pen, run));
     sections.push(pen.closing(run));
     sections.join("\n")
@@ -149,17 +151,17 @@ fn severity(warning: &Warning) -> &'static str {
     }
 }
 
-fn number(value: impl ToString) -> Cell {
+pub(crate) fn number(value: impl ToString) -> Cell {
     Cell::new(value).set_alignment(CellAlignment::Right)
 }
 
 /// Draws tables in one style.
-struct Pen {
-    style: TerminalStyle,
+pub(crate) struct Pen {
+    pub style: TerminalStyle,
 }
 
 impl Pen {
-    fn table(&self, header: &[&str]) -> Table {
+    pub fn table(&self, header: &[&str]) -> Table {
         let mut table = self.bare_table();
         table.load_style(RULED);
         table.set_header(header.iter().map(|h| Cell::new(h).add_attribute(Attribute::Dim)));
@@ -178,7 +180,7 @@ impl Pen {
     }
 
     /// Sentences behind a short label, wrapped.
-    fn list(&self, entries: impl Iterator<Item = (&'static str, String)>) -> String {
+    pub fn list(&self, entries: impl Iterator<Item = (&'static str, String)>) -> String {
         let mut table = self.bare_table();
         for (label, text) in entries {
             table.add_row(vec![self.mark(Cell::new(label)), Cell::new(text)]);
@@ -190,11 +192,11 @@ impl Pen {
         cell.fg(Color::Yellow)
     }
 
-    fn render(&self, table: &Table) -> String {
+    pub fn render(&self, table: &Table) -> String {
         table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
     }
 
-    fn section(&self, title: &str, body: String) -> String {
+    pub fn section(&self, title: &str, body: String) -> String {
         format!("{}\n{body}", self.bold(title))
     }
 
@@ -209,7 +211,7 @@ impl Pen {
         self.render(&table)
     }
 
-    fn bold(&self, text: &str) -> String {
+    pub fn bold(&self, text: &str) -> String {
         match self.style {
             TerminalStyle::Plain => text.to_owned(),
             TerminalStyle::Colour => format!("\u{1b}[1m{text}\u{1b}[0m"),

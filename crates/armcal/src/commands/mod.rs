@@ -1,13 +1,20 @@
 //! One command, one file.
 
+mod add;
+mod compare;
+mod diagnose;
+mod effects;
 mod export;
 mod inspect;
+mod plan;
 mod run;
+mod score;
 mod simulate;
 
 use crate::cli::{Cli, Command};
 use crate::error::Error;
-use std::io::Write as _;
+use armcal_report::TerminalStyle;
+use std::io::{IsTerminal as _, Write as _};
 
 /// How a command ended when it did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +28,20 @@ pub enum Outcome {
 /// Runs the command a user typed.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
+        Command::Compare { before, after, json } => compare::run(before, after, *json),
+        Command::Diagnose { input, json } => diagnose::run(input, *json),
+        Command::Add { effects, pipeline, write, out, json } => {
+            add::run(&add::Request { effects, pipeline, write: write.as_deref(), out, json: *json })
+        }
+        Command::Effects { name, json } => effects::run(name.as_deref(), *json),
+        Command::Score { families, designs, size, seeds, from, sealed, json } => {
+            let (seeds, from, sealed, json) = (*seeds, *from, *sealed, *json);
+            score::run(&score::Request { families, designs, size, seeds, from, sealed, json })
+        }
+        Command::Plan { pipeline, dwells, effects, loads, margin, ranges, json } => {
+            let (dwells, margin_deg, json) = (*dwells, *margin, *json);
+            plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
+        }
         Command::Run { pipeline, out, json } => run::run(pipeline, out, *json),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { lab, out, seed } => simulate::run(lab, out, *seed),
@@ -32,4 +53,15 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
 fn print(text: &str) {
     let mut stdout = std::io::stdout().lock();
     let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+}
+
+/// Colours on a terminal, unless the user asked for none.
+fn style() -> TerminalStyle {
+    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    if colour { TerminalStyle::Colour } else { TerminalStyle::Plain }
+}
+
+/// A value as indented JSON, ending in a newline.
+fn json_text(value: &impl serde::Serialize) -> Result<String, Error> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(Error::Json)
 }

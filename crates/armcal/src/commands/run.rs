@@ -1,12 +1,11 @@
 //! `armcal run`: the main job.
 
-use super::{Outcome, print};
+use super::{Outcome, print, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story;
-use armcal_report::{Status, TerminalStyle, summary_json, terminal, write_all};
-use std::io::IsTerminal as _;
+use armcal_report::{Status, summary_json, terminal, write_all};
 use std::path::Path;
 
 /// Runs a pipeline, writes all results to `out`, prints the table (or the summary as JSON).
@@ -21,8 +20,7 @@ pub fn run(pipeline: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
     if json {
         print(&summary_json(&run));
     } else {
-        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        print(&terminal(&run, if colour { TerminalStyle::Colour } else { TerminalStyle::Plain }));
+        print(&terminal(&run, style()));
         let names: Vec<String> =
             written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
         print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));

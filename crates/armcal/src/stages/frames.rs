@@ -1,10 +1,10 @@
 //! The nominal model of a pipeline: chain, base, tip and one board frame a recording.
 
 use crate::error::Error;
-use crate::pipeline::{BoardPose, FramePose, FrameSection, MarkersOn, Pipeline, TableSection};
+use crate::pipeline::{BoardPose, FramePose, FrameSection, MarkersOn, Pipeline, TableSection, Vertical};
 use crate::stages::perceive::Seen;
-use armcal_core::Pose;
-use armcal_model::{Chain, Frame, Frames, Knowledge, Model};
+use armcal_core::{Observation, Pose};
+use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
 use armcal_table::{Association, Board, Tilt};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
@@ -65,6 +65,21 @@ pub fn nominal_model(
         })?;
     }
     Ok(model)
+}
+
+/// What the pipeline's effects need to know about all observations together.
+pub fn session(pipeline: &Pipeline, observations: &[Observation]) -> Session {
+    let mut session = Session::of(observations);
+    if pipeline.frames.vertical == Vertical::Base {
+        session.gravity_in_base_mps2 = Some(session.gravity_in_world_mps2);
+    }
+    session
+}
+
+/// The effects of the pipeline, in its order.
+pub fn effect_specs(pipeline: &Pipeline, model: &Model) -> Result<Vec<EffectSpec>, Error> {
+    let joints = model.chain().joint_names();
+    pipeline.effects.iter().map(|table| table.spec(joints).map_err(Error::Model)).collect()
 }
 
 /// Starts every estimated board frame where the association found the board.

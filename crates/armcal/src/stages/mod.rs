@@ -3,3 +3,4 @@
 pub mod frames;
 pub mod observe;
 pub mod perceive;
+pub mod suggestion;

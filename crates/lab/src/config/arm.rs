@@ -46,6 +46,9 @@ pub struct DeviationConfig {
     pub length_mm: f64,
     /// Of `theta` and `alpha` [deg]. Default 2, the paper's bound.
     pub angle_deg: f64,
+    /// Of the masses of links and tool [%]. Default 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub mass_percent: f64,
 }
 
 /// Motor, gear, link and controller of one joint.
@@ -122,8 +125,13 @@ impl Default for ArmConfig {
 
 impl Default for DeviationConfig {
     fn default() -> DeviationConfig {
-        DeviationConfig { length_mm: 5.0, angle_deg: 2.0 }
+        DeviationConfig { length_mm: 5.0, angle_deg: 2.0, mass_percent: 0.0 }
     }
+}
+
+/// Keys at their defaults stay out of the truth file.
+fn is_zero(v: &f64) -> bool {
+    *v == 0.0
 }
 
 impl ArmConfig {
@@ -131,6 +139,10 @@ impl ArmConfig {
         not_negative("arm.deviation.length_mm", self.deviation.length_mm)?;
         not_negative("arm.deviation.angle_deg", self.deviation.angle_deg)?;
         not_negative("arm.tip_kg", self.tip_kg)?;
+        not_negative("arm.deviation.mass_percent", self.deviation.mass_percent)?;
+        if self.deviation.mass_percent >= 100.0 {
+            return Err(value("arm.deviation.mass_percent", "must stay below 100".into()));
+        }
         if !self.rows[0].joint {
             return Err(value(
                 "arm.rows",

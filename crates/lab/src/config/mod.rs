@@ -9,9 +9,10 @@ pub use sensors::{
     BodyConfig, ClockConfig, EncoderConfig, JointFormat, PoseMessage, TableMarkers, TemperatureConfig,
     TransportConfig, ViconConfig,
 };
-pub use task::{FreeConfig, HandConfig, Order, PassConfig, SweepConfig, TaskConfig};
+pub use task::{FreeConfig, HandConfig, Order, PassConfig, StopConfig, SweepConfig, TaskConfig, TourConfig};
 
 use crate::LabError;
+use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -55,14 +56,21 @@ pub struct LabConfig {
     pub temperature: TemperatureConfig,
     /// The recordings, in the order of the session.
     pub recordings: Vec<RecordingConfig>,
+    /// What is hidden in the rig: see [`crate::mechanisms`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mechanisms: Vec<MechanismConfig>,
 }
 
 /// The board and its placement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardConfig {
-    /// Board file, relative to the lab file.
+    /// Board file, relative to the lab file; `builtin:paper` is the paper's board, known to the lab.
     pub file: PathBuf,
+    /// How far cavities really are from where the drawing has them, per axis, 1 sigma [mm]; what the board file
+    /// declares when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_cavity_sigma_mm: Option<f64>,
     /// Pose of the untilted board in the robot's base frame, as the lab believes it to be.
     #[serde(default = "default_board_pose")]
     pub in_base: RollPitchYaw,
@@ -128,6 +136,13 @@ impl LabConfig {
         }
         self.arm.check()?;
         self.task.check()?;
+        for stop in self.task.tours.iter().flat_map(|tour| &tour.stops) {
+            if let StopConfig::Pose { joint_deg, from_deg } = stop
+                && ![joint_deg, from_deg].iter().all(|q| q.len() == joints && q.iter().all(|q| q.is_finite()))
+            {
+                return Err(value("task.tours.stops", format!("a pose needs {joints} finite joint angles")));
+            }
+        }
         self.hand.check()?;
         self.joints.check()?;
         self.vicon.check()?;
@@ -137,13 +152,17 @@ impl LabConfig {
             ("board.placement_sigma_deg", self.board.placement_sigma_deg),
             ("board.tilt_sigma_deg", self.board.tilt_sigma_deg),
             ("interval_s", self.interval_s),
+            ("board.true_cavity_sigma_mm", self.board.true_cavity_sigma_mm.unwrap_or(0.0)),
         ];
         board.iter().try_for_each(|(key, v)| not_negative(key, *v))?;
         if self.start_unix_s > 2_100_000_000 {
             let why = "lies beyond 2036, where ROS 2 stamps end soon; give seconds, not milliseconds";
             return Err(value("start_unix_s", why.into()));
         }
-        self.check_recordings()
+        self.check_recordings()?;
+        let recordings = self.recordings.len();
+        let mut tables = self.mechanisms.iter().enumerate();
+        tables.try_for_each(|(table, m)| m.hidden().check(&Keys { table, joints, recordings }))
     }
 
     fn check_recordings(&self) -> Result<(), LabError> {

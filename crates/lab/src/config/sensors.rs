@@ -68,6 +68,22 @@ pub struct ViconConfig {
     pub correlated_share: f64,
     /// Correlation time of that part [s]. Default 0.05.
     pub correlation_s: f64,
+    /// Degrees of freedom of Student's t for the size of the noise from one stretch of `tail_s` to the next: heavy
+    /// tails that averaging over a pause does not remove. 0 for none. Default 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tail_degrees: f64,
+    /// Length of such a stretch [s]. Default 2.
+    #[serde(skip_serializing_if = "is_two")]
+    pub tail_s: f64,
+    /// Swaps of the tip's markers a minute. Default 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub swaps_per_minute: f64,
+    /// Mean length of a swap [s]. Default 2.
+    #[serde(skip_serializing_if = "is_two")]
+    pub swap_s: f64,
+    /// How far a swap displaces the tip, per axis, 1 sigma [mm]. Default 3.
+    #[serde(skip_serializing_if = "is_three")]
+    pub swap_mm: f64,
     /// Whether the bridge passes positions through in single precision. Default false.
     pub single_precision: bool,
     /// Relation of its clock to the robot's.
@@ -149,6 +165,9 @@ pub struct ClockConfig {
 pub struct TemperatureConfig {
     /// Topic. Default `/temperature`.
     pub topic: String,
+    /// Whether there is a thermometer at all. Default true.
+    #[serde(skip_serializing_if = "is_true")]
+    pub published: bool,
     /// Rate [Hz]. Default 0.5.
     pub rate_hz: f64,
     /// Temperature at the start of the session [degC]. Default 22.
@@ -200,6 +219,11 @@ impl Default for ViconConfig {
             noise_95_mm: 0.28,
             correlated_share: 0.3,
             correlation_s: 0.05,
+            tail_degrees: 0.0,
+            tail_s: 2.0,
+            swaps_per_minute: 0.0,
+            swap_s: 2.0,
+            swap_mm: 3.0,
             single_precision: false,
             clock: ClockConfig::default(),
             table_markers: TableMarkers::Board,
@@ -231,6 +255,7 @@ impl Default for TemperatureConfig {
     fn default() -> TemperatureConfig {
         TemperatureConfig {
             topic: "/temperature".into(),
+            published: true,
             rate_hz: 0.5,
             start_c: 22.0,
             rise_k: 6.0,
@@ -283,6 +308,14 @@ impl ViconConfig {
 
     pub(super) fn check(&self) -> Result<(), LabError> {
         not_negative("vicon.noise_95_mm", self.noise_95_mm)?;
+        if self.tail_degrees != 0.0 && !(self.tail_degrees.is_finite() && self.tail_degrees > 2.0) {
+            let why = "must be 0 (normal) or above 2, where Student's t has a variance".into();
+            return Err(value("vicon.tail_degrees", why));
+        }
+        positive("vicon.tail_s", self.tail_s)?;
+        not_negative("vicon.swaps_per_minute", self.swaps_per_minute)?;
+        positive("vicon.swap_s", self.swap_s)?;
+        not_negative("vicon.swap_mm", self.swap_mm)?;
         share("vicon.correlated_share", self.correlated_share)?;
         positive("vicon.correlation_s", self.correlation_s)?;
         not_negative("vicon.base_mount_sigma_mm", self.base_mount_sigma_mm)?;
@@ -321,4 +354,22 @@ impl TemperatureConfig {
 fn rate(key: &str, hz: f64) -> Result<(), LabError> {
     positive(key, hz)?;
     if hz > 5000.0 { Err(value(key, format!("{hz} Hz is more than the lab's 5000"))) } else { Ok(()) }
+}
+
+// Keys at their defaults stay out of the truth file.
+
+fn is_zero(v: &f64) -> bool {
+    *v == 0.0
+}
+
+fn is_two(v: &f64) -> bool {
+    *v == 2.0
+}
+
+fn is_three(v: &f64) -> bool {
+    *v == 3.0
+}
+
+fn is_true(v: &bool) -> bool {
+    *v
 }

@@ -27,6 +27,41 @@ pub struct TaskConfig {
     pub sweep: SweepConfig,
     /// Rate of the set-points [Hz]. Default 100.
     pub set_point_hz: f64,
+    /// Recordings that visit given places instead.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tours: Vec<TourConfig>,
+}
+
+/// A recording that visits given places, in their order, instead of passes and free poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TourConfig {
+    /// Name of the recording.
+    pub recording: String,
+    /// The places.
+    pub stops: Vec<StopConfig>,
+}
+
+/// A place to visit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "lowercase", tag = "at")]
+pub enum StopConfig {
+    /// A cavity.
+    Cavity {
+        /// Its name.
+        name: String,
+        /// Side of the cavity from which the tip slides in, from the board's x towards its y [deg]; straight down when
+        /// absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        slide_from_deg: Option<f64>,
+    },
+    /// A free pose.
+    Pose {
+        /// Joint angles [deg].
+        joint_deg: Vec<f64>,
+        /// The pose from which it is reached [deg].
+        from_deg: Vec<f64>,
+    },
 }
 
 /// One pass over the cavities.
@@ -64,6 +99,10 @@ pub struct FreeConfig {
     pub hold_s: [f64; 2],
     /// Speed along the paths between them [m/s]. Default 0.4.
     pub speed_m_s: f64,
+    /// Whether a hand leads the arm there and holds it, back-driving the gears (or, with `hand.motors_lead`, motors
+    /// that follow the path exactly). Default false: the motors do under control.
+    #[serde(skip_serializing_if = "is_false")]
+    pub by_hand: bool,
 }
 
 /// A path through random waypoints above the board, passed with non-zero velocity.
@@ -105,6 +144,19 @@ pub struct HandConfig {
     pub seated_tremor_mm: f64,
     /// Correlation time of the tremor [s]. Default 0.03.
     pub tremor_s: f64,
+    /// Whether it is not a hand but the motors that jog the tip into the cavities: without tremor, and the motors lead.
+    /// Default false.
+    #[serde(skip_serializing_if = "is_false")]
+    pub motors_lead: bool,
+    /// Whether every cavity is entered by the same final descent, instead of along the way. Default false.
+    #[serde(skip_serializing_if = "is_false")]
+    pub plunge: bool,
+    /// Correlation of where the tip sits in the clearance from one visit to the next. Default 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub seat_correlation: f64,
+    /// Degrees of freedom of Student's t for where the tip sits; 0 for normal. Default 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub seat_tail_degrees: f64,
 }
 
 impl Default for TaskConfig {
@@ -120,6 +172,7 @@ impl Default for TaskConfig {
             free: FreeConfig::default(),
             sweep: SweepConfig::default(),
             set_point_hz: 100.0,
+            tours: Vec::new(),
         }
     }
 }
@@ -131,6 +184,7 @@ impl Default for FreeConfig {
             range_deg: vec![[-60.0, 60.0], [-75.0, 20.0], [-60.0, 50.0]],
             hold_s: [1.6, 2.2],
             speed_m_s: 0.4,
+            by_hand: false,
         }
     }
 }
@@ -156,6 +210,10 @@ impl Default for HandConfig {
             rattle_mm: 0.1,
             seated_tremor_mm: 0.01,
             tremor_s: 0.03,
+            motors_lead: false,
+            plunge: false,
+            seat_correlation: 0.0,
+            seat_tail_degrees: 0.0,
         }
     }
 }
@@ -192,6 +250,13 @@ impl HandConfig {
         not_negative("hand.tremor_mm", self.tremor_mm)?;
         not_negative("hand.rattle_mm", self.rattle_mm)?;
         not_negative("hand.seated_tremor_mm", self.seated_tremor_mm)?;
+        share("hand.seat_correlation", self.seat_correlation)?;
+        if self.seat_tail_degrees != 0.0
+            && !(self.seat_tail_degrees.is_finite() && self.seat_tail_degrees > 2.0)
+        {
+            let why = "must be 0 (normal) or above 2, where Student's t has a variance".into();
+            return Err(value("hand.seat_tail_degrees", why));
+        }
         positive("hand.tremor_s", self.tremor_s)
     }
 }
@@ -205,4 +270,14 @@ fn pause(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
 
 fn all() -> f64 {
     1.0
+}
+
+// Keys at their defaults stay out of the truth file.
+
+fn is_zero(v: &f64) -> bool {
+    *v == 0.0
+}
+
+fn is_false(v: &bool) -> bool {
+    !*v
 }

@@ -3,6 +3,7 @@
 mod clock;
 mod encoder;
 mod message;
+pub(crate) mod outliers;
 mod temperature;
 mod transport;
 mod vicon;
@@ -36,7 +37,9 @@ pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
     for body in [Body::Tip, Body::Table, Body::Base] {
         vicon::subject(config, recording, session, body, &mut log);
     }
-    temperature::readings(config, recording, session, &mut log);
+    if config.temperature.published {
+        temperature::readings(config, recording, session, &mut log);
+    }
     encoder::set_points(config, recording, session, &mut log);
     // Stable: messages logged in the same nanosecond keep the order of their channels.
     log.messages.sort_by_key(|message| message.log_ns);

@@ -2,6 +2,7 @@
 
 use super::Log;
 use super::message::{Channel, Kind, Message, Payload};
+use super::outliers::{Tails, swapped_m, swaps};
 use super::transport::Transport;
 use crate::config::{BodyConfig, LabConfig, PoseMessage, ViconConfig};
 use crate::mechanism::Body;
@@ -53,13 +54,18 @@ pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Bo
     let mut noise = Noise::new(vicon, settings, noise);
     let mut occlusions = draw_occlusions(settings, session.trace.duration_s(), start_ns, occlusion);
     let mut transport = Transport::new(&vicon.clock.transport, transport);
+    let mut tails = Tails::new(vicon, config.seed, recording);
+    let swaps =
+        if body == Body::Tip { swaps(config, recording, session.trace.duration_s()) } else { Vec::new() };
     // The cameras keep time by their own clock.
     let period_s = clock.robot_per_sensor() / settings.rate_hz;
     let mut last = Payload::Pose { position_m: Vector3::zeros(), orientation: Quaternion::identity() };
     for sequence in 0..=(session.trace.duration_s() / period_s).floor() as u32 {
         let time_s = f64::from(sequence) * period_s;
         let robot_ns = start_ns + (time_s * 1e9).round() as i64;
-        let seen = noise.frame(&pose_at(session.trace.seen(body), time_s), vicon.single_precision);
+        let mut truth = pose_at(session.trace.seen(body), time_s);
+        truth.translation.vector += swapped_m(&swaps, time_s);
+        let seen = noise.frame(&truth, tails.at(time_s), vicon.single_precision);
         let hidden = occlusions.iter_mut().find(|o| (o.start_ns..o.end_ns).contains(&robot_ns));
         let payload = match hidden {
             None => seen,
@@ -151,11 +157,12 @@ impl Noise {
     }
 
     /// What one frame makes of a true pose.
-    fn frame(&mut self, truth: &Pose, single_precision: bool) -> Payload {
+    fn frame(&mut self, truth: &Pose, tail: f64, single_precision: bool) -> Payload {
         let step = (1.0 - self.keep * self.keep).sqrt();
         self.slow_position = self.slow_position * self.keep + self.draw.normal3() * step;
         self.slow_rotation = self.slow_rotation * self.keep + self.draw.normal3() * step;
-        let shift = (self.draw.normal3() * self.white + self.slow_position * self.slow) * self.sigma_m;
+        let shift =
+            (self.draw.normal3() * self.white + self.slow_position * self.slow) * (self.sigma_m * tail);
         let turn = (self.draw.normal3() * self.white + self.slow_rotation * self.slow) * self.sigma_rad;
         let position_m = truth.translation.vector + shift;
         let orientation = (truth.rotation * UnitQuaternion::from_scaled_axis(turn)).into_inner();
@@ -181,7 +188,7 @@ mod tests {
         let truth = Pose::translation(1.0, -2.0, 0.5);
         let n = 60_000;
         let errors: Vec<(Vector3<f64>, f64)> = (0..n)
-            .map(|_| match noise.frame(&truth, false) {
+            .map(|_| match noise.frame(&truth, 1.0, false) {
                 Payload::Pose { position_m, orientation } => {
                     (position_m - truth.translation.vector, 2.0 * orientation.i)
                 }

@@ -100,6 +100,7 @@ pub fn synthetic() -> Synthetic {
         model,
         observations,
         calibration,
+        diagnosis: None,
         warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
     };
     Synthetic { run, recordings, paths, folder }
@@ -211,6 +212,9 @@ fn seated(
         joint_rad: START_RAD.to_vec(),
         joint_sigma_rad: vec![1e-5; 3],
         arrival: vec![Arrival::Positive, Arrival::Negative, Arrival::Unknown],
+        path_memory_rad: None,
+        pair_memory_rad: None,
+        joint_velocity_radps: None,
         effort_nm: None,
         temperature_c: None,
         load_kg: 0.2,
@@ -246,6 +250,9 @@ fn tracked(dwell: &Dwell, model: &Model, planted: &[f64]) -> Observation {
         joint_rad: dwell.joint_rad.clone(),
         joint_sigma_rad: dwell.joint_sigma_rad.clone(),
         arrival: dwell.arrival.clone(),
+        path_memory_rad: None,
+        pair_memory_rad: None,
+        joint_velocity_radps: None,
         effort_nm: None,
         temperature_c: dwell.temperature_c,
         load_kg: 0.2,
@@ -271,6 +278,8 @@ fn dwell(recording: usize, dwell: usize, joint_rad: &[f64]) -> Dwell {
         samples: 500,
         effective_samples: 120.5,
         arrival: vec![Arrival::Positive, Arrival::Negative, Arrival::Unknown],
+        path_memory_rad: joint_rad.iter().map(|q| vec![q - 0.1, *q]).collect(),
+        pair_memory_rad: Vec::new(),
         tip: (dwell == 5 && recording == 0).then(|| TipMeasurement {
             position_m: Vector3::new(0.4, 0.05, 0.3),
             covariance_m2: Matrix3::from_diagonal_element(4e-10),

@@ -1,0 +1,129 @@
+//! `armcal add`: puts an effect into the model and shows what that does on points the fit never saw.
+
+use super::{Outcome, print, style};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::stages::{frames, suggestion};
+use crate::story::{self, Settled};
+use armcal_diagnose::Diagnosis;
+use armcal_model::{EffectSpec, EffectTable};
+use armcal_recording::atomic;
+use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// The word for "whatever the diagnosis suggests".
+const SUGGESTED: &str = "suggested";
+
+/// What `armcal add` is asked to do.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    /// Specs of effects, or `suggested`.
+    pub effects: &'a [String],
+    /// The pipeline to extend.
+    pub pipeline: &'a Path,
+    /// Where the extended pipeline goes; beside the original when absent.
+    pub write: Option<&'a Path>,
+    /// Folder for the results of the extended pipeline.
+    pub out: &'a Path,
+    /// JSON instead of tables.
+    pub json: bool,
+}
+
+/// What a program reads of it.
+#[derive(Debug, Serialize)]
+struct Added<'a> {
+    added: Vec<String>,
+    pipeline: &'a Path,
+    comparison: &'a Comparison,
+    remaining: &'a Option<Diagnosis>,
+}
+
+/// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
+pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(request.pipeline)?;
+    let progress = Progress::new();
+    let settled = story::settle(&pipeline, &progress)?;
+    let new = requested(request.effects, &pipeline, &settled, &progress)?;
+    let extended = extend(&pipeline, request, &new)?;
+
+    progress.step("calibrating without and with");
+    let geometry = settled.geometry.clone();
+    let mut effects = frames::effect_specs(&pipeline, &geometry)?;
+    effects.extend(new.iter().cloned());
+    let (mut run, recordings) = settled.into_run(&pipeline, None);
+    let before = PastRun::of(&run);
+    story::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
+    let comparison = Comparison::of(&before, &PastRun::of(&run));
+
+    progress.step("writing results");
+    atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
+    write_all(&run, &recordings, request.out, &extended.pipeline.output)?;
+    progress.finish();
+
+    let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
+    if request.json {
+        let remaining = &run.diagnosis;
+        let value = Added { added, pipeline: &extended.path, comparison: &comparison, remaining };
+        print(&super::json_text(&value)?);
+    } else {
+        print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()));
+        print(&comparison.terminal(style()));
+        print(&format!("\n{}", diagnosis_text(&run, style())));
+        let (path, out) = (extended.path.display(), request.out.display());
+        print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"));
+    }
+    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+}
+
+/// The effects the user named, or those the diagnosis suggests.
+fn requested(
+    words: &[String],
+    pipeline: &Pipeline,
+    settled: &Settled,
+    progress: &Progress,
+) -> Result<Vec<EffectSpec>, Error> {
+    let joints = settled.geometry.chain().joint_names();
+    if words.iter().any(|word| word == SUGGESTED) {
+        let diagnosis = settled.diagnose(pipeline, progress)?;
+        let suggested = diagnosis.map(|d| suggestion::of(&d, joints)).transpose()?.unwrap_or_default();
+        if suggested.is_empty() {
+            return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });
+        }
+        return Ok(suggested);
+    }
+    words.iter().map(|word| EffectSpec::parse(word, joints).map_err(Error::Model)).collect()
+}
+
+/// A pipeline with more effects, and where it is written.
+struct Extended {
+    pipeline: Pipeline,
+    path: PathBuf,
+}
+
+/// Appends `[[effects]]` tables to the pipeline's own text, so that comments and order stay as the user wrote them.
+fn extend(pipeline: &Pipeline, request: &Request<'_>, new: &[EffectSpec]) -> Result<Extended, Error> {
+    #[derive(Serialize)]
+    struct Section {
+        effects: Vec<EffectTable>,
+    }
+    let section = Section { effects: new.iter().map(EffectTable::from).collect() };
+    let tables = toml::to_string(&section).map_err(Error::Toml)?;
+    let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
+    let path = request.write.map_or_else(|| beside(request.pipeline, new), Path::to_owned);
+    let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
+    if std::fs::read_to_string(&path).is_ok_and(|existing| existing != pipeline.text) {
+        return Err(Error::WouldOverwrite { path });
+    }
+    Ok(Extended { pipeline, path })
+}
+
+/// `paper.toml` and `backlash:1` give `paper+backlash-1.toml`.
+fn beside(pipeline: &Path, new: &[EffectSpec]) -> PathBuf {
+    let stem = pipeline.file_stem().unwrap_or_default().to_string_lossy();
+    let safe = |c: char| if c.is_ascii_alphanumeric() || "_.".contains(c) { c } else { '-' };
+    let names: String =
+        new.iter().map(|e| format!("+{}", e.to_string().chars().map(safe).collect::<String>())).collect();
+    pipeline.with_file_name(format!("{stem}{names}.toml"))
+}

@@ -1,0 +1,33 @@
+//! `armcal diagnose`: where the model fails, what is missing, what to record next.
+
+use super::{Outcome, print, style};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::story;
+use armcal_report::{PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
+use std::path::Path;
+
+/// Diagnoses a pipeline, or prints the diagnosis of a finished run (`run.mcap` or its folder).
+pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
+    if input.extension().is_none_or(|e| e != "toml") {
+        let past = PastRun::open(input)?;
+        if json {
+            print(&super::json_text(&past.summary["diagnosis"])?);
+        } else {
+            print(&past_diagnosis(&past, style()));
+        }
+        return Ok(Outcome::Done);
+    }
+    let pipeline = Pipeline::load(input)?;
+    let progress = Progress::new();
+    let (run, _) = story::run(&pipeline, &progress)?;
+    progress.finish();
+    if json {
+        let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;
+        print(&super::json_text(&summary["diagnosis"])?);
+    } else {
+        print(&diagnosis_text(&run, style()));
+    }
+    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+}

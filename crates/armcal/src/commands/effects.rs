@@ -1,0 +1,79 @@
+//! `armcal effects`: the catalogue of physical effects.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use armcal_model::{EffectKind, EffectSpec, Target, catalogue};
+use armcal_report::RULED;
+use comfy_table::{ContentArrangement, Table};
+use serde_json::{Value, json};
+
+/// Prints the catalogue, or everything about one entry.
+pub fn run(name: Option<&str>, json: bool) -> Result<Outcome, Error> {
+    let text = match (name, json) {
+        (None, false) => overview(),
+        (None, true) => super::json_text(&catalogue().iter().map(|k| entry(k)).collect::<Vec<Value>>())?,
+        (Some(name), json) => {
+            let kind = EffectSpec::new(name).kind()?;
+            if json { super::json_text(&entry(kind))? } else { page(kind) }
+        }
+    };
+    print(&text);
+    Ok(Outcome::Done)
+}
+
+fn overview() -> String {
+    let mut table = Table::new();
+    table.load_style(RULED).set_content_arrangement(ContentArrangement::Dynamic).set_width(100);
+    table.force_no_tty();
+    table.set_header(["effect", "what it is"]);
+    for kind in catalogue() {
+        table.add_row([spec(kind), kind.summary.to_owned()]);
+    }
+    let lines: String = table.lines().map(|line| format!("{}\n", line.trim_end())).collect();
+    format!(
+        "{lines}\n`armcal effects NAME` explains one; JOINT is a number from 1 or a name; add @RECORDING or \
+         @RECORDING.DWELL to an event.\n"
+    )
+}
+
+/// How it is written: `backlash:JOINT`, `periodic:JOINT,frequency=..`.
+fn spec(kind: &EffectKind) -> String {
+    let joint = if kind.target == Target::Joint { ":JOINT" } else { "" };
+    let needed = kind.shapes.iter().filter(|s| s.default.is_none());
+    let shapes: String = needed.map(|s| format!(",{}=..", s.name)).collect();
+    format!("{}{joint}{shapes}", kind.name)
+}
+
+fn page(kind: &EffectKind) -> String {
+    let mut text = format!("{}\n{}\n", spec(kind), kind.summary);
+    if !kind.aliases.is_empty() {
+        text.push_str(&format!("The same to the data: {}.\n", kind.aliases.join(", ")));
+    }
+    if !kind.confused_with.is_empty() {
+        text.push_str(&format!("Looks alike in common data: {}.\n", kind.confused_with.join(", ")));
+    }
+    format!("{text}\n{}\n", kind.docs().trim())
+}
+
+fn entry(kind: &EffectKind) -> Value {
+    let shapes: Vec<Value> = kind
+        .shapes
+        .iter()
+        .map(|s| {
+            json!({ "name": s.name, "unit": s.unit, "default": s.default, "lower": s.lower, "upper": s.upper,
+                    "meaning": s.meaning })
+        })
+        .collect();
+    json!({
+        "name": kind.name,
+        "spec": spec(kind),
+        "summary": kind.summary,
+        "same_to_the_data": kind.aliases,
+        "confused_with": kind.confused_with,
+        "family": kind.family,
+        "toggle": kind.toggle,
+        "target": kind.target,
+        "shapes": shapes,
+        "docs": kind.docs(),
+    })
+}

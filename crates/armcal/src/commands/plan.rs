@@ -1,0 +1,253 @@
+//! `armcal plan`: what to record next.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
+use crate::progress::Progress;
+use crate::stages::frames;
+use crate::story::{self, Settled};
+use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_core::Arrival;
+use armcal_model::Model;
+use armcal_report::RULED;
+use comfy_table::{Cell, CellAlignment, Table};
+use nalgebra::Matrix3;
+use std::path::Path;
+
+/// Standard error of a tracked tip that no recording shows and no pipeline declares [m].
+const UNSEEN_SIGMA_M: f64 = 3e-4;
+
+/// What `armcal plan` is asked to do.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    /// The pipeline whose diagnosis leaves something open.
+    pub pipeline: &'a Path,
+    /// Most dwells.
+    pub dwells: usize,
+    /// Specs of effects, joined by commas.
+    pub effects: &'a Option<String>,
+    /// Loads at hand [kg].
+    pub loads_kg: &'a [f64],
+    /// How far free poses may go beyond the recorded range [deg].
+    pub margin_deg: f64,
+    /// `JOINT=LOW..HIGH` [deg].
+    pub ranges: &'a [String],
+    /// JSON instead of a table.
+    pub json: bool,
+}
+
+/// Calibrates, diagnoses, and proposes the dwells that tell apart what stands.
+pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(request.pipeline)?;
+    let progress = Progress::new();
+    let settled = story::settle(&pipeline, &progress)?;
+    let joints = settled.geometry.chain().joint_names();
+    let allowed = allowed(request, joints)?;
+    let diagnosis = settled.diagnose(&pipeline, &progress)?;
+    let open = match (request.effects, &diagnosis) {
+        (Some(words), _) => named(&split(words), diagnosis.as_ref(), joints)?,
+        (None, Some(diagnosis)) => standing(diagnosis, joints)?,
+        (None, None) => return Err(Error::NotDiagnosed),
+    };
+    progress.step("weighing what could be recorded");
+    let (model, values) = with_certain(&pipeline, &settled, &open)?;
+    let session = frames::session(&pipeline, &settled.observations);
+    let known = Known {
+        model: &model,
+        values,
+        observations: &settled.observations,
+        session: &session,
+        fit: &pipeline.fit,
+        board: settled.board.as_ref().filter(|_| pipeline.observations.seated),
+        tracked: tracking(&pipeline, &settled),
+        recordings: settled.seen.iter().map(|s| s.name.clone()).collect(),
+    };
+    let proposal = propose(&known, &open, &allowed, &pipeline.diagnosis)?;
+    progress.finish();
+    print(&if request.json { super::json_text(&proposal)? } else { text(&proposal, joints) });
+    Ok(Outcome::Done)
+}
+
+/// Commas between effects; a part such as `frequency=30` belongs to the effect before it.
+fn split(words: &str) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for part in words.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        match all.last_mut() {
+            Some(effect) if part.contains('=') => *effect = format!("{effect},{part}"),
+            _ => all.push(part.to_owned()),
+        }
+    }
+    all
+}
+
+fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
+    let bad = |option, value: String, problem: &str| {
+        Err(Error::BadPlan { option, value, problem: problem.to_owned() })
+    };
+    if let Some(load) = request.loads_kg.iter().find(|l| !l.is_finite() || **l < 0.0) {
+        return bad("--load", load.to_string(), "give a mass in kg, zero or more");
+    }
+    if !request.margin_deg.is_finite() || request.margin_deg < 0.0 {
+        return bad("--margin", request.margin_deg.to_string(), "give an angle in degrees, zero or more");
+    }
+    let mut ranges_deg = Vec::new();
+    for words in request.ranges {
+        let parsed = words.split_once('=').and_then(|(joint, range)| {
+            let by_name = joints.iter().position(|name| name == joint.trim());
+            let joint = by_name.or_else(|| joint.trim().parse::<usize>().ok()?.checked_sub(1))?;
+            let (low, high) = range.split_once("..")?;
+            Some((joint, [low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?]))
+        });
+        match parsed {
+            Some((joint, [low, high]))
+                if joint < joints.len() && low.is_finite() && low < high && high.is_finite() =>
+            {
+                ranges_deg.push((joint, [low, high]));
+            }
+            _ => {
+                let problem = "write a joint's number or name and its range in degrees, such as 2=-75..20";
+                return bad("--range", words.clone(), problem);
+            }
+        }
+    }
+    let (dwells, loads_kg) = (request.dwells, request.loads_kg.to_vec());
+    Ok(Allowed { dwells, loads_kg, margin_deg: request.margin_deg, ranges_deg })
+}
+
+/// The calibrated model with the effects that are beyond doubt, and its parameters.
+fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Result<(Model, Vec<f64>), Error> {
+    if open.certain.is_empty() {
+        return Ok((settled.model.clone(), settled.calibration.fit.values()));
+    }
+    let session = frames::session(pipeline, &settled.observations);
+    let model = settled.model.with_effects(&open.certain, &session)?;
+    let calibration = calibrate(&model, &settled.observations, &pipeline.fit, &HoldoutConfig::default())?;
+    Ok((model, calibration.fit.values()))
+}
+
+/// How well the sensor saw the tip in the dwells of these recordings (their median).
+fn tracking(pipeline: &Pipeline, settled: &Settled) -> Option<Tracking> {
+    if pipeline.streams.tip.is_none() || !pipeline.observations.tracked {
+        return None;
+    }
+    let settings = &pipeline.observations;
+    let mut seen: Vec<_> =
+        settled.seen.iter().flat_map(|s| &s.dwells).filter_map(|d| d.tip.as_ref()).collect();
+    seen.sort_by(|a, b| a.covariance_m2.trace().total_cmp(&b.covariance_m2.trace()));
+    let floor_m2 = Matrix3::identity() * (settings.sensor_sigma_mm * 1e-3).powi(2);
+    Some(match seen.get(seen.len() / 2) {
+        Some(tip) => Tracking {
+            covariance_m2: tip.covariance_m2 + floor_m2,
+            orientation_sigma_rad: tip
+                .orientation
+                .map(|_| tip.orientation_sigma_rad.hypot(settings.sensor_sigma_deg.to_radians())),
+        },
+        None => Tracking {
+            covariance_m2: Matrix3::identity() * UNSEEN_SIGMA_M.powi(2) + floor_m2,
+            orientation_sigma_rad: None,
+        },
+    })
+}
+
+fn text(proposal: &Proposal, joints: &[String]) -> String {
+    let mut text = format!("To tell apart: {}\n({})\n\n", proposal.explanations.join(", "), proposal.why);
+    if !proposal.dwells.is_empty() {
+        text.push_str(&dwells(proposal, joints));
+        text.push('\n');
+    }
+    text.push_str(&pairs(proposal));
+    text.push_str(&format!("\n{}.\n", capital(&proposal.sentence)));
+    let ranges = proposal.range_deg.iter().zip(joints);
+    let ranges: Vec<String> =
+        ranges.map(|([low, high], name)| format!("{name} {low:.0}..{high:.0}")).collect();
+    text.push_str(&format!("\nWeighed {} dwells within {} deg.\n", proposal.pool, ranges.join(", ")));
+    for assumption in &proposal.assumptions {
+        text.push_str(&format!("- {assumption}\n"));
+    }
+    text
+}
+
+fn dwells(proposal: &Proposal, joints: &[String]) -> String {
+    let mut table = plain();
+    let mut header = vec!["".to_owned(), "where".to_owned()];
+    header.extend(joints.iter().map(|name| format!("{name} [deg]")));
+    header.extend(["arrive", "load [kg]", "Delta"].map(str::to_owned));
+    table.set_header(header);
+    for (i, dwell) in proposal.dwells.iter().enumerate() {
+        let mut cells = vec![right(format!("{}", i + 1)), Cell::new(place(dwell))];
+        cells.extend(dwell.joint_deg.iter().map(|q| right(format!("{q:.1}"))));
+        cells.push(Cell::new(arrival(&dwell.arrival)));
+        cells.push(right(format!("{}", dwell.load_kg)));
+        cells.push(right(format!("{:.1}", dwell.delta)));
+        table.add_row(cells);
+    }
+    lines(&table)
+}
+
+fn pairs(proposal: &Proposal) -> String {
+    let mut table = plain();
+    table.set_header(["pair", "Delta now", "then", "motion or sensor"]);
+    for pair in &proposal.pairs {
+        table.add_row([
+            Cell::new(pair.names.join(" or ")),
+            right(format!("{:.1}", pair.delta_before)),
+            right(format!("{:.1}", pair.delta_after)),
+            Cell::new(pair.sensor.as_deref().unwrap_or("these dwells")),
+        ]);
+    }
+    lines(&table)
+}
+
+fn place(dwell: &Proposed) -> String {
+    match &dwell.place {
+        Place::Cavity { cavity, recording, slide_from_deg } => {
+            let way =
+                slide_from_deg.map_or("straight down".to_owned(), |deg| format!("slid in from {deg:.0} deg"));
+            format!("{cavity} (board as in {recording}), {way}")
+        }
+        Place::Free => "free pose".to_owned(),
+        Place::Again { dwell } => format!("again: {dwell}"),
+    }
+}
+
+fn arrival(sides: &[Arrival]) -> String {
+    let sign = |side: &Arrival| match side {
+        Arrival::Positive => '+',
+        Arrival::Negative => '-',
+        Arrival::Unknown => '.',
+    };
+    sides.iter().map(sign).collect()
+}
+
+fn plain() -> Table {
+    let mut table = Table::new();
+    table.load_style(RULED).force_no_tty();
+    table
+}
+
+fn right(text: String) -> Cell {
+    Cell::new(text).set_alignment(CellAlignment::Right)
+}
+
+fn lines(table: &Table) -> String {
+    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
+fn capital(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters
+        .next()
+        .map(|first| first.to_uppercase().collect::<String>() + letters.as_str())
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split;
+
+    #[test]
+    fn a_shape_stays_with_its_effect() {
+        assert_eq!(split("backlash:1, periodic:2,frequency=30"), ["backlash:1", "periodic:2,frequency=30"]);
+    }
+}

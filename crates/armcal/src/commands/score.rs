@@ -1,0 +1,86 @@
+//! `armcal score`: how often the diagnosis is right on sealed scenarios.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::score::{Judgement, rows, score, table};
+use armcal_lab::LabError;
+use armcal_lab::scenario::{Design, Scenario, Size, families, nothing, outside};
+use serde::de::DeserializeOwned;
+use serde_json::json;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What to score.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    /// Families, or the words `catalogue`, `nothing`, `outside`.
+    pub families: &'a [String],
+    /// Designs of motion.
+    pub designs: &'a [String],
+    /// `small`, `medium`, `large`, `drawn`.
+    pub size: &'a str,
+    /// Seeds for each.
+    pub seeds: u64,
+    /// First seed.
+    pub from: u64,
+    /// Recordings on disk and the whole pipeline.
+    pub sealed: bool,
+    /// One JSON document.
+    pub json: bool,
+}
+
+/// Runs the scenarios and prints the confusion table.
+pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+    let scenarios = scenarios(request)?;
+    let progress = Progress::new();
+    let finished = AtomicUsize::new(0);
+    let done = || {
+        let n = finished.fetch_add(1, Ordering::Relaxed) + 1;
+        progress.step(&format!("scenario {n} of {}", scenarios.len()));
+    };
+    let scored = score(&scenarios, request.sealed, &done)?;
+    progress.finish();
+    let rows = rows(&scored);
+    if request.json {
+        print(&super::json_text(&json!({ "rows": rows, "scenarios": scored }))?);
+    } else {
+        print(&table(&rows));
+        let wrong = scored.iter().filter(|s| s.judgement == Judgement::Wrong).count();
+        let (first, last) = (request.from, request.from + request.seeds.saturating_sub(1));
+        let slowest = scored.iter().map(|s| s.answer.seconds).fold(0.0, f64::max);
+        print(&format!(
+            "\n{} scenarios, seeds {first} to {last}, size {}; {wrong} confidently wrong; slowest diagnosis {slowest:.2} s\n",
+            scored.len(),
+            request.size,
+        ));
+    }
+    Ok(Outcome::Done)
+}
+
+fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
+    let mut names: Vec<String> = Vec::new();
+    for word in request.families {
+        match word.as_str() {
+            "catalogue" => names.extend(families().into_iter().map(str::to_owned)),
+            "nothing" => names.extend(nothing().into_iter().map(str::to_owned)),
+            "outside" => names.extend(outside().into_iter().map(str::to_owned)),
+            name => names.push(name.to_owned()),
+        }
+    }
+    let size: Size = word("size", request.size)?;
+    let mut all = Vec::new();
+    for design in request.designs {
+        let design: Design = word("design", design)?;
+        for name in &names {
+            for seed in request.from..request.from + request.seeds {
+                all.push(Scenario { size, ..Scenario::new(name, design, seed) });
+            }
+        }
+    }
+    Ok(all)
+}
+
+fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, Error> {
+    let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
+    parsed.map_err(|e| Error::Lab(LabError::Value { key: key.to_owned(), why: e.to_string() }))
+}

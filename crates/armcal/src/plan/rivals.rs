@@ -1,0 +1,110 @@
+//! Which explanations are to be told apart.
+
+use crate::error::Error;
+use crate::stages::suggestion;
+use armcal_diagnose::{Diagnosis, ParameterReport, Verdict};
+use armcal_model::EffectSpec;
+
+/// Effects that a quiet diagnosis leaves untested, at most this many.
+const UNTESTED: usize = 6;
+
+/// One explanation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rival {
+    /// The effect.
+    pub spec: EffectSpec,
+    /// Amplitudes that the data ask for, in typical sizes, by quantity; the others are taken at typical size.
+    pub sizes: Vec<(String, f64)>,
+}
+
+/// The explanations that stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Standing {
+    /// Effects, the most probable first.
+    pub rivals: Vec<Rival>,
+    /// Whether "nothing" is one of the explanations.
+    pub nothing: bool,
+    /// Effects that are beyond doubt and belong in the model.
+    pub certain: Vec<EffectSpec>,
+    /// Why these.
+    pub why: String,
+}
+
+/// What a diagnosis leaves standing: the first ambiguous set; the unlisted shape against the best names; otherwise the
+/// effects that could not be tested, against nothing.
+pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Error> {
+    let parse = |name: &String| EffectSpec::parse(name, joints).map_err(Error::Model);
+    let open = diagnosis.effects.iter().position(|e| e.set.len() > 1);
+    let mut certain = Vec::new();
+    for (i, found) in diagnosis.effects.iter().enumerate().filter(|(i, _)| Some(*i) != open) {
+        let _ = i;
+        certain.push(parse(&found.name)?);
+    }
+    if let Some(found) = open.and_then(|i| diagnosis.effects.get(i)) {
+        let mut rivals =
+            found.set.iter().map(|n| rival(diagnosis, n, joints)).collect::<Result<Vec<_>, _>>()?;
+        for rival in rivals.iter_mut().filter(|r| r.spec.to_string() == found.name) {
+            rival.sizes = sizes(&found.parameters);
+        }
+        let why = "the diagnosis leaves more than one name for what it found".to_owned();
+        return Ok(Standing { rivals, nothing: false, certain, why });
+    }
+    if diagnosis.verdict == Verdict::Unknown
+        && let Some(spec) = diagnosis.unknown.as_ref().and_then(suggestion::unlisted)
+    {
+        let mut rivals = vec![Rival { spec, sizes: Vec::new() }];
+        for candidate in diagnosis.candidates.iter().take(3) {
+            rivals.push(rival(diagnosis, &candidate.spec, joints)?);
+        }
+        let why =
+            "the diagnosis found something unlisted; the listed effects that come nearest are its rivals";
+        return Ok(Standing { rivals, nothing: false, certain, why: why.to_owned() });
+    }
+    let rivals = untested(diagnosis, joints)?;
+    let why = "these data could not have shown these effects at a typical size".to_owned();
+    Ok(Standing { rivals, nothing: true, certain, why })
+}
+
+/// The explanations a user names; one alone is told from nothing.
+pub fn named(words: &[String], diagnosis: Option<&Diagnosis>, joints: &[String]) -> Result<Standing, Error> {
+    let one = |word: &String| match diagnosis {
+        Some(diagnosis) => rival(diagnosis, word, joints),
+        None => Ok(Rival { spec: EffectSpec::parse(word, joints)?, sizes: Vec::new() }),
+    };
+    let rivals = words.iter().map(one).collect::<Result<Vec<_>, Error>>()?;
+    let nothing = rivals.len() == 1;
+    Ok(Standing { rivals, nothing, certain: Vec::new(), why: "you named them".to_owned() })
+}
+
+/// The most probable effect of each kind that could not be tested; events come last, a free pose shows none of them.
+fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Error> {
+    let probability =
+        |name: &str| diagnosis.candidates.iter().find(|c| c.spec == name).map_or(0.0, |c| c.probability);
+    let mut names: Vec<&String> = diagnosis.not_testable.iter().map(|n| &n.effect).collect();
+    names.sort_by(|a, b| probability(b).total_cmp(&probability(a)));
+    let mut rivals: Vec<Rival> = Vec::new();
+    for name in names {
+        let rival = rival(diagnosis, name, joints)?;
+        let event = rival.spec.since.is_some();
+        if !event && rivals.len() < UNTESTED && rivals.iter().all(|r| r.spec.kind != rival.spec.kind) {
+            rivals.push(rival);
+        }
+    }
+    Ok(rivals)
+}
+
+/// An effect at the size that the data ask for, where they ask for one.
+fn rival(diagnosis: &Diagnosis, name: &str, joints: &[String]) -> Result<Rival, Error> {
+    let spec = EffectSpec::parse(name, joints)?;
+    let words = spec.to_string();
+    let seen = diagnosis.candidates.iter().find(|c| c.spec == words);
+    Ok(Rival { spec, sizes: seen.map(|c| sizes(&c.parameters)).unwrap_or_default() })
+}
+
+fn sizes(parameters: &[ParameterReport]) -> Vec<(String, f64)> {
+    let clear = |p: &ParameterReport| p.ci95[0] > 0.0 || p.ci95[1] < 0.0;
+    if !parameters.iter().any(clear) {
+        return Vec::new();
+    }
+    parameters.iter().map(|p| (p.name.clone(), p.value / p.typical)).collect()
+}

@@ -1,0 +1,156 @@
+//! One scenario through the tool: what it says, what its suggestion does to held-out points, and the truth to judge by.
+
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::stages::{frames, suggestion};
+use crate::story;
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_core::Observation;
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, diagnose};
+use armcal_lab::scenario::{Hidden, Scenario, seal};
+use armcal_lab::{LabError, Nominal, Truth};
+use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
+use serde::Serialize;
+use std::path::Path;
+
+/// Groups of cavities held out in turn.
+const FOLDS: usize = 5;
+
+/// What the tool said about a scenario.
+#[derive(Debug, Clone, Serialize)]
+pub struct Answer {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Its names.
+    pub names: Vec<String>,
+    /// The sets behind them, one for each effect found.
+    pub sets: Vec<Vec<String>>,
+    /// Where and over what the unlisted enters.
+    pub unknown: Option<(String, String)>,
+    /// What `armcal add suggested` would add.
+    pub suggested: Vec<String>,
+    /// Mean error on held-out points before and after adding it, and the floor that the declared noise sets [mm].
+    pub before_mm: f64,
+    /// After adding it.
+    pub after_mm: f64,
+    /// What the declared noise alone gives.
+    pub floor_mm: f64,
+    /// Dwells it was based on.
+    pub dwells: usize,
+    /// Time of the diagnosis [s].
+    #[serde(skip)]
+    pub seconds: f64,
+    /// Time of the calibration with its hold-out [s].
+    #[serde(skip)]
+    pub calibration_seconds: f64,
+}
+
+/// The observations handed over as the pipeline would have made them.
+pub fn quick(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
+    let observed = scenario.observe()?;
+    let (model, observations) = (nominal_model(&observed.nominal)?, &observed.observations);
+    let (fit, session) = (FitConfig::default(), Session::of(observations));
+    let holdout = match observations.iter().any(|o| o.cavity().is_some()) {
+        true => HoldoutConfig::CavityFolds { k: FOLDS },
+        false => HoldoutConfig::default(),
+    };
+    let begin = std::time::Instant::now();
+    let calibration = calibrate(&model, observations, &fit, &holdout)?;
+    let calibration_seconds = begin.elapsed().as_secs_f64();
+    let begin = std::time::Instant::now();
+    let config = DiagnosisConfig::default();
+    let diagnosis = diagnose(&model, &calibration, observations, &session, &fit, &config)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let suggested = suggestion::of(&diagnosis, model.chain().joint_names())?;
+    let after = with(&model, &suggested, &session, observations, &fit, &holdout)?;
+    let answer = answer(&diagnosis, &suggested, &calibration, after.as_ref());
+    Ok((Answer { seconds, calibration_seconds, ..answer }, observed.truth.hidden))
+}
+
+/// Recordings on disk and the whole pipeline; the truth lies in another folder and is read last.
+pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
+    let folder = |source| LabError::Folder { path: std::env::temp_dir(), source };
+    let (open, closed) = (tempfile::tempdir().map_err(folder)?, tempfile::tempdir().map_err(folder)?);
+    let place = seal(scenario, open.path(), &closed.path().join("truth.json"))?;
+    let pipeline = Pipeline::load(&place.pipeline)?;
+    let progress = Progress::silent();
+    let settled = story::settle(&pipeline, &progress)?;
+    let begin = std::time::Instant::now();
+    let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let suggested = suggestion::of(&diagnosis, settled.geometry.chain().joint_names())?;
+    let session = frames::session(&pipeline, &settled.observations);
+    let (geometry, observations) = (&settled.geometry, &settled.observations);
+    let after = with(geometry, &suggested, &session, observations, &pipeline.fit, &pipeline.holdout)?;
+    let answer = answer(&diagnosis, &suggested, &settled.calibration, after.as_ref());
+    Ok((Answer { seconds, ..answer }, truth(&place.truth)?.hidden))
+}
+
+fn truth(path: &Path) -> Result<Truth, Error> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
+        what: "truth",
+        path: path.to_owned(),
+        source,
+    })?;
+    serde_json::from_str(&text).map_err(Error::Json)
+}
+
+fn with(
+    model: &Model,
+    effects: &[EffectSpec],
+    session: &Session,
+    observations: &[Observation],
+    fit: &FitConfig,
+    holdout: &HoldoutConfig,
+) -> Result<Option<Calibration>, Error> {
+    if effects.is_empty() {
+        return Ok(None);
+    }
+    let extended = model.with_effects(effects, session)?;
+    Ok(Some(calibrate(&extended, observations, fit, holdout)?))
+}
+
+fn answer(
+    diagnosis: &Diagnosis,
+    suggested: &[EffectSpec],
+    before: &Calibration,
+    after: Option<&Calibration>,
+) -> Answer {
+    let held_out_mm = |c: &Calibration| {
+        let side = if c.holdout.fitted.n > 0 { &c.holdout } else { &c.train };
+        side.fitted.mean_m * 1e3
+    };
+    Answer {
+        verdict: diagnosis.verdict,
+        names: diagnosis.names.clone(),
+        sets: diagnosis.effects.iter().map(|e| e.set.clone()).collect(),
+        unknown: diagnosis.unknown.as_ref().map(|u| (u.channel.clone(), u.driver.clone())),
+        suggested: suggested.iter().map(EffectSpec::to_string).collect(),
+        before_mm: held_out_mm(before),
+        after_mm: held_out_mm(after.unwrap_or(before)),
+        floor_mm: before.noise_floor_m * 1e3,
+        dwells: before.residuals.len(),
+        seconds: 0.0,
+        calibration_seconds: 0.0,
+    }
+}
+
+/// The model that a pipeline would start from.
+pub fn nominal_model(nominal: &Nominal) -> Result<Model, Error> {
+    let frame =
+        |name: &str, pose, knowledge| Frame { name: name.into(), pose, knowledge, free_rotation: false };
+    let (sigma_m, sigma_rad) = (nominal.base_sigma_m, nominal.base_sigma_rad);
+    let boards = nominal
+        .boards
+        .iter()
+        .map(|b| frame(&format!("board.{}", b.recording), b.world_from_board, Knowledge::Given));
+    let base = frame("base", nominal.world_from_base, Knowledge::Measured { sigma_m, sigma_rad });
+    let frames = Frames {
+        base: Frame { free_rotation: true, ..base },
+        tip: frame("tip", nominal.link_from_tip, Knowledge::Given),
+        boards: boards.collect(),
+    };
+    let chain = Chain::from_dh_toml(&nominal.dh_toml, Path::new("arm.toml"))?;
+    Ok(Model::new(chain, frames)?)
+}

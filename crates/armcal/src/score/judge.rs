@@ -1,0 +1,139 @@
+//! An answer against the truth.
+
+use super::case::Answer;
+use armcal_diagnose::Verdict;
+use armcal_lab::scenario::Hidden;
+use serde::Serialize;
+
+/// Dwells by which the moment of an event may be missed: between two dwells, nobody can tell.
+const DWELLS: usize = 2;
+
+/// How right an answer was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Judgement {
+    /// Nothing was hidden and nothing was claimed.
+    RightlySilent,
+    /// Everything hidden was named first.
+    First,
+    /// Everything hidden was in the sets.
+    InSet,
+    /// Something outside the catalogue was called unknown, at its place and driver.
+    Placed,
+    /// Called unknown: with the catalogue holding it, or at another place.
+    Unknown,
+    /// Some of what was hidden was found, nothing wrong was claimed.
+    Partial,
+    /// Something hidden went unseen.
+    Silent,
+    /// A set that does not hold the truth.
+    WrongSet,
+    /// A name that is not the truth's, or a claim where nothing was hidden.
+    Wrong,
+}
+
+/// Judges an answer by what was hidden.
+pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
+    if hidden.is_empty() {
+        return match answer.verdict {
+            Verdict::NothingMissing => Judgement::RightlySilent,
+            _ => Judgement::Wrong,
+        };
+    }
+    let listed: Vec<&Hidden> = hidden.iter().filter(|h| h.effect.is_some()).collect();
+    if answer.verdict == Verdict::NothingMissing {
+        return Judgement::Silent;
+    }
+    if listed.is_empty() {
+        return outside(answer, hidden);
+    }
+    let first =
+        |h: &&Hidden| answer.sets.iter().any(|set| set.first().is_some_and(|name| is(h, name, false)));
+    let within = |h: &&Hidden| answer.sets.iter().flatten().any(|name| is(h, name, true));
+    let explained = |set: &Vec<String>| set.iter().any(|name| listed.iter().any(|h| is(h, name, true)));
+    let wrong = answer.sets.iter().filter(|set| !explained(set)).count();
+    let confident = answer.sets.iter().any(|set| set.len() == 1 && !explained(set));
+    if wrong == 0 && listed.iter().all(first) {
+        return Judgement::First;
+    }
+    if wrong == 0 && listed.iter().all(within) {
+        return Judgement::InSet;
+    }
+    match (answer.sets.is_empty(), confident, wrong) {
+        (true, ..) => Judgement::Unknown,
+        (_, true, _) => Judgement::Wrong,
+        (_, _, 0) => Judgement::Partial,
+        _ => Judgement::WrongSet,
+    }
+}
+
+fn outside(answer: &Answer, hidden: &[Hidden]) -> Judgement {
+    if answer.verdict == Verdict::Identified {
+        return Judgement::Wrong;
+    }
+    if !answer.sets.is_empty() {
+        return Judgement::WrongSet;
+    }
+    let at = |(channel, driver): &(String, String)| {
+        hidden.iter().any(|h| h.channel == *channel && h.driver == *driver)
+    };
+    if answer.unknown.as_ref().is_some_and(at) { Judgement::Placed } else { Judgement::Unknown }
+}
+
+/// Whether a name is the hidden effect's, or one that is the same to the data; `alike` also takes what nearly is.
+fn is(hidden: &Hidden, name: &str, alike: bool) -> bool {
+    let mut right: Vec<&String> = hidden.effect.iter().chain(&hidden.same).collect();
+    if alike {
+        right.extend(&hidden.alike);
+    }
+    right.into_iter().any(|truth| same_effect(truth, name))
+}
+
+/// The same kind at the same target; a moment may be missed by a few dwells, and shapes are not compared.
+fn same_effect(truth: &str, name: &str) -> bool {
+    let (truth, name) = (Parts::of(truth), Parts::of(name));
+    let near = match (truth.dwell, name.dwell) {
+        (Some(a), Some(b)) => a.abs_diff(b) <= DWELLS,
+        (None, None) => true,
+        // A step at the first dwell of a recording and one between recordings are one event.
+        (Some(a), None) | (None, Some(a)) => a <= DWELLS,
+    };
+    truth.place == name.place && truth.recording == name.recording && near
+}
+
+struct Parts<'a> {
+    place: &'a str,
+    recording: Option<&'a str>,
+    dwell: Option<usize>,
+}
+
+impl<'a> Parts<'a> {
+    fn of(spec: &'a str) -> Parts<'a> {
+        let head = spec.split(',').next().unwrap_or(spec);
+        let (place, since) = head.split_once('@').map_or((head, None), |(p, s)| (p, Some(s)));
+        let (recording, dwell) = match since.map(|s| s.split_once('.').ok_or(s)) {
+            Some(Ok((recording, dwell))) => (Some(recording), dwell.parse().ok()),
+            Some(Err(recording)) => (Some(recording), None),
+            None => (None, None),
+        };
+        Parts { place, recording, dwell }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::same_effect;
+
+    #[test]
+    fn names_are_the_same_within_what_nobody_can_tell() {
+        assert!(same_effect("backlash:2", "backlash:2") && !same_effect("backlash:2", "backlash:3"));
+        assert!(same_effect("periodic:1,frequency=30", "periodic:1,frequency=29.5"));
+        assert!(
+            same_effect("tool_shift@1.17", "tool_shift@1.19")
+                && !same_effect("tool_shift@1.17", "tool_shift@1.20")
+        );
+        assert!(
+            same_effect("zero_slip:2@1", "zero_slip:2@1.0") && !same_effect("zero_slip:2@1", "zero_slip:2@2")
+        );
+    }
+}

@@ -1,0 +1,46 @@
+//! How often the diagnosis is right: many scenarios whose truth only this module reads.
+//!
+//! `Scenario -> case (calibrated and diagnosed without the truth) -> judge (with it) -> table`. The quick way hands the
+//! observations over as the pipeline would have made them; the sealed way writes recordings to disk and runs the whole
+//! pipeline on them.
+
+mod case;
+mod judge;
+mod table;
+
+pub use case::{Answer, nominal_model, quick, sealed};
+pub use judge::{Judgement, judge};
+pub use table::{Row, rows, table};
+
+use crate::error::Error;
+use armcal_lab::scenario::Scenario;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// One scenario and what came of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scored {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// What the tool said, knowing nothing.
+    pub answer: Answer,
+    /// How right that was.
+    pub judgement: Judgement,
+}
+
+/// Runs scenarios in parallel, in their order; `done` is told of each one.
+pub fn score(
+    scenarios: &[Scenario],
+    whole_pipeline: bool,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Scored>, Error> {
+    scenarios
+        .par_iter()
+        .map(|scenario| {
+            let (answer, hidden) = if whole_pipeline { sealed(scenario)? } else { quick(scenario)? };
+            let judgement = judge(&answer, &hidden);
+            done();
+            Ok(Scored { scenario: scenario.clone(), answer, judgement })
+        })
+        .collect()
+}

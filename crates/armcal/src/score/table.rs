@@ -1,0 +1,134 @@
+//! The confusion table.
+
+use super::{Judgement, Scored};
+use armcal_core::robust::median;
+use armcal_report::RULED;
+use comfy_table::{Cell, CellAlignment, Table};
+use serde::Serialize;
+
+/// All scenarios of one family and design.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Family.
+    pub family: String,
+    /// Design of motion.
+    pub design: String,
+    /// Scenarios.
+    pub n: usize,
+    /// How many were judged so, in the order of [`JUDGEMENTS`].
+    pub counts: [usize; 9],
+    /// Median error on held-out points over the floor, before.
+    pub before: f64,
+    /// The same with the suggestion added.
+    pub after: f64,
+    /// Share of scenarios within 1.1 of the floor after it.
+    pub at_floor: f64,
+    /// Median share of the excess over the floor that the suggestion removed.
+    pub removed: f64,
+    /// What was said instead, most frequent first.
+    pub instead: Vec<(String, usize)>,
+}
+
+/// The judgements in the order of the columns.
+pub const JUDGEMENTS: [(Judgement, &str); 9] = [
+    (Judgement::RightlySilent, "silent, rightly"),
+    (Judgement::First, "first"),
+    (Judgement::InSet, "in set"),
+    (Judgement::Placed, "unknown, placed"),
+    (Judgement::Unknown, "unknown"),
+    (Judgement::Partial, "partial"),
+    (Judgement::Silent, "silent"),
+    (Judgement::WrongSet, "wrong set"),
+    (Judgement::Wrong, "wrong"),
+];
+
+/// One row a family and design, in the order in which they come.
+pub fn rows(scored: &[Scored]) -> Vec<Row> {
+    let mut keys: Vec<(String, String)> = Vec::new();
+    for s in scored {
+        let key = key(s);
+        if !keys.contains(&key) {
+            keys.push(key);
+        }
+    }
+    keys.into_iter()
+        .map(|k| {
+            let own: Vec<&Scored> = scored.iter().filter(|s| key(s) == k).collect();
+            row(k, &own)
+        })
+        .collect()
+}
+
+fn key(s: &Scored) -> (String, String) {
+    let design = serde_json::to_value(s.scenario.design).unwrap_or_default();
+    (s.scenario.family.clone(), design.as_str().unwrap_or_default().to_owned())
+}
+
+fn row((family, design): (String, String), own: &[&Scored]) -> Row {
+    let ratio =
+        |mm: fn(&Scored) -> f64| median(&own.iter().map(|s| mm(s) / s.answer.floor_mm).collect::<Vec<_>>());
+    let removed: Vec<f64> = own
+        .iter()
+        .filter(|s| s.answer.before_mm > 1.05 * s.answer.floor_mm)
+        .map(|s| {
+            let a = &s.answer;
+            (a.before_mm - a.after_mm) / (a.before_mm - a.floor_mm)
+        })
+        .collect();
+    let at_floor = own.iter().filter(|s| s.answer.after_mm <= 1.1 * s.answer.floor_mm).count();
+    let right = [Judgement::RightlySilent, Judgement::First, Judgement::Placed];
+    let mut instead: Vec<(String, usize)> = Vec::new();
+    for s in own.iter().filter(|s| !right.contains(&s.judgement)) {
+        let a = &s.answer;
+        let words = match (&a.unknown, a.sets.is_empty()) {
+            (Some((channel, driver)), true) => format!("{channel} <- {driver}"),
+            (_, true) => "nothing".to_owned(),
+            _ => a.sets.iter().map(|set| set.join("|")).collect::<Vec<_>>().join(" + "),
+        };
+        match instead.iter_mut().find(|(w, _)| *w == words) {
+            Some((_, n)) => *n += 1,
+            None => instead.push((words, 1)),
+        }
+    }
+    instead.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    Row {
+        family,
+        design,
+        n: own.len(),
+        counts: JUDGEMENTS.map(|(j, _)| own.iter().filter(|s| s.judgement == j).count()),
+        before: ratio(|s| s.answer.before_mm),
+        after: ratio(|s| s.answer.after_mm),
+        at_floor: at_floor as f64 / own.len() as f64,
+        removed: if removed.is_empty() { f64::NAN } else { median(&removed) },
+        instead,
+    }
+}
+
+/// The rows as text.
+pub fn table(rows: &[Row]) -> String {
+    let used: Vec<usize> =
+        (0..JUDGEMENTS.len()).filter(|k| rows.iter().any(|row| row.counts[*k] > 0)).collect();
+    let mut table = Table::new();
+    table.load_style(RULED).force_no_tty();
+    let mut header = vec!["hidden".to_owned(), "design".to_owned(), "n".to_owned()];
+    header.extend(used.iter().map(|k| JUDGEMENTS[*k].1.to_owned()));
+    header.extend(["before/floor", "after/floor", "at floor", "removed", "instead"].map(str::to_owned));
+    table.set_header(header);
+    for row in rows {
+        let number = |text: String| Cell::new(text).set_alignment(CellAlignment::Right);
+        let mut cells = vec![Cell::new(&row.family), Cell::new(&row.design), number(row.n.to_string())];
+        cells.extend(used.iter().map(|k| number(row.counts[*k].to_string())));
+        cells.push(number(format!("{:.2}", row.before)));
+        cells.push(number(format!("{:.2}", row.after)));
+        cells.push(number(format!("{:.0} %", 100.0 * row.at_floor)));
+        cells.push(number(if row.removed.is_nan() {
+            "-".into()
+        } else {
+            format!("{:.0} %", 100.0 * row.removed)
+        }));
+        let instead = row.instead.iter().take(3).map(|(words, n)| format!("{n}x {words}"));
+        cells.push(Cell::new(instead.collect::<Vec<_>>().join("; ")));
+        table.add_row(cells);
+    }
+    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}

@@ -1,0 +1,146 @@
+//! Two results on the same dwells: by how much the error differs, and whether that is more than chance.
+
+use crate::outcome::Calibration;
+use crate::statistics::t95;
+use armcal_core::Observation;
+use std::collections::BTreeMap;
+
+/// The error of one dwell under two models.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// What the dwell shares its luck with: its cavity, or itself when it was tracked.
+    pub group: String,
+    /// Norm of the error before [m].
+    pub before_m: f64,
+    /// Norm of the error after [m].
+    pub after_m: f64,
+}
+
+/// Mean errors before and after, and the interval on their difference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairedDifference {
+    /// Dwells compared.
+    pub n: usize,
+    /// Groups they fall into; the interval treats groups, not dwells, as independent.
+    pub groups: usize,
+    /// Mean error before [m].
+    pub before_m: f64,
+    /// Mean error after [m].
+    pub after_m: f64,
+    /// Mean of after minus before [m]: negative when the error fell.
+    pub difference_m: f64,
+    /// 95 % interval of that mean [m]; infinite with fewer than two groups.
+    pub ci95_m: [f64; 2],
+    /// Dwells whose error fell.
+    pub better: usize,
+    /// Dwells whose error rose.
+    pub worse: usize,
+}
+
+impl PairedDifference {
+    /// Compares pair by pair; `None` without a pair.
+    ///
+    /// The variance of the mean is that of the group sums (cluster-robust, CR1 with Student's t on G - 1 degrees of
+    /// freedom: Cameron and Miller, J. Human Resources 50, 2015, eq. 11-12), because dwells in one cavity share its
+    /// machining error.
+    pub fn of(pairs: &[Pair]) -> Option<PairedDifference> {
+        if pairs.is_empty() {
+            return None;
+        }
+        let n = pairs.len() as f64;
+        let mean = |value: fn(&Pair) -> f64| pairs.iter().map(value).sum::<f64>() / n;
+        let difference_m = mean(|p| p.after_m - p.before_m);
+        let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+        for pair in pairs {
+            *sums.entry(&pair.group).or_default() += pair.after_m - pair.before_m - difference_m;
+        }
+        let groups = sums.len();
+        let half_m = match groups {
+            0 | 1 => f64::INFINITY,
+            _ => {
+                let g = groups as f64;
+                let variance = sums.values().map(|s| s * s).sum::<f64>() * g / (g - 1.0);
+                t95(g - 1.0) * variance.sqrt() / n
+            }
+        };
+        Some(PairedDifference {
+            n: pairs.len(),
+            groups,
+            before_m: mean(|p| p.before_m),
+            after_m: mean(|p| p.after_m),
+            difference_m,
+            ci95_m: [difference_m - half_m, difference_m + half_m],
+            better: pairs.iter().filter(|p| p.after_m < p.before_m).count(),
+            worse: pairs.iter().filter(|p| p.after_m > p.before_m).count(),
+        })
+    }
+
+    /// Compares two calibrations of the same observations on the points that neither fit saw; on all points when
+    /// nothing was held out.
+    pub fn between(
+        observations: &[Observation],
+        before: &Calibration,
+        after: &Calibration,
+    ) -> Option<PairedDifference> {
+        let rows = || observations.iter().zip(before.residuals.iter().zip(&after.residuals));
+        let any_held_out = rows().any(|(_, (b, a))| b.held_out && a.held_out);
+        let pairs: Vec<Pair> = rows()
+            .filter(|(_, (b, a))| !any_held_out || (b.held_out && a.held_out))
+            .map(|(o, (b, a))| Pair {
+                group: o.cavity().map_or_else(|| o.dwell.to_string(), str::to_owned),
+                before_m: b.fitted_m.norm(),
+                after_m: a.fitted_m.norm(),
+            })
+            .collect();
+        PairedDifference::of(&pairs)
+    }
+
+    /// Whether the error fell by more than chance explains.
+    pub fn fell(&self) -> bool {
+        self.ci95_m[1] < 0.0
+    }
+
+    /// Whether the error rose by more than chance explains.
+    pub fn rose(&self) -> bool {
+        self.ci95_m[0] > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(group: &str, before_m: f64, after_m: f64) -> Pair {
+        Pair { group: group.into(), before_m, after_m }
+    }
+
+    #[test]
+    fn independent_pairs_give_the_paired_t_interval() {
+        // scipy.stats.ttest_rel([1, 1.2, .7, .9, 1.1], [2, 2.5, 1.5, 2.2, 1.9]).confidence_interval()
+        let before = [2.0, 2.5, 1.5, 2.2, 1.9];
+        let after = [1.0, 1.2, 0.7, 0.9, 1.1];
+        let pairs: Vec<Pair> =
+            before.iter().zip(after).enumerate().map(|(i, (b, a))| pair(&i.to_string(), *b, a)).collect();
+        let d = PairedDifference::of(&pairs).expect("pairs");
+        assert!((d.difference_m + 1.04).abs() < 1e-12);
+        assert!((d.ci95_m[0] + 1.351_655_190).abs() < 1e-6, "{:?}", d.ci95_m);
+        assert!((d.ci95_m[1] + 0.728_344_810).abs() < 1e-6, "{:?}", d.ci95_m);
+        assert!(d.fell() && !d.rose() && d.better == 5 && d.worse == 0);
+    }
+
+    #[test]
+    fn repeating_every_dwell_of_a_group_does_not_narrow_the_interval() {
+        let once: Vec<Pair> = (0..6).map(|i| pair(&i.to_string(), 1.0, 0.5 + 0.1 * f64::from(i))).collect();
+        let thrice: Vec<Pair> = once.iter().flat_map(|p| vec![p.clone(); 3]).collect();
+        let (one, three) =
+            (PairedDifference::of(&once).expect("pairs"), PairedDifference::of(&thrice).expect("pairs"));
+        assert!((one.ci95_m[0] - three.ci95_m[0]).abs() < 1e-12, "{one:?} {three:?}");
+    }
+
+    #[test]
+    fn one_group_says_nothing_about_chance() {
+        let d = PairedDifference::of(&[pair("a", 1.0, 0.1), pair("a", 1.0, 0.2)]).expect("pairs");
+        assert!(!d.fell() && d.ci95_m[1] == f64::INFINITY);
+        assert!(PairedDifference::of(&[]).is_none());
+    }
+}

@@ -1,0 +1,120 @@
+//! Paired contrasts: two visits to one pose that differ in a driver carry no geometry (notes 4.9).
+
+use crate::config::DiagnosisConfig;
+use crate::crossval::sign_flip;
+use crate::problem::{Candidate, DwellRow, Problem, Toggle};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// Fewest pairs that mean anything.
+const MIN_PAIRS: usize = 5;
+
+/// What pairs of visits to the same pose say about an effect, free of geometry.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contrast {
+    /// What differs within a pair.
+    pub differs: String,
+    /// Number of pairs.
+    pub pairs: usize,
+    /// Size of the effect from the pairs alone, in units of the size from the whole fit.
+    pub ratio: f64,
+    /// Standard error of that ratio.
+    pub ratio_sigma: f64,
+    /// P-value that the pairs show nothing (swapping within pairs).
+    pub p: f64,
+    /// Same sign and within two standard errors of the whole fit.
+    pub agrees: bool,
+}
+
+/// Contrast for a candidate fitted at `theta` (typical sizes); none where the design has no pairs or the effect does
+/// not depend on anything that can be switched. `residual`: whitened, at the fitted base.
+pub(crate) fn contrast(
+    problem: &Problem,
+    residual: &DVector<f64>,
+    candidate: &Candidate,
+    columns: &DMatrix<f64>,
+    theta: &DVector<f64>,
+    theta_sigma: f64,
+    config: &DiagnosisConfig,
+) -> Option<Contrast> {
+    if candidate.toggle == Toggle::None || candidate.toggle == Toggle::Recording {
+        return None;
+    }
+    let pairs = pairs(problem, candidate.toggle, config);
+    if pairs.len() < MIN_PAIRS {
+        return None;
+    }
+    let signature = columns * theta;
+    let mut parts = Vec::new();
+    for (a, b) in &pairs {
+        let (a, b) = (&problem.dwells[*a], &problem.dwells[*b]);
+        let d = |v: &DVector<f64>| v.rows(a.first_row, a.rows) - v.rows(b.first_row, b.rows);
+        let (x, y) = (d(&signature), d(residual));
+        parts.push((x.norm_squared(), x.dot(&y), y.norm_squared()));
+    }
+    let xx: f64 = parts.iter().map(|p| p.0).sum();
+    let xy: f64 = parts.iter().map(|p| p.1).sum();
+    let yy: f64 = parts.iter().map(|p| p.2).sum();
+    // Below this no pair sees the effect.
+    if xx < 1.0 {
+        return None;
+    }
+    let ratio = xy / xx;
+    let rows = (pairs.len() * problem.dwells[0].rows) as f64;
+    let ratio_sigma = ((yy - xy * xy / xx).max(0.0) / (rows - 1.0).max(1.0) / xx).sqrt();
+    let p = sign_flip(&parts.iter().map(|p| p.1).collect::<Vec<_>>(), config);
+    let tolerance = 2.0 * (ratio_sigma.powi(2) + theta_sigma.powi(2)).sqrt();
+    // A tenth of the size is the curvature and gap a linear pair cannot show.
+    let agrees = ratio > 0.0 && (ratio - 1.0).abs() < tolerance.max(0.1);
+    Some(Contrast {
+        differs: candidate.toggle.word().to_string(),
+        pairs: pairs.len(),
+        ratio,
+        ratio_sigma,
+        p,
+        agrees,
+    })
+}
+
+/// Disjoint pairs of dwells of one recording at the same pose that differ in the driver.
+pub(crate) fn pairs(problem: &Problem, toggle: Toggle, config: &DiagnosisConfig) -> Vec<(usize, usize)> {
+    let limit = config.same_pose_deg.to_radians();
+    let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
+    let first = |i: usize| problem.dwells[i].joint_rad.first().copied().unwrap_or(0.0);
+    order.sort_by(|a, b| first(*a).total_cmp(&first(*b)));
+    let mut used = vec![false; order.len()];
+    let mut found = Vec::new();
+    for (k, &i) in order.iter().enumerate() {
+        if used[i] {
+            continue;
+        }
+        let near = order[k + 1..].iter().take_while(|j| first(**j) - first(i) < limit);
+        let partner = near.copied().find(|&j| {
+            let (a, b) = (&problem.dwells[i], &problem.dwells[j]);
+            !used[j] && a.rows == b.rows && same_pose(a, b, limit) && differs(a, b, toggle)
+        });
+        if let Some(j) = partner {
+            (used[i], used[j]) = (true, true);
+            found.push((i, j));
+        }
+    }
+    found
+}
+
+fn same_pose(a: &DwellRow, b: &DwellRow, limit: f64) -> bool {
+    a.id.recording == b.id.recording
+        && a.joint_rad.iter().zip(&b.joint_rad).all(|(a, b)| (a - b).abs() < limit)
+}
+
+fn differs(a: &DwellRow, b: &DwellRow, toggle: Toggle) -> bool {
+    match toggle {
+        Toggle::Direction => a.arrival.iter().zip(&b.arrival).any(|(a, b)| a * b < 0.0),
+        Toggle::Load => (a.load_kg - b.load_kg).abs() > 1e-6,
+        Toggle::Time => true,
+        Toggle::Temperature => match (a.temperature_c, b.temperature_c) {
+            (Some(a), Some(b)) => (a - b).abs() > 0.5,
+            _ => false,
+        },
+        Toggle::Recording | Toggle::None => false,
+    }
+}

@@ -1,0 +1,186 @@
+//! Errors on groups the fit never saw, in closed form (notes 4.4).
+//!
+//! For a group of dwells, `beta_(g) = (X'X + P - X_g'X_g)^-1 (X'e - P b0 - X_g'e_g)` and
+//! `e_(g) = e_g - X_g beta_(g)`: exactly the linearised fit without the group. A geometry column that only the group
+//! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
+
+use crate::config::DiagnosisConfig;
+use crate::places::units;
+use crate::problem::Problem;
+use crate::projection::{cholesky_upper, inner};
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Prior precision of an effect's amplitude while it is fitted: ten typical sizes.
+pub(crate) const EFFECT_PRECISION: f64 = 0.01;
+
+/// Dwells by place, or by neighbourhood in joint space where places are few or do not repeat.
+pub(crate) fn by_place(problem: &Problem) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    units(problem).into_iter().enumerate().for_each(|(i, unit)| groups.entry(unit).or_default().push(i));
+    groups.into_values().collect()
+}
+
+/// Dwells by recording.
+pub(crate) fn by_recording(problem: &Problem) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    problem.dwells.iter().enumerate().for_each(|(i, d)| groups.entry(d.id.recording).or_default().push(i));
+    groups.into_values().collect()
+}
+
+/// Whitened residual rows of every dwell, each predicted without its group; `effect` columns are fitted too.
+pub(crate) fn left_out(
+    problem: &Problem,
+    effect: Option<&DMatrix<f64>>,
+    groups: &[Vec<usize>],
+) -> DVector<f64> {
+    let geometry = problem.geometry.ncols();
+    let extra = effect.map_or(0, |e| e.ncols());
+    let mut x = DMatrix::zeros(problem.rows(), geometry + extra);
+    x.columns_mut(0, geometry).copy_from(&problem.geometry);
+    if let Some(effect) = effect {
+        x.columns_mut(geometry, extra).copy_from(effect);
+    }
+    let precision = |k: usize| if k < geometry { problem.geometry_precision[k] } else { EFFECT_PRECISION };
+    let mut normal = inner(&x, &x);
+    let mut right = x.tr_mul(&problem.residual);
+    for k in 0..x.ncols() {
+        normal[(k, k)] += precision(k);
+        if k < geometry {
+            right[k] -= precision(k) * problem.geometry_offset[k];
+        }
+    }
+    let total: Vec<f64> = x.column_iter().map(|c| c.norm_squared()).collect();
+    let factor = cholesky_upper(normal.clone());
+    let beta_all = solve(&factor, &right);
+    let mut out = &problem.residual - &x * &beta_all;
+    for group in groups {
+        let rows: Vec<usize> = group.iter().flat_map(|i| problem.dwells[*i].range()).collect();
+        let x_g = x.select_rows(&rows);
+        let own: Vec<usize> = (0..geometry)
+            .filter(|k| total[*k] > 0.0 && x_g.column(*k).norm_squared() > (1.0 - 1e-9) * total[*k])
+            .collect();
+        let short = own.is_empty() && 2 * rows.len() < x.ncols();
+        let by_hat = if short { without_by_hat(&factor, &x_g, &out.select_rows(&rows)) } else { None };
+        let left = by_hat.unwrap_or_else(|| {
+            let e_g = problem.residual.select_rows(&rows);
+            let factor = cholesky_upper(&normal - x_g.tr_mul(&x_g));
+            let beta = solve(&factor, &(&right - x_g.tr_mul(&e_g)));
+            let mut left = e_g - &x_g * beta;
+            if !own.is_empty() && own.len() < rows.len() {
+                let q = x_g.select_columns(&own).qr().q();
+                left -= &q * q.tr_mul(&left);
+            }
+            left
+        });
+        rows.iter().zip(left.iter()).for_each(|(r, v)| out[*r] = *v);
+    }
+    out
+}
+
+/// `(I - H_gg)^-1 r_g`, r the residual of the whole fit: the same number by a small matrix.
+fn without_by_hat(
+    factor: &DMatrix<f64>,
+    x_g: &DMatrix<f64>,
+    residual: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let half = factor.tr_solve_upper_triangular(&x_g.transpose())?;
+    let n = residual.len();
+    (DMatrix::identity(n, n) - half.tr_mul(&half)).cholesky().map(|c| c.solve(residual))
+}
+
+fn solve(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let half = upper.tr_solve_upper_triangular(right).unwrap_or_else(|| right.clone());
+    upper.solve_upper_triangular(&half).unwrap_or(half)
+}
+
+/// Position errors [m] of the dwells from whitened rows.
+pub(crate) fn norms_m(problem: &Problem, rows: &DVector<f64>) -> Vec<f64> {
+    problem
+        .dwells
+        .iter()
+        .map(|d| {
+            (d.metres * Vector3::new(rows[d.first_row], rows[d.first_row + 1], rows[d.first_row + 2])).norm()
+        })
+        .collect()
+}
+
+/// What an effect does to errors on groups the fit did not see.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Mean error without it [mm].
+    pub before: f64,
+    /// Mean error with it [mm].
+    pub after: f64,
+    /// 95 % interval of the mean change (after - before) over groups [mm].
+    pub change_ci95: [f64; 2],
+    /// Relative fall of the squared whitened error, 0 to 1; below 0 it grew.
+    pub gain: f64,
+    /// Sign-flip p-value that the fall is chance.
+    pub p: f64,
+    /// Number of groups.
+    pub groups: usize,
+}
+
+/// Compares two sets of left-out whitened rows group by group.
+pub(crate) fn compare(
+    problem: &Problem,
+    before: &DVector<f64>,
+    after: &DVector<f64>,
+    groups: &[Vec<usize>],
+    config: &DiagnosisConfig,
+) -> HeldOut {
+    let power = |rows: &DVector<f64>, group: &[usize]| -> f64 {
+        group
+            .iter()
+            .map(|i| rows.rows(problem.dwells[*i].first_row, problem.dwells[*i].rows).norm_squared())
+            .sum()
+    };
+    let fall: Vec<f64> = groups.iter().map(|g| power(before, g) - power(after, g)).collect();
+    let (from, to) = (norms_m(problem, before), norms_m(problem, after));
+    let n = problem.dwells.len().max(1) as f64;
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / n * 1e3;
+    let changes: Vec<(f64, f64)> = groups
+        .iter()
+        .map(|g| (g.iter().map(|i| to[*i] - from[*i]).sum::<f64>() * 1e3, g.len() as f64))
+        .collect();
+    let total_before = before.norm_squared();
+    HeldOut {
+        before: mean(&from),
+        after: mean(&to),
+        change_ci95: ratio_interval(&changes),
+        gain: if total_before > 0.0 { fall.iter().sum::<f64>() / total_before } else { 0.0 },
+        p: sign_flip(&fall, config),
+        groups: groups.len(),
+    }
+}
+
+/// 95 % interval of `sum of changes / sum of sizes` over independent groups (linearised ratio estimator).
+pub(crate) fn ratio_interval(changes: &[(f64, f64)]) -> [f64; 2] {
+    let size: f64 = changes.iter().map(|c| c.1).sum();
+    let mean = changes.iter().map(|c| c.0).sum::<f64>() / size.max(1.0);
+    let k = changes.len() as f64;
+    if k < 2.0 {
+        return [f64::NEG_INFINITY, f64::INFINITY];
+    }
+    let square: f64 = changes.iter().map(|(d, n)| (d - mean * n).powi(2)).sum();
+    let error = (k / (k - 1.0) * square).sqrt() / size;
+    let t = statrs::distribution::StudentsT::new(0.0, 1.0, k - 1.0)
+        .map_or(crate::special::Z_975, |t| statrs::distribution::ContinuousCDF::inverse_cdf(&t, 0.975));
+    [mean - t * error, mean + t * error]
+}
+
+/// P(mean >= observed) when the sign of every group is chance; at least 999 draws.
+pub(crate) fn sign_flip(values: &[f64], config: &DiagnosisConfig) -> f64 {
+    let observed: f64 = values.iter().sum();
+    let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x5167_f11b);
+    let mut above = 0usize;
+    for _ in 0..config.resamplings {
+        let drawn: f64 = values.iter().map(|v| if rng.random::<bool>() { *v } else { -*v }).sum();
+        above += usize::from(drawn >= observed);
+    }
+    (1.0 + above as f64) / (config.resamplings as f64 + 1.0)
+}

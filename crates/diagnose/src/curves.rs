@@ -1,0 +1,85 @@
+//! Several unlisted error curves: each joint may err over its own angle, all at once.
+//!
+//! One curve after the other joins the base while the best unlisted cell is a joint's own angle and predicts places the
+//! fit did not see. Each is then described among the others, so that none carries another's shape.
+
+use crate::DiagnoseError;
+use crate::cells::Unlisted;
+use crate::config::DiagnosisConfig;
+use crate::crossval::{compare, left_out};
+use crate::diagnosis::UnknownReport;
+use crate::forward::something;
+use crate::judge::independent_groups;
+use crate::problem::Candidate;
+use crate::rooms::{Room, Rooms, as_candidate};
+use crate::unknown::described;
+use crate::weigh::Outside;
+
+/// A joint's own error curve.
+#[derive(Debug)]
+pub(crate) struct Curve {
+    /// Its columns as they joined the base.
+    pub candidate: Candidate,
+    /// What it is among the others.
+    pub report: UnknownReport,
+}
+
+/// Curves that are real with `names` in the model, the strongest first.
+pub(crate) fn error_curves(
+    rooms: &mut Rooms<'_>,
+    names: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Vec<Curve>, DiagnoseError> {
+    let mut shapes: Vec<Candidate> = Vec::new();
+    loop {
+        let base: Vec<Candidate> = names.iter().chain(&shapes).cloned().collect();
+        let room = rooms.with(&base)?;
+        if shapes.len() >= room.problem.joints() || (!shapes.is_empty() && !something(&room, config)) {
+            break;
+        }
+        let Some(best) = leading(&room, &shapes, config) else { break };
+        if !predicts(&room, &best.what, config) {
+            break;
+        }
+        shapes.push(as_candidate(&best.what, &room, config));
+    }
+    let mut curves = Vec::new();
+    for (k, shape) in shapes.iter().enumerate() {
+        let others = shapes.iter().enumerate().filter(|(l, _)| *l != k).map(|(_, s)| s);
+        let base: Vec<Candidate> = names.iter().chain(others).cloned().collect();
+        let room = rooms.with(&base)?;
+        let own = room.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
+        let best = own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
+        if let Some(report) = best.and_then(|u| described(&room.problem, &room.weighed, u, config)) {
+            curves.push(Curve { candidate: shape.clone(), report });
+        }
+    }
+    curves.sort_by(|a, b| b.report.log_evidence.total_cmp(&a.report.log_evidence));
+    Ok(curves)
+}
+
+/// The best cell, if it is a joint over its own angle, or as good as such a one.
+fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) -> Option<&'r Outside> {
+    let weighed = &room.weighed;
+    let limit = weighed.best_cell()?.ln_evidence - config.margin_nats;
+    let own = weighed.unlisted.iter().filter(|u| {
+        u.ln_evidence >= limit.max(config.margin_nats)
+            && own_angle(&u.what)
+            && taken.iter().all(|t| t.spec != u.what.name)
+    });
+    own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+}
+
+/// Whether a joint errs over its own angle.
+fn own_angle(cell: &Unlisted) -> bool {
+    cell.name.strip_prefix("joint").and_then(|rest| rest.split_once(" <- q")).is_some_and(|(a, b)| a == b)
+}
+
+/// Whether it helps on places the fit did not see.
+fn predicts(room: &Room, cell: &Unlisted, config: &DiagnosisConfig) -> bool {
+    let (problem, weighed) = (&room.problem, &room.weighed);
+    let groups = independent_groups(problem, weighed);
+    let effect = weighed.tamed(&cell.columns, problem, config);
+    let (before, after) = (left_out(problem, None, &groups), left_out(problem, Some(&effect), &groups));
+    compare(problem, &before, &after, &groups, config).p <= config.max_p_adjusted
+}

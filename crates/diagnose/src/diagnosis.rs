@@ -1,0 +1,245 @@
+//! What a diagnosis returns. Every type serialises as the summary shows it.
+
+use crate::contrasts::Contrast;
+use crate::crossval::HeldOut;
+use crate::structure::Structure;
+use armcal_core::{DwellId, Unit, Warning};
+use serde::Serialize;
+
+/// The answer in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing is missing that these data can show.
+    NothingMissing,
+    /// Every missing effect has one name.
+    Identified,
+    /// Something listed is missing, and these data leave more than one name for it.
+    Ambiguous,
+    /// Something is missing that no listed effect explains.
+    Unknown,
+}
+
+/// The whole diagnosis.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    /// The answer.
+    pub verdict: Verdict,
+    /// Names, most probable first: one for each effect when identified, all members of the sets when ambiguous.
+    pub names: Vec<String>,
+    /// Probability of the answer (the least probable effect's, when there are several).
+    pub probability: f64,
+    /// Largest family-wise p-value of the effects named; of the best candidate when none is.
+    pub p_adjusted: f64,
+    /// Effects that belong in the model, in the order in which they were found.
+    pub effects: Vec<FoundEffect>,
+    /// Effects that show only once the unlisted shape is in the model too; not named, worth a look.
+    pub tentative: Vec<FoundEffect>,
+    /// The catalogue against the calibrated model as it came, best first.
+    pub candidates: Vec<CandidateReport>,
+    /// What no name explains: the answer when unknown, what is left over otherwise.
+    pub unknown: Option<UnknownReport>,
+    /// All of it, the strongest first: several joints may err over their own angles at once.
+    pub unlisted: Vec<UnknownReport>,
+    /// Pairs whose signatures are the same to these data.
+    pub cannot_tell_apart: Vec<[String; 2]>,
+    /// Effects these data could not have shown at a realistic size.
+    pub not_testable: Vec<NotTestable>,
+    /// What to record next, in words.
+    pub record_next: Vec<String>,
+    /// The noise as found.
+    pub noise: NoiseReport,
+    /// Classical tests of what the base model leaves.
+    pub structure: Structure,
+    /// Probability that nothing is missing, before any effect was added.
+    pub p_nothing: f64,
+    /// Mean position error before and after the effects found, on places the fit did not see [mm].
+    pub holdout_mm: BeforeAfter,
+    /// Dwells set aside as suspect.
+    pub set_aside: Vec<DwellId>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+    /// Each number of the verdict in a plain sentence.
+    pub explanations: Vec<Explanation>,
+}
+
+/// An error before and after [mm].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BeforeAfter {
+    /// Without.
+    pub before: f64,
+    /// With.
+    pub after: f64,
+}
+
+/// One effect that belongs in the model.
+#[derive(Debug, Clone, Serialize)]
+pub struct FoundEffect {
+    /// Its most probable name.
+    pub name: String,
+    /// All names that are the same answer, the most probable first.
+    pub set: Vec<String>,
+    /// Probability of the set.
+    pub probability: f64,
+    /// Family-wise p-value.
+    pub p_adjusted: f64,
+    /// ln Bayes factor against its absence, the other effects in the model.
+    pub log_evidence: f64,
+    /// ln Bayes factor against the best unlisted explanation.
+    pub margin_nats: f64,
+    /// Size.
+    pub parameters: Vec<ParameterReport>,
+    /// Errors on places the fit did not see, with the other effects in the model.
+    pub places: HeldOut,
+    /// Errors on recordings it did not see.
+    pub recordings: Option<HeldOut>,
+    /// Pairs of visits that differ in its driver.
+    pub contrast: Option<Contrast>,
+}
+
+/// One amplitude with its interval, SI.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterReport {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: Unit,
+    /// Value.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// Not larger than this with 95 % confidence.
+    pub upper_limit95: f64,
+    /// Typical size.
+    pub typical: f64,
+}
+
+/// One entry of the catalogue, before it is added.
+#[derive(Debug, Clone, Serialize)]
+pub struct CandidateReport {
+    /// Name as the pipeline writes it.
+    pub spec: String,
+    /// Kind.
+    pub effect: String,
+    /// Target.
+    pub target: String,
+    /// One-step estimates.
+    pub parameters: Vec<ParameterReport>,
+    /// ln Bayes factor against nothing.
+    pub log_evidence: f64,
+    /// Posterior probability.
+    pub probability: f64,
+    /// Bootstrap p-value against the best of all candidates.
+    pub p_adjusted: f64,
+    /// Bootstrap p-value on its own.
+    pub p_raw: f64,
+    /// Mean error on places the fit did not see [mm]; the best few only.
+    pub holdout_mm: Option<BeforeAfter>,
+    /// The same on recordings it did not see.
+    pub recording_mm: Option<BeforeAfter>,
+    /// Share of its signature that the fitted geometry takes over.
+    pub absorbed: f64,
+    /// Smallest size seen with 80 % power, in typical sizes.
+    pub smallest_seen: f64,
+    /// Mechanisms and entries that are the same to these data.
+    pub same_to_the_data: Vec<String>,
+}
+
+/// An effect the data could not have shown.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotTestable {
+    /// Its name.
+    pub effect: String,
+    /// Smallest size that would have been seen, with its unit.
+    pub smallest_seen: String,
+    /// Typical size, with its unit.
+    pub typical: String,
+    /// Why.
+    pub why: String,
+}
+
+/// Structure without a listed cause.
+#[derive(Debug, Clone, Serialize)]
+pub struct UnknownReport {
+    /// Where it enters: `joint1`.
+    pub channel: String,
+    /// What it depends on: `q1`.
+    pub driver: String,
+    /// Probability that something unlisted is there.
+    pub probability: f64,
+    /// ln Bayes factor against nothing.
+    pub log_evidence: f64,
+    /// Unit of the shape.
+    pub unit: Unit,
+    /// The shape along the driver, with its band.
+    pub shape: Vec<ShapePoint>,
+    /// The expression effect to paste.
+    pub expression: Option<Expression>,
+    /// Errors on places the fit did not see, with this shape in the model.
+    pub places: HeldOut,
+    /// Other places and drivers that explain it within 3 nats.
+    pub rivals: Vec<String>,
+}
+
+/// A point of a shape, SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ShapePoint {
+    /// Driver.
+    pub at: f64,
+    /// Shape.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
+/// An expression effect, ready to paste.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Expression {
+    /// Formula over q1.., s1.., tau1.., t, load, temperature and its own parameters.
+    pub formula: String,
+    /// What it is added to: the channel.
+    pub acts_on: String,
+    /// Unit of its value.
+    pub unit: Unit,
+    /// Parameters: name, start value, bound on the size.
+    pub parameters: Vec<ExpressionParameter>,
+    /// ln Bayes factor against nothing.
+    pub log_evidence: f64,
+    /// Share of what the free shape removes that the formula removes too.
+    pub share_of_shape: f64,
+    /// The `[[effects]]` table to paste into the pipeline.
+    pub table: String,
+}
+
+/// One parameter of an expression.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExpressionParameter {
+    /// Name.
+    pub name: String,
+    /// Value found.
+    pub start: f64,
+    /// Typical size: prior standard deviation.
+    pub prior: f64,
+    /// Lower bound.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+}
+
+/// The noise as found.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseReport {
+    /// Residual standard deviation over the declared one, after everything found.
+    pub sigma_ratio: f64,
+    /// Kind of correlation with its probability, most probable first.
+    pub kinds: Vec<(String, f64)>,
+}
+
+/// A number of the verdict, in a plain sentence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Which number: `probability`, `p_adjusted`.
+    pub number: String,
+    /// What it says.
+    pub sentence: String,
+}

@@ -1,0 +1,204 @@
+//! What an effect may depend on, as numbers at the dwells, and smooth functions of it.
+
+use crate::problem::Problem;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeSet;
+
+/// Functions kept for a smooth driver, and for a joint's own angle in detail.
+const FUNCTIONS: usize = 8;
+const FINE_FUNCTIONS: usize = 30;
+/// Bins over which the kernel is decomposed.
+const BINS: usize = 41;
+const FINE_BINS: usize = 121;
+/// Lengths of the two kernels, in half ranges (notes 4.7).
+const LENGTHS: [f64; 2] = [0.2, 0.5];
+/// Lengths for a joint's own angle in detail: gears and encoders err on a short scale.
+const FINE_LENGTHS: [f64; 2] = [0.04, 0.12];
+/// Lengths for time: events are shorter.
+const TIME_LENGTHS: [f64; 2] = [0.08, 0.3];
+
+/// What varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum DriverKind {
+    /// A joint reading or a sum of them.
+    Smooth,
+    /// Time.
+    Time,
+    /// The arrival direction of a joint, alone and times the pose.
+    Direction(usize),
+    /// A joint's own angle in detail; enters at that joint only.
+    Own(usize),
+    /// The recording.
+    Recording,
+    /// Load, alone and times the pose.
+    Load,
+}
+
+/// One driver with the functions of it that a cell uses.
+#[derive(Debug, Clone)]
+pub(crate) struct Driver {
+    /// Name, as a formula writes it: `q1`, `q2+q3`, `s2`, `t`, `recording`, `load`, `tau2`, `temperature`.
+    pub name: String,
+    /// What it is.
+    pub kind: DriverKind,
+    /// Its value at each dwell.
+    pub value: Vec<f64>,
+    /// Functions of it at the dwells: dwells x m.
+    pub basis: DMatrix<f64>,
+    /// Kernel behind a smooth basis, for evaluation between the dwells.
+    pub kernel: Option<Kernel>,
+}
+
+/// All drivers that vary in a problem.
+pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
+    let joints = problem.joints();
+    let column = |f: &dyn Fn(&crate::DwellRow) -> f64| -> Vec<f64> { problem.dwells.iter().map(f).collect() };
+    let mut all = Vec::new();
+    for j in 0..joints {
+        all.extend(smooth(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Smooth));
+    }
+    for j in 0..joints {
+        all.extend(smooth(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Own(j)));
+    }
+    for j in 1..joints.saturating_sub(1) {
+        let value = column(&|d| d.joint_rad[j] + d.joint_rad[j + 1]);
+        all.extend(smooth(format!("q{}+q{}", j + 1, j + 2), value, DriverKind::Smooth));
+    }
+    all.extend(smooth("t".to_string(), column(&|d| d.time_s), DriverKind::Time));
+    let temperatures: Option<Vec<f64>> = problem.dwells.iter().map(|d| d.temperature_c).collect();
+    all.extend(temperatures.and_then(|v| smooth("temperature".to_string(), v, DriverKind::Smooth)));
+    let standard = standardised_joints(problem);
+    let with_pose = |value: &[f64]| {
+        DMatrix::from_fn(value.len(), joints + 1, |i, k| {
+            value[i] * if k == 0 { 1.0 } else { standard[(i, k - 1)] }
+        })
+    };
+    for j in 0..joints {
+        let value = column(&|d| d.arrival[j]);
+        if varies(&value) {
+            let basis = with_pose(&value);
+            let kind = DriverKind::Direction(j);
+            all.push(Driver { name: format!("s{}", j + 1), kind, value, basis, kernel: None });
+        }
+    }
+    let load = column(&|d| d.load_kg);
+    if varies(&load) {
+        let (mean, sd) = moments(&load);
+        let basis = with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>());
+        all.push(Driver {
+            name: "load".to_string(),
+            kind: DriverKind::Load,
+            value: load,
+            basis,
+            kernel: None,
+        });
+    }
+    let recordings: BTreeSet<usize> = problem.dwells.iter().map(|d| d.id.recording).collect();
+    if recordings.len() > 1 {
+        let basis = DMatrix::from_fn(problem.dwells.len(), recordings.len(), |i, k| {
+            f64::from(recordings.iter().nth(k) == Some(&problem.dwells[i].id.recording))
+        });
+        let value = column(&|d| d.id.recording as f64);
+        all.push(Driver {
+            name: "recording".to_string(),
+            kind: DriverKind::Recording,
+            value,
+            basis,
+            kernel: None,
+        });
+    }
+    all
+}
+
+/// Joint readings with mean 0 and standard deviation 1; a joint that does not move stays 0.
+pub(crate) fn standardised_joints(problem: &Problem) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(problem.dwells.len(), problem.joints());
+    for j in 0..problem.joints() {
+        let value: Vec<f64> = problem.dwells.iter().map(|d| d.joint_rad[j]).collect();
+        let (mean, sd) = moments(&value);
+        (0..value.len()).for_each(|i| all[(i, j)] = if sd > 1e-9 { (value[i] - mean) / sd } else { 0.0 });
+    }
+    all
+}
+
+pub(crate) fn varies(value: &[f64]) -> bool {
+    value.iter().any(|v| (v - value[0]).abs() > 1e-9 * (1.0 + value[0].abs()))
+}
+
+pub(crate) fn moments(value: &[f64]) -> (f64, f64) {
+    let n = value.len().max(1) as f64;
+    let mean = value.iter().sum::<f64>() / n;
+    (mean, (value.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
+}
+
+fn smooth(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
+    if !varies(&value) {
+        return None;
+    }
+    let (lengths, bins, functions) = match kind {
+        DriverKind::Time => (TIME_LENGTHS, BINS, FUNCTIONS),
+        DriverKind::Own(_) => (FINE_LENGTHS, FINE_BINS, FINE_FUNCTIONS),
+        _ => (LENGTHS, BINS, FUNCTIONS),
+    };
+    let kernel = Kernel::new(&value, lengths, bins, functions);
+    let mut basis = DMatrix::zeros(value.len(), kernel.len());
+    for (i, v) in value.iter().enumerate() {
+        basis.set_row(i, &kernel.at(*v).transpose());
+    }
+    Some(Driver { name, kind, value, basis, kernel: Some(kernel) })
+}
+
+/// Leading functions of a mixture of two squared-exponential kernels over the range of the data (Nystroem on a grid,
+/// weighted by where the data are), each with the standard deviation the kernel gives it.
+#[derive(Debug, Clone)]
+pub(crate) struct Kernel {
+    centre: f64,
+    half: f64,
+    lengths: [f64; 2],
+    grid: Vec<f64>,
+    /// Grid x functions: kernel row at x times this gives the functions at x.
+    weights: DMatrix<f64>,
+}
+
+impl Kernel {
+    fn new(value: &[f64], lengths: [f64; 2], bins: usize, functions: usize) -> Kernel {
+        let low = value.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let grid: Vec<f64> = (0..bins).map(|k| -1.0 + 2.0 * k as f64 / (bins - 1) as f64).collect();
+        // A floor keeps empty stretches of the range in the basis.
+        let mut share = vec![0.02 / bins as f64; bins];
+        for v in value {
+            let bin = (((v - centre) / half + 1.0) * 0.5 * (bins - 1) as f64).round();
+            share[(bin.max(0.0) as usize).min(bins - 1)] += 0.98 / value.len() as f64;
+        }
+        let root = DVector::from_iterator(bins, share.iter().map(|w| w.sqrt()));
+        let k = DMatrix::from_fn(bins, bins, |i, j| root[i] * root[j] * kernel(grid[i] - grid[j], lengths));
+        let eigen = k.symmetric_eigen();
+        let mut order: Vec<usize> = (0..bins).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let keep: Vec<usize> =
+            order.into_iter().take(functions).filter(|k| eigen.eigenvalues[*k] > 1e-6).collect();
+        let weights = DMatrix::from_fn(bins, keep.len(), |i, c| {
+            root[i] * eigen.eigenvectors[(i, keep[c])] / eigen.eigenvalues[keep[c]].sqrt()
+        });
+        Kernel { centre, half, lengths, grid, weights }
+    }
+
+    /// Number of functions.
+    pub fn len(&self) -> usize {
+        self.weights.ncols()
+    }
+
+    /// The functions at a value of the driver.
+    pub fn at(&self, value: f64) -> DVector<f64> {
+        let x = (value - self.centre) / self.half;
+        let row =
+            DVector::from_iterator(self.grid.len(), self.grid.iter().map(|g| kernel(x - g, self.lengths)));
+        self.weights.tr_mul(&row)
+    }
+}
+
+fn kernel(distance: f64, lengths: [f64; 2]) -> f64 {
+    lengths.iter().map(|l| 0.5 * (-0.5 * (distance / l).powi(2)).exp()).sum()
+}

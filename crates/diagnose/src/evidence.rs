@@ -1,0 +1,212 @@
+//! Evidence of a term with a physical amplitude prior, noise variance marginalised (notes 4.6, formula 8).
+
+use crate::config::DiagnosisConfig;
+use crate::noise::{Noise, Whitener};
+use crate::problem::{Columns, Problem};
+use crate::projection::{Gram, Projection, cholesky_upper, eigen, inner};
+use crate::special::ln_sum_exp;
+use nalgebra::{DMatrix, DVector};
+
+/// Above this many columns a factor for each amplitude is cheaper than one eigen-decomposition.
+const EIGEN_COLUMNS: usize = 12;
+/// Columns stacked into one matrix product.
+const BLOCK_COLUMNS: usize = 1200;
+
+/// The problem under one alternative of the noise.
+#[derive(Debug, Clone)]
+pub(crate) struct Metric {
+    /// Which noise.
+    pub noise: Noise,
+    /// Whitening by it.
+    pub whitener: Whitener,
+    /// Geometry projected out.
+    pub projection: Projection,
+    /// ln of prior x evidence, relative to the white alternative.
+    pub ln_weight: f64,
+}
+
+impl Metric {
+    /// Products of columns (declared-noise whitened) under this noise.
+    pub fn gram(&self, columns: &DMatrix<f64>) -> Gram {
+        let mut white = columns.clone();
+        self.whitener.apply(&mut white);
+        self.projection.gram(&white)
+    }
+
+    /// Columns whitened by this noise, not projected.
+    pub fn whitened(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        self.whitener.apply(&mut columns);
+        columns
+    }
+
+    /// ln Bayes factor of a term against its absence under this noise.
+    pub fn ln_bayes(&self, gram: &Gram, config: &DiagnosisConfig) -> f64 {
+        ln_bayes(gram, self.projection.rss, self.projection.dof(), config)
+    }
+}
+
+/// All alternatives of the noise for a problem whose residual noise is `scale` times the declared one.
+pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Vec<Metric> {
+    let kinds = Noise::available(problem);
+    let others = kinds.len().saturating_sub(1).max(1) as f64;
+    let mut metrics = Vec::new();
+    for noise in kinds {
+        let (prior, amplitudes) = match noise {
+            Noise::White => (1.0 - config.prior_correlated_noise, vec![0.0]),
+            _ => (config.prior_correlated_noise / others, config.amplitude_scales.clone()),
+        };
+        for b in &amplitudes {
+            let whitener = Whitener::new(noise, *b, problem);
+            let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
+            let mut geometry = problem.geometry.clone();
+            whitener.apply(&mut residual);
+            whitener.apply(&mut geometry);
+            let projection = Projection::new(
+                &(geometry / scale),
+                &problem.geometry_precision,
+                &problem.geometry_offset,
+                residual.column(0) / scale,
+            );
+            let ln_prior = (prior / amplitudes.len() as f64).ln();
+            metrics.push(Metric { noise, whitener, projection, ln_weight: ln_prior });
+        }
+    }
+    let white = metrics[0].projection.clone();
+    for m in &mut metrics {
+        let p = &m.projection;
+        m.ln_weight += -0.5 * (m.whitener.ln_det + p.ln_det - white.ln_det)
+            - 0.5
+                * (config.noise_prior_dof + white.dof())
+                * ((config.noise_prior_dof + p.rss) / (config.noise_prior_dof + white.rss)).ln();
+    }
+    metrics
+}
+
+/// `ln mean_a B(a)` with
+/// `ln B(a) = -1/2 ln det(I + a^2 A) - (nu0 + nu)/2 ln[(nu0 + RSS(a)) / (nu0 + RSS)]`,
+/// `RSS(a) = RSS - g'(A + a^-2 I)^-1 g`.
+pub(crate) fn ln_bayes(gram: &Gram, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
+    let scales = &config.amplitude_scales;
+    let parts = penalised(gram, scales)
+        .into_iter()
+        .map(|(ln_det, drop)| one_amplitude(ln_det, drop, rss, dof, config));
+    ln_sum_exp(parts) - (scales.len() as f64).ln()
+}
+
+/// The amplitude with the largest evidence.
+pub(crate) fn best_amplitude(gram: &Gram, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
+    let scales = &config.amplitude_scales;
+    let parts = penalised(gram, scales)
+        .into_iter()
+        .map(|(ln_det, drop)| one_amplitude(ln_det, drop, rss, dof, config));
+    let best = parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
+    scales.get(best).copied().unwrap_or(1.0)
+}
+
+fn one_amplitude(ln_det: f64, drop: f64, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
+    let nu0 = config.noise_prior_dof;
+    let left = (rss - drop).max(1e-9 * rss);
+    -0.5 * ln_det - 0.5 * (nu0 + dof) * ((nu0 + left) / (nu0 + rss)).ln()
+}
+
+/// For each amplitude: `ln det(I + a^2 A)` and `g'(A + a^-2 I)^-1 g`.
+fn penalised(gram: &Gram, scales: &[f64]) -> Vec<(f64, f64)> {
+    let m = gram.g.len();
+    if m <= EIGEN_COLUMNS {
+        let (w, v) = eigen(&gram.a, gram.raw.max());
+        let t = v.tr_mul(&gram.g);
+        let at = |a: &f64| {
+            let ln_det = w.iter().map(|w| (1.0 + a * a * w).ln()).sum();
+            let drop = w
+                .iter()
+                .zip(t.iter())
+                .filter(|(w, _)| **w > 0.0)
+                .map(|(w, t)| t * t / (w + 1.0 / (a * a)))
+                .sum();
+            (ln_det, drop)
+        };
+        return scales.iter().map(at).collect();
+    }
+    let at = |a: &f64| {
+        let mut m = gram.a.clone();
+        (0..m.nrows()).for_each(|k| m[(k, k)] += 1.0 / (a * a));
+        let factor = cholesky_upper(m);
+        let ln_det: f64 = 2.0 * factor.diagonal().iter().map(|v| v.ln()).sum::<f64>()
+            + factor.nrows() as f64 * (a * a).ln();
+        let solved = factor.tr_solve_upper_triangular(&gram.g).unwrap_or_else(|| gram.g.clone());
+        (ln_det, solved.norm_squared())
+    };
+    scales.iter().map(at).collect()
+}
+
+/// ln (weight x Bayes factor) of every term in every metric: one matrix product a metric. `result[term][metric]`.
+pub(crate) fn over_noise(
+    terms: &[&Columns],
+    problem: &Problem,
+    scale: f64,
+    metrics: &[Metric],
+    config: &DiagnosisConfig,
+) -> Vec<Vec<f64>> {
+    let mut result = vec![Vec::with_capacity(metrics.len()); terms.len()];
+    let mut from = 0;
+    while from < terms.len() {
+        // Blocks keep the memory of a thousand scan points bounded.
+        let (mut to, mut width) = (from, 0);
+        while to < terms.len() && (to == from || width + terms[to].len() <= BLOCK_COLUMNS) {
+            width += terms[to].len();
+            to += 1;
+        }
+        let mut stacked = DMatrix::zeros(problem.rows(), width);
+        let mut at = 0;
+        for t in &terms[from..to] {
+            stacked.columns_mut(at, t.len()).copy_from(&t.dense(&problem.dwells, 1.0 / scale));
+            at += t.len();
+        }
+        for m in metrics {
+            let white = m.whitened(stacked.clone());
+            let spent = inner(&m.projection.q, &white);
+            let score = white.tr_mul(&m.projection.residual) - spent.tr_mul(&m.projection.z);
+            let mut at = 0;
+            for (k, t) in terms[from..to].iter().enumerate() {
+                let (x, c) = (white.columns(at, t.len()), spent.columns(at, t.len()));
+                let full = x.transpose() * x;
+                let gram = Gram {
+                    raw: full.diagonal(),
+                    a: full - c.transpose() * c,
+                    g: score.rows(at, t.len()).into_owned(),
+                };
+                result[from + k].push(m.ln_weight + m.ln_bayes(&gram, config));
+                at += t.len();
+            }
+        }
+        from = to;
+    }
+    result
+}
+
+/// The metrics worth their time for many terms: white, and of every other kind the amplitude that explains nothing or
+/// a catalogue entry best. `parts[term][metric]`, the null among the terms.
+pub(crate) fn leading(metrics: &[Metric], parts: &[Vec<f64>]) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::new();
+    let value = |m: usize| parts.iter().map(|ln| ln[m]).fold(f64::NEG_INFINITY, f64::max);
+    for m in 0..metrics.len() {
+        match kept.iter().position(|k| metrics[*k].noise == metrics[m].noise) {
+            Some(k) if value(m) > value(kept[k]) => kept[k] = m,
+            Some(_) => {}
+            None => kept.push(m),
+        }
+    }
+    kept
+}
+
+/// Posterior mean and covariance (noise variance 1) of a term's coefficients at amplitude `a`.
+pub(crate) fn coefficients(gram: &Gram, a: f64) -> (DVector<f64>, DMatrix<f64>) {
+    let mut m = gram.a.clone();
+    (0..m.nrows()).for_each(|k| m[(k, k)] += 1.0 / (a * a));
+    let factor = cholesky_upper(m);
+    let n = factor.nrows();
+    let inverse =
+        factor.solve_upper_triangular(&DMatrix::identity(n, n)).unwrap_or_else(|| DMatrix::identity(n, n));
+    let covariance = &inverse * inverse.transpose();
+    (&covariance * &gram.g, covariance)
+}

@@ -1,0 +1,143 @@
+//! Each number of the verdict in one plain sentence.
+
+use crate::config::DiagnosisConfig;
+use crate::diagnosis::{Diagnosis, Explanation, FoundEffect, Verdict};
+
+/// Sentences for the verdict and its numbers.
+pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &DiagnosisConfig) -> Vec<Explanation> {
+    let mut all = Vec::new();
+    let mut say = |number: &str, sentence: String| {
+        all.push(Explanation { number: number.to_string(), sentence });
+    };
+    say("verdict", verdict(d, may_be_shape));
+    say(
+        "p_nothing",
+        format!(
+            "with the prior odds {} : {} : {} for nothing, a listed effect and an unlisted one, the data leave a \
+             probability of {:.2e} that nothing is missing; below {} something is",
+            config.prior_nothing,
+            config.prior_catalogue,
+            config.prior_unknown,
+            d.p_nothing,
+            config.max_probability_nothing
+        ),
+    );
+    say(
+        "p_adjusted",
+        format!(
+            "if there were only noise that repeats as it does here, the best of all {} candidates would look this \
+             convincing in a share {:.3} of data sets ({} sign-flipped copies; a name needs at most {})",
+            d.candidates.len(),
+            d.p_adjusted,
+            config.resamplings,
+            config.max_p_adjusted
+        ),
+    );
+    for e in &d.effects {
+        effect(e, config, &mut say);
+    }
+    say(
+        "holdout_mm",
+        format!(
+            "on places the fit did not see the mean error is {:.3} mm without and {:.3} mm with what was found",
+            d.holdout_mm.before, d.holdout_mm.after
+        ),
+    );
+    if let Some(u) = &d.unknown {
+        say(
+            "unknown",
+            format!(
+                "what no listed effect explains looks most like something that enters at {} and depends on {}; with that \
+                 shape in the model the mean error on places the fit did not see goes from {:.3} to {:.3} mm",
+                u.channel, u.driver, u.places.before, u.places.after
+            ),
+        );
+    }
+    if !d.tentative.is_empty() {
+        let names: Vec<String> = d.tentative.iter().map(|t| t.set.join(" or ")).collect();
+        say(
+            "tentative",
+            format!(
+                "with that unlisted shape in the model too, the data also ask for {}",
+                names.join("; and ")
+            ),
+        );
+    }
+    say(
+        "sigma_ratio",
+        format!("what remains scatters {:.2} times as much as the declared noise", d.noise.sigma_ratio),
+    );
+    if !d.not_testable.is_empty() {
+        say(
+            "not_testable",
+            format!(
+                "{} effects of realistic size would have gone unseen in these data; they are not excluded",
+                d.not_testable.len()
+            ),
+        );
+    }
+    all
+}
+
+fn verdict(d: &Diagnosis, may_be_shape: bool) -> String {
+    let rest = match (&d.unknown, may_be_shape) {
+        (Some(_), true) => "; what is left over is so small that it may be the shape of the first effect",
+        (Some(_), false) => "; something without a listed name is left over",
+        (None, _) => "",
+    };
+    match d.verdict {
+        Verdict::NothingMissing => {
+            "nothing is missing that these data can show; the list of what they cannot show belongs to this answer".to_string()
+        }
+        Verdict::Identified => {
+            let confirmed = d.effects.iter().all(|e| e.contrast.as_ref().is_some_and(|c| c.agrees));
+            let word = if confirmed { "the cause is" } else { "the data are consistent with" };
+            format!("{word} {}, and with no other name{rest}", d.names.join(" and "))
+        }
+        Verdict::Ambiguous => {
+            let sets: Vec<String> = d.effects.iter().map(|e| e.set.join(" or ")).collect();
+            format!("an effect is missing, and these data leave more than one name: {}{rest}", sets.join("; and: "))
+        }
+        Verdict::Unknown => "something is missing, and no listed effect explains it better than an unlisted one".to_string(),
+    }
+}
+
+fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, String)) {
+    say(
+        &format!("{}.probability", e.name),
+        format!(
+            "given the other effects found, {} is the cause with probability {:.3}",
+            e.set.join(" or "),
+            e.probability
+        ),
+    );
+    say(
+        &format!("{}.log_evidence", e.name),
+        format!(
+            "the data are e^{:.1} times as probable with {} as without, and e^{:.1} times as probable as with the best \
+             unlisted explanation (a name needs e^{})",
+            e.log_evidence, e.name, e.margin_nats, config.margin_nats
+        ),
+    );
+    say(
+        &format!("{}.places", e.name),
+        format!(
+            "{} changes the mean error on places the fit did not see from {:.3} to {:.3} mm (95 % interval of the change \
+             {:.3} to {:.3} mm)",
+            e.name, e.places.before, e.places.after, e.places.change_ci95[0], e.places.change_ci95[1]
+        ),
+    );
+    if let Some(c) = &e.contrast {
+        say(
+            &format!("{}.contrast", e.name),
+            format!(
+                "{} pairs of visits to one pose that differ in {} show {:.2} +- {:.2} times the fitted size{}",
+                c.pairs,
+                c.differs,
+                c.ratio,
+                c.ratio_sigma,
+                if c.agrees { ", which confirms it free of geometry" } else { ", which does not confirm it" }
+            ),
+        );
+    }
+}

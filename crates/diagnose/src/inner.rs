@@ -1,0 +1,248 @@
+//! The inner room as one call: from a problem (and a way to refit it) to the whole diagnosis.
+
+use crate::config::DiagnosisConfig;
+use crate::confusion::likeness;
+use crate::crossval::{by_place, left_out, norms_m};
+use crate::diagnosis::{BeforeAfter, Diagnosis, FoundEffect, NoiseReport, UnknownReport, Verdict};
+use crate::explain::explanations;
+use crate::forward::{Accepted, Search, search};
+use crate::judge::{Grade, Judged};
+use crate::outliers::{flipped, suspects};
+use crate::problem::{Problem, Toggle};
+use crate::refit::Refit;
+use crate::reports::{candidate_reports, not_testable, parameters};
+use crate::rooms::{Room, Rooms};
+use crate::structure::structure;
+use crate::unknown::unknown_report;
+use crate::weigh::{Weighed, weigh};
+use crate::{DiagnoseError, next};
+use armcal_core::{Severity, Stage, Warning};
+use nalgebra::DMatrix;
+
+/// Rounds of setting outliers aside.
+const ROUNDS: usize = 3;
+/// Noise this far above the declaration is worth a word.
+const SIGMA_RATIO: f64 = 1.4;
+
+/// Diagnoses a problem. `refit` gives it, and gives it again with effects in the base model.
+pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
+    config.check()?;
+    let whole = refit.problem(&[])?;
+    whole.check()?;
+    let mut keep = vec![true; whole.dwells.len()];
+    let mut problem = whole.clone();
+    let mut weighed = weigh(&problem, config);
+    for _ in 0..ROUNDS {
+        let found = suspects(&problem, &weighed, config);
+        if found.is_empty() {
+            break;
+        }
+        let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
+        found.iter().for_each(|i| keep[kept[*i]] = false);
+        problem = whole.without(&keep);
+        weighed = weigh(&problem, config);
+    }
+    let mut rooms = Rooms::new(refit, keep.clone(), (problem, weighed), config);
+    let first = rooms.with(&[])?;
+    let top = first.weighed.ranking().first().map(|top| first.judge(*top, config));
+    let search = search(&mut rooms, config)?;
+    Ok(assemble(&whole, &keep, &first, top.as_ref(), &search, config))
+}
+
+fn assemble(
+    whole: &Problem,
+    keep: &[bool],
+    first: &Room,
+    top: Option<&Judged>,
+    search: &Search,
+    config: &DiagnosisConfig,
+) -> Diagnosis {
+    let (problem, weighed) = (&first.problem, &first.weighed);
+    let effects: Vec<FoundEffect> = search.accepted.iter().map(found_effect).collect();
+    let single = search.accepted.iter().all(|a| a.judged.set.len() == 1 && a.grade == Grade::Named);
+    let verdict = match (effects.is_empty(), search.left_over) {
+        (true, false) => Verdict::NothingMissing,
+        (true, true) => Verdict::Unknown,
+        (false, _) if single => Verdict::Identified,
+        (false, _) => Verdict::Ambiguous,
+    };
+    let rest = &search.rest;
+    let mut unlisted: Vec<UnknownReport> = search.curves.iter().map(|c| c.report.clone()).collect();
+    if search.left_over && unlisted.is_empty() {
+        unlisted.extend(unknown_report(&rest.problem, &rest.weighed, config));
+    }
+    let names = match verdict {
+        Verdict::Ambiguous => effects.iter().flat_map(|e| e.set.iter().cloned()).collect(),
+        _ => effects.iter().map(|e| e.name.clone()).collect(),
+    };
+    let probability = match verdict {
+        Verdict::NothingMissing => weighed.p_nothing,
+        Verdict::Unknown => 1.0 - weighed.p_nothing,
+        _ => effects.iter().map(|e| e.probability).fold(1.0, f64::min),
+    };
+    let p_adjusted = match effects.is_empty() {
+        true => top.map_or(1.0, |t| t.own().p_adjusted),
+        false => effects.iter().map(|e| e.p_adjusted).fold(0.0, f64::max),
+    };
+    let mean = |p: &Problem| {
+        let norms = norms_m(p, &left_out(p, None, &by_place(p)));
+        norms.iter().sum::<f64>() / norms.len().max(1) as f64 * 1e3
+    };
+    let noise = noise(&search.with_curves.weighed);
+    let set_aside: Vec<_> = whole.dwells.iter().zip(keep).filter(|(_, k)| !**k).map(|(d, _)| d.id).collect();
+    let mut diagnosis = Diagnosis {
+        verdict,
+        names,
+        probability,
+        p_adjusted,
+        candidates: candidate_reports(problem, weighed, top, &by_place(problem), config),
+        cannot_tell_apart: confused(problem, weighed, config),
+        not_testable: not_testable(problem, weighed),
+        record_next: Vec::new(),
+        structure: structure(problem, config),
+        p_nothing: weighed.p_nothing,
+        holdout_mm: BeforeAfter { before: mean(problem), after: mean(&search.with_curves.problem) },
+        warnings: warnings(&noise, &set_aside, search, config),
+        noise,
+        set_aside,
+        tentative: search.tentative.iter().map(found_effect).collect(),
+        effects,
+        unknown: unlisted.first().cloned(),
+        unlisted,
+        explanations: Vec::new(),
+    };
+    diagnosis.record_next = next::record_next(problem, &diagnosis);
+    diagnosis.explanations = explanations(&diagnosis, search.may_be_shape, config);
+    diagnosis
+}
+
+fn found_effect(a: &Accepted) -> FoundEffect {
+    let (judged, weighed) = (&a.judged, &a.room.weighed);
+    let name = |k: &usize| weighed.entries[*k].candidate.spec.clone();
+    let mut set: Vec<String> = judged.set.iter().map(name).collect();
+    if a.grade == Grade::OrUnlisted {
+        set.push("something not listed".to_string());
+    }
+    let probability = judged.set.iter().map(|k| weighed.entries[*k].probability).sum::<f64>();
+    FoundEffect {
+        name: name(&judged.entry),
+        set,
+        probability: probability.min(1.0),
+        p_adjusted: judged.own().p_adjusted,
+        log_evidence: weighed.entries[judged.entry].ln_evidence,
+        margin_nats: weighed.entries[judged.entry].ln_evidence
+            - weighed.best_cell().map_or(0.0, |u| u.ln_evidence),
+        parameters: parameters(judged, weighed),
+        places: judged.places,
+        recordings: judged.recordings,
+        contrast: judged.contrast.clone(),
+    }
+}
+
+/// Pairs of testable entries whose signatures, at typical size, are the same.
+fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<[String; 2]> {
+    let projection = &weighed.metrics[0].projection;
+    let columns: Vec<DMatrix<f64>> =
+        weighed.entries.iter().map(|e| weighed.dense(&e.candidate.columns, problem)).collect();
+    let mut pairs = Vec::new();
+    for k in 0..columns.len() {
+        if weighed.entries[k].candidate.is_group()
+            || projection.gram(&columns[k]).a.trace() < config.min_delta
+        {
+            continue;
+        }
+        let theta = nalgebra::DVector::from_element(columns[k].ncols(), 1.0);
+        for l in k + 1..columns.len() {
+            if columns[k].ncols() == columns[l].ncols()
+                && likeness(projection, &columns[k], &theta, &columns[l], 1.0).cosine > config.merge_cosine
+            {
+                let name = |i: usize| weighed.entries[i].candidate.spec.clone();
+                pairs.push([name(k), name(l)]);
+            }
+        }
+    }
+    pairs
+}
+
+fn noise(rest: &Weighed) -> NoiseReport {
+    let p = &rest.metrics[0].projection;
+    let mut kinds: Vec<(String, f64)> =
+        rest.p_noise.iter().map(|(n, p)| (n.word().to_string(), *p)).collect();
+    kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    NoiseReport { sigma_ratio: (p.rss / p.dof()).sqrt() * rest.scale, kinds }
+}
+
+fn warnings(
+    noise: &NoiseReport,
+    set_aside: &[armcal_core::DwellId],
+    search: &Search,
+    config: &DiagnosisConfig,
+) -> Vec<Warning> {
+    let mut all = Vec::new();
+    let mut add = |severity, code, subject: String, message: String| {
+        all.push(Warning::new(severity, Stage::Calibrate, code, subject, message));
+    };
+    for id in set_aside {
+        add(
+            Severity::Notice,
+            "suspect-dwell",
+            id.to_string(),
+            format!(
+                "its error is as rare as {} sigma under every explanation at hand, so it was set aside; look for a \
+                 swapped marker, a bump or a wrong cavity",
+                config.outlier_sigma
+            ),
+        );
+    }
+    if noise.sigma_ratio > SIGMA_RATIO {
+        add(
+            Severity::Notice,
+            "scatter-larger",
+            "noise".to_string(),
+            format!(
+                "what remains scatters {:.1} times as much as declared; check the declared noise, the seats and the sensor",
+                noise.sigma_ratio
+            ),
+        );
+    }
+    if let Some((kind, p)) = noise.kinds.first()
+        && *p > 0.95
+        && *kind != crate::noise::Noise::White.word()
+    {
+        let message =
+            format!("the scatter is {kind} (probability {p:.2}); more repeats of the same kind average less");
+        add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
+    }
+    for a in &search.accepted {
+        if a.candidate.toggle == Toggle::Direction {
+            let wrong = direction_suspects(a);
+            if !wrong.is_empty() {
+                let list = wrong.iter().take(5).map(|d| d.to_string()).collect::<Vec<_>>().join(", ");
+                let message = format!(
+                    "{} dwells fit {} far better with the arrival direction turned over ({list}); check how the \
+                     directions were found",
+                    wrong.len(),
+                    a.candidate.spec
+                );
+                add(Severity::Notice, "suspect-direction", a.candidate.spec.clone(), message);
+            }
+        }
+    }
+    all
+}
+
+/// Dwells whose arrival direction an accepted direction effect contradicts.
+fn direction_suspects(a: &Accepted) -> Vec<armcal_core::DwellId> {
+    let (problem, weighed) = (&a.room.problem, &a.room.weighed);
+    let projection = &weighed.metrics[0].projection;
+    let columns = a.candidate.columns.dense(&problem.dwells, 1.0 / weighed.scale);
+    let fitted = crate::confusion::one_step(&projection.gram(&columns), 1.0);
+    let signature = &columns * &fitted.estimate;
+    let with = projection.project(&columns) * &fitted.estimate;
+    // Residual without the effect, the geometry as fitted with it.
+    let residual = projection.projected_residual() - with + &signature;
+    flipped(problem, residual.as_slice(), signature.as_slice())
+        .into_iter()
+        .map(|i| problem.dwells[i].id)
+        .collect()
+}

@@ -1,0 +1,264 @@
+//! May the best candidate be named? Gate, left-out errors, rivals, pairs (notes 9).
+
+use crate::bootstrap::{Direction, Significance, wild_cluster};
+use crate::config::DiagnosisConfig;
+use crate::confusion::{likeness, one_step};
+use crate::contrasts::{Contrast, contrast};
+use crate::crossval::{HeldOut, by_place, by_recording, compare, left_out};
+use crate::evidence::{Metric, best_amplitude, coefficients};
+use crate::noise::Noise;
+use crate::places::units;
+use crate::problem::{Problem, Scan};
+use crate::projection::Gram;
+use crate::weigh::Weighed;
+use nalgebra::DVector;
+use std::collections::BTreeMap;
+
+/// Dwells of a block when the noise has memory.
+const BLOCK: usize = 8;
+/// Fewest clusters for clustering by place alone.
+const MIN_CLUSTERS: usize = 12;
+/// Most points of one scan in the bootstrap.
+const GATE_POINTS: usize = 80;
+/// Probability not worth a look.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// Everything that speaks for or against naming one entry.
+#[derive(Debug, Clone)]
+pub(crate) struct Judged {
+    /// Index of the entry.
+    pub entry: usize,
+    /// Significance of every entry.
+    pub significance: Vec<Significance>,
+    /// Errors on places the fit did not see.
+    pub places: HeldOut,
+    /// Errors on recordings it did not see, where there are several.
+    pub recordings: Option<HeldOut>,
+    /// Indices of entries that are the same answer, the entry itself first.
+    pub set: Vec<usize>,
+    /// ln B(entry) - ln B(best unlisted with a channel) - what is asked for; at least 0 to be named.
+    pub margin: f64,
+    /// Probability of unlisted explanations whose fitted shape is another one.
+    pub p_other: f64,
+    /// Paired contrast, where the design has one.
+    pub contrast: Option<Contrast>,
+    /// Products of its columns under white noise.
+    pub gram: Gram,
+}
+
+impl Judged {
+    /// Its own significance.
+    pub fn own(&self) -> Significance {
+        self.significance[self.entry]
+    }
+
+    /// Real and not chance: evidence, gate and left-out errors agree. Says nothing about its name.
+    pub fn real(&self, weighed: &Weighed, config: &DiagnosisConfig) -> bool {
+        let evidence = weighed.entries[self.entry].ln_evidence >= config.margin_nats;
+        evidence && self.own().p_adjusted <= config.max_p_adjusted && self.places.p < config.max_p_heldout
+    }
+
+    /// Worth trying in the model. The gate waits until the other effects are there too: what they leave behind looks
+    /// like correlated noise, under which no single effect stands out.
+    pub fn promising(&self, weighed: &Weighed, config: &DiagnosisConfig) -> bool {
+        let evidence = weighed.entries[self.entry].ln_evidence >= config.margin_nats;
+        evidence && self.own().p_raw <= config.max_p_heldout && self.places.p < config.max_p_heldout
+    }
+
+    /// How far the name can be trusted.
+    pub fn grade(&self, weighed: &Weighed, config: &DiagnosisConfig) -> Grade {
+        let something = 1.0 - weighed.p_nothing;
+        let listed = self.p_other < 0.5 * something && self.set.len() <= config.max_set;
+        if !self.real(weighed, config) || !listed {
+            return Grade::Refused;
+        }
+        let beats = self.margin >= 0.0 && self.p_other <= (1.0 - config.credible_mass) * something;
+        let disagrees = self.contrast.as_ref().is_some_and(|c| !c.agrees);
+        if beats && !disagrees { Grade::Named } else { Grade::OrUnlisted }
+    }
+}
+
+/// How far a name can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Grade {
+    /// Not real, or something unlisted is more probable.
+    Refused,
+    /// Real and listed, but something unlisted cannot be excluded or pairs of visits disagree.
+    OrUnlisted,
+    /// The set holds the name.
+    Named,
+}
+
+/// Judges an entry of a weighed problem.
+pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: &DiagnosisConfig) -> Judged {
+    let white = &weighed.metrics[0];
+    let projection = &white.projection;
+    let dense = |k: usize| weighed.dense(&weighed.entries[k].candidate.columns, problem);
+    let directions = gate_directions(problem, weighed);
+    let rows = |g: Vec<usize>| g.into_iter().flat_map(|i| problem.dwells[i].range()).collect();
+    let clusters: Vec<Vec<usize>> = clusters(problem, weighed).into_iter().map(rows).collect();
+    let all = wild_cluster(projection, &directions, &clusters, config);
+    let significance = all[..weighed.entries.len()].to_vec();
+
+    let own = dense(entry);
+    let gram = projection.gram(&own);
+    let fitted = one_step(&gram, 1.0);
+    let residual_variance = (projection.rss - significance[entry].score).max(0.0) / projection.dof();
+    let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
+    let set = answer(problem, weighed, metric, entry, config);
+
+    let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
+    let groups = independent_groups(problem, weighed);
+    let places = compare(
+        problem,
+        &left_out(problem, None, &groups),
+        &left_out(problem, Some(&effect), &groups),
+        &groups,
+        config,
+    );
+    let groups = by_recording(problem);
+    let recordings = (groups.len() > 1).then(|| {
+        let (before, after) = (left_out(problem, None, &groups), left_out(problem, Some(&effect), &groups));
+        compare(problem, &before, &after, &groups, config)
+    });
+
+    let theta = &fitted.estimate;
+    let theta_sigma = (residual_variance * (theta.transpose() * &fitted.covariance * theta)[(0, 0)]).sqrt()
+        / theta.norm_squared().max(1e-300);
+    let base = &problem.residual - &problem.geometry * base_fit(problem);
+    let contrast =
+        contrast(problem, &base, &weighed.entries[entry].candidate, &effect, theta, theta_sigma, config);
+    let (margin, p_other) = against_unlisted(problem, weighed, metric, entry, config);
+    Judged { entry, gram, significance, places, recordings, set, margin, p_other, contrast }
+}
+
+/// Projected directions of all entries, then of every other point of the scans: the maximum runs over all of them.
+fn gate_directions(problem: &Problem, weighed: &Weighed) -> Vec<Direction> {
+    let projection = &weighed.metrics[0].projection;
+    let entries = weighed.entries.iter().map(|e| &e.candidate.columns);
+    // Neighbours on a grid are nearly the same column: a thinned grid has nearly the same maximum.
+    let thin = |s: &Scan| s.points.len().div_ceil(GATE_POINTS).max(1);
+    let points = problem.scans.iter().flat_map(|s| s.points.iter().step_by(thin(s))).map(|c| &c.columns);
+    entries.chain(points).map(|c| Direction::new(projection, &weighed.dense(c, problem))).collect()
+}
+
+/// Dwells that keep their sign together: as the noise seems to repeat.
+pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    let unit = units(problem);
+    for (i, d) in problem.dwells.iter().enumerate() {
+        let key = if weighed.probable(Noise::Memory) {
+            (d.id.recording, d.id.dwell / BLOCK)
+        } else if weighed.probable(Noise::Place) {
+            (0, unit[i])
+        } else if weighed.probable(Noise::Visit) {
+            (d.id.recording, unit[i])
+        } else {
+            (d.id.recording, i)
+        };
+        groups.entry(key).or_default().push(i);
+    }
+    if groups.len() < MIN_CLUSTERS {
+        (0..problem.dwells.len()).map(|i| vec![i]).collect()
+    } else {
+        groups.into_values().collect()
+    }
+}
+
+/// Groups to leave out: places, or stretches of time when the noise has memory (neighbours in time would tell).
+pub(crate) fn independent_groups(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
+    if weighed.probable(Noise::Memory) { clusters(problem, weighed) } else { by_place(problem) }
+}
+
+/// The set that is one answer: the credible set, and everything whose signature is the same.
+fn answer(
+    problem: &Problem,
+    weighed: &Weighed,
+    metric: &Metric,
+    entry: usize,
+    config: &DiagnosisConfig,
+) -> Vec<usize> {
+    let projection = &metric.projection;
+    let white = |k: usize| metric.whitened(weighed.dense(&weighed.entries[k].candidate.columns, problem));
+    let own = white(entry);
+    let fitted = one_step(&projection.gram(&own), 1.0);
+    let score = fitted.estimate.dot(&projection.gram(&own).g);
+    let variance = ((projection.rss - score) / projection.dof()).max(1e-12);
+
+    let total = 1.0 - weighed.p_nothing;
+    let mut order: Vec<(f64, Option<usize>)> =
+        weighed.entries.iter().enumerate().map(|(k, e)| (e.probability, Some(k))).collect();
+    order.push((weighed.p_unlisted, None));
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (mut sum, mut set) = (0.0, vec![entry]);
+    for (p, who) in order {
+        if sum >= config.credible_mass * total {
+            break;
+        }
+        sum += p;
+        set.extend(who.filter(|k| *k != entry));
+    }
+    for k in (0..weighed.entries.len()).filter(|k| *k != entry) {
+        let like = likeness(projection, &own, &fitted.estimate, &white(k), variance);
+        let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
+        let same =
+            like.cosine > config.merge_cosine || (like.delta < config.min_delta && gap < config.margin_nats);
+        if same && !set.contains(&k) {
+            set.push(k);
+        }
+    }
+    // A group holds its members: it is no other name for one of them.
+    set.retain(|k| *k == entry || !weighed.entries[*k].candidate.is_group());
+    set[1..].sort_by(|a, b| weighed.entries[*b].ln_evidence.total_cmp(&weighed.entries[*a].ln_evidence));
+    set
+}
+
+/// Margin of an entry over the cells, and the probability of unlisted explanations of another shape.
+///
+/// A cell holds many shapes, often the entry's own. Where its fitted shape is the entry's, it is no rival but the same
+/// answer without the name, and needs no margin over it; the entry must still be more probable.
+fn against_unlisted(
+    problem: &Problem,
+    weighed: &Weighed,
+    metric: &Metric,
+    entry: usize,
+    config: &DiagnosisConfig,
+) -> (f64, f64) {
+    let projection = &metric.projection;
+    let own_ln = weighed.entries[entry].ln_evidence;
+    let own = metric.whitened(weighed.dense(&weighed.entries[entry].candidate.columns, problem));
+    let (mut margin, mut p_other) = (f64::INFINITY, 0.0);
+    for u in &weighed.unlisted {
+        let close = u.ln_evidence > own_ln - config.margin_nats;
+        if !close && u.probability < NEGLIGIBLE {
+            margin = margin.min(own_ln - u.ln_evidence - config.margin_nats);
+            continue;
+        }
+        let columns = metric.whitened(weighed.dense(&u.what.columns, problem));
+        let gram = projection.gram(&columns);
+        let a = best_amplitude(&gram, projection.rss, projection.dof(), config);
+        let (theta, _) = coefficients(&gram, a);
+        let same = likeness(projection, &columns, &theta, &own, 1.0).cosine > config.merge_cosine;
+        let asked = if same { 0.0 } else { config.margin_nats };
+        if u.what.channel.is_some() {
+            margin = margin.min(own_ln - u.ln_evidence - asked);
+        }
+        if !same {
+            p_other += u.probability;
+        }
+    }
+    (margin, p_other)
+}
+
+/// Penalised linear fit of the geometry alone.
+pub(crate) fn base_fit(problem: &Problem) -> DVector<f64> {
+    let mut normal = crate::projection::inner(&problem.geometry, &problem.geometry);
+    let mut right = problem.geometry.tr_mul(&problem.residual);
+    for k in 0..right.len() {
+        normal[(k, k)] += problem.geometry_precision[k];
+        right[k] -= problem.geometry_precision[k] * problem.geometry_offset[k];
+    }
+    let factor = crate::projection::cholesky_upper(normal);
+    let half = factor.tr_solve_upper_triangular(&right).unwrap_or_else(|| right.clone());
+    factor.solve_upper_triangular(&half).unwrap_or(half)
+}

@@ -1,0 +1,75 @@
+//! Which physical effect is missing from a calibrated model, with error control and honest refusals.
+//!
+//! Two rooms. The inner one ([`diagnose_problem`], [`plan()`]) is linear algebra on a [`Problem`]: whitened residuals, what
+//! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`], [`plan_dwells`])
+//! builds problems from a model and refits it. In the order of the story:
+//!
+//! * `projection`: what the geometry could do is taken out, prior rows and all;
+//! * `noise`, `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete under every kind of noise;
+//! * `outliers`: accidents are set aside and reported;
+//! * `forward`, `pairs`: one effect after the other while they are promising;
+//! * `judge`: each among the others: `bootstrap` is the gate, `crossval` asks places the fit did not see, `contrasts`
+//!   pairs of visits, `confusion` what is the same to these data;
+//! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
+//! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
+//! * `inner`, `reports`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
+//!
+//! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
+
+mod bootstrap;
+mod cells;
+mod compare;
+mod config;
+mod confusion;
+mod contrasts;
+mod crossval;
+mod curves;
+mod diagnosis;
+mod drivers;
+mod error;
+mod evidence;
+mod explain;
+mod expression;
+mod forward;
+mod group;
+mod inner;
+mod judge;
+mod next;
+mod noise;
+mod observed;
+mod outliers;
+mod pairs;
+mod places;
+mod plan;
+mod planned;
+mod problem;
+mod projection;
+mod refit;
+mod reports;
+mod rooms;
+mod special;
+mod structure;
+mod unknown;
+mod weigh;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
+mod tests;
+
+#[cfg(test)]
+extern crate self as armcal_diagnose;
+
+pub use compare::compare_heldout;
+pub use config::DiagnosisConfig;
+pub use contrasts::Contrast;
+pub use crossval::HeldOut;
+pub use diagnosis::*;
+pub use error::DiagnoseError;
+pub use inner::diagnose_problem;
+pub use observed::diagnose;
+pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
+pub use planned::plan_dwells;
+pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan, Toggle};
+pub use refit::{LinearRefit, Refit};
+pub use structure::{LackOfFit, Structure};

@@ -1,0 +1,201 @@
+//! Noise that is not independent from dwell to dwell: seats, visits, short memory (notes 4.7 iii).
+//!
+//! Each alternative is a covariance `(I + b^2 K) / (1 + b^2)` of the whitened rows. `K` is so structured that its inverse root
+//! costs no more than walking the rows: groups that share one displacement (rank 3 a group), or a first-order
+//! autoregression, whitened by its Kalman filter. Rows it touches are rescaled by `1 + b^2`: the correlated part is a
+//! share of the declared noise, not an addition to it, so that pure correlated noise does not contradict the declared
+//! size. Everything else is then done in the whitened rows, so that a
+//! noise-like term and a physical one compete on equal ground (formula 9, evaluated exactly for all terms).
+
+use crate::problem::{DwellRow, Problem};
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// Correlation length of the short memory [dwells].
+const MEMORY_DWELLS: f64 = 3.0;
+
+/// What the noise may be besides independent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Noise {
+    /// Independent from dwell to dwell.
+    White,
+    /// The same offset at every visit to a place, in the board's axes.
+    Place,
+    /// The same offset at every visit to a place within one recording.
+    Visit,
+    /// Memory over a few dwells.
+    Memory,
+}
+
+impl Noise {
+    /// In words.
+    pub fn word(self) -> &'static str {
+        match self {
+            Noise::White => "independent from dwell to dwell",
+            Noise::Place => "repeated at every visit to a place (seat or cavity errors)",
+            Noise::Visit => "repeated at visits to a place within a recording",
+            Noise::Memory => "correlated over a few dwells in a row",
+        }
+    }
+
+    /// Those the data can tell from white noise: groups need repeats.
+    pub fn available(problem: &Problem) -> Vec<Noise> {
+        let repeats = |by_recording: bool| {
+            let mut count: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+            for d in &problem.dwells {
+                if let Some(place) = &d.place {
+                    *count.entry((if by_recording { d.id.recording } else { 0 }, place)).or_insert(0) += 1;
+                }
+            }
+            count.values().filter(|n| **n > 1).count() >= 4
+        };
+        let mut found = vec![Noise::White];
+        if repeats(false) {
+            found.push(Noise::Place);
+        }
+        let recordings: std::collections::BTreeSet<usize> =
+            problem.dwells.iter().map(|d| d.id.recording).collect();
+        if recordings.len() > 1 && repeats(true) {
+            found.push(Noise::Visit);
+        }
+        if problem.dwells.len() >= 20 {
+            found.push(Noise::Memory);
+        }
+        found
+    }
+}
+
+/// `((I + b^2 K) / (1 + b^2))^(-1/2)`, ready to be applied to columns.
+#[derive(Debug, Clone)]
+pub(crate) struct Whitener {
+    kind: Kind,
+    /// ln of the determinant of that covariance.
+    pub ln_det: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    White,
+    /// `sqrt(1 + b^2)`, and for each group its rows and P with `x - P P'x` whitened.
+    Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
+    /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
+    Memory(Vec<Filter>),
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Filter {
+    row: usize,
+    /// Axis of the state.
+    axis: usize,
+    decay: f64,
+    gain: f64,
+    weight: f64,
+}
+
+impl Whitener {
+    /// For noise of a kind with standard deviation `b` (declared noise = 1).
+    pub fn new(noise: Noise, b: f64, problem: &Problem) -> Whitener {
+        match noise {
+            Noise::White => Whitener { kind: Kind::White, ln_det: 0.0 },
+            Noise::Place => groups(problem, b, false),
+            Noise::Visit => groups(problem, b, true),
+            Noise::Memory => memory(problem, b),
+        }
+    }
+
+    /// Whitens columns in place.
+    pub fn apply(&self, columns: &mut DMatrix<f64>) {
+        match &self.kind {
+            Kind::White => {}
+            Kind::Groups(unit, groups) => {
+                for (rows, p) in groups {
+                    for mut column in columns.column_iter_mut() {
+                        let x = DVector::from_iterator(rows.len(), rows.iter().map(|r| column[*r]));
+                        let change = p * p.tr_mul(&x);
+                        rows.iter()
+                            .zip(change.iter())
+                            .for_each(|(r, c)| column[*r] = unit * (column[*r] - c));
+                    }
+                }
+            }
+            Kind::Memory(filters) => {
+                let axes = filters.iter().map(|f| f.axis + 1).max().unwrap_or(0);
+                let mut state = vec![0.0; axes];
+                for mut column in columns.column_iter_mut() {
+                    state.fill(0.0);
+                    for f in filters {
+                        let predicted = f.decay * state[f.axis];
+                        let innovation = column[f.row] - predicted;
+                        state[f.axis] = predicted + f.gain * innovation;
+                        column[f.row] = innovation * f.weight;
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
+    let mut members: BTreeMap<(usize, &str), Vec<&DwellRow>> = BTreeMap::new();
+    for dwell in &problem.dwells {
+        if let Some(place) = &dwell.place {
+            let recording = if by_recording { dwell.id.recording } else { 0 };
+            members.entry((recording, place)).or_default().push(dwell);
+        }
+    }
+    let mut ln_det = 0.0;
+    let mut groups = Vec::new();
+    for dwells in members.values() {
+        let rows: Vec<usize> = dwells.iter().flat_map(|d| d.range()).collect();
+        let mut z = DMatrix::zeros(rows.len(), 3);
+        let mut at = 0;
+        for d in dwells {
+            z.rows_mut(at, d.rows).copy_from(&d.seat);
+            at += d.rows;
+        }
+        let eigen = z.tr_mul(&z).symmetric_eigen();
+        let mut p = &z * &eigen.eigenvectors;
+        for (k, w) in eigen.eigenvalues.iter().enumerate() {
+            let grown = 1.0 + b * b * w.max(0.0);
+            ln_det += grown.ln();
+            let share = if *w > 1e-12 { ((1.0 - 1.0 / grown.sqrt()) / w).sqrt() } else { 0.0 };
+            p.column_mut(k).scale_mut(share);
+        }
+        ln_det -= rows.len() as f64 * (1.0 + b * b).ln();
+        groups.push((rows, p));
+    }
+    Whitener { kind: Kind::Groups((1.0 + b * b).sqrt(), groups), ln_det }
+}
+
+/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2, seen with unit noise; reset at each recording.
+fn memory(problem: &Problem, b: f64) -> Whitener {
+    let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
+    order.sort_by_key(|i| problem.dwells[*i].id);
+    let axes = problem.dwells.iter().map(|d| d.rows).max().unwrap_or(0);
+    let mut variance = vec![b * b; axes];
+    let (mut filters, mut ln_det) = (Vec::new(), 0.0);
+    let mut last: Option<&DwellRow> = None;
+    for i in order {
+        let dwell = &problem.dwells[i];
+        let gap = match last {
+            Some(l) if l.id.recording == dwell.id.recording => dwell.id.dwell.abs_diff(l.id.dwell) as f64,
+            _ => f64::INFINITY,
+        };
+        let decay = (-gap / MEMORY_DWELLS).exp();
+        for (axis, state) in variance.iter_mut().enumerate() {
+            let predicted = decay * decay * *state + (1.0 - decay * decay) * b * b;
+            *state = predicted;
+            if axis < dwell.rows {
+                let innovation = predicted + 1.0;
+                let share = innovation / (1.0 + b * b);
+                let gain = predicted / innovation;
+                *state = predicted * (1.0 - gain);
+                ln_det += share.ln();
+                let row = dwell.first_row + axis;
+                filters.push(Filter { row, axis, decay, gain, weight: 1.0 / share.sqrt() });
+            }
+        }
+        last = Some(dwell);
+    }
+    Whitener { kind: Kind::Memory(filters), ln_det }
+}

@@ -1,0 +1,349 @@
+//! What a diagnosis sees: whitened residuals and the columns that could explain them. No model knowledge.
+
+use crate::DiagnoseError;
+use crate::crossval::EFFECT_PRECISION;
+use armcal_core::{DwellId, Unit};
+use nalgebra::{DMatrix, DVector, Matrix3};
+use std::sync::Arc;
+
+/// A linearised calibration with everything that might be missing from it.
+///
+/// Rows are whitened by the declared noise: residual rows are N(0, 1) if the model is complete and the declaration
+/// right. Residual = measured - predicted; all columns are d predicted / d something.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// One entry for each dwell, in the order of the rows.
+    pub dwells: Vec<DwellRow>,
+    /// Whitened residual at the fitted base model.
+    pub residual: DVector<f64>,
+    /// Whitened d predicted / d free parameter, each column scaled to the parameter's prior standard deviation.
+    pub geometry: DMatrix<f64>,
+    /// (fitted - prior mean) / prior standard deviation of each free parameter.
+    pub geometry_offset: DVector<f64>,
+    /// Prior precision of each free parameter in those units: 1 with a prior, less for a ridge.
+    pub geometry_precision: DVector<f64>,
+    /// The catalogue, one entry for each effect and target.
+    pub candidates: Vec<Candidate>,
+    /// Families with a shape to be searched (frequency, step time, time constant).
+    pub scans: Vec<Scan>,
+    /// Ways an unlisted effect may enter.
+    pub channels: Vec<Channel>,
+}
+
+/// What is known about one dwell.
+#[derive(Debug, Clone)]
+pub struct DwellRow {
+    /// Its name.
+    pub id: DwellId,
+    /// First row in the stacked residual.
+    pub first_row: usize,
+    /// Rows: 3, or 6 with orientation.
+    pub rows: usize,
+    /// Time since the start of the session [s].
+    pub time_s: f64,
+    /// Joint readings [rad].
+    pub joint_rad: Vec<f64>,
+    /// Arrival direction of each joint: +1, -1, or 0 when unknown.
+    pub arrival: Vec<f64>,
+    /// Gravity torque of each joint [N m]; empty when unknown.
+    pub torque_nm: Vec<f64>,
+    /// Load at the tip [kg].
+    pub load_kg: f64,
+    /// Temperature [degC].
+    pub temperature_c: Option<f64>,
+    /// Place that is visited again: the cavity, where there is one.
+    pub place: Option<String>,
+    /// Whitened rows of a displacement by one declared standard deviation along each axis of the board, or of the
+    /// world where there is no board: `rows` x 3.
+    pub seat: DMatrix<f64>,
+    /// Position residual [m] = this x the first three whitened rows.
+    pub metres: Matrix3<f64>,
+}
+
+impl DwellRow {
+    /// The rows it owns.
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.first_row..self.first_row + self.rows
+    }
+
+    /// Declared standard deviation of a coordinate [m].
+    pub fn sigma_m(&self) -> f64 {
+        (self.metres.norm_squared() / 3.0).sqrt()
+    }
+}
+
+/// What kind of driver can be switched while the pose stays the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Toggle {
+    /// Arrival direction.
+    Direction,
+    /// Load.
+    Load,
+    /// Time.
+    Time,
+    /// Recording.
+    Recording,
+    /// Temperature.
+    Temperature,
+    /// None: it depends on the pose alone.
+    None,
+}
+
+impl Toggle {
+    /// In words.
+    pub fn word(self) -> &'static str {
+        match self {
+            Toggle::Direction => "arrival direction",
+            Toggle::Load => "load",
+            Toggle::Time => "time",
+            Toggle::Recording => "recording",
+            Toggle::Temperature => "temperature",
+            Toggle::None => "pose",
+        }
+    }
+}
+
+/// One amplitude of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Amplitude {
+    /// Its name: `width`.
+    pub name: String,
+    /// Unit of the SI value.
+    pub unit: Unit,
+    /// Typical size, SI: one unit of the column.
+    pub typical: f64,
+}
+
+/// One effect on one target.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Its name as the pipeline writes it: `backlash:1`.
+    pub spec: String,
+    /// Kind: `backlash`.
+    pub family: String,
+    /// Target in words: `joint1`.
+    pub target: String,
+    /// Other mechanisms that are the same to the data.
+    pub aliases: Vec<String>,
+    /// Amplitudes, one for each column.
+    pub amplitudes: Vec<Amplitude>,
+    /// What drives it.
+    pub toggle: Toggle,
+    /// Columns at typical size.
+    pub columns: Columns,
+}
+
+impl Candidate {
+    /// Joins the specs of effects that are tried together.
+    pub(crate) const AND: &'static str = "+";
+
+    /// The specs of the effects it stands for: its own, or those of a group.
+    pub(crate) fn members(&self) -> impl Iterator<Item = &str> {
+        self.spec.split(Candidate::AND)
+    }
+
+    /// Whether it stands for several effects together.
+    pub(crate) fn is_group(&self) -> bool {
+        self.spec.contains(Candidate::AND)
+    }
+}
+
+/// A family whose shape must be searched.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// Family and target without the shape: `periodic:1`.
+    pub name: String,
+    /// One candidate for each point of the grid.
+    pub points: Vec<Candidate>,
+}
+
+/// A way an effect may enter: `joint1`, `link 2 length`, `shift`.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    /// Its name.
+    pub name: String,
+    /// Unit of its columns' amplitude.
+    pub unit: Unit,
+    /// Name of each axis: what an expression effect acts on.
+    pub axes: Vec<String>,
+    /// Whitened rows of one SI unit along each of its axes.
+    pub columns: Arc<DMatrix<f64>>,
+}
+
+/// Whitened columns, stored or as a product that is cheap to keep.
+#[derive(Debug, Clone)]
+pub enum Columns {
+    /// As they are: rows x m.
+    Dense(Arc<DMatrix<f64>>),
+    /// Every column of `base` (rows x c) times every column of `basis` (dwells x m) at the row's dwell.
+    Product {
+        /// Unit columns.
+        base: Arc<DMatrix<f64>>,
+        /// Values at the dwells.
+        basis: Arc<DMatrix<f64>>,
+    },
+}
+
+impl Columns {
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        match self {
+            Columns::Dense(m) => m.ncols(),
+            Columns::Product { base, basis } => base.ncols() * basis.ncols(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The columns, times `factor`. Products are ordered channel axis by channel axis.
+    pub fn dense(&self, dwells: &[DwellRow], factor: f64) -> DMatrix<f64> {
+        match self {
+            Columns::Dense(m) => m.as_ref() * factor,
+            Columns::Product { base, basis } => {
+                let mut out = DMatrix::zeros(base.nrows(), self.len());
+                for c in 0..base.ncols() {
+                    for b in 0..basis.ncols() {
+                        let mut column = out.column_mut(c * basis.ncols() + b);
+                        for (i, dwell) in dwells.iter().enumerate() {
+                            let value = basis[(i, b)] * factor;
+                            if value != 0.0 {
+                                for row in dwell.range() {
+                                    column[row] = base[(row, c)] * value;
+                                }
+                            }
+                        }
+                    }
+                }
+                out
+            }
+        }
+    }
+
+    fn rows(&self) -> usize {
+        match self {
+            Columns::Dense(m) => m.nrows(),
+            Columns::Product { base, .. } => base.nrows(),
+        }
+    }
+}
+
+impl Problem {
+    /// Number of residual rows.
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.dwells.first().map_or(0, |d| d.joint_rad.len())
+    }
+
+    /// Checks that sizes agree and everything is finite.
+    pub fn check(&self) -> Result<(), DiagnoseError> {
+        let rows = self.rows();
+        let same = |what: &str, found: usize, expected: usize| {
+            if found == expected {
+                return Ok(());
+            }
+            Err(DiagnoseError::Shape { what: what.to_string(), found, expected })
+        };
+        same("the dwells", self.dwells.iter().map(|d| d.rows).sum(), rows)?;
+        same("the geometry", self.geometry.nrows(), rows)?;
+        same("the geometry's offsets", self.geometry_offset.len(), self.geometry.ncols())?;
+        same("the geometry's precisions", self.geometry_precision.len(), self.geometry.ncols())?;
+        for c in self.candidates.iter().chain(self.scans.iter().flat_map(|s| &s.points)) {
+            same(&format!("candidate {}", c.spec), c.columns.rows(), rows)?;
+            same(&format!("the amplitudes of {}", c.spec), c.amplitudes.len(), c.columns.len())?;
+        }
+        for c in &self.channels {
+            same(&format!("channel {}", c.name), c.columns.nrows(), rows)?;
+        }
+        let mut at = 0;
+        for d in &self.dwells {
+            same("the first row of a dwell", d.first_row, at)?;
+            same("the joints of a dwell", d.joint_rad.len(), self.joints())?;
+            same("the arrival signs of a dwell", d.arrival.len(), self.joints())?;
+            same("the seat rows of a dwell", d.seat.nrows(), d.rows)?;
+            at += d.rows;
+        }
+        let finite = self.residual.iter().chain(self.geometry.iter()).chain(self.geometry_offset.iter());
+        if !finite.into_iter().all(|v| v.is_finite()) {
+            return Err(DiagnoseError::NotFinite { what: "the residual or the geometry".to_string() });
+        }
+        for c in &self.candidates {
+            if !c.columns.dense(&self.dwells, 1.0).iter().all(|v| v.is_finite()) {
+                return Err(DiagnoseError::NotFinite { what: format!("candidate {}", c.spec) });
+            }
+        }
+        if rows < 6 || self.dwells.len() < 4 {
+            return Err(DiagnoseError::TooFew { rows, parameters: self.geometry.ncols() });
+        }
+        Ok(())
+    }
+
+    /// The same problem with more columns among the geometry, each with the prior of an effect's amplitude.
+    pub(crate) fn with_columns(mut self, columns: &DMatrix<f64>) -> Problem {
+        let (from, m) = (self.geometry.ncols(), columns.ncols());
+        let mut geometry = DMatrix::zeros(self.rows(), from + m);
+        geometry.columns_mut(0, from).copy_from(&self.geometry);
+        geometry.columns_mut(from, m).copy_from(columns);
+        self.geometry = geometry;
+        let extended = |v: &DVector<f64>, value: f64| {
+            DVector::from_iterator(from + m, v.iter().copied().chain(std::iter::repeat_n(value, m)))
+        };
+        self.geometry_offset = extended(&self.geometry_offset, 0.0);
+        self.geometry_precision = extended(&self.geometry_precision, EFFECT_PRECISION);
+        self
+    }
+
+    /// The same problem without some dwells (`keep[i]` false).
+    pub fn without(&self, keep: &[bool]) -> Problem {
+        let kept: Vec<usize> = (0..self.dwells.len()).filter(|i| keep[*i]).collect();
+        let rows: Vec<usize> = kept.iter().flat_map(|i| self.dwells[*i].range()).collect();
+        let mut at = 0;
+        let dwells = kept.iter().map(|i| {
+            let dwell = DwellRow { first_row: at, ..self.dwells[*i].clone() };
+            at += dwell.rows;
+            dwell
+        });
+        // Products share their base: the cut of a base is kept for all that use it.
+        let mut cut: Vec<[Arc<DMatrix<f64>>; 2]> = Vec::new();
+        let mut shared = |m: &Arc<DMatrix<f64>>, rows: &[usize]| {
+            if let Some([_, done]) = cut.iter().find(|c| Arc::ptr_eq(&c[0], m)) {
+                return done.clone();
+            }
+            let done = Arc::new(m.select_rows(rows));
+            cut.push([m.clone(), done.clone()]);
+            done
+        };
+        let mut columns = |c: &Columns| match c {
+            Columns::Dense(m) => Columns::Dense(Arc::new(m.select_rows(&rows))),
+            Columns::Product { base, basis } => {
+                Columns::Product { base: shared(base, &rows), basis: Arc::new(basis.select_rows(&kept)) }
+            }
+        };
+        let mut candidate = |c: &Candidate| Candidate { columns: columns(&c.columns), ..c.clone() };
+        let candidates = self.candidates.iter().map(&mut candidate).collect();
+        let scan =
+            |s: &Scan| Scan { name: s.name.clone(), points: s.points.iter().map(&mut candidate).collect() };
+        let scans = self.scans.iter().map(scan).collect();
+        let channels = self
+            .channels
+            .iter()
+            .map(|c| Channel { columns: Arc::new(c.columns.select_rows(&rows)), ..c.clone() })
+            .collect();
+        Problem {
+            dwells: dwells.collect(),
+            residual: self.residual.select_rows(&rows),
+            geometry: self.geometry.select_rows(&rows),
+            geometry_offset: self.geometry_offset.clone(),
+            geometry_precision: self.geometry_precision.clone(),
+            candidates,
+            scans,
+            channels,
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! The catalogue as the user reads it: sizes, intervals, what could not have been seen.
+
+use crate::bootstrap::Significance;
+use crate::config::DiagnosisConfig;
+use crate::confusion::{half_width, likeness, one_step, smallest_seen};
+use crate::crossval::{compare, left_out};
+use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
+use crate::judge::Judged;
+use crate::problem::{Amplitude, Candidate, Problem, Toggle};
+use crate::weigh::Weighed;
+use nalgebra::{DMatrix, DVector};
+
+/// Candidates whose left-out errors are shown.
+const SHOWN: usize = 5;
+/// A signature this much absorbed is called absorbed.
+const ABSORBED: f64 = 0.9;
+
+/// Sizes of a judged entry from the metric that explains it under white noise.
+pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> Vec<ParameterReport> {
+    let entry = &weighed.entries[judged.entry];
+    let projection = &weighed.metrics[0].projection;
+    let variance = (projection.rss - judged.own().score).max(0.0) / projection.dof();
+    let fitted = one_step(&judged.gram, 1.0);
+    sizes(&entry.candidate.amplitudes, &fitted.estimate, &(fitted.covariance * variance))
+}
+
+fn sizes(
+    amplitudes: &[Amplitude],
+    estimate: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> Vec<ParameterReport> {
+    amplitudes
+        .iter()
+        .enumerate()
+        .map(|(k, a)| {
+            let value = estimate[k] * a.typical;
+            let half = half_width(covariance[(k, k)].max(0.0).sqrt()) * a.typical.abs();
+            ParameterReport {
+                name: a.name.clone(),
+                unit: a.unit,
+                value,
+                ci95: [value - half, value + half],
+                upper_limit95: value.abs() + half,
+                typical: a.typical,
+            }
+        })
+        .collect()
+}
+
+/// The whole catalogue against the base model, best first.
+pub(crate) fn candidate_reports(
+    problem: &Problem,
+    weighed: &Weighed,
+    top: Option<&Judged>,
+    groups: &[Vec<usize>],
+    config: &DiagnosisConfig,
+) -> Vec<CandidateReport> {
+    let projection = &weighed.metrics[0].projection;
+    let variance = projection.rss / projection.dof();
+    let order = weighed.ranking();
+    let before = left_out(problem, None, groups);
+    let none = Significance { score: 0.0, surprise: 0.0, p_raw: 1.0, p_adjusted: 1.0 };
+    let mut reports = Vec::new();
+    for (rank, k) in order.iter().copied().enumerate() {
+        let entry = &weighed.entries[k];
+        let c = &entry.candidate;
+        let columns = weighed.dense(&c.columns, problem);
+        let gram = projection.gram(&columns);
+        let fitted = one_step(&gram, 1.0);
+        let significance = top.map_or(none, |t| t.significance[k]);
+        let own_variance = (projection.rss - significance.score).max(0.0) / projection.dof();
+        let held = (rank < SHOWN).then(|| {
+            let after = left_out(problem, Some(&c.columns.dense(&problem.dwells, 1.0)), groups);
+            compare(problem, &before, &after, groups, config)
+        });
+        let mut same: Vec<String> = c.aliases.clone();
+        if rank < SHOWN {
+            let others = order.iter().filter(|l| **l != k).filter(|l| {
+                let other = weighed.dense(&weighed.entries[**l].candidate.columns, problem);
+                likeness(projection, &columns, &fitted.estimate, &other, own_variance).cosine
+                    > config.merge_cosine
+            });
+            same.extend(others.map(|l| weighed.entries[*l].candidate.spec.clone()));
+        }
+        reports.push(CandidateReport {
+            spec: c.spec.clone(),
+            effect: c.family.clone(),
+            target: c.target.clone(),
+            parameters: sizes(&c.amplitudes, &fitted.estimate, &(&fitted.covariance * own_variance)),
+            log_evidence: entry.ln_evidence,
+            probability: entry.probability,
+            p_adjusted: significance.p_adjusted,
+            p_raw: significance.p_raw,
+            holdout_mm: held.map(|h| BeforeAfter { before: h.before, after: h.after }),
+            recording_mm: top
+                .filter(|t| t.entry == k)
+                .and_then(|t| t.recordings)
+                .map(|h| BeforeAfter { before: h.before, after: h.after }),
+            absorbed: fitted.absorbed,
+            smallest_seen: smallest_seen(&gram, variance, order.len()),
+            same_to_the_data: same,
+        });
+    }
+    reports
+}
+
+/// Entries whose smallest visible size exceeds the typical one.
+pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTestable> {
+    let projection = &weighed.metrics[0].projection;
+    // What the best explanation leaves is the noise against which sizes are seen.
+    let best = weighed.ranking().first().map_or(0.0, |k| {
+        let gram = weighed.white_gram(&weighed.entries[*k].candidate.columns, problem);
+        one_step(&gram, 1.0).estimate.dot(&gram.g).max(0.0)
+    });
+    let variance = (projection.rss - best).max(0.0) / projection.dof();
+    let mut all = Vec::new();
+    for entry in weighed.entries.iter().filter(|e| !e.candidate.is_group()) {
+        let c = &entry.candidate;
+        let gram = weighed.white_gram(&c.columns, problem);
+        let smallest = smallest_seen(&gram, variance, weighed.entries.len());
+        if smallest <= 1.0 {
+            continue;
+        }
+        let size = |factor: f64| match c.amplitudes.first() {
+            Some(_) if !factor.is_finite() => "none".to_string(),
+            Some(a) => format!("{:.3} {}", a.unit.to_display(a.typical * factor), a.unit.display_symbol()),
+            None => String::new(),
+        };
+        let absorbed = one_step(&gram, 1.0).absorbed;
+        all.push(NotTestable {
+            effect: c.spec.clone(),
+            smallest_seen: size(smallest),
+            typical: size(1.0),
+            why: why(problem, c, gram.raw.sum(), absorbed),
+        });
+    }
+    all
+}
+
+fn why(problem: &Problem, c: &Candidate, raw: f64, absorbed: f64) -> String {
+    if raw <= 0.0 {
+        return match c.toggle {
+            Toggle::Direction => "the arrival directions are unknown or the joint never moves".to_string(),
+            Toggle::Load => "the load never changes".to_string(),
+            Toggle::Recording => "there is one recording only".to_string(),
+            Toggle::Temperature => "no temperature was recorded, or it never changed".to_string(),
+            _ => "these motions do not move the tip through it".to_string(),
+        };
+    }
+    let one_sided = c.toggle == Toggle::Direction
+        && (0..problem.joints()).any(|j| {
+            let signs: Vec<f64> = problem.dwells.iter().map(|d| d.arrival[j]).collect();
+            !crate::drivers::varies(&signs)
+        });
+    match () {
+        () if one_sided => "a joint always arrives from the same side".to_string(),
+        () if absorbed > ABSORBED => {
+            format!("the fitted geometry takes over {:.1} % of it", absorbed * 100.0)
+        }
+        () => "too few or too noisy dwells for its size".to_string(),
+    }
+}

@@ -1,0 +1,104 @@
+//! Problems with effects and unlisted shapes in their base, each weighed once.
+
+use crate::DiagnoseError;
+use crate::cells::Unlisted;
+use crate::config::DiagnosisConfig;
+use crate::judge::{Judged, judge};
+use crate::problem::{Candidate, Columns, Problem, Toggle};
+use crate::refit::Refit;
+use crate::weigh::{Weighed, weigh};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// Family of a shape that joins the base without a name.
+const UNLISTED: &str = "unlisted";
+
+/// A problem with some effects in its base, weighed; judgements are kept by entry.
+#[derive(Debug)]
+pub(crate) struct Room {
+    accepted: Vec<String>,
+    /// The problem.
+    pub problem: Problem,
+    /// Weighed.
+    pub weighed: Weighed,
+    judged: std::cell::RefCell<BTreeMap<usize, Judged>>,
+}
+
+impl Room {
+    /// Judges an entry, once.
+    pub fn judge(&self, entry: usize, config: &DiagnosisConfig) -> Judged {
+        if let Some(done) = self.judged.borrow().get(&entry) {
+            return done.clone();
+        }
+        let judged = judge(&self.problem, &self.weighed, entry, config);
+        self.judged.borrow_mut().insert(entry, judged.clone());
+        judged
+    }
+}
+
+/// Gives rooms and remembers them: the same base is asked for more than once.
+pub(crate) struct Rooms<'a> {
+    refit: &'a mut dyn Refit,
+    keep: Vec<bool>,
+    config: &'a DiagnosisConfig,
+    known: Vec<Rc<Room>>,
+}
+
+impl<'a> Rooms<'a> {
+    /// `keep` masks dwells out of every problem; `first` is the problem without effects, weighed.
+    pub fn new(
+        refit: &'a mut dyn Refit,
+        keep: Vec<bool>,
+        first: (Problem, Weighed),
+        config: &'a DiagnosisConfig,
+    ) -> Rooms<'a> {
+        let room =
+            Room { accepted: Vec::new(), problem: first.0, weighed: first.1, judged: Default::default() };
+        Rooms { refit, keep, config, known: vec![Rc::new(room)] }
+    }
+
+    /// The room with these effects in the base.
+    pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<Room>, DiagnoseError> {
+        let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
+        if let Some(known) = self.known.iter().find(|r| r.accepted == names) {
+            return Ok(known.clone());
+        }
+        let problem = self.bare(accepted)?;
+        let weighed = weigh(&problem, self.config);
+        let room = Rc::new(Room { accepted: names, problem, weighed, judged: Default::default() });
+        self.known.push(room.clone());
+        Ok(room)
+    }
+
+    /// The problem alone.
+    pub fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
+            accepted.iter().cloned().partition(|c| c.family == UNLISTED);
+        let mut problem = self.refit.problem(&named)?;
+        problem.check()?;
+        if !self.keep.iter().all(|k| *k) {
+            problem = problem.without(&self.keep);
+        }
+        for shape in &shapes {
+            // The dwells are the same in all rooms, so a shape's columns fit as they are.
+            let columns = shape.columns.dense(&problem.dwells, 1.0);
+            problem = problem.with_columns(&columns);
+        }
+        Ok(problem)
+    }
+}
+
+/// An unlisted shape as something that can join the base, with the freedom these data give it.
+pub(crate) fn as_candidate(cell: &Unlisted, room: &Room, config: &DiagnosisConfig) -> Candidate {
+    let tamed = room.weighed.tamed(&cell.columns, &room.problem, config);
+    Candidate {
+        spec: cell.name.clone(),
+        family: UNLISTED.to_string(),
+        target: String::new(),
+        aliases: Vec::new(),
+        amplitudes: Vec::new(),
+        toggle: Toggle::None,
+        columns: Columns::Dense(Arc::new(tamed)),
+    }
+}

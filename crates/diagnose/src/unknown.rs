@@ -1,0 +1,148 @@
+//! What to say about structure no listed effect explains: where, on what, what shape, and a formula to paste.
+
+use crate::cells::Unlisted;
+use crate::config::DiagnosisConfig;
+use crate::crossval::{by_place, compare, left_out};
+use crate::diagnosis::{ShapePoint, UnknownReport};
+use crate::drivers::{Driver, DriverKind};
+use crate::evidence::{best_amplitude, coefficients};
+use crate::expression::expression;
+use crate::problem::{Channel, Problem};
+use crate::weigh::{Outside, Weighed};
+use armcal_core::Unit;
+use nalgebra::{DMatrix, DVector};
+
+/// Points of a shape.
+const POINTS: usize = 41;
+
+/// Describes the best unlisted explanation of a weighed problem.
+pub(crate) fn unknown_report(
+    problem: &Problem,
+    weighed: &Weighed,
+    config: &DiagnosisConfig,
+) -> Option<UnknownReport> {
+    // A discrepancy that beats every cell knows the driver better than any cell; a cell also knows where.
+    described(problem, weighed, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
+}
+
+/// Describes one unlisted explanation.
+pub(crate) fn described(
+    problem: &Problem,
+    weighed: &Weighed,
+    outside: &Outside,
+    config: &DiagnosisConfig,
+) -> Option<UnknownReport> {
+    let (best, ln) = (&outside.what, outside.ln_evidence);
+    let metric = weighed.metric_of(&best.columns, problem, config);
+    let gram = metric.gram(&weighed.dense(&best.columns, problem));
+    let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
+    let (theta, covariance) = coefficients(&gram, a);
+    let drop = theta.dot(&gram.g);
+    let variance = ((metric.projection.rss - drop) / metric.projection.dof()).max(0.0);
+    let effect = weighed.tamed(&best.columns, problem, config);
+    let groups = by_place(problem);
+    let places = compare(
+        problem,
+        &left_out(problem, None, &groups),
+        &left_out(problem, Some(&effect), &groups),
+        &groups,
+        config,
+    );
+    let channel = best.channel.and_then(|c| problem.channels.get(c));
+    let driver = best.driver.and_then(|d| weighed.drivers.get(d));
+    let mut shape = Vec::new();
+    if let (Some(channel), Some(driver)) = (channel, driver) {
+        let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
+        shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
+    }
+    // A formula acts on one thing: where the best cell has no such thing, the best one that has.
+    let formulable = |u: &&Outside| {
+        u.what.channel.and_then(|c| problem.channels.get(c)).is_some_and(|c| !c.axes.is_empty())
+            && !u.what.driver_name.starts_with("recording")
+    };
+    let pasted =
+        weighed.unlisted.iter().filter(formulable).max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
+    let formula = pasted.and_then(|u| {
+        let (channel, driver) = (&problem.channels[u.what.channel?], &weighed.drivers[u.what.driver?]);
+        let gram = metric.gram(&weighed.dense(&u.what.columns, problem));
+        let (theta, _) = coefficients(&gram, a);
+        let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
+        let mut e = expression(problem, weighed, metric, channel, axis, driver, config)?;
+        e.share_of_shape = if drop > 0.0 { (e.share_of_shape / drop).clamp(0.0, 1.0) } else { 0.0 };
+        Some(e)
+    });
+    let mut rivals: Vec<&Outside> = weighed
+        .unlisted
+        .iter()
+        .filter(|u| u.what.name != best.name && u.ln_evidence > ln - config.margin_nats)
+        .collect();
+    rivals.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
+    Some(UnknownReport {
+        channel: channel.map_or("displacement", |c| c.name.as_str()).to_string(),
+        driver: best.driver_name.clone(),
+        probability: weighed.p_unlisted,
+        log_evidence: ln,
+        unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
+        shape,
+        expression: formula,
+        places,
+        rivals: rivals.into_iter().map(|u| u.what.name.clone()).collect(),
+    })
+}
+
+/// The axis whose fitted part moves the residual most.
+fn strongest_axis(a: &DMatrix<f64>, theta: &DVector<f64>, axes: usize) -> usize {
+    let per = theta.len() / axes.max(1);
+    let power = |axis: usize| {
+        let part = theta.rows(axis * per, per);
+        (part.transpose() * a.view((axis * per, axis * per), (per, per)) * part)[(0, 0)]
+    };
+    (0..axes).max_by(|x, y| power(*x).total_cmp(&power(*y))).unwrap_or(0)
+}
+
+/// Posterior mean and band of one axis along the driver.
+fn points(
+    problem: &Problem,
+    best: &Unlisted,
+    driver: &Driver,
+    axis: usize,
+    theta: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+) -> Vec<ShapePoint> {
+    let per = driver.basis.ncols();
+    let own = theta.rows(axis * per, per);
+    let spread = covariance.view((axis * per, axis * per), (per, per));
+    let at = |at: f64, basis: DVector<f64>| ShapePoint {
+        at,
+        value: best.unit_si * basis.dot(&own),
+        sigma: best.unit_si * (basis.transpose() * spread * &basis)[(0, 0)].max(0.0).sqrt(),
+    };
+    let low = driver.value.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = driver.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match (&driver.kernel, driver.kind) {
+        (Some(kernel), _) => {
+            let x = |k: usize| low + (high - low) * k as f64 / (POINTS - 1) as f64;
+            (0..POINTS).map(|k| at(x(k), kernel.at(x(k)))).collect()
+        }
+        (None, DriverKind::Recording) => {
+            let mut first: Vec<(usize, usize)> = Vec::new();
+            for (i, d) in problem.dwells.iter().enumerate() {
+                if first.iter().all(|f| f.0 != d.id.recording) {
+                    first.push((d.id.recording, i));
+                }
+            }
+            first.sort_unstable();
+            first.into_iter().map(|(r, i)| at(r as f64, driver.basis.row(i).transpose())).collect()
+        }
+        // At the mean pose only the switched value itself is left.
+        (None, _) => [low, high]
+            .into_iter()
+            .map(|v| {
+                let dwell = (0..driver.value.len()).find(|i| driver.value[*i] == v).unwrap_or(0);
+                let mut basis = DVector::zeros(per);
+                basis[0] = driver.basis[(dwell, 0)];
+                at(v, basis)
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,234 @@
+//! One round of weighing: the evidence of nothing, of every candidate, of everything unlisted (notes 4.6 to 4.8).
+
+use crate::cells::{Unlisted, cells, discrepancies};
+use crate::config::DiagnosisConfig;
+use crate::crossval::EFFECT_PRECISION;
+use crate::drivers::{Driver, drivers};
+use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
+use crate::noise::Noise;
+use crate::problem::{Candidate, Columns, Problem, Scan};
+use crate::projection::Gram;
+use crate::special::ln_sum_exp;
+use nalgebra::DMatrix;
+
+/// Residual variance of the best explanation above which the declared noise is taken to be wrong and everything is
+/// weighed again in units of what was found.
+const RESCALE_ABOVE: f64 = 4.0;
+/// Points of a scan weighed under every kind of noise.
+const SCAN_POINTS: usize = 32;
+
+/// One entry of the catalogue: a candidate, or a scan at its best point.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// ln Bayes factor against nothing, averaged over noise (and over the grid of a scan).
+    pub ln_evidence: f64,
+    /// Posterior probability.
+    pub probability: f64,
+}
+
+/// One explanation outside the catalogue, weighed.
+#[derive(Debug, Clone)]
+pub(crate) struct Outside {
+    /// The explanation.
+    pub what: Unlisted,
+    /// ln Bayes factor against nothing, averaged over noise.
+    pub ln_evidence: f64,
+    /// Posterior probability.
+    pub probability: f64,
+}
+
+/// Everything weighed.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighed {
+    /// Noise found, in units of the declared one, where the declaration is far off; 1 otherwise.
+    pub scale: f64,
+    /// The alternatives of the noise.
+    pub metrics: Vec<Metric>,
+    /// Drivers of the cells.
+    pub drivers: Vec<Driver>,
+    /// The catalogue in the order given, scans last.
+    pub entries: Vec<Entry>,
+    /// What is not listed.
+    pub unlisted: Vec<Outside>,
+    /// Posterior probability of nothing.
+    pub p_nothing: f64,
+    /// Posterior probability of something unlisted.
+    pub p_unlisted: f64,
+    /// Posterior probability of correlated noise of each kind, over everything.
+    pub p_noise: Vec<(Noise, f64)>,
+}
+
+/// Weighs a problem, with the noise rescaled where the declaration is far off.
+pub(crate) fn weigh(problem: &Problem, config: &DiagnosisConfig) -> Weighed {
+    let first = weigh_at(problem, 1.0, config);
+    let variance = first.best_variance(problem, config);
+    if variance > RESCALE_ABOVE { weigh_at(problem, variance.sqrt(), config) } else { first }
+}
+
+/// Weighs with the noise `scale` times the declared one.
+pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Weighed {
+    let all = metrics(problem, scale, config);
+    let listed: Vec<&Columns> = problem.candidates.iter().map(|c| &c.columns).collect();
+    let mut scout = over_noise(&listed, problem, scale, &all, config);
+    scout.push(all.iter().map(|m| m.ln_weight).collect());
+    let kept = leading(&all, &scout);
+    let metrics: Vec<Metric> = kept.iter().map(|m| all[*m].clone()).collect();
+    let drivers = drivers(problem);
+    let null: Vec<f64> = metrics.iter().map(|m| m.ln_weight).collect();
+    let ln_null = ln_sum_exp(null.iter().copied());
+    // ln of (prior x evidence) by metric, for the noise's own posterior.
+    let mut by_metric: Vec<Vec<f64>> = vec![null.iter().map(|v| v + config.prior_nothing.ln()).collect()];
+    let plus = |ln: &[f64], prior: f64| ln.iter().map(|v| v + prior).collect::<Vec<f64>>();
+
+    let count = (problem.candidates.len() + problem.scans.len()).max(1) as f64;
+    let share = (config.prior_catalogue / count).ln();
+    let mut entries = Vec::new();
+    for (candidate, scouted) in problem.candidates.iter().zip(&scout) {
+        let ln: Vec<f64> = kept.iter().map(|m| scouted[*m]).collect();
+        let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
+        by_metric.push(plus(&ln, share));
+        entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0 });
+    }
+    for scan in &problem.scans {
+        let all = scanned(problem, scan, scale, &metrics, config);
+        let totals: Vec<f64> = all.iter().map(|ln| ln_sum_exp(ln.iter().copied())).collect();
+        let Some(best) = (0..totals.len()).max_by(|a, b| totals[*a].total_cmp(&totals[*b])) else { continue };
+        let ln_points = (totals.len() as f64).ln();
+        let ln_evidence = ln_sum_exp(totals.iter().copied()) - ln_points - ln_null;
+        let mixed: Vec<f64> =
+            (0..metrics.len()).map(|m| ln_sum_exp(all.iter().map(|ln| ln[m])) - ln_points).collect();
+        by_metric.push(plus(&mixed, share));
+        entries.push(Entry { candidate: scan.points[best].clone(), ln_evidence, probability: 0.0 });
+    }
+
+    let (cells, smooth) = (cells(problem, &drivers, config), discrepancies(problem, config));
+    let mut unlisted = Vec::new();
+    let families = if cells.is_empty() || smooth.is_empty() { 1.0 } else { 2.0 };
+    for family in [cells, smooth] {
+        let share = (config.prior_unknown / families / family.len().max(1) as f64).ln();
+        let columns: Vec<&Columns> = family.iter().map(|u| &u.columns).collect();
+        let parts = over_noise(&columns, problem, scale, &metrics, config);
+        for (what, ln) in family.into_iter().zip(parts) {
+            let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
+            by_metric.push(plus(&ln, share));
+            unlisted.push(Outside { what, ln_evidence, probability: 0.0 });
+        }
+    }
+
+    let ln_total = ln_sum_exp(by_metric.iter().flatten().copied());
+    let probability = |ln: &[f64]| (ln_sum_exp(ln.iter().copied()) - ln_total).exp();
+    let p_nothing = probability(&by_metric[0]);
+    for (entry, ln) in entries.iter_mut().zip(&by_metric[1..]) {
+        entry.probability = probability(ln);
+    }
+    for (outside, ln) in unlisted.iter_mut().zip(&by_metric[1 + entries.len()..]) {
+        outside.probability = probability(ln);
+    }
+    let p_unlisted = unlisted.iter().map(|u| u.probability).sum();
+    let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
+    let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
+    Weighed { scale, metrics, drivers, entries, unlisted, p_nothing, p_unlisted, p_noise }
+}
+
+/// ln (weight x Bayes factor) of every point of a scan in every metric. Under white noise all points are weighed, under
+/// the others the points that white noise likes best; the rest are taken to say nothing there.
+fn scanned(
+    problem: &Problem,
+    scan: &Scan,
+    scale: f64,
+    metrics: &[Metric],
+    config: &DiagnosisConfig,
+) -> Vec<Vec<f64>> {
+    let points: Vec<&Columns> = scan.points.iter().map(|c| &c.columns).collect();
+    let white = over_noise(&points, problem, scale, &metrics[..1], config);
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|a, b| white[*b][0].total_cmp(&white[*a][0]));
+    order.truncate(SCAN_POINTS);
+    let leading: Vec<&Columns> = order.iter().map(|k| points[*k]).collect();
+    let others = over_noise(&leading, problem, scale, &metrics[1..], config);
+    let silent = |w: &Vec<f64>| w.iter().copied().chain(metrics[1..].iter().map(|m| m.ln_weight)).collect();
+    let mut all: Vec<Vec<f64>> = white.iter().map(silent).collect();
+    for (k, ln) in order.into_iter().zip(others) {
+        all[k].truncate(1);
+        all[k].extend(ln);
+    }
+    all
+}
+
+impl Weighed {
+    /// The metric in which a term is explained best.
+    pub fn metric_of(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> &Metric {
+        let parts = over_noise(&[columns], problem, self.scale, &self.metrics, config).concat();
+        let best = (0..parts.len()).max_by(|a, b| parts[*a].total_cmp(&parts[*b])).unwrap_or(0);
+        &self.metrics[best]
+    }
+
+    /// Entries by falling evidence.
+    pub fn ranking(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.entries.len()).collect();
+        order.sort_by(|a, b| self.entries[*b].ln_evidence.total_cmp(&self.entries[*a].ln_evidence));
+        order
+    }
+
+    /// The best unlisted explanation.
+    pub fn best_unlisted(&self) -> Option<&Outside> {
+        self.unlisted.iter().max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    }
+
+    /// The best cell: it names a channel and a driver.
+    pub fn best_cell(&self) -> Option<&Outside> {
+        let cells = self.unlisted.iter().filter(|u| u.what.channel.is_some());
+        cells.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    }
+
+    /// The best explanation of all, with its ln Bayes factor.
+    pub fn best(&self) -> Option<(&Columns, f64)> {
+        let listed = self.entries.iter().map(|e| (&e.candidate.columns, e.ln_evidence));
+        let all = listed.chain(self.unlisted.iter().map(|u| (&u.what.columns, u.ln_evidence)));
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// How probable a kind of noise is.
+    pub fn probable(&self, noise: Noise) -> bool {
+        self.p_noise.iter().any(|(n, p)| *n == noise && *p > 0.5)
+    }
+
+    /// Residual variance (declared noise = 1, white) left by the best explanation of all.
+    pub fn best_variance(&self, problem: &Problem, config: &DiagnosisConfig) -> f64 {
+        let white = &self.metrics[0];
+        let drop = match self.best() {
+            Some((columns, ln)) if ln > 0.0 => {
+                let gram = white.gram(&self.dense(columns, problem));
+                let (p, a) = (
+                    &white.projection,
+                    best_amplitude(&gram, white.projection.rss, white.projection.dof(), config),
+                );
+                let _ = p;
+                coefficients(&gram, a).0.dot(&gram.g)
+            }
+            _ => 0.0,
+        };
+        (white.projection.rss - drop).max(0.0) / white.projection.dof() * self.scale.powi(2)
+    }
+
+    /// Columns in the units of the weighing.
+    pub fn dense(&self, columns: &Columns, problem: &Problem) -> DMatrix<f64> {
+        columns.dense(&problem.dwells, 1.0 / self.scale)
+    }
+
+    /// Columns scaled so that the weak prior of left-out fits is the amplitude these data prefer: a flexible shape must
+    /// not be fitted freely where nothing was seen.
+    pub fn tamed(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> DMatrix<f64> {
+        let metric = self.metric_of(columns, problem, config);
+        let gram = metric.gram(&self.dense(columns, problem));
+        let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
+        columns.dense(&problem.dwells, a * EFFECT_PRECISION.sqrt() / self.scale)
+    }
+
+    /// Products under white noise.
+    pub fn white_gram(&self, columns: &Columns, problem: &Problem) -> Gram {
+        self.metrics[0].gram(&self.dense(columns, problem))
+    }
+}

@@ -1,0 +1,155 @@
+//! From a model and observations: the real catalogue, real refits, and a plan.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
+use armcal_diagnose::{DiagnosisConfig, Verdict, compare_heldout, diagnose, plan_dwells};
+use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
+use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::path::Path;
+
+const SIGMA_M: f64 = 0.28e-3;
+const ARM: &str = r#"
+name = "arm"
+[[rows]]
+name = "joint1"
+theta_deg = 0.0
+d_mm = 76.0
+a_mm = 0.0
+alpha_deg = 90.0
+[[rows]]
+name = "joint2"
+theta_deg = 90.0
+d_mm = 0.0
+a_mm = 400.0
+alpha_deg = 0.0
+[[rows]]
+name = "joint3"
+theta_deg = 0.0
+d_mm = -12.0
+a_mm = 0.0
+alpha_deg = 90.0
+[[rows]]
+name = "tool"
+joint = "fixed"
+theta_deg = 0.0
+d_mm = 354.3
+a_mm = 0.0
+alpha_deg = 90.0
+"#;
+
+fn model() -> Model {
+    let chain = Chain::from_dh_toml(ARM, Path::new("arm.toml")).unwrap();
+    let tip = Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) };
+    Model::new(chain, Frames { base: Frame::given("base", Pose::identity()), tip, boards: Vec::new() })
+        .unwrap()
+}
+
+/// `n` tracked poses, arrival directions at random.
+fn poses(n: usize, rng: &mut ChaCha8Rng) -> Vec<Observation> {
+    let pose = |dwell: usize, rng: &mut ChaCha8Rng| {
+        let joint_rad = [(-1.2, 1.2), (-1.3, 0.3), (-1.0, 0.9)].map(|(a, b)| rng.random_range(a..b)).to_vec();
+        let arrival = (0..3)
+            .map(|_| if rng.random::<bool>() { Arrival::Positive } else { Arrival::Negative })
+            .collect();
+        Observation {
+            dwell: DwellId { recording: 0, dwell },
+            time_ns: dwell as i64 * 10_000_000_000,
+            joint_sigma_rad: vec![0.0; 3],
+            arrival,
+            joint_rad,
+            path_memory_rad: None,
+            pair_memory_rad: None,
+            joint_velocity_radps: None,
+            effort_nm: None,
+            temperature_c: None,
+            load_kg: 0.0,
+            reference: Reference::Tracked {
+                position_m: Vector3::zeros(),
+                orientation: None,
+                orientation_sigma_rad: 0.0,
+            },
+            covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
+        }
+    };
+    (0..n).map(|i| pose(i, rng)).collect()
+}
+
+/// What an arm with geometry errors and these effects, `times` their typical size, would show.
+fn observed(hidden: &[&str], times: f64, seed: u64) -> (Model, Vec<Observation>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let model = model();
+    let mut observations = poses(90, &mut rng);
+    let session = Session::of(&observations);
+    let specs: Vec<EffectSpec> = hidden.iter().map(|h| model.effect(h).unwrap()).collect();
+    let truth = model.with_effects(&specs, &session).unwrap();
+    let free = model.parameters().len();
+    let mut p = truth.nominal();
+    for (k, parameter) in truth.parameters().iter().enumerate().filter(|(_, p)| p.free) {
+        let z: f64 = rng.sample(StandardNormal);
+        let sigma = parameter.prior_sigma.unwrap_or(0.0);
+        p[k] += if k < free { 0.5 * z.clamp(-1.5, 1.5) * sigma } else { times * sigma };
+    }
+    for o in &mut observations {
+        let noise = Vector3::from_fn(|_, _| SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+        let position_m = truth.predicted_tip_in_world(&p, o) + noise;
+        o.reference = Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 };
+    }
+    (model, observations)
+}
+
+fn calibration(model: &Model, observations: &[Observation]) -> Calibration {
+    calibrate(model, observations, &FitConfig::default(), &HoldoutConfig::CavityFolds { k: 5 }).unwrap()
+}
+
+fn config() -> DiagnosisConfig {
+    DiagnosisConfig { resamplings: 199, ..Default::default() }
+}
+
+#[test]
+fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
+    let (model, observations) = observed(&["backlash:2"], 1.0, 1);
+    let session = Session::of(&observations);
+    let before = calibration(&model, &observations);
+    let d = diagnose(&model, &before, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    assert!(d.effects[0].set.iter().any(|n| n == "backlash:2"), "{:?} {:?}", d.verdict, d.names);
+    assert_eq!(d.effects.len(), 1, "{:?}", d.names);
+    let extended = model.with_effects(&[model.effect("backlash:2").unwrap()], &session).unwrap();
+    let after = calibration(&extended, &observations);
+    let held = compare_heldout(&before, &after, &observations, &config()).unwrap();
+    assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
+    let left =
+        diagnose(&extended, &after, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
+}
+
+#[test]
+fn a_complete_model_misses_nothing() {
+    let (model, observations) = observed(&[], 0.0, 2);
+    let session = Session::of(&observations);
+    let fit = calibration(&model, &observations);
+    let d = diagnose(&model, &fit, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    assert_eq!(d.verdict, Verdict::NothingMissing, "{:?}", d.names);
+}
+
+#[test]
+fn a_plan_separates_two_effects_that_few_poses_leave_standing() {
+    let (model, observations) = observed(&["gear_ratio:2"], 1.0, 3);
+    let few: Vec<Observation> = observations
+        .into_iter()
+        .filter(|o| o.joint_rad[1].abs() < 0.25 && o.joint_rad[2].abs() < 0.5)
+        .collect();
+    let session = Session::of(&few);
+    let fit = calibration(&model, &few);
+    let survivors = ["gear_ratio:2", "eccentricity:2"].map(|s| model.effect(s).unwrap());
+    let pool = poses(120, &mut ChaCha8Rng::seed_from_u64(9));
+    let plan =
+        plan_dwells(&model, &fit, &few, &session, &FitConfig::default(), &survivors, &pool, 6, &config())
+            .unwrap();
+    assert!(plan.pairs[0].delta_after > plan.pairs[0].delta_before, "{plan:?}");
+    assert!(!plan.chosen.is_empty() && !plan.sentence.is_empty(), "{plan:?}");
+}

@@ -1,0 +1,57 @@
+//! A belt that runs around another joint's axis: where the two pulleys there differ, turning that joint pulls
+//! the belt, and the joint it drives turns along.
+
+use super::{Hidden, Keys};
+use crate::{LabError, Mechanism, Moment};
+use serde::{Deserialize, Serialize};
+
+/// `kind = "belt_coupling"`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeltCoupling {
+    /// The joint that is dragged along. Default 3.
+    #[serde(default = "three")]
+    pub joint: usize,
+    /// The joint that drags. Default 2.
+    #[serde(default = "two")]
+    pub by: usize,
+    /// How far one turns for a turn of the other [%]: the difference of the pulleys' radii.
+    pub share_percent: f64,
+}
+
+fn three() -> usize {
+    3
+}
+
+fn two() -> usize {
+    2
+}
+
+impl Mechanism for BeltCoupling {
+    fn name(&self) -> &str {
+        "belt_coupling"
+    }
+
+    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+        joint_rad[self.joint - 1] += joint_rad[self.by - 1] * self.share_percent / 100.0;
+    }
+
+    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+        joint_rad[self.joint - 1] -= joint_rad[self.by - 1] * self.share_percent / 100.0;
+    }
+}
+
+impl Hidden for BeltCoupling {
+    fn check(&self, keys: &Keys) -> Result<(), LabError> {
+        keys.joint("joint", self.joint)?;
+        keys.joint("by", self.by)?;
+        if self.by == self.joint {
+            return Err(keys.wrong("by", "must be another joint".into()));
+        }
+        keys.within("share_percent", self.share_percent, [-100.0, 100.0])
+    }
+
+    fn mechanism(&self) -> Box<dyn Mechanism> {
+        Box::new(self.clone())
+    }
+}

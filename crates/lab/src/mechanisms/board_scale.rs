@@ -1,0 +1,37 @@
+//! A board printed, or cut, to a wrong scale.
+
+use super::{Hidden, Keys};
+use crate::board::Board;
+use crate::{LabError, Mechanism};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// `kind = "board_scale"`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardScale {
+    /// By how much it is too large along each of its axes [%].
+    pub percent: [f64; 3],
+}
+
+impl Mechanism for BoardScale {
+    fn name(&self) -> &str {
+        "board_scale"
+    }
+}
+
+impl Hidden for BoardScale {
+    fn check(&self, keys: &Keys) -> Result<(), LabError> {
+        self.percent.iter().try_for_each(|v| keys.within("percent", *v, [-20.0, 20.0]))
+    }
+
+    fn mechanism(&self) -> Box<dyn Mechanism> {
+        Box::new(self.clone())
+    }
+
+    fn machine_board(&self, board: &mut Board) {
+        for cavity in &mut board.cavities {
+            cavity.true_m += cavity.true_m.component_mul(&Vector3::from(self.percent)) / 100.0;
+        }
+    }
+}

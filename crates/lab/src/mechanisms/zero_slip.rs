@@ -1,0 +1,52 @@
+//! A pulley slips on its shaft, once.
+
+use super::{Hidden, Keys, happened};
+use crate::{LabError, Mechanism, Moment};
+use serde::{Deserialize, Serialize};
+
+/// `kind = "zero_slip"`: from the event on the link is further than the motor says, to the end of the session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZeroSlip {
+    /// The joint.
+    pub joint: usize,
+    /// How far the link is ahead from then on [deg].
+    pub slip_deg: f64,
+    /// Index of the recording, from 0.
+    pub recording: usize,
+    /// When in it [s]. Default 0: before it begins.
+    #[serde(default)]
+    pub at_s: f64,
+}
+
+impl ZeroSlip {
+    fn slip_rad(&self, now: &Moment<'_>) -> f64 {
+        if happened(now, self.recording, self.at_s) { self.slip_deg.to_radians() } else { 0.0 }
+    }
+}
+
+impl Mechanism for ZeroSlip {
+    fn name(&self) -> &str {
+        "zero_slip"
+    }
+
+    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+        joint_rad[self.joint - 1] += self.slip_rad(now);
+    }
+
+    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+        joint_rad[self.joint - 1] -= self.slip_rad(now);
+    }
+}
+
+impl Hidden for ZeroSlip {
+    fn check(&self, keys: &Keys) -> Result<(), LabError> {
+        keys.joint("joint", self.joint)?;
+        keys.within("slip_deg", self.slip_deg, [-30.0, 30.0])?;
+        keys.event(self.recording, self.at_s)
+    }
+
+    fn mechanism(&self) -> Box<dyn Mechanism> {
+        Box::new(self.clone())
+    }
+}

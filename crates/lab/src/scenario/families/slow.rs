@@ -1,0 +1,147 @@
+//! Families of events and drifts, of sensors and boards.
+
+use super::*;
+use armcal_core::Pose;
+use nalgebra::Point3;
+
+pub fn zero_slip(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    slip(draw, config, false)
+}
+
+pub fn zero_slip_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    slip(draw, config, true)
+}
+
+pub fn tool_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    bump(draw, config, BumpedBody::Tool, false)
+}
+
+pub fn tool_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    bump(draw, config, BumpedBody::Tool, true)
+}
+
+pub fn frame_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    bump(draw, config, BumpedBody::Base, false)
+}
+
+pub fn frame_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    bump(draw, config, BumpedBody::Base, true)
+}
+
+fn slip(draw: &mut Draw, config: &LabConfig, within: bool) -> Result<Made, LabError> {
+    let slip_deg = draw.signed();
+    let (recording, at_s, when) = draw.event(config, within)?;
+    let slip = ZeroSlip { joint: draw.joint, slip_deg, recording, at_s };
+    let same = match draw.joint {
+        1 => vec![format!("frame_shift{when}")],
+        joint if joint == config.arm.drives.len() => vec![format!("tool_shift{when}")],
+        _ => Vec::new(),
+    };
+    let effect = draw.at_joint("zero_slip") + &when;
+    let enters = [draw.joint_channel(), "recording".to_owned()];
+    Ok(made(MechanismConfig::ZeroSlip(slip), effect, enters).same(&same))
+}
+
+fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, within: bool) -> Result<Made, LabError> {
+    let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
+    let turn_deg =
+        if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };
+    let (recording, at_s, when) = draw.event(config, within)?;
+    let knock = Bump { body, shift_mm, turn_deg: turn_deg.into(), recording, at_s };
+    let (effect, channel, alike) = match body {
+        BumpedBody::Tool => {
+            ("tool_shift", "tip", vec![format!("zero_slip:3{when}"), format!("frame_shift{when}")])
+        }
+        _ => ("frame_shift", "world", vec![format!("zero_slip:1{when}"), format!("tool_shift{when}")]),
+    };
+    let enters = [channel.to_owned(), "recording".to_owned()];
+    Ok(made(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
+}
+
+/// Length of the session [s].
+fn session_s(config: &LabConfig) -> Result<f64, LabError> {
+    let rehearsal = observe(config)?;
+    let times = || rehearsal.observations.iter().map(|o| o.time_ns);
+    let (first, last) = (times().min().unwrap_or_default(), times().max().unwrap_or_default());
+    Ok((last - first).max(1) as f64 * 1e-9)
+}
+
+fn slow_relatives() -> Vec<String> {
+    let mut all: Vec<String> =
+        ["frame_drift", "thermal_growth", "warm_up"].iter().map(|name| (*name).to_owned()).collect();
+    all.extend((1..=3).map(|joint| format!("zero_drift:{joint}")));
+    all
+}
+
+pub fn zero_drift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    let deg_per_hour = draw.signed() * 3600.0 / session_s(config)?;
+    let drift = ZeroDrift { joint: draw.joint, deg_per_hour };
+    let enters = [draw.joint_channel(), "time".to_owned()];
+    let made = made(MechanismConfig::ZeroDrift(drift), draw.at_joint("zero_drift"), enters);
+    Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
+}
+
+pub fn frame_drift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    let way = draw.direction() * (draw.size * 3600.0 / session_s(config)?);
+    let drift = FrameDrift { body: DriftingBody::Base, mm_per_hour: way.into() };
+    let enters = ["world".to_owned(), "time".to_owned()];
+    let made = made(MechanismConfig::FrameDrift(drift), "frame_drift".into(), enters);
+    Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
+}
+
+/// Printed links: 70 ppm/K.
+const PLASTIC_PPM: f64 = 70.0;
+
+pub fn thermal_growth(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    // The size is reached when the thermometer no longer rises.
+    config.temperature.rise_k = draw.size * 1e4 / PLASTIC_PPM;
+    let growth = ThermalGrowth { links: vec![1, 2, 3], per_kelvin_ppm: PLASTIC_PPM, ..Default::default() };
+    let enters = ["length".to_owned(), "temperature".to_owned()];
+    let made = made(MechanismConfig::ThermalGrowth(growth), "thermal_growth".into(), enters);
+    Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
+}
+
+pub fn warm_up(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    config.temperature.published = false;
+    let time_constant_s = draw.draw.uniform([400.0, 1200.0]);
+    let warming = WarmUp {
+        links: vec![1, 2, 3],
+        per_kelvin_ppm: PLASTIC_PPM,
+        rise_k: draw.size * 1e4 / PLASTIC_PPM,
+        time_constant_s,
+        ..Default::default()
+    };
+    let enters = ["length".to_owned(), "time".to_owned()];
+    let made = made(MechanismConfig::WarmUp(warming), "warm_up".into(), enters);
+    Ok(made.alike(&["thermal_growth".to_owned()]).alike_unless(draw.design.is_wide(), &slow_relatives()))
+}
+
+/// Between the base and the board, where the arm works, in the world [m].
+fn middle_m(config: &LabConfig) -> [f64; 3] {
+    (Pose::from(config.base) * Point3::new(0.3, 0.0, 0.3)).coords.into()
+}
+
+pub fn sensor_scale(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    let axes = draw.direction();
+    let percent: [f64; 3] = (axes * (draw.size / axes.amax())).into();
+    let wand = CameraScale { percent, centre_m: middle_m(config) };
+    let enters = ["world".to_owned(), "position".to_owned()];
+    let made = made(MechanismConfig::CameraScale(wand), "sensor_scale".into(), enters);
+    Ok(made.alike(&["volume_distortion".to_owned(), "board_scale".to_owned()]))
+}
+
+pub fn volume_distortion(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    // The edge of the arm's own volume is half a metre away.
+    let mm_at_1m = draw.signed() / 0.5f64.powi(3);
+    let lens = CameraDistortion { mm_at_1m, centre_m: middle_m(config) };
+    let enters = ["world".to_owned(), "position".to_owned()];
+    let made = made(MechanismConfig::CameraDistortion(lens), "volume_distortion".into(), enters);
+    Ok(made.alike(&["sensor_scale".to_owned()]))
+}
+
+pub fn board_scale(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let percent = [draw.signed(); 3];
+    let enters = ["board".to_owned(), "position".to_owned()];
+    let made = made(MechanismConfig::BoardScale(BoardScale { percent }), "board_scale".into(), enters);
+    Ok(made.alike(&["sensor_scale".to_owned()]))
+}

@@ -1,0 +1,105 @@
+//! Mechanisms that are in no catalogue: the right answer is where they enter and what they depend on.
+
+use super::families::{Draw, Family, Made, stretched_nm};
+use crate::LabError;
+use crate::config::LabConfig;
+use crate::mechanisms::*;
+
+/// Every one.
+pub(super) const FAMILIES: &[Family] = &[
+    Family { name: "outside:axis_wobble", joints: &[1], range: [0.05, 0.5], unit: "deg", build: axis_wobble },
+    Family { name: "outside:cable_drag", joints: &[2], range: [0.2, 1.0], unit: "deg", build: cable_drag },
+    Family { name: "outside:worn_gap", joints: &[1, 2], range: [0.3, 1.2], unit: "deg", build: worn_gap },
+    Family {
+        name: "outside:damaged_teeth",
+        joints: &[1],
+        range: [0.15, 0.8],
+        unit: "deg",
+        build: damaged_teeth,
+    },
+    Family { name: "outside:twist", joints: &[1], range: [0.2, 1.0], unit: "deg", build: twist },
+    Family {
+        name: "outside:room_temperature",
+        joints: &[],
+        range: [0.05, 0.2],
+        unit: "%",
+        build: room_temperature,
+    },
+    Family { name: "outside:soft_stop", joints: &[2], range: [2.0, 8.0], unit: "%", build: soft_stop },
+    Family { name: "outside:sawtooth", joints: &[1, 2, 3], range: [0.1, 0.5], unit: "deg", build: sawtooth },
+];
+
+fn made(mechanism: MechanismConfig, channel: String, driver: &str) -> Made {
+    Made {
+        mechanism,
+        effect: None,
+        same: Vec::new(),
+        alike: Vec::new(),
+        enters: [channel, driver.to_owned()],
+    }
+}
+
+fn axis_wobble(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let phase_deg = draw.phase_deg();
+    let wobble = AxisWobble { joint: draw.joint, tilt_deg: draw.size, per_turn: 3.0, phase_deg };
+    Ok(made(MechanismConfig::AxisWobble(wobble), "tilt".into(), "q1"))
+}
+
+/// Size: how far the joint is pulled 30 deg beyond where the cable gets taut.
+fn cable_drag(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    let gear_nm_rad = stretched_nm(config)[1] / 0.2f64.to_radians();
+    // On the board joint 1 turns by 15 deg to either side only.
+    let (slack_deg, anchor_deg) = (8.0, -8.0);
+    let cable_nm_rad = gear_nm_rad * draw.size / 30.0;
+    let cable = CableDrag { joint: draw.joint, by: 1, cable_nm_rad, slack_deg, anchor_deg, gear_nm_rad };
+    Ok(made(MechanismConfig::CableDrag(cable), draw.joint_channel(), "q1"))
+}
+
+fn worn_gap(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let worn_centre_deg = if draw.joint == 1 { 8.0 } else { -45.0 };
+    let gap =
+        Gap { joint: draw.joint, worn_deg: draw.size, worn_centre_deg, worn_span_deg: 8.0, ..Gap::default() };
+    let driver = format!("dir{}", draw.joint);
+    let mut made = made(MechanismConfig::Gap(gap), draw.joint_channel(), &driver);
+    made.alike.push(draw.at_joint("backlash"));
+    Ok(made)
+}
+
+fn damaged_teeth(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let (height_deg, centre_deg) = (draw.signed(), draw.draw.uniform([-8.0, 8.0]));
+    let teeth = DamagedTeeth { joint: draw.joint, height_deg, centre_deg, span_deg: 7.0 };
+    Ok(made(MechanismConfig::DamagedTeeth(teeth), draw.joint_channel(), "q1"))
+}
+
+fn twist(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let twist = Twist { link: 2, by: draw.joint, deg_at_45: draw.signed() };
+    Ok(made(MechanismConfig::Twist(twist), "joint2.alpha".into(), "q1"))
+}
+
+fn room_temperature(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    config.temperature.published = false;
+    let room = RoomTemperature {
+        links: vec![1, 2, 3],
+        per_kelvin_ppm: 70.0,
+        swing_k: draw.size * 1e4 / 70.0,
+        period_s: draw.draw.uniform([240.0, 480.0]),
+        time_constant_s: 60.0,
+        ..Default::default()
+    };
+    Ok(made(MechanismConfig::RoomTemperature(room), "length".into(), "time"))
+}
+
+fn soft_stop(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let stop = SoftStop { joint: draw.joint, from_deg: -45.0, give_percent: draw.size };
+    Ok(made(MechanismConfig::SoftStop(stop), draw.joint_channel(), "q2"))
+}
+
+fn sawtooth(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
+    let per_turn = draw.draw.uniform([8.0, 24.0]).round();
+    let teeth = Sawtooth { joint: draw.joint, amplitude_deg: draw.size, per_turn };
+    let driver = format!("q{}", draw.joint);
+    let mut made = made(MechanismConfig::Sawtooth(teeth), draw.joint_channel(), &driver);
+    // Its first harmonic is a periodic error, and most of it.
+    made.alike.push(format!("{},frequency={per_turn}", draw.at_joint("periodic")));
+    Ok(made)
+}

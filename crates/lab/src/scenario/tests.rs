@@ -1,0 +1,159 @@
+//! Scenarios.
+
+use super::*;
+use armcal_core::Reference;
+
+fn everything() -> Vec<&'static str> {
+    families().into_iter().chain(nothing()).chain(outside()).collect()
+}
+
+#[test]
+fn every_family_can_be_observed_and_says_what_it_hides() {
+    let start = std::time::Instant::now();
+    for name in everything() {
+        let scenario = Scenario { size: Size::Medium, ..Scenario::new(name, Design::FreePoses, 3) };
+        let seen = scenario.observe().unwrap();
+        assert!((260..=297).contains(&seen.observations.len()), "{name}: {}", seen.observations.len());
+        let hidden = &seen.truth.hidden;
+        assert_eq!(hidden.len(), usize::from(!name.starts_with("nothing")), "{name}");
+        for h in hidden {
+            assert_eq!(h.effect.is_none(), name.starts_with("outside:"), "{name}");
+            assert!(!h.channel.is_empty() && !h.driver.is_empty() && h.size != 0.0);
+        }
+        let json = serde_json::to_string(&seen.truth).unwrap();
+        let back: crate::Truth = serde_json::from_str(&json).unwrap();
+        assert_eq!(
+            back.hidden.iter().map(|h| &h.effect).collect::<Vec<_>>(),
+            hidden.iter().map(|h| &h.effect).collect::<Vec<_>>()
+        );
+        assert_eq!(back.config.mechanisms.len(), seen.truth.config.mechanisms.len(), "{name}");
+    }
+    println!("{} sessions in {:?}", everything().len(), start.elapsed());
+}
+
+/// How far what is hidden moves the tip, or its reading: mean over the dwells [m].
+fn moved_m(name: &str, design: Design) -> f64 {
+    let scenario = Scenario { size: Size::Medium, ..Scenario::new(name, design, 8) };
+    let mut planted = scenario.plant().unwrap();
+    let with = observe(&planted.config).unwrap();
+    planted.config.mechanisms.clear();
+    let without = observe(&planted.config).unwrap();
+    let arm = crate::arm::AxisArm::from_rows(&with.truth.rows);
+    let pairs = with.observations.iter().zip(&without.observations);
+    let moved: Vec<f64> = pairs
+        .map(|(a, b)| match (&a.reference, &b.reference) {
+            (Reference::Tracked { position_m: p, .. }, Reference::Tracked { position_m: q, .. }) => {
+                (p - q).norm() + (arm.tip(&a.joint_rad) - arm.tip(&b.joint_rad)).norm()
+            }
+            _ => (arm.tip(&a.joint_rad) - arm.tip(&b.joint_rad)).norm(),
+        })
+        .collect();
+    moved.iter().sum::<f64>() / moved.len() as f64
+}
+
+#[test]
+fn a_middling_size_moves_the_tip_by_tenths_to_some_millimetres() {
+    for name in families().into_iter().chain(outside()) {
+        let moved_mm = 1e3 * moved_m(name, Design::FreePoses);
+        println!("{name}: {moved_mm:.2} mm");
+        assert!((0.05..12.0).contains(&moved_mm), "{name}: {moved_mm} mm");
+    }
+}
+
+#[test]
+fn designs_have_the_dwells_they_say() {
+    for (design, dwells, recordings) in [
+        (Design::OneTiltOnePass, 33, 1),
+        (Design::OneTiltBothWays, 66, 1),
+        (Design::ThreeTiltsOnePass, 99, 3),
+        (Design::ThreeTiltsBothWays, 198, 3),
+        (Design::Plunge, 198, 3),
+        (Design::FreePoses, 297, 3),
+        (Design::Load, 396, 6),
+        (Design::FreePosesAndLoad, 594, 6),
+        (Design::TrackedOnly, 198, 3),
+    ] {
+        let seen = Scenario::new("nothing", design, 2).observe().unwrap();
+        let n = seen.observations.len();
+        assert!(n <= dwells && 10 * n >= 9 * dwells, "{design:?}: {n} of {dwells}");
+        assert_eq!(seen.nominal.boards.len(), recordings);
+        let seated = seen.observations.iter().filter(|o| o.cavity().is_some()).count();
+        assert_eq!(seated == 0, design == Design::TrackedOnly);
+        if design == Design::Plunge {
+            // Always the same final descent: joints 2 and 3 arrive from one side.
+            for joint in [1, 2] {
+                let up = seen.observations.iter().filter(|o| o.arrival[joint].sign() > 0.0).count();
+                assert!(20 * up.min(n - up) <= n, "joint {joint}: {up} of {n} from below");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_event_happens_between_the_dwells_it_names() {
+    for name in
+        ["zero_slip@dwell", "tool_shift@dwell", "frame_shift@dwell", "zero_slip", "tool_shift", "frame_shift"]
+    {
+        for seed in 0..4 {
+            let scenario =
+                Scenario { size: Size::Large, ..Scenario::new(name, Design::ThreeTiltsBothWays, seed) };
+            let mut planted = scenario.plant().unwrap();
+            let hidden = planted.hidden.remove(0);
+            let with = observe(&planted.config).unwrap();
+            planted.config.mechanisms.clear();
+            let without = observe(&planted.config).unwrap();
+            let recording = hidden.recording.unwrap();
+            assert!(hidden.effect.unwrap().contains(&format!("@{recording}")));
+            for (a, b) in with.observations.iter().zip(&without.observations) {
+                let moved = a.joint_rad.iter().zip(&b.joint_rad).any(|(p, q)| (p - q).abs() > 2e-4);
+                let since = match hidden.dwell {
+                    Some(dwell) => (a.dwell.recording, a.dwell.dwell) >= (recording, dwell),
+                    // Before the second recording: the first is the odd one out; before the last: the last is.
+                    None if recording == 0 => a.dwell.recording > 0,
+                    None => a.dwell.recording == recording,
+                };
+                assert_eq!(
+                    moved, since,
+                    "{name} seed {seed}: {} against {recording} {:?}",
+                    a.dwell, hidden.dwell
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn two_things_are_hidden_at_once() {
+    let scenario = Scenario::new("backlash+compliance", Design::FreePoses, 5);
+    let seen = scenario.observe().unwrap();
+    assert_eq!(seen.truth.hidden.len(), 2);
+    assert_eq!(seen.truth.config.mechanisms.len(), 2);
+    assert_eq!(seen, scenario.observe().unwrap());
+    let error = Scenario::new("backlsh", Design::FreePoses, 5).plant().unwrap_err().to_string();
+    assert!(error.contains("backlsh") && error.contains("backlash,"), "{error}");
+}
+
+#[test]
+fn sealed_folders_tell_nothing_of_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let (open, truth) = (folder.path().join("open"), folder.path().join("kept/truth.json"));
+    let scenario = Scenario::new("outside:cable_drag", Design::OneTiltOnePass, 11);
+    let sealed = seal(&scenario, &open, &truth).unwrap();
+    assert_eq!(sealed.recordings.len(), 1);
+    let words = ["cable", "outside", "mechanism", "seed", "hidden", "scenario", "kept"];
+    for entry in std::fs::read_dir(&open).unwrap() {
+        let path = entry.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        for word in words.into_iter().filter(|word| !(path.ends_with("board.toml") && *word == "mechanism")) {
+            let found = bytes.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word.as_bytes()));
+            assert!(!found, "{} says `{word}`", path.display());
+        }
+    }
+    let facts: crate::Truth = serde_json::from_slice(&std::fs::read(&truth).unwrap()).unwrap();
+    assert_eq!(facts.scenario, Some(scenario.clone()));
+    assert_eq!(facts.hidden[0].channel, "joint2");
+    let pipeline: toml::Table = toml::from_str(&std::fs::read_to_string(&sealed.pipeline).unwrap()).unwrap();
+    assert_eq!(pipeline["recordings"][0]["paths"][0].as_str(), Some("normal.mcap"));
+    let error = seal(&scenario, &open, &open.join("truth.json")).unwrap_err().to_string();
+    assert!(error.contains("outside of the folder"), "{error}");
+}

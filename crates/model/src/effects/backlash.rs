@@ -1,0 +1,69 @@
+//! Backlash of a joint, or Coulomb wind-up.
+//!
+//! # What moves
+//! The link lags behind the encoder by half a gap: which flank touches depends on where the joint came from. A
+//! drive of finite stiffness wound up by dry friction does the same, with `b = 2 F_c / K`.
+//!
+//! # Equation
+//! `dq = -(b/2) s`, `s = +1` where the joint arrived moving towards +q. Where the recording shows the path of the
+//! encoder, the play operator on it, `w <- max(q - b/2, min(q + b/2, w))`, `dq = w - q`, which is also right when
+//! the last move was shorter than the gap. Below 0.3 deg, where a servo's overshoot is a move of its own, `dq` is in
+//! proportion to b, as large as the play operator makes it at 0.3 deg. Negative b: `dq = -(b/2) s` with s the direction
+//! of the encoder's last move, however small, because a link that leads pushes the encoder from the flank it touches.
+//!
+//! # Parameters and units
+//! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
+//!
+//! # Signature in the data
+//! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
+//!
+//! # Not to be confused with
+//! `friction_windup`, which grows with load; `gravity_backlash`, where gravity holds one flank; `crossed_backlash`,
+//! where the direction of another joint counts. Backlash and Coulomb wind-up themselves are the same to position
+//! data; motor current, or a rest test with the motor off, separates them.
+//!
+//! # Source
+//! Slamani, Nubiola, Bonev 2012 (Industrial Robot 39:4); play operator: Visintin, Differential Models of
+//! Hysteresis, 1994, ch. III.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use super::play::{RESOLVED_DEG, lagging};
+use crate::rigid::Scalar;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "backlash",
+    aliases: &["Coulomb wind-up"],
+    summary: "play between encoder and link: the tip depends on the direction of arrival",
+    family: Family::LostMotion,
+    toggle: Toggle::Direction,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
+    source: include_str!("backlash.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct Backlash {
+    joint: usize,
+    resolved: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.joint()?;
+    let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
+    let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
+    let resolved = placing.joint_size(joint, RESOLVED_DEG);
+    Ok(Placement::new(vec![width], Backlash { joint, resolved }))
+}
+
+impl Physics for Backlash {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let memory = x.path_memory_rad(self.joint);
+        change.joint(self.joint, lagging(theta[0], self.resolved, memory, x.arrival[self.joint]));
+    }
+}

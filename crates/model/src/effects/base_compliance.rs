@@ -1,0 +1,99 @@
+//! A base that rocks.
+//!
+//! # What moves
+//! The foot, the plate under it or the table tilts under the overturning moment of the arm.
+//!
+//! # Equation
+//! `w = c M`, M the moment of all weights about the origin of the base; the arm turns by w about the point (0, 0, h) of
+//! the base: its foot, or the bearing of the first joint.
+//!
+//! # Parameters and units
+//! `compliance` c [rad/(N m)] of the links with their default masses, `compliance_outer` the correction for the share
+//! of the outer links, `compliance_load` under the load; shape `height` h [m], 0 unless said. Prior: 0.3 deg with the
+//! nominal arm stretched out.
+//!
+//! # Signature in the data
+//! The tip sinks towards where the arm reaches out, as with a compliant shoulder whose pivot lies lower.
+//!
+//! # Not to be confused with
+//! `compliance` of the shoulder: they differ only by the height of the pivot; a marker on the base separates them.
+//!
+//! # Source
+//! Notes of the project; ISO 9283 asks for a rigid mounting.
+
+use super::drivers::{BASE, Drivers};
+use super::frame_shift::about;
+use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::Placing;
+use super::shares::Shares;
+use crate::rigid::Scalar;
+use armcal_core::{Observation, Unit};
+use nalgebra::Vector3;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "base_compliance",
+    aliases: &[],
+    summary: "the base rocks under the weight of the arm",
+    family: Family::Elasticity,
+    toggle: Toggle::Load,
+    target: Target::Whole,
+    offered: Offered::Once,
+    shapes: &[Shape {
+        name: "height",
+        unit: Unit::Metre,
+        default: Some(0.0),
+        lower: -2.0,
+        upper: 5.0,
+        meaning: "height of the pivot above the origin of the base",
+        parameter: true,
+        values: Some(heights),
+    }],
+    confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
+    source: include_str!("base_compliance.rs"),
+    place,
+};
+
+/// Links from this one on count as outer.
+const OUTER: usize = 2;
+
+#[derive(Debug)]
+struct BaseCompliance {
+    shares: Shares,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joints = placing.zero.joints.len();
+    let shares = Shares::of(placing, OUTER.min(joints) - 1);
+    let largest = (0..joints).map(|joint| placing.reference_torque_nm(joint)).fold(1e-3, f64::max);
+    let per_deg = 1f64.to_radians() / largest;
+    let unit = Unit::RadianPerNewtonMetre;
+    let amplitudes =
+        shares.amplitudes("compliance", unit, 0.3 * per_deg, 6.0 * per_deg, "tilt per overturning moment");
+    Ok(Placement::twisting(BASE, amplitudes, BaseCompliance { shares }))
+}
+
+/// Between the foot and the axis of the second joint.
+fn heights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    let (Some(base), Some(second)) = (placing.zero.slots.get(BASE), placing.zero.joints.get(1)) else {
+        return Vec::new();
+    };
+    let height_m = base.rotation.column(2).dot(&(second.origin_m - base.translation_m));
+    [0.5, 1.0].iter().map(|part| part * height_m).filter(|height| *height > 0.0).collect()
+}
+
+impl Physics for BaseCompliance {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let base = &x.pose.slots[BASE];
+        let gravity = &x.gravity_mps2;
+        let links = x.pose.moment_nm(&base.translation_m, 0, gravity);
+        let outer = x.pose.moment_nm(&base.translation_m, OUTER, gravity);
+        let load = (x.pose.tip_m - base.translation_m).cross(gravity) * x.observation.load_kg;
+        let turn = [0, 1, 2].map(|k| {
+            let axis = base.rotation.column(k);
+            self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
+        });
+        let pivot_m = Vector3::new(D::from(0.0), D::from(0.0), theta[self.shares.count()]);
+        change.twist(BASE, about(&pivot_m, turn), turn);
+    }
+}

@@ -1,0 +1,70 @@
+//! Backlash on the side of a motor that sits on the base.
+//!
+//! # What moves
+//! A belt from the base sets the direction of the link in space, so the gap follows how that direction was reached,
+//! not how the joint itself moved.
+//!
+//! # Equation
+//! `dq_j = w - u`, u the sum of the two angles (their difference where the axes point against each other) and w the
+//! play operator on its path, `w <- max(u - b/2, min(u + b/2, w))`: `-(b/2)` in the direction in which the sum arrived,
+//! less after moves shorter than the gap. Narrow and negative widths as in `backlash`. Where no path was recorded:
+//! `-(b/2) sgn(s_{j-1} + s_j)`, nothing where the two arrived against each other.
+//!
+//! # Parameters and units
+//! `width` b [rad]. The spec names the joint j that is driven from the base.
+//!
+//! # Signature in the data
+//! The residual flips with the direction in which the link turned in space, whatever its own joint did.
+//!
+//! # Not to be confused with
+//! `backlash` of j, and `crossed_backlash` from j-1: it follows whichever of the two moved further.
+//!
+//! # Source
+//! Play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III; layout of the paper's arm.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use super::play::{RESOLVED_DEG, lagging};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "belt_backlash",
+    aliases: &["play on the motor side of a belt"],
+    summary: "play in a belt from the base: the sum of two joints decides",
+    family: Family::LostMotion,
+    toggle: Toggle::Direction,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["backlash", "crossed_backlash", "friction_windup"],
+    source: include_str!("belt_backlash.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct BeltBacklash {
+    joint: usize,
+    sense: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.turning_joint()?;
+    let sense = placing
+        .parallel_to_previous(joint)
+        .ok_or("a belt from the base needs an axis parallel to the one before it")?;
+    let deg = 1f64.to_radians();
+    let width = amplitude("width", Unit::Radian, 0.5 * deg, 8.0 * deg, "width of the gap");
+    Ok(Placement::new(vec![width], BeltBacklash { joint, sense }))
+}
+
+impl Physics for BeltBacklash {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let sum = self.sense * x.arrival[self.joint - 1] + x.arrival[self.joint];
+        let direction = if sum == 0.0 { 0.0 } else { sum.signum() };
+        let memory = x.pair_memory_rad(self.joint, self.sense);
+        change.joint(self.joint, lagging(theta[0], RESOLVED_DEG.to_radians(), memory, direction));
+    }
+}

@@ -1,0 +1,62 @@
+//! A board that is a little larger or smaller than its file says.
+//!
+//! # What moves
+//! Print shrinkage, temperature, a wrong drawing: the cavities are spread or squeezed.
+//!
+//! # Equation
+//! `dp = (x X, y Y, 0)` of the cavity at (X, Y) in the frame of the board; seated points only.
+//!
+//! # Parameters and units
+//! `x`, `y` [1] along the axes of the board.
+//!
+//! # Signature in the data
+//! An error that grows from the board's origin outwards and turns with the board.
+//!
+//! # Not to be confused with
+//! All lengths of the arm scaled alike; `seat_offset`, which is random.
+//!
+//! # Source
+//! Notes of the project; PLA prints 0.1 to 0.5 %.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+use armcal_core::{Reference, Unit};
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "board_scale",
+    aliases: &["print shrinkage"],
+    summary: "the board is larger or smaller than declared",
+    family: Family::Board,
+    toggle: Toggle::None,
+    target: Target::Whole,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["sensor_scale"],
+    source: include_str!("board_scale.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct BoardScale;
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    if placing.session.cavities.is_empty() {
+        return Err("no observation is seated in the board".to_owned());
+    }
+    let scale = |axis: &str| {
+        amplitude(axis, Unit::One, 0.003, 0.05, format!("relative error of the board's size along {axis}"))
+    };
+    Ok(Placement::new(vec![scale("x"), scale("y")], BoardScale))
+}
+
+impl Physics for BoardScale {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        if let Reference::Seated { in_board_m, .. } = &x.observation.reference {
+            change.seat_m.x += theta[0] * in_board_m.x;
+            change.seat_m.y += theta[1] * in_board_m.y;
+        }
+    }
+}

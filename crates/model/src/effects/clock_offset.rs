@@ -1,0 +1,59 @@
+//! Clocks of robot and sensor that differ.
+//!
+//! # What moves
+//! The reading of the joints and the position of the tip belong to different moments.
+//!
+//! # Equation
+//! `dq = t0 dq/dt` of every joint.
+//!
+//! # Parameters and units
+//! `offset` t0 [s]: by how much the tip is later than the joints.
+//!
+//! # Signature in the data
+//! An error along the path in proportion to speed; nothing in dwells.
+//!
+//! # Not to be confused with
+//! `backlash`, where slow motion in both directions is all there is.
+//!
+//! # Source
+//! Notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "clock_offset",
+    aliases: &[],
+    summary: "clocks of robot and sensor differ: an error in proportion to speed",
+    family: Family::Timing,
+    toggle: Toggle::None,
+    target: Target::Whole,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &[],
+    source: include_str!("clock_offset.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct ClockOffset;
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    if !placing.session.moving {
+        return Err("clocks do not matter in dwells; it needs observations of the moving arm".to_owned());
+    }
+    let offset = amplitude("offset", Unit::Second, 0.01, 0.3, "by how much the tip is later than the joints");
+    Ok(Placement::new(vec![offset], ClockOffset))
+}
+
+impl Physics for ClockOffset {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        for (joint, velocity) in x.observation.joint_velocity_radps.iter().flatten().enumerate() {
+            change.joint(joint, theta[0] * *velocity);
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Lost motion of one joint that follows the direction of another.
+//!
+//! # What moves
+//! A cable or a belt that runs over another joint is dragged along by it: where that joint came from decides how
+//! this one rests.
+//!
+//! # Equation
+//! `dq_j = -(b/2) s_i`. Where the recording shows the path of joint i, the play operator on it: what is dragged along
+//! follows joint i until its spring is stronger than the friction, and turns back as slowly. Below 0.3 deg in proportion
+//! to b, as in `backlash`.
+//!
+//! # Parameters and units
+//! `width` b [rad] (sliding joint: [m]), negative where j is dragged along with i; `from` i names the joint whose
+//! direction counts. The spec names j.
+//!
+//! # Signature in the data
+//! The residual enters like a rotation of one joint and flips with the direction of arrival of another.
+//!
+//! # Not to be confused with
+//! `backlash` of either joint: on a single path, where their directions always go together, nothing separates them.
+//!
+//! # Source
+//! Dahl's friction with a sharp slip is the play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use super::play::{RESOLVED_DEG, following};
+use crate::rigid::Scalar;
+use armcal_core::{Observation, Unit};
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "crossed_backlash",
+    aliases: &["cable drag"],
+    summary: "lost motion of one joint that follows the direction of another",
+    family: Family::LostMotion,
+    toggle: Toggle::Direction,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[Shape {
+        name: "from",
+        unit: Unit::One,
+        default: None,
+        lower: 1.0,
+        upper: 64.0,
+        meaning: "number of the joint whose direction of arrival counts",
+        parameter: false,
+        values: Some(others),
+    }],
+    confused_with: &["backlash", "belt_backlash"],
+    source: include_str!("crossed_backlash.rs"),
+    place,
+};
+
+/// On longer arms only neighbours are offered.
+const FEW_JOINTS: usize = 4;
+
+#[derive(Debug)]
+struct CrossedBacklash {
+    joint: usize,
+    from: usize,
+    resolved: f64,
+    /// Of the unit of j per unit of i, where one of them slides.
+    per_unit: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.joint()?;
+    let number = placing.shape("from").unwrap_or_default();
+    let from = (0..placing.zero.joints.len())
+        .find(|k| (*k + 1) as f64 == number && *k != joint)
+        .ok_or_else(|| format!("from = {number} is not the number of another joint"))?;
+    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 8.0));
+    let width = amplitude(
+        "width",
+        placing.joint_unit(joint),
+        typical,
+        bound,
+        "difference between the two directions",
+    );
+    let resolved = placing.joint_size(from, RESOLVED_DEG);
+    let per_unit = placing.joint_size(joint, 1.0) / placing.joint_size(from, 1.0);
+    Ok(Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit }))
+}
+
+fn others(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    let joints = placing.zero.joints.len();
+    let own = placing.spec.target.unwrap_or_default();
+    let near = |k: &usize| *k != own && (joints <= FEW_JOINTS || k.abs_diff(own) == 1);
+    (0..joints).filter(near).map(|k| (k + 1) as f64).collect()
+}
+
+impl Physics for CrossedBacklash {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let width = theta[0] * self.per_unit.recip();
+        let dragged = following(width, self.resolved, x.path_memory_rad(self.from), x.arrival[self.from]);
+        change.joint(self.joint, dragged * self.per_unit);
+    }
+}

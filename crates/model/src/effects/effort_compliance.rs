@@ -1,0 +1,67 @@
+//! A joint that yields to the effort its motor measures.
+//!
+//! # What moves
+//! The drive turns against the effort it exerts, whatever causes that: weight, friction, contact.
+//!
+//! # Equation
+//! `dq = c e`, e the measured effort.
+//!
+//! # Parameters and units
+//! `compliance` c [rad/(N m)], signed as the effort of the recording is: negative where effort holds the arm up.
+//! Prior: 0.4 deg at the largest effort seen.
+//!
+//! # Signature in the data
+//! The residual follows the measured effort, including its part that flips with the direction.
+//!
+//! # Not to be confused with
+//! `compliance`, which knows only the nominal weights; `friction_windup`.
+//!
+//! # Source
+//! Spong 1987; notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "effort_compliance",
+    aliases: &[],
+    summary: "a joint yields to the effort its motor measures",
+    family: Family::Elasticity,
+    toggle: Toggle::Load,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["compliance", "hardening_compliance"],
+    source: include_str!("effort_compliance.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct EffortCompliance {
+    joint: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.turning_joint()?;
+    let efforts = placing.session.largest_effort_nm.as_ref();
+    let largest_nm = efforts
+        .and_then(|efforts| efforts.get(joint).copied())
+        .filter(|largest| *largest > 0.0)
+        .ok_or("the observations have no measured effort of this joint")?;
+    let per_deg = 1f64.to_radians() / largest_nm;
+    let unit = Unit::RadianPerNewtonMetre;
+    let compliance = amplitude("compliance", unit, 0.4 * per_deg, 8.0 * per_deg, "angle per measured effort");
+    Ok(Placement::new(vec![compliance], EffortCompliance { joint }))
+}
+
+impl Physics for EffortCompliance {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let efforts = x.observation.effort_nm.as_ref();
+        let effort_nm = efforts.and_then(|efforts| efforts.get(self.joint).copied()).unwrap_or(0.0);
+        change.joint(self.joint, theta[0] * effort_nm);
+    }
+}

@@ -1,0 +1,98 @@
+//! A joint's own error curve, of no particular shape.
+//!
+//! # What moves
+//! Gear, bearing and encoder of a joint together turn the link by a little more or less than the encoder says, again
+//! and again the same at the same angle: eccentric discs, wave generators, uneven lines, a worn zone.
+//!
+//! # Equation
+//! `dq = sum_n a_n sin(n q) + b_n cos(n q)`, n = 1..N turns of the joint: a Fourier series whose amplitudes are expected
+//! to fall with n as those of a smooth random curve do (Matern 5/2 with a length of 5 deg).
+//!
+//! # Parameters and units
+//! `sin<n>`, `cos<n>` [rad]; shape `harmonics` N (default 16; features down to about 180/N deg are followed). Prior of
+//! the whole curve: 0.1 deg.
+//!
+//! # Signature in the data
+//! Errors that look like noise against everything but this joint's angle, and repeat exactly. The curve holds where the
+//! joint was in the data; elsewhere it returns to zero.
+//!
+//! # Not to be confused with
+//! A mechanism: this is what is left to say when no shape of the catalogue (`eccentricity`, `second_harmonic`,
+//! `periodic`, `gear_ratio`) says it. The diagnosis offers it for an unknown curve over a joint's own angle and never
+//! names it as a cause.
+//!
+//! # Source
+//! Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.15 and 4.17; Hu et al., Sensors 2020.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "error_curve",
+    aliases: &["encoder error map", "gear error curve"],
+    summary: "the joint's own repeatable error curve, a Fourier series over its angle",
+    family: Family::Transmission,
+    toggle: Toggle::None,
+    target: Target::Joint,
+    offered: Offered::Never,
+    shapes: &[Shape {
+        name: "harmonics",
+        unit: Unit::One,
+        default: Some(16.0),
+        lower: 1.0,
+        upper: 180.0,
+        meaning: "number of harmonics of the turn",
+        parameter: false,
+        values: None,
+    }],
+    confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
+    source: include_str!("error_curve.rs"),
+    place,
+};
+
+/// Standard deviation of the whole curve [deg].
+const TYPICAL_DEG: f64 = 0.1;
+/// Length over which it stays alike [rad].
+const LENGTH_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+
+#[derive(Debug)]
+struct ErrorCurve {
+    joint: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.turning_joint()?;
+    let asked = placing.shape("harmonics").unwrap_or(16.0);
+    let harmonics = asked as usize;
+    if harmonics as f64 != asked || !(1..=180).contains(&harmonics) {
+        return Err(format!("harmonics = {asked} must be a whole number from 1 to 180"));
+    }
+    // Spectral density of the Matern 5/2 kernel at n turns, up to a factor.
+    let density = |n: f64| (5.0 + (n * LENGTH_RAD).powi(2)).powi(-3);
+    let all: f64 = (1..=180).map(|n| density(f64::from(n))).sum();
+    let sigma = |n: usize| TYPICAL_DEG.to_radians() * (density(n as f64) / all).sqrt();
+    let amplitudes = (1..=harmonics)
+        .flat_map(|n| ["sin", "cos"].map(|name| (n, name)))
+        .map(|(n, name)| {
+            let meaning = format!("amplitude of {name} {n}q");
+            amplitude(&format!("{name}{n}"), Unit::Radian, sigma(n), 50.0 * sigma(n), meaning)
+        })
+        .collect();
+    Ok(Placement::new(amplitudes, ErrorCurve { joint }))
+}
+
+impl Physics for ErrorCurve {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let q = x.joint_rad(self.joint);
+        let mut sum = D::from(0.0);
+        for (n, pair) in (1..).map(f64::from).zip(theta.chunks_exact(2)) {
+            let (sine, cosine) = (n * q).sin_cos();
+            sum += pair[0] * sine + pair[1] * cosine;
+        }
+        change.joint(self.joint, sum);
+    }
+}

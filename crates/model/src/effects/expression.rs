@@ -1,0 +1,311 @@
+//! A formula of the user.
+//!
+//! # What moves
+//! One joint reading, one parameter of the chain, the base or the tip, or the tip in the world.
+//!
+//! # Equation
+//! Any, over q1.. (readings), s1.. (arrival: -1, 0, 1), tau1.. (gravity torque of the nominal masses and the load),
+//! effort1.. (measured effort), temperature [degC], t (time since the first observation), load, and parameters;
+//! with + - * / ^, pi, sin, cos, tan, atan, tanh, exp, ln, sqrt, abs, sign.
+//!
+//! # Parameters and units
+//! As named in the table, each with a unit, and a prior or a bound. q [rad] (sliding joint: [m]), tau and effort
+//! [N m], t [s], load [kg]. Units are checked as far as the formula tells them: a number in it, as the 60 in t/60, may
+//! stand for any.
+//!
+//! # Signature in the data
+//! Whatever the formula says.
+//!
+//! # Not to be confused with
+//! An entry of the catalogue that says the same: prefer that, it carries its prior and its source.
+//!
+//! # Source
+//! The user.
+
+use super::drivers::Drivers;
+use super::formula::{Formula, Number};
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::measure::{Dimension, Measure, dimension, symbol};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use super::spec::joint_index;
+use super::table::unit_of;
+use crate::error::nearest;
+use crate::rigid::Scalar;
+use crate::segment::Motion;
+use armcal_core::Unit;
+use num_dual::Dual64;
+use serde::{Deserialize, Serialize};
+
+/// Where a bound is given and no prior: how much of it is a typical size.
+const SIGMA_OF_BOUND: f64 = 0.3;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "expression",
+    aliases: &[],
+    summary: "a formula of the user; written in an [[effects]] table",
+    family: Family::User,
+    toggle: Toggle::None,
+    target: Target::Whole,
+    offered: Offered::Never,
+    shapes: &[],
+    confused_with: &[],
+    source: include_str!("expression.rs"),
+    place,
+};
+
+/// A user's formula.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Expression {
+    /// Its name in specs and parameter names.
+    pub name: String,
+    /// The formula.
+    pub formula: String,
+    /// A joint, a parameter of the path, or `world.x`, `world.y`, `world.z`.
+    pub acts_on: String,
+}
+
+/// What a variable of a formula is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Variable {
+    Parameter(usize),
+    Reading(usize),
+    Arrival(usize),
+    Torque(usize),
+    Effort(usize),
+    Temperature,
+    Time,
+    Load,
+}
+
+/// What a formula changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Acts {
+    Joint(usize),
+    Parameter(usize),
+    World(usize),
+}
+
+#[derive(Debug)]
+struct UserEffect {
+    formula: Formula,
+    variables: Vec<Variable>,
+    acts: Acts,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let expression = placing
+        .spec
+        .expression
+        .as_ref()
+        .ok_or("write it as an [[effects]] table with name, formula, acts_on and parameters")?;
+    let formula = Formula::read(&expression.formula)?;
+    let mut amplitudes = Vec::new();
+    for (name, said) in &placing.spec.overrides {
+        let unit = said.unit.as_deref().unwrap_or(Unit::One.symbol());
+        let (unit, si) = unit_of(unit).ok_or_else(|| unknown_unit(name, unit))?;
+        let sigma = said.prior.or(said.bound.map(|bound| SIGMA_OF_BOUND * bound));
+        let sigma = sigma.ok_or_else(|| {
+            format!("parameter \"{name}\" needs a typical size: prior = ..., or a bound = ...")
+        })?;
+        let bound = said.bound.unwrap_or(10.0 * sigma);
+        if !(sigma > 0.0 && bound > 0.0) {
+            return Err(format!("parameter \"{name}\": prior and bound must be positive"));
+        }
+        amplitudes.push(amplitude(
+            name,
+            unit,
+            sigma * si,
+            bound * si,
+            format!("{name} of the user's formula"),
+        ));
+    }
+    let names: Vec<&str> = placing.spec.overrides.keys().map(String::as_str).collect();
+    let variables = formula
+        .variables()
+        .iter()
+        .map(|name| variable(name, &names, placing))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(unused) = (0..names.len()).find(|k| !variables.contains(&Variable::Parameter(*k))) {
+        return Err(format!("the formula \"{}\" has no \"{}\"", expression.formula, names[unused]));
+    }
+    let acts = acts_on(&expression.acts_on, placing)?;
+    let measures: Vec<Measure> = variables
+        .iter()
+        .map(|variable| match variable {
+            Variable::Parameter(k) => Measure::Known(dimension(amplitudes[*k].unit)),
+            other => other.measure(placing),
+        })
+        .collect();
+    let expected = acts.dimension(placing);
+    let wrong =
+        |why: String| Err(format!("the units of the formula \"{}\" do not fit: {why}", expression.formula));
+    match formula.measure(&measures) {
+        Measure::Wrong(why) => return wrong(why),
+        Measure::Known(found) if found != expected => {
+            return wrong(format!(
+                "{} takes {}, it gives {}",
+                expression.acts_on,
+                symbol(&expected),
+                symbol(&found)
+            ));
+        }
+        Measure::Known(_) | Measure::Literal(_) | Measure::Anything => {}
+    }
+    let physics = UserEffect { formula, variables, acts };
+    Ok(match acts {
+        Acts::World(_) => Placement::twisting(0, amplitudes, physics),
+        Acts::Joint(_) | Acts::Parameter(_) => Placement::new(amplitudes, physics),
+    })
+}
+
+fn unknown_unit(name: &str, unit: &str) -> String {
+    let known: Vec<&str> = Unit::ALL.iter().map(|unit| unit.symbol()).collect();
+    let hint = nearest(unit, known.iter().copied())
+        .map(|name| format!("; did you mean \"{name}\"?"))
+        .unwrap_or_default();
+    format!("parameter \"{name}\": there is no unit \"{unit}\"{hint} The units are {}", known.join(", "))
+}
+
+fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Variable, String> {
+    if let Some(k) = parameters.iter().position(|parameter| *parameter == name) {
+        return Ok(Variable::Parameter(k));
+    }
+    let joints = placing.zero.joints.len();
+    let session = placing.session;
+    let numbered = |prefix: &str| {
+        let number: usize = name.strip_prefix(prefix)?.parse().ok()?;
+        (1..=joints).contains(&number).then(|| number - 1)
+    };
+    let missing = |what: &str| Err(format!("the formula needs {name}, and the observations have no {what}"));
+    match name {
+        "t" => return Ok(Variable::Time),
+        "load" => return Ok(Variable::Load),
+        "temperature" if session.temperature => return Ok(Variable::Temperature),
+        "temperature" => return missing("temperature"),
+        _ => {}
+    }
+    if let Some(joint) = numbered("q") {
+        return Ok(Variable::Reading(joint));
+    }
+    if let Some(joint) = numbered("s") {
+        return Ok(Variable::Arrival(joint));
+    }
+    if let Some(joint) = numbered("tau") {
+        return Ok(Variable::Torque(joint));
+    }
+    if let Some(joint) = numbered("effort") {
+        let known = session.largest_effort_nm.is_some();
+        return if known { Ok(Variable::Effort(joint)) } else { missing("measured effort") };
+    }
+    let of_joints =
+        (1..=joints).flat_map(|j| ["q", "s", "tau", "effort"].map(|prefix| format!("{prefix}{j}")));
+    let known: Vec<String> = ["t", "load", "temperature"]
+        .into_iter()
+        .chain(parameters.iter().copied())
+        .map(str::to_owned)
+        .chain(of_joints)
+        .collect();
+    let hint = nearest(name, known.iter().map(String::as_str))
+        .map(|near| format!("; did you mean \"{near}\"?"))
+        .unwrap_or_default();
+    Err(format!(
+        "the formula has a variable \"{name}\" that is neither a parameter nor one of q1.. s1.. tau1.. effort1.. (to \
+         {joints}), temperature, t, load{hint}"
+    ))
+}
+
+fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
+    if let Some(axis) = ["world.x", "world.y", "world.z"].iter().position(|name| *name == text) {
+        return Ok(Acts::World(axis));
+    }
+    let model = placing.model;
+    let joint_names = model.chain().joint_names();
+    let reading = text.strip_prefix('q').filter(|number| number.parse::<usize>().is_ok());
+    if reading.is_some() || joint_names.iter().any(|name| name == text) {
+        return joint_index(reading.unwrap_or(text), joint_names).map(Acts::Joint);
+    }
+    if let Some(index) = model.index(text).filter(|index| model.is_on_path(*index)) {
+        return Ok(Acts::Parameter(index));
+    }
+    let on_path = (0..model.parameters().len()).filter(|index| model.is_on_path(*index));
+    let names: Vec<&str> = on_path.map(|index| model.parameters()[index].name.as_str()).collect();
+    let all = names.iter().copied().chain(joint_names.iter().map(String::as_str));
+    let hint = nearest(text, all).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
+    Err(format!(
+        "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of world.x, world.y, \
+         world.z{hint}"
+    ))
+}
+
+impl Acts {
+    fn dimension(self, placing: &Placing<'_>) -> Dimension {
+        dimension(match self {
+            Acts::Joint(joint) => placing.joint_unit(joint),
+            Acts::Parameter(index) => placing.model.parameters()[index].unit,
+            Acts::World(_) => Unit::Metre,
+        })
+    }
+}
+
+impl Variable {
+    /// The unit of a driver.
+    fn measure(self, placing: &Placing<'_>) -> Measure {
+        let unit = match self {
+            Variable::Parameter(_) => return Measure::Anything,
+            Variable::Reading(joint) => placing.joint_unit(joint),
+            Variable::Arrival(_) => Unit::One,
+            Variable::Torque(joint) | Variable::Effort(joint) => match placing.motion(joint) {
+                Motion::Revolute => Unit::NewtonMetre,
+                // Newtons: no parameter has them, so they go unchecked.
+                Motion::Prismatic => return Measure::Anything,
+            },
+            Variable::Temperature => Unit::Kelvin,
+            Variable::Time => Unit::Second,
+            Variable::Load => Unit::Kilogram,
+        };
+        Measure::Known(dimension(unit))
+    }
+
+    fn value(self, theta: &[f64], x: &Drivers<'_>) -> f64 {
+        let o = x.observation;
+        match self {
+            Variable::Parameter(k) => theta[k],
+            Variable::Reading(joint) => x.joint_rad(joint),
+            Variable::Arrival(joint) => x.arrival[joint],
+            Variable::Torque(joint) => x.torque[joint].total_nm(),
+            Variable::Effort(joint) => {
+                o.effort_nm.as_ref().and_then(|efforts| efforts.get(joint).copied()).unwrap_or(f64::NAN)
+            }
+            Variable::Temperature => o.temperature_c.unwrap_or(f64::NAN),
+            Variable::Time => x.time_s,
+            Variable::Load => o.load_kg,
+        }
+    }
+}
+
+impl Physics for UserEffect {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let real: Vec<f64> = theta.iter().map(|value| value.re()).collect();
+        let mut values: Vec<Number> =
+            self.variables.iter().map(|variable| Number(Dual64::from(variable.value(&real, x)))).collect();
+        let mut sum = D::from(self.formula.value(&values).re);
+        for (position, variable) in self.variables.iter().enumerate() {
+            let Variable::Parameter(k) = variable else { continue };
+            // What the scalar carries beyond its real part: the derivatives it was seeded with.
+            let seed = theta[*k] - real[*k];
+            values[position].0.eps = 1.0;
+            sum += seed * self.formula.value(&values).eps;
+            values[position].0.eps = 0.0;
+        }
+        match self.acts {
+            Acts::Joint(joint) => change.joint(joint, sum),
+            Acts::Parameter(index) => change.parameter(index, sum),
+            Acts::World(axis) => {
+                let mut moved = [D::from(0.0); 3];
+                moved[axis] = sum;
+                change.twist(0, moved, [D::from(0.0); 3]);
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Robot, board or camera frame moved against each other.
+//!
+//! # What moves
+//! The whole arm as the sensor (or the board) sees it: a foot slid, a table was pushed, the camera was knocked.
+//!
+//! # Equation
+//! `p' = Exp(w) (p - c) + c + t`, `c` the middle of the working volume, in the recording, or from the dwell on, that
+//! the spec names.
+//!
+//! # Parameters and units
+//! `x`, `y`, `z` t [m]; `rx`, `ry`, `rz` w [rad], in the world.
+//!
+//! # Signature in the data
+//! A step between recordings or at a dwell that is the same for every pose, or turns all of them together.
+//!
+//! # Not to be confused with
+//! `zero_slip` of a vertical first joint, the same as a turn about it; `tool_shift`. A fixed reference marker on
+//! the base separates them. A board whose tilt is not what was declared is the same to the data.
+//!
+//! # Source
+//! Vicon Tracker help, "Prepare the capture environment" (camera creep); notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitudes_xyz};
+use crate::rigid::{Scalar, rotation_of_vector};
+use armcal_core::Unit;
+use nalgebra::Vector3;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "frame_shift",
+    aliases: &["wrongly declared tilt of the board"],
+    summary: "robot, board or camera moved, between recordings or at a dwell",
+    family: Family::Event,
+    toggle: Toggle::Recording,
+    target: Target::Whole,
+    offered: Offered::Events,
+    shapes: &[],
+    confused_with: &["zero_slip", "tool_shift", "frame_drift"],
+    source: include_str!("frame_shift.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct FrameShift {
+    centre_m: Vector3<f64>,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    placing.event()?;
+    let deg = 1f64.to_radians();
+    let mut amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift along");
+    amplitudes.extend(amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, "turn about"));
+    let physics = FrameShift { centre_m: placing.volume_centre_m() };
+    Ok(Placement::twisting(0, amplitudes, physics))
+}
+
+impl Physics for FrameShift {
+    fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let turn = [theta[3], theta[4], theta[5]];
+        let move_m = about(&self.centre_m.map(D::from), turn);
+        change.twist(0, [theta[0] + move_m[0], theta[1] + move_m[1], theta[2] + move_m[2]], turn);
+    }
+}
+
+/// The translation that makes a turn about the frame's origin one about `pivot`: `c - Exp(w) c`.
+pub(super) fn about<D: Scalar>(pivot_m: &Vector3<D>, turn_rad: [D; 3]) -> [D; 3] {
+    let rotation = rotation_of_vector(&Vector3::from(turn_rad));
+    let moved = rotation * pivot_m;
+    [0, 1, 2].map(|axis| pivot_m[axis] - moved[axis])
+}

@@ -1,0 +1,113 @@
+//! Backlash of a joint whose gap gravity closes.
+//!
+//! # What moves
+//! Gravity presses the link against one flank of the gap, whichever way the motor turns; only where drag exceeds
+//! the gravity torque does the direction of arrival decide.
+//!
+//! # Equation
+//! `dq = -(b/2) tanh((F s - tau/T) / e)`, T the gravity torque of the nominal arm stretched out, F the drag and e
+//! the smoothing as fractions of it; the part of tau that the outer links cause counts r times. F = 0: gravity alone
+//! decides.
+//!
+//! # Parameters and units
+//! `width` b [rad]; shapes `friction` F [1], `smoothing` e [1], `outer` r [1]: nobody knows the masses, and where the
+//! torque changes sign depends on their ratio.
+//!
+//! # Signature in the data
+//! A jump where the gravity torque of the joint changes sign, a constant elsewhere: with one sign of torque it is
+//! the zero of the joint.
+//!
+//! # Not to be confused with
+//! `backlash`, which flips with the direction; `compliance`, which grows with the torque.
+//!
+//! # Source
+//! Contact torque of a gap with friction, notes of the project (eq. 4); Slamani, Bonev 2012.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+use armcal_core::{Observation, Unit};
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "gravity_backlash",
+    aliases: &[],
+    summary: "play whose flank gravity chooses",
+    family: Family::LostMotion,
+    toggle: Toggle::Load,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[
+        Shape {
+            name: "friction",
+            unit: Unit::One,
+            default: Some(0.0),
+            lower: 0.0,
+            upper: 10.0,
+            meaning: "drag as a fraction of the largest gravity torque",
+            parameter: true,
+            values: Some(drags),
+        },
+        Shape {
+            name: "smoothing",
+            unit: Unit::One,
+            default: Some(0.05),
+            lower: 1e-3,
+            upper: 10.0,
+            meaning: "width of the change of flank as a fraction of the largest gravity torque",
+            parameter: true,
+            values: None,
+        },
+        Shape {
+            name: "outer",
+            unit: Unit::One,
+            default: Some(1.0),
+            lower: 0.1,
+            upper: 10.0,
+            meaning: "weight of the outer links relative to their default masses",
+            parameter: true,
+            values: Some(weights),
+        },
+    ],
+    confused_with: &["backlash", "compliance", "arm_compliance"],
+    source: include_str!("gravity_backlash.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct GravityBacklash {
+    joint: usize,
+    per_torque: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.joint()?;
+    placing.loaded(joint)?;
+    let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
+    let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
+    let per_torque = 1.0 / placing.reference_torque_nm(joint);
+    Ok(Placement::new(vec![width], GravityBacklash { joint, per_torque }))
+}
+
+fn drags(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    vec![0.05, 0.1, 0.2, 0.3, 0.5]
+}
+
+/// The last joint has no outer links.
+fn weights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    match placing.spec.target {
+        Some(joint) if joint + 1 < placing.zero.joints.len() => vec![0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 3.0],
+        _ => Vec::new(),
+    }
+}
+
+impl Physics for GravityBacklash {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let [width, friction, smoothing, outer] = [theta[0], theta[1], theta[2], theta[3]];
+        let torque = &x.torque[self.joint];
+        let load = (outer * torque.outer_nm + (torque.total_nm() - torque.outer_nm)) * self.per_torque;
+        let contact = (friction * x.arrival[self.joint] - load) / smoothing;
+        change.joint(self.joint, width * contact.tanh() * -0.5);
+    }
+}

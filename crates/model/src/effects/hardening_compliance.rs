@@ -1,0 +1,80 @@
+//! A joint whose spring is not linear.
+//!
+//! # What moves
+//! As in `compliance`, but soft under small torque and stiffer under large (or the other way round), as harmonic
+//! drives are.
+//!
+//! # Equation
+//! `dq = c tau + a (tau/T)^3`, T the gravity torque of the nominal arm stretched out.
+//!
+//! # Parameters and units
+//! `compliance`, `compliance_outer`, `compliance_load` [rad/(N m)] as in `compliance`; `cubic` a [rad], negative
+//! where the joint hardens.
+//!
+//! # Signature in the data
+//! A sag whose growth with the lever of gravity bends over.
+//!
+//! # Not to be confused with
+//! `compliance`, its special case a = 0; `gravity_backlash`, the extreme soft zone.
+//!
+//! # Source
+//! Adv. Mech. Eng. 2015, 10.1177/1687814015590289 (piecewise linear joint compliance).
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use super::shares::Shares;
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "hardening_compliance",
+    aliases: &[],
+    summary: "a joint yields to gravity like a spring that is not linear",
+    family: Family::Elasticity,
+    toggle: Toggle::Load,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["compliance", "gravity_backlash"],
+    source: include_str!("hardening_compliance.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct HardeningCompliance {
+    joint: usize,
+    shares: Shares,
+    /// Index of the cubic amplitude.
+    cubic: usize,
+    per_torque: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.turning_joint()?;
+    placing.loaded(joint)?;
+    let shares = Shares::of(placing, joint);
+    let deg = 1f64.to_radians();
+    let per_torque = 1.0 / placing.reference_torque_nm(joint);
+    let (typical, bound) = (0.4 * deg * per_torque, 8.0 * deg * per_torque);
+    let mut amplitudes = shares.amplitudes(
+        "compliance",
+        Unit::RadianPerNewtonMetre,
+        typical,
+        bound,
+        "angle per gravity torque",
+    );
+    let cubic = amplitudes.len();
+    let meaning = "cubic part of the angle with the nominal arm stretched out";
+    amplitudes.push(amplitude("cubic", Unit::Radian, 0.2 * deg, 8.0 * deg, meaning));
+    Ok(Placement::new(amplitudes, HardeningCompliance { joint, shares, cubic, per_torque }))
+}
+
+impl Physics for HardeningCompliance {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let torque = &x.torque[self.joint];
+        let cubic = (torque.total_nm() * self.per_torque).powi(3);
+        change.joint(self.joint, self.shares.torque(theta, torque) + theta[self.cubic] * cubic);
+    }
+}

@@ -1,0 +1,173 @@
+//! Effects in a model: adding them, what could be added, and what drives them.
+
+use super::kind::{EffectKind, Offered, Target};
+use super::placed::{self, Effects, PlacedEffect};
+use super::placing::Placing;
+use super::spec::Since;
+use super::{Drivers, EffectSpec, NominalPose, Session, catalogue};
+use crate::{Model, ModelError};
+use armcal_core::{DwellId, Observation};
+use std::collections::BTreeSet;
+
+/// A step may happen before this many dwells at most; a longer session is thinned out evenly.
+const MOST_STEPS: usize = 250;
+/// Dwells before the first and after the last step that is tried.
+const STEP_MARGIN: usize = 3;
+
+impl Model {
+    /// The same model with more effects behind its parameters; at their nominal zero they change nothing.
+    ///
+    /// Their parameters are named `<spec>.<quantity>`. Errors name what a spec asks for and this arm, or these
+    /// observations, cannot give.
+    pub fn with_effects(&self, specs: &[EffectSpec], session: &Session) -> Result<Model, ModelError> {
+        if specs.is_empty() {
+            return Ok(self.clone());
+        }
+        let zero = self.zero_pose();
+        let mut parameters = self.parameters().to_vec();
+        let mut placed = self.effects().to_vec();
+        for spec in specs {
+            let (effect, own) = placed::place(self, session, spec, &zero, parameters.len())?;
+            placed.push(effect);
+            parameters.extend(own);
+        }
+        self.with_placed(placed, session.clone(), parameters)
+    }
+
+    /// The effects, in the order of their parameters.
+    pub fn effects(&self) -> &[PlacedEffect] {
+        self.placed_effects().map_or(&[], |effects| &effects.placed)
+    }
+
+    /// Reads a spec such as `backlash:1` for this arm.
+    pub fn effect(&self, text: &str) -> Result<EffectSpec, ModelError> {
+        EffectSpec::parse(text, self.chain().joint_names())
+    }
+
+    /// Everything of the catalogue that this arm and these observations could show: every kind at every joint
+    /// and in every recording it can act in, with default shapes.
+    pub fn candidates(&self, session: &Session) -> Vec<EffectSpec> {
+        let zero = self.zero_pose();
+        let mut specs = Vec::new();
+        for kind in catalogue() {
+            let at_targets = self.targets(kind, EffectSpec::new(kind.name));
+            match kind.offered {
+                Offered::Once => {
+                    specs.extend(at_targets.flat_map(|spec| self.parts(kind, spec, session, &zero)))
+                }
+                Offered::Events => {
+                    for recording in session.telling_recordings() {
+                        let since = Since::Recording(recording);
+                        specs.extend(self.targets(kind, EffectSpec::new(kind.name).since(since)));
+                    }
+                }
+                Offered::Scanned | Offered::Never => {}
+            }
+        }
+        specs.retain(|spec| placed::place(self, session, spec, &zero, 0).is_ok());
+        specs
+    }
+
+    /// The families with a number to be scanned: each without it, and with every value worth trying. Steps at
+    /// a dwell are families too.
+    pub fn scans(
+        &self,
+        session: &Session,
+        observations: &[Observation],
+    ) -> Vec<(EffectSpec, Vec<EffectSpec>)> {
+        let zero = self.zero_pose();
+        let steps = steps(observations);
+        let mut families = Vec::new();
+        for kind in catalogue() {
+            for spec in self.targets(kind, EffectSpec::new(kind.name)) {
+                let mut members = Vec::new();
+                if kind.offered == Offered::Events {
+                    members.extend(steps.iter().map(|dwell| spec.clone().since(Since::Dwell(*dwell))));
+                }
+                for shape in kind.shapes.iter().filter(|shape| shape.parameter) {
+                    let Some(values) = shape.values else { continue };
+                    let placing = Placing { model: self, session, spec: &spec, kind, zero: &zero };
+                    members.extend(
+                        values(&placing, observations).iter().map(|v| spec.clone().with(shape.name, *v)),
+                    );
+                }
+                members.retain(|spec| placed::place(self, session, spec, &zero, 0).is_ok());
+                if !members.is_empty() {
+                    families.push((spec, members));
+                }
+            }
+        }
+        families
+    }
+
+    /// What drives the effects in an observation.
+    pub fn drivers<'o>(&self, session: &Session, o: &'o Observation) -> Drivers<'o> {
+        let nominal = self.nominal();
+        let pose = self.nominal_pose(&nominal, &o.joint_rad);
+        let seated = o.cavity().is_some();
+        let board = seated.then(|| self.board_in_world(&nominal, o.dwell.recording)).flatten();
+        Drivers::of(session, pose, board.map(|board| board.translation.vector), o)
+    }
+
+    fn targets(&self, kind: &EffectKind, spec: EffectSpec) -> impl Iterator<Item = EffectSpec> + use<> {
+        let joints = match kind.target {
+            Target::Joint => (0..self.joint_count()).map(Some).collect(),
+            Target::Whole => vec![None],
+        };
+        joints.into_iter().map(move |target| EffectSpec { target, ..spec.clone() })
+    }
+
+    /// The spec with every part of the arm that a shape of its kind can name.
+    fn parts(
+        &self,
+        kind: &'static EffectKind,
+        spec: EffectSpec,
+        session: &Session,
+        zero: &NominalPose,
+    ) -> Vec<EffectSpec> {
+        let part = kind.shapes.iter().find(|shape| !shape.parameter);
+        let Some((shape, values)) = part.and_then(|shape| Some((shape, shape.values?))) else {
+            return vec![spec];
+        };
+        let placing = Placing { model: self, session, spec: &spec, kind, zero };
+        values(&placing, &[]).iter().map(|value| spec.clone().with(shape.name, *value)).collect()
+    }
+}
+
+impl Session {
+    /// The recordings whose difference from the others says something: of two, one is enough.
+    fn telling_recordings(&self) -> std::ops::Range<usize> {
+        match self.recordings {
+            0 | 1 => 0..0,
+            2 => 1..2,
+            n => 0..n,
+        }
+    }
+}
+
+impl Effects {
+    /// The drivers of an observation for this model.
+    pub fn drivers<'o>(&self, model: &Model, o: &'o Observation) -> Drivers<'o> {
+        model.drivers(&self.session, o)
+    }
+}
+
+/// The dwells at which a step can be told from noise, in the order of time. A step that only sets the first or
+/// the last recording apart is that recording's own event.
+fn steps(observations: &[Observation]) -> Vec<DwellId> {
+    let dwells: Vec<DwellId> =
+        observations.iter().map(|o| o.dwell).collect::<BTreeSet<_>>().into_iter().collect();
+    let recordings: BTreeSet<usize> = dwells.iter().map(|dwell| dwell.recording).collect();
+    let own_event: Vec<usize> = recordings
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| *i == 1 || i + 1 == recordings.len())
+        .map(|(_, r)| *r)
+        .collect();
+    let begins = |k: usize| k > 0 && dwells[k - 1].recording != dwells[k].recording;
+    let telling = |k: &usize| !(begins(*k) && own_event.contains(&dwells[*k].recording));
+    let dwells: Vec<DwellId> = (0..dwells.len()).filter(telling).map(|k| dwells[k]).collect();
+    let inner = dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]);
+    let stride = inner.len().div_ceil(MOST_STEPS).max(1);
+    inner.iter().step_by(stride).copied().collect()
+}

@@ -1,0 +1,172 @@
+//! What the catalogue says about a kind of effect, and what placing it gives.
+
+use super::physics::{AnyPhysics, Slot};
+use super::placing::Placing;
+use armcal_core::{Observation, Parameter, Unit};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// One entry of the catalogue.
+pub struct EffectKind {
+    /// Its name in specs and files.
+    pub name: &'static str,
+    /// Other mechanisms that are the same to the data.
+    pub aliases: &'static [&'static str],
+    /// One line.
+    pub summary: &'static str,
+    /// Which part of the world it belongs to.
+    pub family: Family,
+    /// What the user can switch to see it in a paired experiment.
+    pub toggle: Toggle,
+    /// Whether it acts at a joint.
+    pub target: Target,
+    /// How the catalogue offers it to the diagnosis.
+    pub offered: Offered,
+    /// Numbers that are not amplitudes.
+    pub shapes: &'static [Shape],
+    /// Other entries that look alike in common data, though not in all.
+    pub confused_with: &'static [&'static str],
+    /// Its source file, whose header is its documentation.
+    pub(crate) source: &'static str,
+    /// Puts it in its place, or says why it has none there.
+    pub(crate) place: fn(&Placing<'_>) -> Result<Placement, String>,
+}
+
+impl EffectKind {
+    /// Its documentation under the fixed headings: the header of its source file.
+    pub fn docs(&self) -> String {
+        self.source
+            .lines()
+            .map_while(|line| line.strip_prefix("//!"))
+            .map(|line| line.strip_prefix(' ').unwrap_or(line))
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+}
+
+impl std::fmt::Debug for EffectKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "EffectKind({})", self.name)
+    }
+}
+
+/// Families of mechanisms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Family {
+    /// Play and friction: what depends on the direction of arrival.
+    LostMotion,
+    /// What gives way under load.
+    Elasticity,
+    /// Gears, belts and encoders: what depends on the joint angle.
+    Transmission,
+    /// The shape of the arm.
+    Geometry,
+    /// Something moved or slipped once.
+    Event,
+    /// Something creeps with time or temperature.
+    Drift,
+    /// The position sensor.
+    Sensor,
+    /// The calibration board.
+    Board,
+    /// Clocks.
+    Timing,
+    /// A formula of the user.
+    User,
+}
+
+/// What can be switched while the pose stays, so that the effect shows in the difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Toggle {
+    /// The direction of arrival.
+    Direction,
+    /// The load at the tip.
+    Load,
+    /// Time.
+    Time,
+    /// The recording.
+    Recording,
+    /// The temperature.
+    Temperature,
+    /// Nothing.
+    None,
+}
+
+/// Where an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    /// At one joint.
+    Joint,
+    /// On the whole: its spec names no joint.
+    Whole,
+}
+
+/// How the catalogue offers an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Offered {
+    /// For every target.
+    Once,
+    /// For every target in every recording, and as a step at any dwell.
+    Events,
+    /// Only with its shape scanned.
+    Scanned,
+    /// Not by itself: it belongs to the noise, or to the user.
+    Never,
+}
+
+/// The values of a shape worth trying, where it would be placed, for these observations.
+pub(crate) type Values = fn(&Placing<'_>, &[Observation]) -> Vec<f64>;
+
+/// A number of an effect that is not an amplitude.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// Key in specs and files.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: Unit,
+    /// Value where none is given; without one the spec must say it.
+    pub default: Option<f64>,
+    /// Smallest value.
+    pub lower: f64,
+    /// Largest value.
+    pub upper: f64,
+    /// What it means.
+    pub meaning: &'static str,
+    /// Whether it is a parameter (fixed unless freed); otherwise it names a part of the arm.
+    pub parameter: bool,
+    /// The values worth trying.
+    pub(crate) values: Option<Values>,
+}
+
+/// An effect in its place: its amplitudes and its physics.
+pub(crate) struct Placement {
+    /// The amplitudes; their names are the quantities, without the spec.
+    pub amplitudes: Vec<Parameter>,
+    /// What they do.
+    pub physics: Arc<dyn AnyPhysics>,
+    /// Where it twists the path.
+    pub slots: Vec<Slot>,
+    /// Whether it distorts what the sensor sees.
+    pub distorts: bool,
+}
+
+impl Placement {
+    /// An effect that changes joints, parameters or seated points.
+    pub fn new(amplitudes: Vec<Parameter>, physics: impl AnyPhysics + 'static) -> Placement {
+        Placement { amplitudes, physics: Arc::new(physics), slots: Vec::new(), distorts: false }
+    }
+
+    /// An effect that twists the path at a slot.
+    pub fn twisting(slot: Slot, amplitudes: Vec<Parameter>, physics: impl AnyPhysics + 'static) -> Placement {
+        Placement { slots: vec![slot], ..Placement::new(amplitudes, physics) }
+    }
+
+    /// An effect that distorts what the sensor sees.
+    pub fn distorting(amplitudes: Vec<Parameter>, physics: impl AnyPhysics + 'static) -> Placement {
+        Placement { distorts: true, ..Placement::new(amplitudes, physics) }
+    }
+}

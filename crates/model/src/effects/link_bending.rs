@@ -1,0 +1,126 @@
+//! A link that bends under what it carries.
+//!
+//! # What moves
+//! The link is a beam clamped at its joint; the weight of what follows, and its moment, push its end down and turn
+//! it.
+//!
+//! # Equation
+//! Euler-Bernoulli cantilever of length a: `w = (F a^3/3 + M a^2/2)/EI`, `phi = (F a^2/2 + M a)/EI`, F and M the
+//! parts across the link; 3/8 of its own weight counts as hanging at its end.
+//!
+//! # Parameters and units
+//! `sag` w [m] of the link held out level with the nominal masses beyond it; `sag_outer` the correction for the
+//! moment of the outer links; `sag_load` under a load of 1 kg.
+//!
+//! # Signature in the data
+//! The tip sinks with the lever of gravity, and the links beyond it tilt.
+//!
+//! # Not to be confused with
+//! `compliance` of its joint, which is close to it in most poses. Of the last link: the same as `compliance` of the
+//! last joint, and left to that.
+//!
+//! # Source
+//! Gere and Timoshenko, Mechanics of Materials, app. G; Klimchik et al., arXiv 1211.5739.
+
+use super::drivers::Drivers;
+use super::frame_shift::about;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::Placing;
+use super::shares::Shares;
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+use nalgebra::Vector3;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "link_bending",
+    aliases: &[],
+    summary: "a link bends under what it carries",
+    family: Family::Elasticity,
+    toggle: Toggle::Load,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
+    source: include_str!("link_bending.rs"),
+    place,
+};
+
+/// Shorter links do not bend by an amount worth an entry.
+const SHORTEST_M: f64 = 0.05;
+/// Share of its own weight that a cantilever carries at its end.
+const OWN_SHARE: f64 = 3.0 / 8.0;
+
+#[derive(Debug)]
+struct LinkBending {
+    link: usize,
+    shares: Shares,
+    /// Inverse of EI for a sag of 1 m under the nominal masses, and under 1 kg at the tip.
+    per_sag: f64,
+    per_load_sag: f64,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let link = placing.joint()?;
+    if link + 1 >= placing.zero.joints.len() {
+        return Err("bending of the last link is the same as compliance of its joint; use that".to_owned());
+    }
+    let (from, to) = placing.zero.link_m(link);
+    let length_m = (to - from).norm();
+    if length_m < SHORTEST_M {
+        return Err(format!("its link is only {:.0} mm long", length_m * 1e3));
+    }
+    let gravity = placing.gravity_mps2();
+    let outer_kg: f64 = (link + 1..placing.zero.joints.len()).map(|k| placing.zero.link_mass_kg(k)).sum();
+    let force_n = (outer_kg + OWN_SHARE * placing.zero.link_mass_kg(link)) * gravity;
+    let sag =
+        |force_n: f64, moment_nm: f64| force_n * length_m.powi(3) / 3.0 + moment_nm * length_m.powi(2) / 2.0;
+    let shares = Shares::of(placing, link);
+    let amplitudes = shares.amplitudes("sag", Unit::Metre, 1.2e-3, 0.03, "sag of the link held out level");
+    let per_sag = 1.0 / sag(force_n, placing.reference_torque_nm(link + 1));
+    let per_load_sag = 1.0 / sag(gravity, gravity * placing.reach_m(link + 1));
+    Ok(Placement::twisting(
+        placing.zero.joints[link + 1].slot,
+        amplitudes,
+        LinkBending { link, shares, per_sag, per_load_sag },
+    ))
+}
+
+impl Physics for LinkBending {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let pose = &x.pose;
+        let (from, end) = pose.link_m(self.link);
+        let beam = end - from;
+        let gravity = &x.gravity_mps2;
+        let outer_kg: f64 = (self.link + 1..pose.joints.len()).map(|k| pose.link_mass_kg(k)).sum();
+        let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(self.link));
+        let links_nm = pose.moment_nm(&end, self.link + 1, gravity);
+        let load_n = gravity * x.observation.load_kg;
+        let load_nm = (pose.tip_m - end).cross(&load_n);
+        let links = bend(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
+        let outer = bend(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
+        let load = bend(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);
+        let joint = &pose.joints[self.link + 1];
+        let slot = &pose.slots[joint.slot];
+        let part = |k: usize, axis: usize| {
+            let axis = slot.rotation.column(axis);
+            self.shares.sum(theta, axis.dot(&links[k]), axis.dot(&outer[k]), axis.dot(&load[k]))
+        };
+        let turn = [part(1, 0), part(1, 1), part(1, 2)];
+        let pivot_m = slot.rotation.tr_mul(&(end - slot.translation_m));
+        let back = about(&pivot_m.map(D::from), turn);
+        change.twist(joint.slot, [part(0, 0) + back[0], part(0, 1) + back[1], part(0, 2) + back[2]], turn);
+    }
+}
+
+/// Deflection and slope at the end of a clamped beam under a force and a moment there, for EI = 1.
+fn bend(beam_m: &Vector3<f64>, force_n: &Vector3<f64>, moment_nm: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let a = beam_m.norm();
+    // The nominal link never has length zero here; a degenerate pose gives no bending.
+    let Some(e) = beam_m.try_normalize(1e-9) else { return [Vector3::zeros(); 2] };
+    let force = force_n - e * e.dot(force_n);
+    let moment = moment_nm - e * e.dot(moment_nm);
+    let deflection = force * (a.powi(3) / 3.0) + moment.cross(&e) * (a * a / 2.0);
+    let slope = e.cross(&force) * (a * a / 2.0) + moment * a;
+    [deflection, slope]
+}

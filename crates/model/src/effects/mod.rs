@@ -1,0 +1,122 @@
+//! Effects: what makes the arm differ from its rigid geometry. One file, one line of the list below.
+//!
+//! An effect is a [`Physics`](physics::Physics) in a file of its own, whose header is its documentation under
+//! fixed headings, and an [`EffectKind`] that says what it is called, where it can act and with which
+//! parameters. [`catalogue`] is the only registration: specs, files, help texts, the candidates of the diagnosis
+//! and the contract tests iterate it.
+//!
+//! The prediction with effects is `B A_1(q + dq, p + dp) ... A_n T`, with small twists between the segments where
+//! an effect bends or shifts something; what each effect adds to `dq`, `dp` and the twists depends only on its own
+//! parameters and on the [`Drivers`] of the observation. So one pass of dual numbers through each effect and the
+//! product rule of `path` give exact columns, and zero amplitudes give the rigid prediction to the last bit.
+//!
+//! To add one, start from `eccentricity.rs` (a joint), `tool_shift.rs` (a parameter), `frame_drift.rs` (a twist) or
+//! `sensor_scale.rs` (what is seen), and name the file below: as a module, and in the catalogue.
+
+mod arm_compliance;
+mod axis_tilt;
+mod backlash;
+mod base_compliance;
+mod bearing_compliance;
+mod belt_backlash;
+mod belt_compliance;
+mod belt_coupling;
+mod board_scale;
+mod clock_offset;
+mod compliance;
+mod crossed_backlash;
+mod drivers;
+mod eccentricity;
+mod effort_compliance;
+mod error_curve;
+mod expression;
+mod formula;
+mod frame_drift;
+mod frame_shift;
+mod friction_windup;
+mod gear_ratio;
+mod gravity_backlash;
+mod hardening_compliance;
+mod in_model;
+mod kind;
+mod link_bending;
+mod measure;
+mod periodic;
+mod physics;
+mod placed;
+mod placing;
+mod play;
+mod seat_offset;
+mod second_harmonic;
+mod sensor_scale;
+mod session;
+mod shares;
+mod spec;
+mod table;
+mod thermal_growth;
+mod tool_shift;
+mod volume_distortion;
+mod warm_up;
+mod zero_drift;
+mod zero_slip;
+
+#[cfg(test)]
+mod tests;
+
+pub use drivers::{Drivers, Torque};
+pub use expression::Expression;
+pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
+pub use placed::PlacedEffect;
+pub use session::Session;
+pub use spec::{EffectSpec, Since};
+pub use table::{EffectTable, Extra, Override, Word};
+
+pub(crate) use drivers::NominalPose;
+pub(crate) use placed::Effects;
+
+/// Every kind of effect, in the order in which people read about them.
+static CATALOGUE: &[&EffectKind] = &[
+    &backlash::KIND,
+    &gravity_backlash::KIND,
+    &friction_windup::KIND,
+    &crossed_backlash::KIND,
+    &belt_backlash::KIND,
+    &compliance::KIND,
+    &arm_compliance::KIND,
+    &hardening_compliance::KIND,
+    &effort_compliance::KIND,
+    &belt_compliance::KIND,
+    &link_bending::KIND,
+    &base_compliance::KIND,
+    &bearing_compliance::KIND,
+    &eccentricity::KIND,
+    &second_harmonic::KIND,
+    &periodic::KIND,
+    &error_curve::KIND,
+    &gear_ratio::KIND,
+    &belt_coupling::KIND,
+    &axis_tilt::KIND,
+    &zero_slip::KIND,
+    &tool_shift::KIND,
+    &frame_shift::KIND,
+    &zero_drift::KIND,
+    &frame_drift::KIND,
+    &thermal_growth::KIND,
+    &warm_up::KIND,
+    &sensor_scale::KIND,
+    &volume_distortion::KIND,
+    &board_scale::KIND,
+    &seat_offset::KIND,
+    &clock_offset::KIND,
+    &expression::KIND,
+];
+
+/// Every kind of effect, in the order in which people read about them.
+pub fn catalogue() -> &'static [&'static EffectKind] {
+    CATALOGUE
+}
+
+/// A kind by its name.
+pub fn find(kind: &str) -> Option<&'static EffectKind> {
+    CATALOGUE.iter().copied().find(|entry| entry.name == kind)
+}

@@ -1,0 +1,343 @@
+//! The effects of a model: placing them and evaluating them together.
+
+use super::drivers::{Drivers, NominalPose};
+use super::kind::{EffectKind, Placement};
+use super::physics::{AnyPhysics, Deformation, Slot};
+use super::placing::Placing;
+use super::session::Session;
+use super::spec::EffectSpec;
+use crate::error::nearest;
+use crate::path::{Twist, linearise};
+use crate::rigid::Rigid;
+use crate::segment::{Freedom, Geometry, Segment};
+use crate::{Model, ModelError};
+use armcal_core::{Parameter, Reference, Role};
+use nalgebra::{Matrix3, Vector3};
+use num_dual::Dual64;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// An effect in its place in a model.
+#[derive(Debug, Clone)]
+pub struct PlacedEffect {
+    /// Which effect, where.
+    pub spec: EffectSpec,
+    /// Its entry in the catalogue.
+    pub kind: &'static EffectKind,
+    /// Its entries in the parameter vector: amplitudes, then shapes.
+    pub parameters: Range<usize>,
+    /// How many of them are amplitudes.
+    pub amplitudes: usize,
+    physics: Arc<dyn AnyPhysics>,
+    slots: Vec<Slot>,
+    distorts: bool,
+}
+
+impl PartialEq for PlacedEffect {
+    /// The same spec in the same place of the vector has the same physics.
+    fn eq(&self, other: &PlacedEffect) -> bool {
+        self.spec == other.spec && self.parameters == other.parameters
+    }
+}
+
+impl PlacedEffect {
+    fn acts_on(&self, x: &Drivers<'_>) -> bool {
+        self.spec.since.is_none_or(|since| since.holds(x.observation.dwell))
+    }
+}
+
+/// All effects of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Effects {
+    pub placed: Vec<PlacedEffect>,
+    pub session: Session,
+    /// World to tip with a twist, the identity at rest, at every slot in use.
+    path: Vec<Segment>,
+    /// The slots in use, ascending.
+    slots: Vec<Slot>,
+}
+
+/// A deformed arm at one observation.
+pub(crate) struct Evaluated {
+    /// The tip where the sensor sees it.
+    pub tip: Rigid<f64>,
+    /// The seated point in its board's frame [m]; zero for a tracked tip.
+    pub in_board_m: Vector3<f64>,
+}
+
+/// A deformed arm at one observation, with its derivatives.
+pub(crate) struct Linearised {
+    pub at: Evaluated,
+    /// Motion of the tip per unit of a parameter.
+    pub parameters: Vec<(usize, Twist)>,
+    /// Motion of the tip per unit of a joint reading.
+    pub joints: Vec<(usize, Twist)>,
+    /// Motion of the seated point in its board per unit of a parameter.
+    pub seats: Vec<(usize, Vector3<f64>)>,
+}
+
+/// Places one effect whose parameters start at `first`; gives it and its parameters.
+pub(crate) fn place(
+    model: &Model,
+    session: &Session,
+    spec: &EffectSpec,
+    zero: &NominalPose,
+    first: usize,
+) -> Result<(PlacedEffect, Vec<Parameter>), ModelError> {
+    let kind = spec.kind()?;
+    let bad = |problem: String| ModelError::BadEffect { effect: spec.to_string(), problem };
+    let placing = Placing { model, session, spec, kind, zero };
+    check_words(&placing).map_err(bad)?;
+    let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&placing).map_err(bad)?;
+    let count = amplitudes.len();
+    let mut parameters = amplitudes;
+    parameters.extend(kind.shapes.iter().filter(|shape| shape.parameter).map(|shape| Parameter {
+        name: shape.name.to_owned(),
+        unit: shape.unit,
+        nominal: placing.shape(shape.name).unwrap_or_default(),
+        lower: shape.lower,
+        upper: shape.upper,
+        prior_sigma: None,
+        free: false,
+        role: Role::Effect,
+        meaning: shape.meaning.to_owned(),
+    }));
+    for (quantity, change) in &spec.overrides {
+        let known = || parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
+        let message = || {
+            let hint = nearest(quantity, known().into_iter());
+            let hint = hint.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
+            format!("it has no parameter \"{quantity}\"{hint} It has: {}", known().join(", "))
+        };
+        let unknown = message();
+        let own = parameters.iter_mut().find(|p| p.name == *quantity).ok_or_else(|| bad(unknown))?;
+        change.apply(own).map_err(bad)?;
+    }
+    for parameter in &mut parameters {
+        parameter.name = format!("{spec}.{}", parameter.name);
+    }
+    let range = first..first + parameters.len();
+    let effect = PlacedEffect {
+        spec: spec.clone(),
+        kind,
+        parameters: range,
+        amplitudes: count,
+        physics,
+        slots,
+        distorts,
+    };
+    Ok((effect, parameters))
+}
+
+/// Whether everything the spec says has a meaning for its kind.
+fn check_words(placing: &Placing<'_>) -> Result<(), String> {
+    let (spec, kind) = (placing.spec, placing.kind);
+    if kind.target == super::Target::Whole && spec.target.is_some() {
+        return Err("it does not act at a joint; leave the joint out".to_owned());
+    }
+    for (name, value) in &spec.shape {
+        let Some(shape) = kind.shapes.iter().find(|shape| shape.name == name) else {
+            let known: Vec<&str> = kind.shapes.iter().map(|shape| shape.name).collect();
+            let hint = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            return Err(format!("it has no shape \"{name}\"; its shapes are: {hint}"));
+        };
+        if !(shape.lower <= *value && *value <= shape.upper) {
+            return Err(format!("{name} = {value} is not within {} and {}", shape.lower, shape.upper));
+        }
+    }
+    match kind.shapes.iter().find(|shape| placing.shape(shape.name).is_none()) {
+        Some(shape) => {
+            Err(format!("say its {} ({}), such as {spec},{}=...", shape.name, shape.meaning, shape.name))
+        }
+        None => Ok(()),
+    }
+}
+
+impl Effects {
+    /// Puts placed effects on the path of a model whose parameter vector then has `count` entries.
+    pub fn new(placed: Vec<PlacedEffect>, session: Session, rigid: &[Segment], count: usize) -> Effects {
+        let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        let mut path = Vec::with_capacity(rigid.len() + slots.len());
+        for slot in 0..=rigid.len() {
+            if let Ok(index) = slots.binary_search(&slot) {
+                let first = count + 6 * index;
+                path.push(Segment {
+                    frame: None,
+                    geometry: Geometry::Origin { nominal: Rigid::identity(), freedom: Freedom::Full },
+                    joint: None,
+                    parameters: first..first + 6,
+                });
+            }
+            path.extend(rigid.get(slot).cloned());
+        }
+        Effects { placed, session, path, slots }
+    }
+
+    /// The deformed arm, predicted.
+    pub fn evaluate(&self, p: &[f64], x: &Drivers<'_>) -> Evaluated {
+        let (p, q, in_board_m) = self.deformed(p, x);
+        let mut tip = crate::path::follow(&self.path, &p, &q);
+        tip.translation_m += self.seen_m(&p, x, &tip.translation_m);
+        Evaluated { tip, in_board_m }
+    }
+
+    /// The deformed arm and its derivatives with respect to everything.
+    pub fn linearise(&self, p: &[f64], x: &Drivers<'_>) -> Linearised {
+        let count = p.len();
+        let (p, q, in_board_m) = self.deformed(p, x);
+        let path = linearise(&self.path, &p, &q);
+        let (mut parameters, twists): (Vec<_>, Vec<_>) =
+            path.parameters.into_iter().partition(|(index, _)| *index < count);
+        let mut motions = vec![Twist::none(); p.len()];
+        for (index, twist) in parameters.iter().chain(&twists) {
+            motions[*index] = *twist;
+        }
+        let mut joint_motions = vec![Twist::none(); q.len()];
+        for (index, twist) in &path.joints {
+            joint_motions[*index] = *twist;
+        }
+        let mut seats = Vec::new();
+        let mut change = Deformation::none();
+        let mut lanes = Vec::new();
+        for effect in self.placed.iter().filter(|effect| effect.acts_on(x)) {
+            lanes.clear();
+            lanes.extend(p[effect.parameters.clone()].iter().map(|&value| Dual64::from(value)));
+            for k in effect.physics.touched_entries(x, lanes.len()) {
+                lanes[k].eps = 1.0;
+                change.clear();
+                effect.physics.differentiate(&lanes, x, &mut change);
+                lanes[k].eps = 0.0;
+                let mut motion = Twist::none();
+                for (joint, value) in &change.joints {
+                    motion.add(&joint_motions[*joint], value.eps);
+                }
+                for (index, value) in &change.parameters {
+                    motion.add(&motions[*index], value.eps);
+                }
+                for (slot, values) in &change.twists {
+                    for (motion_k, value) in motions[self.twist(*slot, count)].iter().zip(values) {
+                        motion.add(motion_k, value.eps);
+                    }
+                }
+                parameters.push((effect.parameters.start + k, motion));
+                if change.seat_m.iter().any(|s| s.eps != 0.0) {
+                    seats.push((effect.parameters.start + k, change.seat_m.map(|s| s.eps)));
+                }
+            }
+        }
+        let mut at = Evaluated { tip: path.tip, in_board_m };
+        let mut joints = path.joints;
+        self.distort(&p, x, &mut at.tip, &mut parameters, &mut joints);
+        Linearised { at, parameters, joints, seats }
+    }
+
+    /// Parameters with the twists behind them, joint readings, and the seated point.
+    fn deformed(&self, p: &[f64], x: &Drivers<'_>) -> (Vec<f64>, Vec<f64>, Vector3<f64>) {
+        let mut change = Deformation::none();
+        for effect in self.placed.iter().filter(|effect| effect.acts_on(x)) {
+            effect.physics.predict(&p[effect.parameters.clone()], x, &mut change);
+        }
+        let mut extended = Vec::with_capacity(p.len() + 6 * self.slots.len());
+        extended.extend_from_slice(p);
+        extended.resize(p.len() + 6 * self.slots.len(), 0.0);
+        for (index, value) in &change.parameters {
+            extended[*index] += value;
+        }
+        for (slot, values) in &change.twists {
+            for (entry, value) in extended[self.twist(*slot, p.len())].iter_mut().zip(values) {
+                *entry += value;
+            }
+        }
+        let mut q = x.observation.joint_rad.clone();
+        for (joint, value) in &change.joints {
+            if let Some(reading) = q.get_mut(*joint) {
+                *reading += value;
+            }
+        }
+        let in_board_m = match &x.observation.reference {
+            Reference::Seated { in_board_m, .. } => in_board_m + change.seat_m,
+            Reference::Tracked { .. } => Vector3::zeros(),
+        };
+        (extended, q, in_board_m)
+    }
+
+    /// Where the twist of a slot stands behind the `count` parameters.
+    fn twist(&self, slot: Slot, count: usize) -> Range<usize> {
+        // Every slot an effect twists was declared when it was placed.
+        let index = self.slots.binary_search(&slot).unwrap_or_default();
+        count + 6 * index..count + 6 * index + 6
+    }
+
+    fn distorting(&self, x: &Drivers<'_>) -> impl Iterator<Item = &PlacedEffect> {
+        self.placed.iter().filter(move |effect| effect.distorts && effect.acts_on(x))
+    }
+
+    /// How much further than the base the sensor moves what the tip is compared with: the tip itself, or the board it
+    /// is seated in. The base was measured by the same sensor, so that its own shift is in the model already.
+    fn seen_m(&self, p: &[f64], x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Vector3<f64> {
+        let (Some(at_m), base_m) = (sensed_m(x, tip_m), x.base_m()) else { return Vector3::zeros() };
+        let moved = |effect: &PlacedEffect| {
+            let theta = &p[effect.parameters.clone()];
+            effect.physics.predict_seen(theta, &at_m) - effect.physics.predict_seen(theta, &base_m)
+        };
+        self.distorting(x).map(moved).sum()
+    }
+
+    /// Carries tip and columns through the sensor's distortion and adds the columns of that.
+    fn distort(
+        &self,
+        p: &[f64],
+        x: &Drivers<'_>,
+        tip: &mut Rigid<f64>,
+        parameters: &mut [(usize, Twist)],
+        joints: &mut [(usize, Twist)],
+    ) {
+        let Some(at_m) = sensed_m(x, &tip.translation_m) else { return };
+        let tracked = matches!(x.observation.reference, Reference::Tracked { .. });
+        let (point, base) = (at_m.map(Dual64::from), x.base_m().map(Dual64::from));
+        let mut stretch = Matrix3::identity();
+        let mut own = Vec::new();
+        for effect in self.distorting(x) {
+            let mut lanes: Vec<Dual64> =
+                p[effect.parameters.clone()].iter().map(|&value| Dual64::from(value)).collect();
+            // The board stays where it was measured when the arm moves.
+            for axis in (0..3).filter(|_| tracked) {
+                let mut seeded = point;
+                seeded[axis].eps = 1.0;
+                let change = effect.physics.differentiate_seen(&lanes, &seeded).map(|s| s.eps);
+                let mut column = stretch.column_mut(axis);
+                column += change;
+            }
+            for k in 0..lanes.len() {
+                lanes[k].eps = 1.0;
+                let [at, of_base] =
+                    [&point, &base].map(|m| effect.physics.differentiate_seen(&lanes, m).map(|s| s.eps));
+                let change = at - of_base;
+                lanes[k].eps = 0.0;
+                own.push((effect.parameters.start + k, change));
+            }
+        }
+        if own.is_empty() {
+            return;
+        }
+        for (_, twist) in parameters.iter_mut().chain(joints) {
+            twist.translation_m = stretch * twist.translation_m;
+        }
+        for (index, change) in own {
+            if let Some((_, twist)) = parameters.iter_mut().find(|(column, _)| *column == index) {
+                twist.translation_m += change;
+            }
+        }
+        tip.translation_m += self.seen_m(p, x, &tip.translation_m);
+    }
+}
+
+/// The point the sensor measured in the world [m]: the tip, or the board it is seated in.
+fn sensed_m(x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Option<Vector3<f64>> {
+    match &x.observation.reference {
+        Reference::Tracked { .. } => Some(*tip_m),
+        Reference::Seated { .. } => x.board_m,
+    }
+}

@@ -1,0 +1,215 @@
+//! Putting an effect in its place on a given arm: what its kind may ask about the arm and the session.
+
+use super::drivers::{NominalPose, gravity_in_world};
+use super::kind::EffectKind;
+use super::session::Session;
+use super::spec::EffectSpec;
+use crate::Model;
+use crate::segment::Motion;
+use armcal_core::{Parameter, Role, Unit};
+use nalgebra::Vector3;
+
+/// A first axis closer to the vertical than this cosine (2.6 deg) is meant to stand upright.
+const UPRIGHT_COSINE: f64 = 0.999;
+/// Axes closer to parallel than this cosine count as parallel by design.
+const PARALLEL_COSINE: f64 = 0.99;
+
+/// One spec about to be placed.
+pub(crate) struct Placing<'a> {
+    /// The model it joins.
+    pub model: &'a Model,
+    /// The observations it will explain.
+    pub session: &'a Session,
+    /// What was asked for.
+    pub spec: &'a EffectSpec,
+    /// Its entry in the catalogue.
+    pub kind: &'static EffectKind,
+    /// The nominal arm with all joints at zero.
+    pub zero: &'a NominalPose,
+}
+
+impl Placing<'_> {
+    /// The joint the spec names.
+    pub fn joint(&self) -> Result<usize, String> {
+        let joint = self
+            .spec
+            .target
+            .ok_or_else(|| format!("it acts at a joint; say which, such as {}:1", self.kind.name))?;
+        if joint < self.zero.joints.len() {
+            return Ok(joint);
+        }
+        Err(format!("there is no joint {}; the arm has {}", joint + 1, self.zero.joints.len()))
+    }
+
+    /// The joint the spec names, if it turns.
+    pub fn turning_joint(&self) -> Result<usize, String> {
+        let joint = self.joint()?;
+        match self.motion(joint) {
+            Motion::Revolute => Ok(joint),
+            Motion::Prismatic => Err(format!("joint {} slides, and this effect is about turns", joint + 1)),
+        }
+    }
+
+    /// Checks that gravity loads a joint at all: a first axis that stands upright carries no torque.
+    pub fn loaded(&self, joint: usize) -> Result<(), String> {
+        let gravity = gravity_in_world(self.session, self.zero);
+        let along = self.zero.joints[joint].axis.dot(&gravity).abs() / gravity.norm().max(f64::MIN_POSITIVE);
+        if joint > 0 || self.motion(joint) == Motion::Prismatic || along < UPRIGHT_COSINE {
+            return Ok(());
+        }
+        Err(format!("the axis of joint {} stands upright, so gravity does not load it", joint + 1))
+    }
+
+    /// Checks that the spec says when: without that, an event is a part of the geometry.
+    pub fn event(&self) -> Result<(), String> {
+        if self.spec.since.is_some() {
+            return Ok(());
+        }
+        Err(format!("say when: {}@1 in recording 1 only, {}@1.17 from its dwell 17 on", self.spec, self.spec))
+    }
+
+    /// Checks that time passes in the session.
+    pub fn lasting(&self) -> Result<(), String> {
+        if self.session.end_ns > self.session.start_ns {
+            return Ok(());
+        }
+        Err("it grows with time, and all observations are of one moment".to_owned())
+    }
+
+    /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].
+    pub fn lengths_m(&self) -> Vec<(usize, f64)> {
+        let parameters = self.model.parameters();
+        let chain = 0..self.model.chain().parameters().len();
+        chain
+            .chain(self.model.tip_segment().parameters.clone())
+            .filter(|&index| parameters[index].unit == Unit::Metre && parameters[index].nominal != 0.0)
+            .map(|index| (index, parameters[index].nominal))
+            .collect()
+    }
+
+    /// How a joint moves.
+    pub fn motion(&self, joint: usize) -> Motion {
+        self.zero.joints[joint].motion
+    }
+
+    /// Unit of a joint's reading.
+    pub fn joint_unit(&self, joint: usize) -> Unit {
+        match self.motion(joint) {
+            Motion::Revolute => Unit::Radian,
+            Motion::Prismatic => Unit::Metre,
+        }
+    }
+
+    /// The typical size of a lost motion or step of a joint: the angle where it turns, 1 mm a degree where it slides.
+    pub fn joint_size(&self, joint: usize, deg: f64) -> f64 {
+        match self.motion(joint) {
+            Motion::Revolute => deg.to_radians(),
+            Motion::Prismatic => deg * 1e-3,
+        }
+    }
+
+    /// Whether a joint's axis is parallel to the one before it by design: +1, -1 where they point against
+    /// each other, `None` where they are not parallel or one of them slides.
+    pub fn parallel_to_previous(&self, joint: usize) -> Option<f64> {
+        let previous = self.zero.joints.get(joint.checked_sub(1)?)?;
+        let own = self.zero.joints.get(joint)?;
+        let cosine = previous.axis.dot(&own.axis);
+        let turning = previous.motion == Motion::Revolute && own.motion == Motion::Revolute;
+        (turning && cosine.abs() > PARALLEL_COSINE).then(|| cosine.signum())
+    }
+
+    /// Gravity torque of the nominal links on a joint with the arm stretched out level [N m] (prismatic: their
+    /// weight [N]): the scale of everything that torque drives. Never zero.
+    pub fn reference_torque_nm(&self, joint: usize) -> f64 {
+        let gravity = self.gravity_mps2();
+        let (mut reach_m, mut torque_nm, mut weight_n) = (0.0, 0.0, 0.0);
+        for k in joint..self.zero.joints.len() {
+            let (from, to) = self.zero.link_m(k);
+            let length_m = (to - from).norm();
+            let link_n = self.zero.link_mass_kg(k) * gravity;
+            torque_nm += link_n * (reach_m + 0.5 * length_m);
+            weight_n += link_n;
+            reach_m += length_m;
+        }
+        let scale = match self.motion(joint) {
+            Motion::Revolute => torque_nm,
+            Motion::Prismatic => weight_n,
+        };
+        scale.max(1e-3)
+    }
+
+    /// Length of the links from `first` on, stretched out [m].
+    pub fn reach_m(&self, first: usize) -> f64 {
+        let length = |k| {
+            let (from, to) = self.zero.link_m(k);
+            (to - from).norm()
+        };
+        (first..self.zero.joints.len()).map(length).sum()
+    }
+
+    /// Size of gravity [m/s^2].
+    pub fn gravity_mps2(&self) -> f64 {
+        self.session.gravity_in_base_mps2.unwrap_or(self.session.gravity_in_world_mps2).norm()
+    }
+
+    /// A shape: as the spec says, or its default.
+    pub fn shape(&self, name: &str) -> Option<f64> {
+        let given = self.spec.shape.iter().find(|(key, _)| key == name).map(|(_, value)| *value);
+        given.or_else(|| self.kind.shapes.iter().find(|shape| shape.name == name)?.default)
+    }
+
+    /// Middle of where the tip was seen or seated, in the world [m].
+    pub fn volume_centre_m(&self) -> Vector3<f64> {
+        let seated = || {
+            let p = self.model.nominal();
+            let points: Vec<Vector3<f64>> = self
+                .session
+                .board_centres_m
+                .iter()
+                .filter_map(|(recording, in_board)| {
+                    let board = self.model.board_in_world(&p, *recording)?;
+                    Some((board * nalgebra::Point3::from(*in_board)).coords)
+                })
+                .collect();
+            (!points.is_empty()).then(|| points.iter().sum::<Vector3<f64>>() / points.len() as f64)
+        };
+        self.session.volume_centre_m.or_else(seated).unwrap_or_else(Vector3::zeros)
+    }
+}
+
+/// An amplitude: zero before the fit, free within `bound` around it.
+pub(crate) fn amplitude(
+    quantity: &str,
+    unit: Unit,
+    prior_sigma: f64,
+    bound: f64,
+    meaning: impl Into<String>,
+) -> Parameter {
+    Parameter {
+        name: quantity.to_owned(),
+        unit,
+        nominal: 0.0,
+        lower: -bound,
+        upper: bound,
+        prior_sigma: Some(prior_sigma),
+        free: true,
+        role: Role::Effect,
+        meaning: meaning.into(),
+    }
+}
+
+/// Three amplitudes along or about x, y, z.
+pub(crate) fn amplitudes_xyz(
+    prefix: &str,
+    unit: Unit,
+    prior_sigma: f64,
+    bound: f64,
+    meaning: &str,
+) -> Vec<Parameter> {
+    ["x", "y", "z"]
+        .into_iter()
+        .map(|axis| {
+            amplitude(&format!("{prefix}{axis}"), unit, prior_sigma, bound, format!("{meaning} {axis}"))
+        })
+        .collect()
+}

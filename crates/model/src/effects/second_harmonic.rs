@@ -1,0 +1,49 @@
+//! An error twice a turn.
+//!
+//! # What moves
+//! An elliptic ring or pulley, a misaligned coupling, an encoder with two reading heads: the joint runs ahead and
+//! behind twice a turn.
+//!
+//! # Equation
+//! `dq = A sin 2q + B cos 2q`.
+//!
+//! # Parameters and units
+//! `sin` A, `cos` B [rad].
+//!
+//! # Signature in the data
+//! A wave twice a turn in one joint, whatever the direction, load and time.
+//!
+//! # Not to be confused with
+//! `eccentricity` and `gear_ratio`, which look the same in a narrow range.
+//!
+//! # Source
+//! Hu et al., Sensors 2020 (harmonic errors of joint modules); Tuttle, MIT TR 1992.
+
+use super::eccentricity::Harmonic;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::placing::{Placing, amplitude};
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "second_harmonic",
+    aliases: &["elliptic ring", "misaligned coupling"],
+    summary: "an error twice a turn of the joint",
+    family: Family::Transmission,
+    toggle: Toggle::None,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
+    source: include_str!("second_harmonic.rs"),
+    place,
+};
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.turning_joint()?;
+    let deg = 1f64.to_radians();
+    let amplitudes = vec![
+        amplitude("sin", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of sin 2q"),
+        amplitude("cos", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of cos 2q"),
+    ];
+    Ok(Placement::new(amplitudes, Harmonic { joint, harmonic: 2.0 }))
+}

@@ -1,0 +1,168 @@
+//! Naming one effect in one place: `backlash:1`, `zero_slip:2@1`, `tool_shift@1.17`, `periodic:1,frequency=30`.
+//!
+//! Grammar: `kind [":" joint] ["@" recording ["." dwell]] {"," shape "=" number}`. The joint is its number from
+//! 1 or its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only; `@1.17`
+//! is from dwell 17 of recording 1 to the end of the session.
+
+use super::expression::Expression;
+use super::table::Override;
+use super::{EffectKind, Family, catalogue, find};
+use crate::ModelError;
+use crate::error::nearest;
+use armcal_core::DwellId;
+use std::collections::BTreeMap;
+
+/// One effect in one place.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EffectSpec {
+    /// Its kind: the name of an entry of the catalogue.
+    pub kind: String,
+    /// Index of its joint, from 0.
+    pub target: Option<usize>,
+    /// When it acts; always, where nothing is said.
+    pub since: Option<Since>,
+    /// Shapes that differ from their defaults, in the order they were given.
+    pub shape: Vec<(String, f64)>,
+    /// What the user says about its parameters, by quantity.
+    pub overrides: BTreeMap<String, Override>,
+    /// The formula of an `expression`.
+    pub expression: Option<Expression>,
+}
+
+/// When an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Since {
+    /// In this recording only.
+    Recording(usize),
+    /// From this dwell on, to the end of the session.
+    Dwell(DwellId),
+}
+
+impl Since {
+    /// Whether the effect acts in this dwell.
+    pub fn holds(&self, dwell: DwellId) -> bool {
+        match self {
+            Since::Recording(recording) => dwell.recording == *recording,
+            Since::Dwell(first) => dwell >= *first,
+        }
+    }
+}
+
+impl std::fmt::Display for Since {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Since::Recording(recording) => write!(f, "{recording}"),
+            Since::Dwell(dwell) => write!(f, "{}.{}", dwell.recording, dwell.dwell),
+        }
+    }
+}
+
+impl std::str::FromStr for Since {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Since, &'static str> {
+        let number = |text: &str| {
+            text.parse().map_err(|_| "expected RECORDING or RECORDING.DWELL, counted from 0, after \"@\"")
+        };
+        match text.split_once('.') {
+            None => Ok(Since::Recording(number(text)?)),
+            Some((recording, dwell)) => {
+                Ok(Since::Dwell(DwellId { recording: number(recording)?, dwell: number(dwell)? }))
+            }
+        }
+    }
+}
+
+impl EffectSpec {
+    /// An effect on the whole, always, with default shapes.
+    pub fn new(kind: impl Into<String>) -> EffectSpec {
+        EffectSpec { kind: kind.into(), ..EffectSpec::default() }
+    }
+
+    /// The same at a joint (index from 0).
+    pub fn at(self, joint: usize) -> EffectSpec {
+        EffectSpec { target: Some(joint), ..self }
+    }
+
+    /// The same at another time.
+    pub fn since(self, since: Since) -> EffectSpec {
+        EffectSpec { since: Some(since), ..self }
+    }
+
+    /// The same with another shape.
+    pub fn with(mut self, shape: &str, value: f64) -> EffectSpec {
+        self.shape.retain(|(name, _)| name != shape);
+        self.shape.push((shape.to_owned(), value));
+        self
+    }
+
+    /// Reads a spec; errors name what is not understood and what is known.
+    pub fn parse(text: &str, joint_names: &[String]) -> Result<EffectSpec, ModelError> {
+        let bad = |problem: String| ModelError::BadEffect { effect: text.to_owned(), problem };
+        let mut parts = text.split(',').map(str::trim);
+        let head = parts.next().unwrap_or_default();
+        let (place, since) = head.split_once('@').map_or((head, None), |(place, since)| (place, Some(since)));
+        let (kind, target) = place.split_once(':').map_or((place, None), |(kind, joint)| (kind, Some(joint)));
+        let mut spec = EffectSpec::new(kind);
+        if spec.kind()?.family == Family::User {
+            return Err(bad("write a formula as an [[effects]] table".to_owned()));
+        }
+        spec.target = target.map(|joint| joint_index(joint, joint_names)).transpose().map_err(bad)?;
+        spec.since = since.map(str::parse).transpose().map_err(|problem: &str| bad(problem.to_owned()))?;
+        for part in parts {
+            let (name, value) = part
+                .split_once('=')
+                .and_then(|(name, value)| Some((name.trim(), value.trim().parse().ok()?)))
+                .ok_or_else(|| bad(format!("\"{part}\" is not of the form shape=number")))?;
+            spec = spec.with(name, value);
+        }
+        Ok(spec)
+    }
+
+    /// The entry of the catalogue; errors name the nearest one.
+    pub fn kind(&self) -> Result<&'static EffectKind, ModelError> {
+        known_kind(&self.kind)
+    }
+}
+
+impl std::fmt::Display for EffectSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.kind)?;
+        if let Some(expression) = &self.expression {
+            write!(f, ":{}", expression.name)?;
+        }
+        if let Some(joint) = self.target {
+            write!(f, ":{}", joint + 1)?;
+        }
+        if let Some(since) = &self.since {
+            write!(f, "@{since}")?;
+        }
+        self.shape.iter().try_for_each(|(name, value)| write!(f, ",{name}={value}"))
+    }
+}
+
+fn known_kind(kind: &str) -> Result<&'static EffectKind, ModelError> {
+    find(kind).ok_or_else(|| {
+        let names = || catalogue().iter().map(|entry| entry.name);
+        ModelError::UnknownEffect {
+            kind: kind.to_owned(),
+            nearest: nearest(kind, names()),
+            known: names().collect::<Vec<_>>().join(", "),
+        }
+    })
+}
+
+/// The index of a joint by number from 1 or by name; what is wrong otherwise.
+pub(crate) fn joint_index(text: &str, joint_names: &[String]) -> Result<usize, String> {
+    if let Ok(number) = text.parse::<usize>() {
+        let within = (1..=joint_names.len()).contains(&number);
+        let wrong = || format!("there is no joint {number}; the arm has joints 1 to {}", joint_names.len());
+        return if within { Ok(number - 1) } else { Err(wrong()) };
+    }
+    joint_names.iter().position(|name| name == text).ok_or_else(|| {
+        let hint = nearest(text, joint_names.iter().map(String::as_str))
+            .map(|name| format!("; did you mean \"{name}\"?"))
+            .unwrap_or_default();
+        format!("there is no joint \"{text}\"{hint} The joints are {}", joint_names.join(", "))
+    })
+}

@@ -1,0 +1,187 @@
+//! Effects in a pipeline file: one `[[effects]]` table for each.
+//!
+//! ```toml
+//! [[effects]]
+//! kind = "periodic"
+//! target = 1                     # joint, by number from 1 or by name
+//! since = "1.17"                 # only where it matters: recording, or recording.dwell
+//! frequency = 30                 # shapes, SI
+//! parameters.sin = { prior = 0.1, bound = 2.0 }     # display units (mm, deg) unless `unit` is given
+//!
+//! [[effects]]
+//! kind = "expression"
+//! name = "cable"
+//! formula = "k * sin(q1)"
+//! acts_on = "joint3"             # a joint, a parameter such as "joint2.a", or world.x, world.y, world.z
+//! parameters.k = { unit = "deg", prior = 0.3 }
+//! ```
+
+use super::expression::Expression;
+use super::spec::{EffectSpec, Since, joint_index};
+use crate::ModelError;
+use crate::error::nearest;
+use armcal_core::{Parameter, Unit};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One `[[effects]]` table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectTable {
+    /// Name of the kind.
+    pub kind: String,
+    /// Its joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<Word>,
+    /// When it acts: `1` or `"1.17"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since: Option<Word>,
+    /// Name of an expression.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Formula of an expression.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
+    /// What an expression acts on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acts_on: Option<String>,
+    /// Shapes by their names, SI; any other key, which [`EffectTable::spec`] then names.
+    #[serde(flatten)]
+    pub shape: BTreeMap<String, Extra>,
+    /// Parameters of an expression, or changes to those of another kind.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Override>,
+}
+
+/// A number or a word.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Word {
+    /// A number.
+    Number(usize),
+    /// A word.
+    Text(String),
+}
+
+/// The value of a key that depends on the kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Extra {
+    /// The number of a shape.
+    Number(f64),
+    /// No key of an effect has a text that is not listed in [`EffectTable`].
+    Text(String),
+}
+
+impl std::fmt::Display for Word {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Word::Number(number) => write!(f, "{number}"),
+            Word::Text(text) => f.write_str(text),
+        }
+    }
+}
+
+/// What the user says about a parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Override {
+    /// Unit of the numbers here: an SI symbol or a display symbol. Default: the display unit (mm, deg, ppm/K).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Value before the fit, and centre of the prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<f64>,
+    /// Largest deviation from it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
+    /// Standard deviation of the prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<f64>,
+    /// Whether the fit may change it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free: Option<bool>,
+}
+
+impl Override {
+    /// Changes a parameter; what is wrong otherwise.
+    pub(crate) fn apply(&self, p: &mut Parameter) -> Result<(), String> {
+        let per_unit = match &self.unit {
+            None => 1.0 / p.unit.to_display(1.0),
+            Some(text) => match unit_of(text) {
+                Some((unit, si_per_unit)) if unit == p.unit => si_per_unit,
+                _ => return Err(format!("{} is in {}, not in \"{text}\"", p.name, p.unit)),
+            },
+        };
+        if let Some(start) = self.start {
+            let shift = start * per_unit - p.nominal;
+            (p.nominal, p.lower, p.upper) = (p.nominal + shift, p.lower + shift, p.upper + shift);
+        }
+        if let Some(bound) = self.bound {
+            (p.lower, p.upper) = (p.nominal - bound * per_unit, p.nominal + bound * per_unit);
+        }
+        p.prior_sigma = self.prior.map(|prior| prior * per_unit).or(p.prior_sigma);
+        p.free = self.free.unwrap_or(p.free);
+        Ok(())
+    }
+}
+
+/// A unit by its SI or display symbol, and how much SI one of it is.
+pub(crate) fn unit_of(text: &str) -> Option<(Unit, f64)> {
+    Unit::ALL.into_iter().find_map(|unit| {
+        let si = (text == unit.symbol()).then_some(1.0);
+        let display = (text == unit.display_symbol()).then(|| 1.0 / unit.to_display(1.0));
+        si.or(display).map(|scale| (unit, scale))
+    })
+}
+
+impl EffectTable {
+    /// The spec it means on an arm with these joints.
+    pub fn spec(&self, joint_names: &[String]) -> Result<EffectSpec, ModelError> {
+        let bad = |problem: String| ModelError::BadEffect { effect: self.kind.clone(), problem };
+        let mut spec = EffectSpec::new(&self.kind);
+        spec.kind()?;
+        spec.target = match &self.target {
+            Some(word) => Some(joint_index(&word.to_string(), joint_names).map_err(bad)?),
+            None => None,
+        };
+        spec.since = match &self.since {
+            Some(word) => Some(word.to_string().parse::<Since>().map_err(|e| bad(format!("since: {e}")))?),
+            None => None,
+        };
+        for (key, value) in &self.shape {
+            let Extra::Number(value) = value else { return Err(bad(unknown_key(key))) };
+            spec.shape.push((key.clone(), *value));
+        }
+        spec.overrides = self.parameters.clone();
+        spec.expression = match (&self.name, &self.formula, &self.acts_on) {
+            (None, None, None) => None,
+            (Some(name), Some(formula), Some(acts_on)) => {
+                Some(Expression { name: name.clone(), formula: formula.clone(), acts_on: acts_on.clone() })
+            }
+            _ => return Err(bad("an expression needs a name, a formula and acts_on".to_owned())),
+        };
+        Ok(spec)
+    }
+}
+
+fn unknown_key(key: &str) -> String {
+    let known = ["kind", "target", "since", "name", "formula", "acts_on", "parameters"];
+    let hint = nearest(key, known.into_iter()).map(|near| format!("; did you mean \"{near}\"?"));
+    format!("there is no key \"{key}\"{}", hint.unwrap_or_default())
+}
+
+impl From<&EffectSpec> for EffectTable {
+    fn from(spec: &EffectSpec) -> EffectTable {
+        let expression = spec.expression.as_ref();
+        EffectTable {
+            kind: spec.kind.clone(),
+            target: spec.target.map(|joint| Word::Number(joint + 1)),
+            since: spec.since.map(|since| Word::Text(since.to_string())),
+            name: expression.map(|e| e.name.clone()),
+            formula: expression.map(|e| e.formula.clone()),
+            acts_on: expression.map(|e| e.acts_on.clone()),
+            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Extra::Number(*value))).collect(),
+            parameters: spec.overrides.clone(),
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Whether drivers and effects are what their equations say, in closed form.
+
+use super::super::{EffectSpec, NominalPose, Session, Since};
+use super::rig::{observations, panda, paper, scara, ur10};
+use crate::Model;
+use crate::tests::{RIGHT_ARM, bare, dh, tracked};
+use armcal_core::{Arrival, Observation, Pose};
+use nalgebra::Vector3;
+use std::f64::consts::FRAC_PI_2;
+
+const G: f64 = 9.80665;
+
+/// Potential energy of the nominal links and the load [J].
+fn energy_j(model: &Model, joints: &[f64], load_kg: f64) -> f64 {
+    let pose: NominalPose = model.nominal_pose(&model.nominal(), joints);
+    let links: f64 = (0..joints.len())
+        .map(|k| {
+            let (from, to) = pose.link_m(k);
+            pose.link_mass_kg(k) * G * 0.5 * (from.z + to.z)
+        })
+        .sum();
+    links + load_kg * G * pose.tip_m.z
+}
+
+#[test]
+fn torque_is_the_slope_of_the_potential_energy() {
+    for model in [paper(), ur10(), scara(), panda()] {
+        for o in observations(&model, 6, true) {
+            let session = Session::of(std::slice::from_ref(&o));
+            let drivers = model.drivers(&session, &o);
+            for (j, torque) in drivers.torque.iter().enumerate() {
+                let energy = |step: f64| {
+                    let mut q = o.joint_rad.clone();
+                    q[j] += step;
+                    energy_j(&model, &q, o.load_kg)
+                };
+                let slope = (energy(1e-5) - energy(-1e-5)) / 2e-5;
+                assert!((torque.total_nm() + slope).abs() < 1e-7, "joint {}: {torque:?} {slope}", j + 1);
+            }
+        }
+    }
+}
+
+fn at(joints: &[f64]) -> Observation {
+    let mut o = tracked(joints, &Pose::identity());
+    o.arrival = vec![Arrival::Positive; joints.len()];
+    o
+}
+
+/// Motion of the tip of the paper's arm by one amplitude, all others zero.
+fn motion_m(text: &str, quantity: &str, amplitude: f64, o: &Observation) -> Vector3<f64> {
+    let model = bare(dh(RIGHT_ARM));
+    let session = Session { load: true, end_ns: 1, ..Session::of(std::slice::from_ref(o)) };
+    let spec: EffectSpec = model.effect(text).expect("a spec");
+    let extended = model.with_effects(&[spec], &session).expect("a model");
+    let mut p = extended.nominal();
+    p[extended.index(&format!("{text}.{quantity}")).expect("a parameter")] = amplitude;
+    extended.predicted_tip_in_world(&p, o) - model.predicted_tip_in_world(&model.nominal(), o)
+}
+
+#[test]
+fn the_forearm_sags_by_its_torque() {
+    // Joints at zero: forearm level, 354.3 mm forward and 12 mm aside; its weight pulls towards -q3.
+    let o = at(&[0.0; 3]);
+    let length_m = 0.3543f64.hypot(0.012);
+    let torque_nm = -2.5 * length_m * G * 0.3543 / 2.0;
+    let sag_m = motion_m("compliance:3", "compliance", 1e-4, &o);
+    let expected_m = 0.3543 * (1e-4 * torque_nm).sin();
+    assert!((sag_m.z - expected_m).abs() < 1e-12 && sag_m.z < 0.0, "{sag_m}");
+    let loaded = Observation { load_kg: 0.7, ..o };
+    let sag_m = motion_m("compliance:3", "compliance_load", 1e-4, &loaded);
+    assert!((sag_m.z - 0.3543 * (-1e-4 * 0.7 * G * 0.3543).sin()).abs() < 1e-12, "{sag_m}");
+}
+
+#[test]
+fn everything_elastic_sags_when_stretched_out() {
+    // Upper arm and forearm level, with a load.
+    let o = Observation { load_kg: 0.5, ..at(&[0.3, -FRAC_PI_2, FRAC_PI_2]) };
+    for (text, quantity) in [
+        ("compliance:2", "compliance"),
+        ("compliance:2", "compliance_load"),
+        ("hardening_compliance:2", "cubic"),
+        ("belt_compliance:3", "compliance"),
+        ("belt_compliance:3", "compliance_load"),
+        ("base_compliance", "compliance"),
+        ("base_compliance", "compliance_load"),
+        ("link_bending:2", "sag"),
+        ("link_bending:2", "sag_outer"),
+        ("link_bending:2", "sag_load"),
+    ] {
+        assert!(motion_m(text, quantity, 1e-4, &o).z < -1e-6, "{text}.{quantity}");
+    }
+}
+
+#[test]
+fn a_link_held_out_level_is_a_cantilever() {
+    // Upper arm and forearm level and in line: force and moment of the forearm at the end of the upper arm.
+    let o = at(&[0.0, -FRAC_PI_2, FRAC_PI_2]);
+    let (a, forearm) = (0.4f64, 0.3543f64);
+    // Masses up to their common density.
+    let force = forearm + 3.0 / 8.0 * a;
+    let moment = forearm * forearm / 2.0;
+    let sag = force * a.powi(3) / 3.0 + moment * a.powi(2) / 2.0;
+    let slope = force * a.powi(2) / 2.0 + moment * a;
+    let expected_m = -1e-3 * (1.0 + slope / sag * forearm);
+    let found_m = motion_m("link_bending:2", "sag", 1e-3, &o).z;
+    // The forearm is 12 mm aside of the line, which the reference length includes.
+    assert!((found_m / expected_m - 1.0).abs() < 2e-3, "{found_m} {expected_m}");
+    // Hanging straight down from a level upper arm, the forearm has no moment and sinks by the force alone.
+    let hanging = at(&[0.0, -FRAC_PI_2, 0.0]);
+    let expected_m = -1e-3 * force * a.powi(3) / 3.0 / sag;
+    let found_m = motion_m("link_bending:2", "sag", 1e-3, &hanging).z;
+    assert!((found_m / expected_m - 1.0).abs() < 2e-2, "{found_m} {expected_m}");
+}
+
+#[test]
+fn backlash_lags_behind_the_motion() {
+    let mut o = at(&[0.2, 0.1, -0.3]);
+    let lag = motion_m("backlash:1", "width", 0.01, &o);
+    let model = bare(dh(RIGHT_ARM));
+    let behind = model.tip_in_base(&model.nominal(), &[0.195, 0.1, -0.3]).translation.vector
+        - model.tip_in_base(&model.nominal(), &[0.2, 0.1, -0.3]).translation.vector;
+    assert!((lag - behind).norm() < 1e-15);
+    // The last move was shorter than the gap: the link still is where the move before it left it.
+    o.path_memory_rad = Some(vec![vec![0.5, 0.198, 0.2], vec![0.1], vec![-0.3]]);
+    let held = motion_m("backlash:1", "width", 0.01, &o);
+    let link = model.tip_in_base(&model.nominal(), &[0.203, 0.1, -0.3]).translation.vector
+        - model.tip_in_base(&model.nominal(), &[0.2, 0.1, -0.3]).translation.vector;
+    assert!((held - link).norm() < 1e-15);
+    // Nobody knows where joint 2 came from.
+    o.arrival[1] = Arrival::Unknown;
+    assert_eq!(motion_m("backlash:2", "width", 0.01, &o), Vector3::zeros());
+}
+
+#[test]
+fn a_shift_turns_about_the_middle_of_the_volume() {
+    let mut o = at(&[0.2, 0.1, -0.3]);
+    let model = bare(dh(RIGHT_ARM));
+    let tip_m = model.predicted_tip_in_world(&model.nominal(), &o);
+    if let armcal_core::Reference::Tracked { position_m, .. } = &mut o.reference {
+        *position_m = tip_m;
+    }
+    // The tip is the middle of a volume of one point: a turn leaves it, a shift moves it.
+    assert!(motion_m("frame_shift@0", "rz", 0.1, &o).norm() < 1e-15);
+    let shift_m = motion_m("frame_shift@0", "x", 1e-3, &o);
+    assert!((shift_m - Vector3::new(1e-3, 0.0, 0.0)).norm() < 1e-15);
+    assert_eq!(motion_m("frame_shift@1", "x", 1e-3, &o), Vector3::zeros());
+    assert_eq!(motion_m("frame_shift@0.1", "x", 1e-3, &o), Vector3::zeros());
+}
+
+#[test]
+fn without_a_sensor_a_shift_turns_about_the_middle_of_the_board() {
+    let model = paper();
+    let mut seated = observations(&model, 40, false);
+    seated.retain(|o| o.cavity().is_some() && o.dwell.recording == 1);
+    let session = Session::of(&seated);
+    let spec = EffectSpec::new("frame_shift").since(Since::Recording(1));
+    let extended = model.with_effects(&[spec], &session).expect("a model");
+    let mut p = extended.nominal();
+    let board = model.board_in_world(&p, 1).expect("a board");
+    let middle_m = board * nalgebra::Point3::from(session.board_centres_m[&1]);
+    p[extended.index("frame_shift@1.rz").expect("a parameter")] = 0.1;
+    let turn = nalgebra::Rotation3::from_scaled_axis(Vector3::new(0.0, 0.0, 0.1));
+    for o in &seated {
+        let rigid_m = model.predicted_tip_in_world(&model.nominal(), o);
+        let expected_m = turn * (rigid_m - middle_m.coords) + middle_m.coords;
+        assert!((extended.predicted_tip_in_world(&p, o) - expected_m).norm() < 1e-14);
+    }
+}
+
+#[test]
+fn gravity_in_the_base_goes_before_gravity_in_the_world() {
+    let model = paper();
+    let o = at(&[0.2, 0.5, -0.3]);
+    let session = Session::of(std::slice::from_ref(&o));
+    let base = model.base_in_world(&model.nominal());
+    let in_base = base.rotation.inverse() * session.gravity_in_world_mps2;
+    let other = Session {
+        gravity_in_base_mps2: Some(in_base),
+        gravity_in_world_mps2: Vector3::x(),
+        ..session.clone()
+    };
+    for (a, b) in model.drivers(&session, &o).torque.iter().zip(&model.drivers(&other, &o).torque) {
+        assert!((a.total_nm() - b.total_nm()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,61 @@
+//! The tool or its marker moved on the last link.
+//!
+//! # What moves
+//! The tool was remounted, bent or knocked; or the marker on it was.
+//!
+//! # Equation
+//! `d tip = (x, y, z)` in the last link, in the recording, or from the dwell on, that the spec names.
+//!
+//! # Parameters and units
+//! `x`, `y`, `z` [m] along the axes of the last link.
+//!
+//! # Signature in the data
+//! A step between recordings or at a dwell that turns with the last link.
+//!
+//! # Not to be confused with
+//! `zero_slip` of the last joint, to a tip in one plane; `frame_shift`, which does not turn with the arm. A second
+//! marker on the tool separates them.
+//!
+//! # Source
+//! Notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitudes_xyz};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "tool_shift",
+    aliases: &["marker shift"],
+    summary: "the tool or its marker moved, between recordings or at a dwell",
+    family: Family::Event,
+    toggle: Toggle::Recording,
+    target: Target::Whole,
+    offered: Offered::Events,
+    shapes: &[],
+    confused_with: &["zero_slip", "frame_shift"],
+    source: include_str!("tool_shift.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct ToolShift {
+    /// Index of the tip's x.
+    tip: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    placing.event()?;
+    let amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift on the last link along");
+    Ok(Placement::new(amplitudes, ToolShift { tip: placing.model.tip_segment().parameters.start }))
+}
+
+impl Physics for ToolShift {
+    fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
+        for (axis, shift) in theta.iter().enumerate() {
+            change.parameter(self.tip + axis, *shift);
+        }
+    }
+}

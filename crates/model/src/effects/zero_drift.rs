@@ -1,0 +1,58 @@
+//! The zero of an encoder creeps.
+//!
+//! # What moves
+//! A potentiometer or analog encoder drifts, a belt creeps over its pulley.
+//!
+//! # Equation
+//! `dq = r t/T`, t the time since the first observation, T the length of the session.
+//!
+//! # Parameters and units
+//! `drift` r [rad] over the whole session (sliding joint: [m]).
+//!
+//! # Signature in the data
+//! An error that grows steadily with time and enters like a rotation of one joint.
+//!
+//! # Not to be confused with
+//! `thermal_growth`, `frame_drift`: nearly the same in a narrow range of poses; `zero_slip`, which is a step.
+//!
+//! # Source
+//! Notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "zero_drift",
+    aliases: &[],
+    summary: "the zero of an encoder creeps over the session",
+    family: Family::Drift,
+    toggle: Toggle::Time,
+    target: Target::Joint,
+    offered: Offered::Once,
+    shapes: &[],
+    confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
+    source: include_str!("zero_drift.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct ZeroDrift {
+    joint: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.joint()?;
+    placing.lasting()?;
+    let (typical, bound) = (placing.joint_size(joint, 0.3), placing.joint_size(joint, 8.0));
+    let drift = amplitude("drift", placing.joint_unit(joint), typical, bound, "drift over the whole session");
+    Ok(Placement::new(vec![drift], ZeroDrift { joint }))
+}
+
+impl Physics for ZeroDrift {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        change.joint(self.joint, theta[0] * x.session_fraction);
+    }
+}

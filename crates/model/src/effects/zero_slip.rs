@@ -1,0 +1,61 @@
+//! The zero of an encoder slipped.
+//!
+//! # What moves
+//! From one moment on (or in one recording) a joint reads a constant more or less: a pulley jumped a tooth, a
+//! set-screw turned, the homing found another edge.
+//!
+//! # Equation
+//! `dq = o` in the recording, or from the dwell on, that the spec names.
+//!
+//! # Parameters and units
+//! `offset` o [rad] (sliding joint: [m]).
+//!
+//! # Signature in the data
+//! A step between recordings or at a dwell that enters like a rotation of that joint.
+//!
+//! # Not to be confused with
+//! `frame_shift`: a turn about a vertical first axis is the same; `tool_shift`: so is a slip of the last joint to a
+//! tip that stays in one plane. A fixed reference marker, a second tool marker, or moving the joint over a wide
+//! range in each recording separates them.
+//!
+//! # Source
+//! notes of the project; a belt tooth of a pulley with z teeth is 360/z deg.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitude};
+use crate::rigid::Scalar;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "zero_slip",
+    aliases: &[],
+    summary: "the zero of an encoder slipped, between recordings or at a dwell",
+    family: Family::Event,
+    toggle: Toggle::Recording,
+    target: Target::Joint,
+    offered: Offered::Events,
+    shapes: &[],
+    confused_with: &["frame_shift", "tool_shift", "zero_drift"],
+    source: include_str!("zero_slip.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct ZeroSlip {
+    joint: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let joint = placing.joint()?;
+    placing.event()?;
+    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 30.0));
+    let offset = amplitude("offset", placing.joint_unit(joint), typical, bound, "how far the zero slipped");
+    Ok(Placement::new(vec![offset], ZeroSlip { joint }))
+}
+
+impl Physics for ZeroSlip {
+    fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
+        change.joint(self.joint, theta[0]);
+    }
+}

@@ -1,0 +1,182 @@
+//! What is missing, for a person in the terminal.
+
+use crate::past_run::PastRun;
+use crate::run::Run;
+use crate::terminal::{Pen, TerminalStyle, number};
+use crate::text::{in_display_unit, printable};
+use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, ParameterReport, UnknownReport, Verdict};
+use comfy_table::Cell;
+use serde_json::Value;
+
+/// Rows of the ranking.
+const RANKED: usize = 8;
+
+/// The diagnosis of a run in full, ending in a newline; says so where there is none.
+pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
+    let pen = Pen { style };
+    match &run.diagnosis {
+        None => "This run was not diagnosed ([diagnosis] enabled = false).\n".to_owned(),
+        Some(d) => full(&pen, d),
+    }
+}
+
+/// The diagnosis of an earlier run, from its summary: the answer, the ranking, and every number in a sentence.
+pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
+    let pen = Pen { style };
+    let d = &past.summary["diagnosis"];
+    let text = |v: &Value| v.as_str().map(printable).unwrap_or_default();
+    let list = |v: &Value| v.as_array().into_iter().flatten().map(text).collect::<Vec<_>>();
+    if d.is_null() {
+        return format!("{} was not diagnosed ([diagnosis] enabled = false).\n", past.path.display());
+    }
+    let names = list(&d["names"]).join(", ");
+    let headline = format!("{} {names}", text(&d["verdict"]).replace('_', " "));
+    let mut table = pen.table(&["effect", "probability", "ln B", "p", "held out [mm]"]);
+    let three = |v: &Value| v.as_f64().map_or("-".to_owned(), |v| format!("{v:.3}"));
+    for c in d["candidates"].as_array().into_iter().flatten().take(RANKED) {
+        let h = &c["holdout_mm"];
+        table.add_row(vec![
+            Cell::new(text(&c["spec"])),
+            number(three(&c["probability"])),
+            number(three(&c["log_evidence"])),
+            number(three(&c["p_adjusted"])),
+            number(format!("{} -> {}", three(&h["before"]), three(&h["after"]))),
+        ]);
+    }
+    let sentences = d["explanations"].as_array().into_iter().flatten();
+    let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), text(&e["sentence"]))));
+    let next = list(&d["record_next"]).into_iter().map(|r| ("next:", r));
+    [
+        pen.section(headline.trim(), pen.list(next)),
+        pen.section("Candidates, best first", pen.render(&table)),
+        pen.section("The numbers, one by one", pen.list(sentences)),
+    ]
+    .join("\n")
+}
+
+/// The part of a run's summary that says what is missing.
+pub(crate) fn brief(pen: &Pen, d: &Diagnosis) -> String {
+    let mut text = pen.list(d.effects.iter().map(|e| ("-", found(e))));
+    text.push_str(&pen.list(d.unknown.iter().map(|u| ("-", unlisted(u)))));
+    text.push_str(&pen.list(d.record_next.iter().map(|r| ("next:", printable(r)))));
+    pen.section(&headline(d), text)
+}
+
+/// The answer in one sentence.
+pub fn headline(d: &Diagnosis) -> String {
+    let names = printable(&d.names.join(", "));
+    let unseen = d.not_testable.len();
+    match d.verdict {
+        Verdict::NothingMissing => {
+            let not_shown = match unseen {
+                0 => String::new(),
+                n => format!(" ({n} effects of realistic size would not have shown)"),
+            };
+            format!("Nothing is missing that these data can show{not_shown}.")
+        }
+        Verdict::Identified => {
+            format!("Missing: {names} (probability {:.2}, p = {:.3}).", d.probability, d.p_adjusted)
+        }
+        Verdict::Ambiguous => {
+            format!("An effect is missing, and these data cannot tell which of: {names}.")
+        }
+        Verdict::Unknown => match &d.unknown {
+            Some(u) => format!(
+                "Something unlisted is missing: it enters at {} and depends on {}.",
+                printable(&u.channel),
+                printable(&u.driver)
+            ),
+            None => "Something is missing, and nothing listed explains it.".to_owned(),
+        },
+    }
+}
+
+fn full(pen: &Pen, d: &Diagnosis) -> String {
+    let mut sections = vec![brief(pen, d)];
+    sections.push(pen.section("Candidates, best first", ranking(pen, d)));
+    if !d.cannot_tell_apart.is_empty() {
+        let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", printable(&format!("{a} and {b}"))));
+        sections.push(pen.section("The same to these data", pen.list(pairs)));
+    }
+    if !d.not_testable.is_empty() {
+        let rows = d.not_testable.iter().map(|n| {
+            let text = format!(
+                "{}: smallest size seen {}, typical {} ({})",
+                n.effect, n.smallest_seen, n.typical, n.why
+            );
+            ("-", printable(&text))
+        });
+        sections.push(pen.section("What these data could not have shown", pen.list(rows)));
+    }
+    let sentences = d.explanations.iter().map(|e| ("-", printable(&format!("{}: {}", e.number, e.sentence))));
+    sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
+    sections.join("\n")
+}
+
+fn ranking(pen: &Pen, d: &Diagnosis) -> String {
+    let mut table =
+        pen.table(&["effect", "size", "probability", "ln B", "p", "held out [mm]", "absorbed", "also"]);
+    for c in d.candidates.iter().take(RANKED) {
+        table.add_row(vec![
+            Cell::new(printable(&c.spec)),
+            Cell::new(sizes(c)),
+            number(format!("{:.3}", c.probability)),
+            number(format!("{:.1}", c.log_evidence)),
+            number(format!("{:.3}", c.p_adjusted)),
+            number(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
+            number(format!("{:.0} %", c.absorbed * 100.0)),
+            Cell::new(printable(&c.same_to_the_data.join(", "))),
+        ]);
+    }
+    pen.render(&table)
+}
+
+fn sizes(c: &CandidateReport) -> String {
+    let mut shown: Vec<String> = c.parameters.iter().take(3).map(size).collect();
+    if c.parameters.len() > shown.len() {
+        shown.push(format!("and {} more", c.parameters.len() - shown.len()));
+    }
+    printable(&shown.join(", "))
+}
+
+fn size(p: &ParameterReport) -> String {
+    let half = (p.ci95[1] - p.ci95[0]) / 2.0;
+    let shown = |si| in_display_unit(p.unit, si);
+    format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol())
+}
+
+fn found(e: &FoundEffect) -> String {
+    let sizes: Vec<String> = e.parameters.iter().map(size).collect();
+    let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
+    let contrast = match &e.contrast {
+        Some(c) if c.agrees => {
+            format!("; {} pairs that differ only in {} confirm it", c.pairs, c.differs)
+        }
+        _ => String::new(),
+    };
+    let h = &e.places;
+    printable(&format!(
+        "{}{set}: {}; held out {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 %){contrast}",
+        e.name,
+        sizes.join(", "),
+        h.before,
+        h.after,
+        h.change_ci95[0],
+        h.change_ci95[1],
+    ))
+}
+
+fn unlisted(u: &UnknownReport) -> String {
+    let range = match (u.shape.first(), u.shape.last()) {
+        (Some(from), Some(to)) => format!(", known for {} from {:.3} to {:.3}", u.driver, from.at, to.at),
+        _ => String::new(),
+    };
+    let formula = u
+        .expression
+        .as_ref()
+        .map_or(String::new(), |e| format!("; as a formula on {}: {}", e.acts_on, e.formula));
+    printable(&format!(
+        "unlisted, at {} over {}: held out {:.3} -> {:.3} mm with its shape{range}{formula}",
+        u.channel, u.driver, u.places.before, u.places.after
+    ))
+}

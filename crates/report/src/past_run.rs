@@ -1,0 +1,174 @@
+//! A run read back from its `run.mcap`: what comparing and re-reading need, without the recordings it came from.
+
+use crate::proto;
+use crate::run::{Run, effects};
+use armcal_core::DwellId;
+use armcal_recording::{Recording, RecordingError};
+use prost::Message as _;
+use std::path::{Path, PathBuf};
+
+/// Results of an earlier run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastRun {
+    /// The file; empty for a run that has not been written.
+    pub path: PathBuf,
+    /// Name of its pipeline.
+    pub pipeline: String,
+    /// Physical effects of its model beyond geometry.
+    pub effects: Vec<String>,
+    /// One entry an observation, in the order of the file.
+    pub residuals: Vec<PastResidual>,
+    /// All parameters, free and fixed.
+    pub parameters: Vec<PastParameter>,
+    /// Its `summary.json`.
+    pub summary: serde_json::Value,
+}
+
+/// The error of one observation after calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastResidual {
+    /// Name of the recording.
+    pub recording: String,
+    /// Its dwell.
+    pub dwell: DwellId,
+    /// Cavity; empty when the tip was tracked.
+    pub cavity: String,
+    /// Whether the fit that predicted it never saw it.
+    pub held_out: bool,
+    /// Norm of measured minus predicted [m].
+    pub error_m: f64,
+}
+
+/// One parameter, in the unit shown to people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastParameter {
+    /// Its name.
+    pub name: String,
+    /// Unit of the numbers.
+    pub display_unit: String,
+    /// Value after the fit.
+    pub display_value: f64,
+    /// Half the width of its 95 % interval.
+    pub display_ci95_half: f64,
+    /// Whether the fit was allowed to change it.
+    pub free: bool,
+    /// Whether the data, rather than the prior, decide its value.
+    pub determined: bool,
+}
+
+/// Why a result cannot be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum PastRunError {
+    /// The file is not there or not an MCAP.
+    #[error("reading the result {}: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<RecordingError>,
+    },
+    /// The file holds no results of armcal.
+    #[error(
+        "{} holds no results of armcal (no messages on {topic}); name the run.mcap that `armcal run` wrote, or its folder",
+        path.display()
+    )]
+    NoResults {
+        /// The file.
+        path: PathBuf,
+        /// The topic that is missing.
+        topic: &'static str,
+    },
+}
+
+impl PastRun {
+    /// A run that has just finished, as it would be read back.
+    pub fn of(run: &Run) -> PastRun {
+        let residual = |r: &armcal_calibrate::Residual| PastResidual {
+            recording: run.recording_name(r.dwell).to_owned(),
+            dwell: r.dwell,
+            cavity: run.cavity_of(r.dwell).unwrap_or_default().to_owned(),
+            held_out: r.held_out,
+            error_m: r.fitted_m.norm(),
+        };
+        let parameter = |e: &armcal_calibrate::Estimate| {
+            let shown = |si: f64| e.parameter.unit.to_display(si);
+            PastParameter {
+                name: e.parameter.name.clone(),
+                display_unit: e.parameter.unit.display_symbol().into(),
+                display_value: shown(e.value),
+                display_ci95_half: shown((e.ci95[1] - e.ci95[0]) / 2.0),
+                free: e.parameter.free,
+                determined: e.determined,
+            }
+        };
+        PastRun {
+            path: PathBuf::new(),
+            pipeline: run.pipeline_name.clone(),
+            effects: effects(&run.calibration).into_iter().map(str::to_owned).collect(),
+            residuals: run.calibration.residuals.iter().map(residual).collect(),
+            parameters: run.calibration.fit.estimates.iter().map(parameter).collect(),
+            summary: serde_json::from_str(&crate::summary_json(run)).unwrap_or_default(),
+        }
+    }
+
+    /// Reads `run.mcap`, given itself or the folder it is in.
+    pub fn open(path: &Path) -> Result<PastRun, PastRunError> {
+        let path = if path.is_dir() { path.join("run.mcap") } else { path.to_owned() };
+        let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
+        let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
+        let mut residuals = Vec::new();
+        let mut parameters = Vec::new();
+        let mut report = None;
+        let each = &mut |message: armcal_recording::RawMessage<'_>| {
+            // A message that cannot be decoded is not one of ours.
+            match message.channel.topic.as_str() {
+                "/armcal/residuals" => residuals.extend(proto::Residual::decode(message.data).ok()),
+                "/armcal/parameters" => parameters.extend(proto::Parameters::decode(message.data).ok()),
+                "/armcal/report" => report = proto::Calibration::decode(message.data).ok().or(report.take()),
+                _ => {}
+            }
+            Ok(())
+        };
+        recording.for_each_raw(each).map_err(at)?;
+        let missing = |topic| PastRunError::NoResults { path: path.clone(), topic };
+        let report = report.ok_or_else(|| missing("/armcal/report"))?;
+        if residuals.is_empty() {
+            return Err(missing("/armcal/residuals"));
+        }
+        let attachments = recording.attachments();
+        let summary = attachments.iter().find(|a| a.name == "armcal/summary.json");
+        Ok(PastRun {
+            pipeline: report.pipeline,
+            effects: report.effects,
+            residuals: residuals.into_iter().map(PastResidual::from).collect(),
+            parameters: parameters.into_iter().flat_map(|p| p.parameters).map(PastParameter::from).collect(),
+            summary: summary.and_then(|a| serde_json::from_slice(a.data).ok()).unwrap_or_default(),
+            path,
+        })
+    }
+}
+
+impl From<proto::Residual> for PastResidual {
+    fn from(r: proto::Residual) -> PastResidual {
+        PastResidual {
+            recording: r.recording,
+            dwell: DwellId { recording: r.recording_index as usize, dwell: r.dwell as usize },
+            cavity: r.cavity,
+            held_out: r.held_out,
+            error_m: r.fitted_norm_mm * 1e-3,
+        }
+    }
+}
+
+impl From<proto::Parameter> for PastParameter {
+    fn from(p: proto::Parameter) -> PastParameter {
+        PastParameter {
+            name: p.name,
+            display_unit: p.display_unit,
+            display_value: p.display_value,
+            display_ci95_half: p.display_ci95_half,
+            free: p.free,
+            determined: p.determined,
+        }
+    }
+}

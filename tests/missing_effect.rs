@@ -1,0 +1,114 @@
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Simulates a laboratory and returns a pipeline on its recordings; the truth stays where only the assertion looks.
+fn recorded(lab: &str, folder: &Path) -> PathBuf {
+    let recordings = folder.join("recordings");
+    let output = armcal(
+        [Path::new("simulate"), &root().join(lab), Path::new("--out"), &recordings].map(Path::as_os_str),
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let pipeline = folder.join("pipeline.toml");
+    std::fs::write(&pipeline, paper_pipeline(&recordings)).expect("pipeline");
+    pipeline
+}
+
+fn names(diagnosis: &Value) -> Vec<String> {
+    let all = diagnosis["names"].as_array().expect("names");
+    all.iter().map(|n| n.as_str().expect("a name").to_owned()).collect()
+}
+
+/// The shipped recordings hide nothing but geometry.
+#[test]
+fn nothing_is_claimed_where_nothing_is_hidden() {
+    let out = tempfile::tempdir().expect("temporary folder");
+    let summary = run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
+    let diagnosis = &summary["diagnosis"];
+    assert_eq!(diagnosis["verdict"], "nothing_missing", "{diagnosis:#}");
+    assert!(names(diagnosis).is_empty());
+    assert!(number(diagnosis, "/p_nothing") > 0.5);
+    let unseen = diagnosis["not_testable"].as_array().expect("list");
+    assert!(unseen.iter().all(|n| n["effect"].is_string() && n["smallest_seen"].is_string()));
+}
+
+/// The paper's story: play in every gear, three tilts. Geometry leaves much of the error; the diagnosis names the play;
+/// adding what it suggests brings held-out points to what the camera can see.
+#[test]
+fn the_papers_backlash_is_named_and_adding_it_brings_the_error_down() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let pipeline = recorded("pipelines/lab/paper-backlash.toml", folder.path());
+    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[3]);
+    let mut found = names(&before["diagnosis"]);
+    found.sort();
+    assert_eq!(before["diagnosis"]["verdict"], "identified", "{:#}", before["diagnosis"]["explanations"]);
+    assert_eq!(found, ["backlash:1", "backlash:2", "backlash:3"]);
+
+    let extended = folder.path().join("extended.toml");
+    let out = folder.path().join("after");
+    let output = armcal([
+        Path::new("add"),
+        Path::new("suggested"),
+        &pipeline,
+        Path::new("--write"),
+        &extended,
+        Path::new("--out"),
+        &out,
+    ]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", String::from_utf8_lossy(&output.stderr));
+    println!("{text}");
+    let after = read_json(&out.join("summary.json"));
+    let mean = |summary: &Value, of: &str| number(summary, &format!("/fit/holdout/{of}/mean"));
+    let (nominal, geometry, with) =
+        (mean(&before, "nominal_mm"), mean(&before, "fitted_mm"), mean(&after, "fitted_mm"));
+    let floor = number(&after, "/fit/noise_floor_mm");
+    println!(
+        "held out: nominal {nominal:.2}, geometry {geometry:.2}, with play {with:.3}, floor {floor:.3} mm"
+    );
+    assert!(geometry > 0.15 * nominal, "geometry alone must leave much of the error");
+    assert!(with < 0.05 * geometry && with < 1.5 * floor);
+
+    // The truth is opened only now.
+    let truth = read_json(&folder.path().join("recordings/truth.json"));
+    let planted = truth["config"]["mechanisms"].as_array().expect("mechanisms");
+    for parameter in after["fit"]["parameters"].as_array().expect("parameters") {
+        let name = parameter["name"].as_str().expect("name");
+        let Some(joint) = name.strip_prefix("backlash:").and_then(|rest| rest.strip_suffix(".width")) else {
+            continue;
+        };
+        let of_joint = |m: &&Value| m["joint"].as_u64().map(|j| j.to_string()).as_deref() == Some(joint);
+        let planted_deg = number(planted.iter().find(of_joint).expect("a gap there"), "/width_deg");
+        let fitted_deg = number(parameter, "/value").to_degrees();
+        println!("{name}: {fitted_deg:.3} deg, planted {planted_deg} deg");
+        assert!((fitted_deg - planted_deg).abs() < 0.05, "{name}");
+    }
+
+    // The extended pipeline stands on its own and gives the same.
+    let again = run_pipeline(&extended, &folder.path().join("again"), &[0, 3]);
+    assert_eq!(mean(&again, "fitted_mm"), with);
+}
+
+#[test]
+fn an_effect_that_does_not_exist_is_refused_with_the_nearest_name() {
+    let pipeline = root().join("pipelines/paper.toml");
+    let output = armcal([Path::new("add"), Path::new("backlsh:1"), &pipeline]);
+    assert_eq!(output.status.code(), Some(1));
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(words.contains("backlsh") && words.contains("backlash"), "{words}");
+    assert!(!pipeline.with_file_name("paper+backlsh-1.toml").exists());
+}
+
+#[test]
+fn the_catalogue_explains_every_entry() {
+    let all: Vec<Value> =
+        serde_json::from_slice(&armcal(["effects", "--json"]).stdout).expect("the catalogue as JSON");
+    assert!(all.len() >= 25, "{} effects", all.len());
+    for entry in &all {
+        let name = entry["name"].as_str().expect("name");
+        let page = String::from_utf8(armcal(["effects", name]).stdout).expect("text");
+        for heading in ["What moves", "Equation", "Parameters and units", "Signature in the data", "Source"] {
+            assert!(page.contains(heading), "{name}: no `{heading}`");
+        }
+    }
+}
