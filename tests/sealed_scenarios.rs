@@ -58,8 +58,12 @@ fn hidden_effects_are_named_and_adding_them_reaches_the_floor() {
 #[test]
 fn where_nothing_is_hidden_nothing_is_claimed_whatever_the_noise() {
     let all = scored(&["nothing", "--seeds", "3"]);
+    let named = |s: &&Value| s["answer"]["names"].as_array().is_some_and(|names| !names.is_empty());
+    println!("silent {} of {}", count(&all, &["rightly_silent"]), all.len());
     assert!(all.len() >= 18);
-    assert_eq!(count(&all, &["rightly_silent"]), all.len());
+    assert_eq!(all.iter().filter(named).count(), 0, "no effect may be named");
+    // Two in a hundred may be called unknown (docs/confusion.md has the large run): of eighteen, one.
+    assert!(count(&all, &["rightly_silent"]) + 1 >= all.len());
 }
 
 #[test]

@@ -58,10 +58,14 @@ pub(crate) fn error_curves(
     Ok(curves)
 }
 
-/// The best cell, if it is a joint over its own angle, or as good as such a one.
+/// The best joint over its own angle; the first must be as good as the best cell of all.
 fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) -> Option<&'r Outside> {
     let weighed = &room.weighed;
-    let limit = weighed.best_cell()?.ln_evidence - config.margin_nats;
+    // Joints of one make err alike: after a first curve the next need not lead all cells, only predict.
+    let limit = match taken.is_empty() {
+        true => weighed.best_cell()?.ln_evidence - config.margin_nats,
+        false => config.margin_nats,
+    };
     let own = weighed.unlisted.iter().filter(|u| {
         u.ln_evidence >= limit.max(config.margin_nats)
             && own_angle(&u.what)

@@ -43,12 +43,21 @@ pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &Diagnosis
             d.holdout_mm.before, d.holdout_mm.after
         ),
     );
-    if let Some(u) = &d.unknown {
+    for u in &d.unlisted {
+        let known = match (u.shape.first(), u.shape.last()) {
+            (Some(first), Some(last)) if u.driver.starts_with('q') => format!(
+                "; it is known for {} from {:.0} to {:.0} deg, the angles visited, and says nothing beyond",
+                u.driver,
+                first.at.to_degrees(),
+                last.at.to_degrees()
+            ),
+            _ => String::new(),
+        };
         say(
             "unknown",
             format!(
                 "what no listed effect explains looks most like something that enters at {} and depends on {}; with that \
-                 shape in the model the mean error on places the fit did not see goes from {:.3} to {:.3} mm",
+                 shape in the model the mean error on places the fit did not see goes from {:.3} to {:.3} mm{known}",
                 u.channel, u.driver, u.places.before, u.places.after
             ),
         );

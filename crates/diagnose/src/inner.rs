@@ -123,7 +123,9 @@ fn found_effect(a: &Accepted) -> FoundEffect {
     if a.grade == Grade::OrUnlisted {
         set.push("something not listed".to_string());
     }
-    let probability = judged.set.iter().map(|k| weighed.entries[*k].probability).sum::<f64>();
+    let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l));
+    let meant = (0..weighed.entries.len()).filter(meant);
+    let probability = meant.map(|k| weighed.entries[k].probability).sum::<f64>();
     FoundEffect {
         name: name(&judged.entry),
         set,

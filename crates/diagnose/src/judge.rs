@@ -210,6 +210,13 @@ fn answer(
     // A group holds its members: it is no other name for one of them.
     set.retain(|k| *k == entry || !weighed.entries[*k].candidate.is_group());
     set[1..].sort_by(|a, b| weighed.entries[*b].ln_evidence.total_cmp(&weighed.entries[*a].ln_evidence));
+    // A second value of a shape is no second name: the value that fits best stands for it.
+    let mut names: Vec<usize> = Vec::new();
+    set.retain(|k| {
+        let new = !names.iter().any(|n| weighed.one_name(*n, *k));
+        names.extend(new.then_some(*k));
+        new
+    });
     set
 }
 

@@ -190,3 +190,22 @@ fn bootstrap_p_values_are_uniform_under_noise() {
     }
     assert!(below <= 8, "{below} of 60");
 }
+
+#[test]
+fn with_two_sockets_the_poses_are_the_groups() {
+    let mut p = small(5);
+    for (i, d) in p.dwells.iter_mut().enumerate() {
+        d.place = Some(format!("hole_{}", i % 2));
+    }
+    let groups = crate::crossval::by_place(&p);
+    assert!(groups.len() >= 8, "two sockets are no sample, their poses are: {}", groups.len());
+    let of = |i: usize| groups.iter().position(|g| g.contains(&i)).unwrap();
+    for i in 0..p.dwells.len() {
+        for j in 0..i {
+            let apart = p.dwells[i].joint_rad.iter().zip(&p.dwells[j].joint_rad);
+            if apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-9 {
+                assert_eq!(of(i), of(j), "visits {i} and {j} to one pose tell of one another");
+            }
+        }
+    }
+}

@@ -60,8 +60,11 @@ pub(crate) fn described(
         u.what.channel.and_then(|c| problem.channels.get(c)).is_some_and(|c| !c.axes.is_empty())
             && !u.what.driver_name.starts_with("recording")
     };
-    let pasted =
-        weighed.unlisted.iter().filter(formulable).max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
+    let best_formulable = || {
+        let all = weighed.unlisted.iter().filter(formulable);
+        all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    };
+    let pasted = Some(outside).filter(formulable).or_else(best_formulable);
     let formula = pasted.and_then(|u| {
         let (channel, driver) = (&problem.channels[u.what.channel?], &weighed.drivers[u.what.driver?]);
         let gram = metric.gram(&weighed.dense(&u.what.columns, problem));

@@ -50,6 +50,8 @@ pub(crate) struct Weighed {
     pub drivers: Vec<Driver>,
     /// The catalogue in the order given, scans last.
     pub entries: Vec<Entry>,
+    /// How many of them were given without a search; the rest are scans.
+    pub given: usize,
     /// What is not listed.
     pub unlisted: Vec<Outside>,
     /// Posterior probability of nothing.
@@ -129,7 +131,8 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     let p_unlisted = unlisted.iter().map(|u| u.probability).sum();
     let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
-    Weighed { scale, metrics, drivers, entries, unlisted, p_nothing, p_unlisted, p_noise }
+    let given = problem.candidates.len();
+    Weighed { scale, metrics, drivers, entries, given, unlisted, p_nothing, p_unlisted, p_noise }
 }
 
 /// ln (weight x Bayes factor) of every point of a scan in every metric. Under white noise all points are weighed, under
@@ -163,6 +166,15 @@ impl Weighed {
         let parts = over_noise(&[columns], problem, self.scale, &self.metrics, config).concat();
         let best = (0..parts.len()).max_by(|a, b| parts[*a].total_cmp(&parts[*b])).unwrap_or(0);
         &self.metrics[best]
+    }
+
+    /// Whether two entries are one effect at one target, apart from the value of a searched shape.
+    pub fn one_name(&self, k: usize, l: usize) -> bool {
+        let placed = |k: usize| {
+            let spec = &self.entries[k].candidate.spec;
+            spec.split_once(',').map_or(spec.as_str(), |(placed, _)| placed)
+        };
+        k == l || (k.max(l) >= self.given && placed(k) == placed(l))
     }
 
     /// Entries by falling evidence.

@@ -4,8 +4,8 @@
 
 mod arm;
 
-use arm::{Noise, catalogue, design, outside, overconfident, problem, rng};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Problem, Verdict, diagnose_problem};
+use arm::{Noise, catalogue, design, on_joint, outside, overconfident, problem, rng};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Problem, Scan, Verdict, diagnose_problem};
 
 fn run(p: Problem) -> Diagnosis {
     let config = DiagnosisConfig { resamplings: 199, ..Default::default() };
@@ -107,4 +107,43 @@ fn a_wrong_noise_declaration_hides_nothing() {
 fn the_same_input_gives_the_same_bytes() {
     let text = || serde_json::to_string(&planted(&["backlash:2"], 0, 9)).unwrap();
     assert_eq!(text(), text());
+}
+
+#[test]
+fn two_values_of_a_shape_are_one_name() {
+    let mut r = rng(7);
+    let poses = design(0, &mut r);
+    let list = catalogue(&poses);
+    let own = list.iter().find(|l| l.spec == "backlash:1").unwrap();
+    let hidden = [(own.effect.clone(), own.typical.clone())];
+    let mut p = problem(&poses, &hidden, Noise::White, &mut r, false);
+    let mut shaped = p.candidates.iter().find(|c| c.spec == "backlash:1").unwrap().clone();
+    shaped.spec = "backlash:1,shape=2".to_string();
+    p.scans.push(Scan { name: "backlash:1".to_string(), points: vec![shaped] });
+    let d = run(p);
+    let of_joint = |set: &[String]| set.iter().filter(|n| n.starts_with("backlash:1")).count();
+    assert_eq!(d.effects.len(), 1, "{:?}", d.names);
+    assert_eq!(of_joint(&d.effects[0].set), 1, "{:?}", d.effects[0].set);
+    assert!(d.effects[0].probability > 0.9, "both values together: {}", d.effects[0].probability);
+}
+
+#[test]
+fn the_error_curves_of_two_joints_are_both_listed() {
+    let mut r = rng(8);
+    let poses = design(60, &mut r);
+    let deg = std::f64::consts::PI / 180.0;
+    let bumps = move |q: f64| {
+        0.5 * deg * ((-((q - 0.05) / 0.05).powi(2)).exp() - (-((q + 0.1) / 0.04).powi(2)).exp())
+    };
+    let hidden = [
+        (on_joint(0, move |p, _, _| bumps(p.q[0])), vec![]),
+        (on_joint(2, move |p, _, _| 0.3 * deg * (25.0 * p.q[2]).sin().powi(3)), vec![]),
+    ];
+    let d = run(problem(&poses, &hidden, Noise::White, &mut r, false));
+    let listed: Vec<_> = d.unlisted.iter().map(|u| (u.channel.as_str(), u.driver.as_str())).collect();
+    for own in [("joint1", "q1"), ("joint3", "q3")] {
+        assert!(listed.contains(&own), "{own:?} is not among {listed:?}");
+    }
+    assert_eq!(d.unknown.unwrap().channel, d.unlisted[0].channel, "the strongest comes first");
+    assert!(d.holdout_mm.after < 0.7 * d.holdout_mm.before, "{:?}", d.holdout_mm);
 }

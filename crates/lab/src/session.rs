@@ -225,3 +225,35 @@ fn rest(kind: RestKind) -> Rest {
 fn slide_direction(travel: &Vector3<f64>, turned_rad: f64) -> Vector3<f64> {
     crate::screw::turn(&Vector3::z(), &-Vector3::new(travel.x, travel.y, 0.0), turned_rad)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::config::{StopConfig, TourConfig};
+    use crate::observe;
+    use crate::scenario::{Design, Scenario};
+    use armcal_core::Arrival::{Negative, Positive};
+
+    #[test]
+    fn a_tour_goes_where_it_is_sent_and_arrives_from_there() {
+        let planted = Scenario::new("nothing:white", Design::OneTiltOnePass, 3).plant().unwrap();
+        let (mut config, mut before) =
+            (planted.config.clone(), observe(&planted.config).unwrap().observations);
+        let mut next = config.recordings[0].clone();
+        (next.name, next.load_kg) = ("next".into(), 0.5);
+        config.recordings.push(next);
+        let pose = StopConfig::Pose { joint_deg: vec![20.0, -30.0, 10.0], from_deg: vec![15.0, -25.0, 5.0] };
+        let cavity = StopConfig::Cavity { name: "circle03".into(), slide_from_deg: Some(90.0) };
+        config.task.tours.push(TourConfig { recording: "next".into(), stops: vec![pose, cavity] });
+        let after = observe(&config).unwrap().observations;
+        let tour: Vec<_> = after.iter().filter(|o| o.dwell.recording == 1).collect();
+        assert_eq!(tour.len(), 2);
+        let reached = tour[0].joint_rad.iter().zip([20.0_f64, -30.0, 10.0]);
+        assert!(reached.into_iter().all(|(q, deg)| (q - deg.to_radians()).abs() < 1e-3));
+        assert_eq!(tour[0].arrival, [Positive, Negative, Positive]);
+        assert_eq!((tour[1].cavity(), tour[1].load_kg), (Some("circle03"), 0.5));
+        // Slid in from the left, towards the right: joint 1 turns clockwise.
+        assert_eq!(tour[1].arrival[0], Negative);
+        before.retain(|o| o.dwell.recording == 0);
+        assert_eq!(before, after[..before.len()], "a tour changes what came before it");
+    }
+}

@@ -17,6 +17,8 @@ pub(crate) struct DiagnosisSummary<'a> {
     p_adjusted: f64,
     candidates: Vec<Candidate<'a>>,
     unknown: Option<Unknown<'a>>,
+    /// All unlisted shapes, the strongest (`unknown`) first.
+    unlisted: Vec<Unknown<'a>>,
     cannot_tell_apart: &'a [[String; 2]],
     not_testable: &'a [NotTestable],
     record_next: &'a [String],
@@ -73,6 +75,7 @@ impl<'a> DiagnosisSummary<'a> {
             p_adjusted: d.p_adjusted,
             candidates: d.candidates.iter().map(candidate).collect(),
             unknown: d.unknown.as_ref().map(unknown),
+            unlisted: d.unlisted.iter().map(unknown).collect(),
             cannot_tell_apart: &d.cannot_tell_apart,
             not_testable: &d.not_testable,
             record_next: &d.record_next,

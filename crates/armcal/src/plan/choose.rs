@@ -8,18 +8,25 @@ use super::{Allowed, Known, Pair, Proposal, Proposed};
 use crate::error::Error;
 use armcal_calibrate::linearise;
 use armcal_core::Observation;
-use armcal_diagnose::{DiagnosisConfig, Plan, PoolDwell, Survivor, plan};
+use armcal_diagnose::{DiagnosisConfig, PoolDwell, Survivor, plan};
 use armcal_model::{EffectSpec, Model, Session};
 use nalgebra::{DMatrix, DVector};
 
-/// Load tried when the user named none and motion alone does not help [kg].
-const TRIAL_LOAD_KG: f64 = 0.5;
+/// Precision of an amplitude's prior in typical sizes: a tenth, so that it hardly holds it back.
+const AMPLITUDE_PRECISION: f64 = 0.01;
+/// At this Delta the evidence names the true one (Bayes factor above 20 in 85 % of cases).
+const SETTLED: f64 = 14.0;
+/// Effects that are told from nothing together, at most.
+const TOGETHER: usize = 6;
 /// Name of the absence of every effect.
 const NOTHING: &str = "nothing";
 
 /// Chooses the dwells that best tell the standing explanations apart.
 ///
-/// `known.model` has the effects that are beyond doubt, and `known.values` are its fitted parameters.
+/// `known.model` has the effects that are beyond doubt, and `known.values` are its fitted parameters. First every pair is
+/// asked whether any `allowed.dwells` of the pool would separate it; those that none would are one explanation for the
+/// choice. Then batches are chosen greedily, each of other places than the ones before, so that the answer never hangs on
+/// one dwell.
 pub fn propose(
     known: &Known<'_>,
     standing: &Standing,
@@ -27,59 +34,47 @@ pub fn propose(
     config: &DiagnosisConfig,
 ) -> Result<Proposal, Error> {
     let limits = Limits::of(known, allowed);
-    let first = Weighed::new(known, standing, &limits, allowed)?;
-    let all = first.plan(&vec![true; first.survivors.len()], allowed.dwells, config);
-    // What no motion separates is one explanation for the choice, so that no dwell is spent on it.
-    let mut kept = vec![true; first.survivors.len()];
-    for pair in all.pairs.iter().filter(|p| !p.separable) {
-        let index = |name: &String| first.survivors.iter().position(|s| s.name == *name);
-        if let [Some(a), Some(b)] = [index(&pair.names[0]), index(&pair.names[1])]
-            && kept[a]
-            && kept[b]
-        {
-            // "Nothing" stays, and of two effects the more probable one, which comes first.
-            let (first_of, last_of) = (a.min(b), a.max(b));
-            kept[if first.survivors[last_of].name == NOTHING { first_of } else { last_of }] = false;
+    let weighed = Weighed::new(known, standing, &limits, allowed)?;
+    let choice = weighed.choose(standing, allowed.dwells, config);
+    let deltas: Vec<f64> =
+        (1..=choice.dwells.len()).map(|n| weighed.smallest(&choice.kept, &choice.dwells[..n])).collect();
+    let dwells = choice.dwells.iter().zip(&deltas);
+    let name = |k: &usize| weighed.survivors[*k].name.clone();
+    let mut pairs = Vec::new();
+    for (i, a) in choice.kept.iter().enumerate() {
+        for b in &choice.kept[i + 1..] {
+            let [before, after] = [&[][..], &choice.dwells].map(|dwells| weighed.apart(*a, *b, dwells));
+            pairs.push(Pair {
+                names: [name(a), name(b)],
+                delta_before: before,
+                delta_after: after,
+                sensor: None,
+            });
         }
     }
-    let best = first.plan(&kept, allowed.dwells, config);
-    let mut assumptions = assumptions(known, allowed);
-    let stuck = all.pairs.iter().any(|p| !p.separable);
-    if stuck
-        && allowed.loads_kg.iter().all(|l| *l == 0.0)
-        && known.observations.iter().all(|o| o.load_kg == 0.0)
-    {
-        let loaded = Allowed { loads_kg: vec![0.0, TRIAL_LOAD_KG], ..allowed.clone() };
-        let trial = Weighed::new(known, standing, &limits, &loaded)?;
-        let with = trial.plan(&vec![true; trial.survivors.len()], allowed.dwells, config);
-        let won = all
-            .pairs
-            .iter()
-            .filter(|p| !p.separable)
-            .filter(|p| with.pairs.iter().any(|w| w.names == p.names && w.separable));
-        let won: Vec<String> = won.map(|p| p.names.join(" and ")).collect();
-        if !won.is_empty() {
-            assumptions.push(format!(
-                "a load of {TRIAL_LOAD_KG} kg would also tell apart {}: give --load {TRIAL_LOAD_KG}",
-                won.join("; ")
-            ));
-        }
+    for (a, b) in &choice.stuck {
+        let names = [name(a), name(b)];
+        let [before, after] = [&[][..], &choice.dwells].map(|dwells| weighed.apart(*a, *b, dwells));
+        let sensor = Some(sensor(&names[0], &names[1]).to_owned());
+        pairs.push(Pair { names, delta_before: before, delta_after: after, sensor });
     }
     Ok(Proposal {
-        explanations: first.survivors.iter().map(|s| s.name.clone()).collect(),
+        explanations: choice.kept.iter().map(name).collect(),
         why: standing.why.clone(),
-        dwells: best
-            .chosen
-            .iter()
-            .zip(&best.smallest_delta)
-            .map(|(i, d)| proposed(&first.pool[*i], *d))
-            .collect(),
-        sentence: sentence(&all, &best, config),
-        pairs: pairs(&all, &best),
-        assumptions,
+        dwells: dwells.map(|(i, d)| proposed(&weighed.pool[*i], *d)).collect(),
+        sentence: sentence(&pairs, &deltas, config),
+        pairs,
+        assumptions: assumptions(known, allowed),
         range_deg: limits.0.iter().map(|range| range.map(f64::to_degrees)).collect(),
-        pool: first.pool.len(),
+        pool: weighed.pool.len(),
     })
+}
+
+/// What was chosen: indices of survivors and of dwells.
+struct Choice {
+    kept: Vec<usize>,
+    stuck: Vec<(usize, usize)>,
+    dwells: Vec<usize>,
 }
 
 /// Everything the choice needs, whitened.
@@ -143,17 +138,123 @@ impl Weighed {
         Ok(Weighed { pool, dwells, survivors, geometry, precision })
     }
 
-    /// The choice among those that are kept.
-    fn plan(&self, kept: &[bool], count: usize, config: &DiagnosisConfig) -> Plan {
-        let some = |k: &usize| kept.get(*k).copied().unwrap_or(false);
-        let indices: Vec<usize> = (0..self.survivors.len()).filter(some).collect();
-        let survivors: Vec<Survivor> = indices.iter().map(|k| self.survivors[*k].clone()).collect();
-        let dwell = |d: &PoolDwell| PoolDwell {
-            geometry: d.geometry.clone(),
-            effects: indices.iter().map(|k| d.effects[*k].clone()).collect(),
+    fn choose(&self, standing: &Standing, count: usize, config: &DiagnosisConfig) -> Choice {
+        let nothing = standing.nothing.then_some(self.survivors.len() - 1);
+        let (mut kept, mut stuck, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, rival) in standing.rivals.iter().enumerate() {
+            let known_kind = nothing.is_some() && kinds.contains(&rival.spec.kind.as_str());
+            if kept.len() == TOGETHER || known_kind {
+                continue;
+            }
+            let parted = |other: &usize| self.separable(k, *other, count, config);
+            match nothing.iter().chain(&kept).find(|other| !parted(other)) {
+                Some(other) => stuck.push((k.min(*other), k.max(*other))),
+                None => {
+                    kept.push(k);
+                    kinds.push(rival.spec.kind.as_str());
+                }
+            }
+        }
+        kept.extend(nothing);
+        let (mut dwells, mut barred) = (Vec::new(), vec![false; self.pool.len()]);
+        let mut repeating = false;
+        while dwells.len() < count && kept.len() > 1 {
+            let batch = self.plan(&kept, &barred, count - dwells.len(), config);
+            if batch.is_empty() && repeating {
+                break;
+            }
+            if batch.is_empty() {
+                // No other place helps: the same places again, from another side or with another load.
+                repeating = true;
+                barred.fill(false);
+                dwells.iter().for_each(|i: &usize| barred[*i] = true);
+            }
+            for chosen in &batch {
+                let same = |o: &Possible| {
+                    !repeating
+                        && o.place == self.pool[*chosen].place
+                        && o.observation.joint_rad == self.pool[*chosen].observation.joint_rad
+                        && o.observation.load_kg == self.pool[*chosen].observation.load_kg
+                };
+                barred[*chosen] = true;
+                self.pool
+                    .iter()
+                    .zip(&mut barred)
+                    .filter(|(o, _)| same(o))
+                    .for_each(|(_, barred)| *barred = true);
+            }
+            dwells.extend(batch);
+        }
+        Choice { kept, stuck, dwells }
+    }
+
+    /// Whether `count` dwells of the pool would separate a pair.
+    fn separable(&self, a: usize, b: usize, count: usize, config: &DiagnosisConfig) -> bool {
+        let pair = [a.min(b), a.max(b)];
+        let dwells = self.plan(&pair, &vec![false; self.pool.len()], count, config);
+        self.apart(pair[0], pair[1], &dwells) >= config.min_delta
+    }
+
+    /// The greedy choice among survivors that part them, of the dwells that are not barred.
+    fn plan(&self, kept: &[usize], barred: &[bool], count: usize, config: &DiagnosisConfig) -> Vec<usize> {
+        let survivors: Vec<Survivor> = kept.iter().map(|k| self.survivors[*k].clone()).collect();
+        let open: Vec<usize> = (0..self.dwells.len()).filter(|i| !barred[*i]).collect();
+        let dwell = |i: &usize| PoolDwell {
+            geometry: self.dwells[*i].geometry.clone(),
+            effects: kept.iter().map(|k| self.dwells[*i].effects[*k].clone()).collect(),
         };
-        let dwells: Vec<PoolDwell> = self.dwells.iter().map(dwell).collect();
-        plan(&self.geometry, &self.precision, &survivors, &dwells, count, config)
+        let dwells: Vec<PoolDwell> = open.iter().map(dwell).collect();
+        let plan = plan(&self.geometry, &self.precision, &survivors, &dwells, count, config);
+        let mut chosen: Vec<usize> = Vec::new();
+        for i in plan.chosen.iter().map(|i| open[*i]) {
+            if !chosen.contains(&i) {
+                chosen.push(i);
+            }
+        }
+        chosen
+    }
+
+    /// Smallest Delta over all pairs of `kept` with these dwells.
+    fn smallest(&self, kept: &[usize], dwells: &[usize]) -> f64 {
+        let pairs = kept.iter().enumerate().flat_map(|(i, a)| kept[i + 1..].iter().map(move |b| (*a, *b)));
+        pairs.map(|(a, b)| self.apart(a, b, dwells)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Delta of a pair with these dwells, the smaller of both directions that there are.
+    fn apart(&self, a: usize, b: usize, dwells: &[usize]) -> f64 {
+        [(a, b), (b, a)]
+            .into_iter()
+            .filter(|(true_one, _)| !self.survivors[*true_one].theta.is_empty())
+            .map(|(true_one, rival)| self.delta(true_one, rival, dwells))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// `|(I - P) G theta|^2`: what the rival and the geometry leave of the true one's signature.
+    fn delta(&self, true_one: usize, rival: usize, dwells: &[usize]) -> f64 {
+        let size = self.geometry.ncols() + self.survivors[rival].columns.ncols();
+        let mut a = DMatrix::zeros(size, size);
+        for (j, precision) in self.precision.iter().enumerate() {
+            a[(j, j)] = *precision;
+        }
+        for j in self.precision.len()..size {
+            a[(j, j)] = AMPLITUDE_PRECISION;
+        }
+        let (mut b, mut c) = (DVector::zeros(size), 0.0);
+        let mut add = |geometry: &DMatrix<f64>, own: &DMatrix<f64>, other: &DMatrix<f64>| {
+            let mut x = DMatrix::zeros(geometry.nrows(), size);
+            x.columns_mut(0, geometry.ncols()).copy_from(geometry);
+            x.columns_mut(geometry.ncols(), other.ncols()).copy_from(other);
+            let signature = own * &self.survivors[true_one].theta;
+            a += x.tr_mul(&x);
+            b += x.tr_mul(&signature);
+            c += signature.norm_squared();
+        };
+        add(&self.geometry, &self.survivors[true_one].columns, &self.survivors[rival].columns);
+        for dwell in dwells.iter().map(|i| &self.dwells[*i]) {
+            add(&dwell.geometry, &dwell.effects[true_one], &dwell.effects[rival]);
+        }
+        let explained = a.cholesky().map_or(c, |a| b.dot(&a.solve(&b)));
+        (c - explained).max(0.0)
     }
 }
 
@@ -175,59 +276,37 @@ fn proposed(possible: &Possible, delta: f64) -> Proposed {
     }
 }
 
-/// Pairs after the chosen dwells; those that no dwell separates with what does.
-fn pairs(all: &Plan, best: &Plan) -> Vec<Pair> {
-    let pair = |p: &armcal_diagnose::PlannedPair| {
-        let chosen = best.pairs.iter().find(|b| b.names == p.names);
-        let other = p.names.iter().find(|n| *n != NOTHING);
-        let with_nothing = p.names.iter().any(|n| n == NOTHING);
-        let help = || match other {
-            Some(name) if with_nothing => {
-                format!("{name} stays invisible to these motions: {}", sensor(name, name))
-            }
-            _ => sensor(&p.names[0], &p.names[1]).to_owned(),
+fn sentence(pairs: &[Pair], deltas: &[f64], config: &DiagnosisConfig) -> String {
+    let mut advice: Vec<(&str, Vec<String>)> = Vec::new();
+    for pair in pairs {
+        let Some(sensor) = pair.sensor.as_deref() else { continue };
+        let words = match pair.names.iter().position(|name| name == NOTHING) {
+            Some(nothing) => pair.names[1 - nothing].clone(),
+            None => pair.names.join(" and "),
         };
-        Pair {
-            names: p.names.clone(),
-            delta_before: p.delta_before,
-            delta_after: chosen.map_or(p.delta_after, |c| c.delta_after),
-            sensor: (!p.separable).then(help),
-        }
-    };
-    all.pairs.iter().map(pair).collect()
-}
-
-fn sentence(all: &Plan, best: &Plan, config: &DiagnosisConfig) -> String {
-    let stuck: Vec<String> = all
-        .pairs
-        .iter()
-        .filter(|p| !p.separable)
-        .map(|p| format!("{} ({})", p.names.join(" and "), sensor(&p.names[0], &p.names[1])))
-        .collect();
-    let rest = format!("no motion within these ranges will tell apart {}", stuck.join("; "));
-    let told = best.pairs.iter().filter(|p| p.delta_after >= config.min_delta).count();
-    match () {
-        () if all.pairs.is_empty() => {
-            "there is only one explanation: nothing is left to tell apart".to_owned()
-        }
-        () if told == 0 => rest,
-        () if best.chosen.is_empty() && stuck.is_empty() => {
-            "the data at hand tell these explanations apart already: run `armcal diagnose`".to_owned()
-        }
-        () => {
-            let least = best.smallest_delta.last().copied().unwrap_or(f64::NAN);
-            let odds = match () {
-                () if least >= 14.0 => "which will settle it",
-                () if least >= config.min_delta => "which will probably settle it; more dwells make it sure",
-                () => "which leaves the closest pair open; ask for more with --dwells",
-            };
-            let first = format!(
-                "{} more dwells bring every pair to Delta {least:.0} or more, {odds}",
-                best.chosen.len()
-            );
-            if stuck.is_empty() { first } else { format!("{first}; {rest}") }
+        match advice.iter_mut().find(|(known, _)| *known == sensor) {
+            Some((_, all)) => all.push(words),
+            None => advice.push((sensor, vec![words])),
         }
     }
+    let stuck: Vec<String> =
+        advice.into_iter().map(|(sensor, words)| format!("{} ({sensor})", words.join(", "))).collect();
+    let rest = format!("no motion within these ranges will settle {}", stuck.join("; "));
+    let Some(least) = deltas.last() else {
+        return match (pairs.iter().any(|p| p.sensor.is_none()), stuck.is_empty()) {
+            (true, true) => "the data at hand tell these explanations apart already".to_owned(),
+            (false, true) => "there is only one explanation: nothing is left to tell apart".to_owned(),
+            _ => rest,
+        };
+    };
+    let odds = match () {
+        () if *least >= SETTLED => "which as a rule settles it",
+        () if *least >= config.min_delta => "which may settle it; more dwells make it sure",
+        () => "which leaves the closest pair open; ask for more with --dwells",
+    };
+    let dwells = if deltas.len() == 1 { "dwell brings" } else { "dwells bring" };
+    let first = format!("{} more {dwells} every pair to Delta {least:.0} or more, {odds}", deltas.len());
+    if stuck.is_empty() { first } else { format!("{first}; {rest}") }
 }
 
 fn assumptions(known: &Known<'_>, allowed: &Allowed) -> Vec<String> {

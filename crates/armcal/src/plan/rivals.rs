@@ -3,10 +3,10 @@
 use crate::error::Error;
 use crate::stages::suggestion;
 use armcal_diagnose::{Diagnosis, ParameterReport, Verdict};
-use armcal_model::EffectSpec;
+use armcal_model::{EffectSpec, Family};
 
 /// Effects that a quiet diagnosis leaves untested, at most this many.
-const UNTESTED: usize = 6;
+const UNTESTED: usize = 24;
 
 /// One explanation.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,8 +36,7 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Er
     let parse = |name: &String| EffectSpec::parse(name, joints).map_err(Error::Model);
     let open = diagnosis.effects.iter().position(|e| e.set.len() > 1);
     let mut certain = Vec::new();
-    for (i, found) in diagnosis.effects.iter().enumerate().filter(|(i, _)| Some(*i) != open) {
-        let _ = i;
+    for (_, found) in diagnosis.effects.iter().enumerate().filter(|(i, _)| Some(*i) != open) {
         certain.push(parse(&found.name)?);
     }
     if let Some(found) = open.and_then(|i| diagnosis.effects.get(i)) {
@@ -76,7 +75,8 @@ pub fn named(words: &[String], diagnosis: Option<&Diagnosis>, joints: &[String])
     Ok(Standing { rivals, nothing, certain: Vec::new(), why: "you named them".to_owned() })
 }
 
-/// The most probable effect of each kind that could not be tested; events come last, a free pose shows none of them.
+/// The effects that could not be tested and that depend on pose, direction or load, the most probable first. Events and
+/// drifts are no matter of where the arm goes.
 fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Error> {
     let probability =
         |name: &str| diagnosis.candidates.iter().find(|c| c.spec == name).map_or(0.0, |c| c.probability);
@@ -85,8 +85,8 @@ fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Erro
     let mut rivals: Vec<Rival> = Vec::new();
     for name in names {
         let rival = rival(diagnosis, name, joints)?;
-        let event = rival.spec.since.is_some();
-        if !event && rivals.len() < UNTESTED && rivals.iter().all(|r| r.spec.kind != rival.spec.kind) {
+        let family = rival.spec.kind()?.family;
+        if rivals.len() < UNTESTED && rival.spec.since.is_none() && family != Family::Drift {
             rivals.push(rival);
         }
     }

@@ -9,14 +9,12 @@ const FORMULA_SHARE: f64 = 0.9;
 /// Harmonics of an error curve that stands for an unlisted shape over a joint's own angle.
 const HARMONICS: f64 = 30.0;
 
-/// The effects found, the most probable name of each; where none has a name, the unlisted shape.
+/// The effects found, the most probable name of each; where none has a name, all unlisted shapes.
 pub fn of(diagnosis: &Diagnosis, joint_names: &[String]) -> Result<Vec<EffectSpec>, Error> {
     let named = diagnosis.effects.iter().map(|e| EffectSpec::parse(&e.name, joint_names));
     let mut effects = named.collect::<Result<Vec<_>, ModelError>>()?;
-    if diagnosis.verdict == Verdict::Unknown
-        && let Some(unknown) = &diagnosis.unknown
-    {
-        effects.extend(unlisted(unknown));
+    if diagnosis.verdict == Verdict::Unknown {
+        effects.extend(diagnosis.unlisted.iter().filter_map(unlisted));
     }
     Ok(effects)
 }

@@ -87,11 +87,14 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for ErrorCurve {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let q = x.joint_rad(self.joint);
+        // sin nq and cos nq by turning from one harmonic to the next: a pass for each of many amplitudes comes here.
+        let (first_sine, first_cosine) = x.joint_rad(self.joint).sin_cos();
+        let (mut sine, mut cosine) = (first_sine, first_cosine);
         let mut sum = D::from(0.0);
-        for (n, pair) in (1..).map(f64::from).zip(theta.chunks_exact(2)) {
-            let (sine, cosine) = (n * q).sin_cos();
+        for pair in theta.chunks_exact(2) {
             sum += pair[0] * sine + pair[1] * cosine;
+            (sine, cosine) =
+                (sine * first_cosine + cosine * first_sine, cosine * first_cosine - sine * first_sine);
         }
         change.joint(self.joint, sum);
     }
