@@ -3,12 +3,24 @@
 use crate::outcome::Calibration;
 use crate::statistics::t95;
 use armcal_core::Observation;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Fewer cavities than this are no sample of cavities: dwells then stand for themselves.
+const MIN_CAVITIES: usize = 12;
+
+/// What each dwell shares its luck with: its cavity, whose machining error it shares, where there are enough of them;
+/// itself otherwise. `dwells` are (name of the dwell, cavity; empty or absent when tracked).
+pub fn independent_groups(dwells: &[(String, Option<&str>)]) -> Vec<String> {
+    let cavity = |c: &Option<&str>| c.filter(|name| !name.is_empty()).map(str::to_owned);
+    let distinct: BTreeSet<String> = dwells.iter().filter_map(|(_, c)| cavity(c)).collect();
+    let by_cavity = distinct.len() >= MIN_CAVITIES;
+    dwells.iter().map(|(dwell, c)| cavity(c).filter(|_| by_cavity).unwrap_or_else(|| dwell.clone())).collect()
+}
 
 /// The error of one dwell under two models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// What the dwell shares its luck with: its cavity, or itself when it was tracked.
+    /// What the dwell shares its luck with ([`independent_groups`]).
     pub group: String,
     /// Norm of the error before [m].
     pub before_m: f64,
@@ -84,10 +96,14 @@ impl PairedDifference {
     ) -> Option<PairedDifference> {
         let rows = || observations.iter().zip(before.residuals.iter().zip(&after.residuals));
         let any_held_out = rows().any(|(_, (b, a))| b.held_out && a.held_out);
-        let pairs: Vec<Pair> = rows()
-            .filter(|(_, (b, a))| !any_held_out || (b.held_out && a.held_out))
-            .map(|(o, (b, a))| Pair {
-                group: o.cavity().map_or_else(|| o.dwell.to_string(), str::to_owned),
+        let judged: Vec<_> =
+            rows().filter(|(_, (b, a))| !any_held_out || (b.held_out && a.held_out)).collect();
+        let dwells: Vec<_> = judged.iter().map(|(o, _)| (o.dwell.to_string(), o.cavity())).collect();
+        let pairs: Vec<Pair> = judged
+            .iter()
+            .zip(independent_groups(&dwells))
+            .map(|((_, (b, a)), group)| Pair {
+                group,
                 before_m: b.fitted_m.norm(),
                 after_m: a.fitted_m.norm(),
             })
@@ -135,6 +151,16 @@ mod tests {
         let (one, three) =
             (PairedDifference::of(&once).expect("pairs"), PairedDifference::of(&thrice).expect("pairs"));
         assert!((one.ci95_m[0] - three.ci95_m[0]).abs() < 1e-12, "{one:?} {three:?}");
+    }
+
+    #[test]
+    fn two_sockets_are_no_sample_of_sockets() {
+        let dwell = |i: usize| format!("dwell {i}");
+        let few: Vec<_> = (0..40).map(|i| (dwell(i), Some(["a", "b"][i % 2]))).collect();
+        assert_eq!(independent_groups(&few), (0..40).map(dwell).collect::<Vec<_>>());
+        let names: Vec<String> = (0..20).map(|i| format!("circle{i}")).collect();
+        let many: Vec<_> = (0..40).map(|i| (dwell(i), Some(names[i % 20].as_str()))).collect();
+        assert_eq!(independent_groups(&many)[21], "circle1");
     }
 
     #[test]

@@ -3,8 +3,7 @@
 use crate::past_run::{PastParameter, PastResidual, PastRun};
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
-use armcal_calibrate::{Pair, PairedDifference};
-use armcal_core::DwellId;
+use armcal_calibrate::{Pair, PairedDifference, independent_groups};
 use comfy_table::Cell;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -40,7 +39,7 @@ pub struct Comparison {
 pub struct Difference {
     /// Dwells compared.
     pub n: usize,
-    /// Groups treated as independent (cavities; single dwells where the tip was tracked).
+    /// Groups treated as independent: cavities, or single dwells where the tip was tracked or cavities are few.
     pub groups: usize,
     /// Mean error before [mm].
     pub before_mm: f64,
@@ -209,12 +208,12 @@ impl Comparison {
 }
 
 fn difference(rows: &[(&PastResidual, &PastResidual)]) -> Option<Difference> {
-    let group = |r: &PastResidual| match r.cavity.as_str() {
-        "" => DwellId::to_string(&r.dwell),
-        cavity => cavity.to_owned(),
-    };
-    let pairs: Vec<Pair> =
-        rows.iter().map(|(b, a)| Pair { group: group(a), before_m: b.error_m, after_m: a.error_m }).collect();
+    let dwells: Vec<_> = rows.iter().map(|(_, a)| (a.dwell.to_string(), Some(a.cavity.as_str()))).collect();
+    let pairs: Vec<Pair> = rows
+        .iter()
+        .zip(independent_groups(&dwells))
+        .map(|((b, a), group)| Pair { group, before_m: b.error_m, after_m: a.error_m })
+        .collect();
     let d = PairedDifference::of(&pairs)?;
     let mm = |m: f64| m * 1e3;
     Some(Difference {
