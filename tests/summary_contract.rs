@@ -27,7 +27,25 @@ const CONTRACT: &[(&str, &str)] = &[
     ("/fit/parameters/0/determined", "boolean"),
     ("/fit/parameters/0/at_bound", "boolean"),
     ("/fit/undetermined", "array"),
-    ("/diagnosis", "null"),
+    ("/diagnosis/verdict", "string"),
+    ("/diagnosis/names", "array"),
+    ("/diagnosis/probability", "number"),
+    ("/diagnosis/p_adjusted", "number"),
+    ("/diagnosis/candidates/0/effect", "string"),
+    ("/diagnosis/candidates/0/target", "string"),
+    ("/diagnosis/candidates/0/parameters", "object"),
+    ("/diagnosis/candidates/0/log_evidence", "number"),
+    ("/diagnosis/candidates/0/probability", "number"),
+    ("/diagnosis/candidates/0/p_adjusted", "number"),
+    ("/diagnosis/candidates/0/holdout_mm/before", "number"),
+    ("/diagnosis/candidates/0/holdout_mm/after", "number"),
+    ("/diagnosis/candidates/0/same_to_the_data", "array"),
+    // An object with channel, driver and expression where something unlisted is missing.
+    ("/diagnosis/unknown", "null"),
+    ("/diagnosis/cannot_tell_apart/0/1", "string"),
+    ("/diagnosis/not_testable/0/effect", "string"),
+    ("/diagnosis/not_testable/0/smallest_seen", "string"),
+    ("/diagnosis/record_next", "array"),
 ];
 
 fn kind(value: &Value) -> &'static str {

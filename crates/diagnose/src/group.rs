@@ -1,6 +1,6 @@
 //! One family at all joints together.
 
-use crate::problem::{Candidate, Columns};
+use crate::problem::{Amplitude, Candidate, Columns};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -27,11 +27,17 @@ pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
         let group = Candidate {
             spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
             target: "all joints".to_owned(),
-            amplitudes: members.iter().flat_map(|c| c.amplitudes.iter().cloned()).collect(),
+            amplitudes: members.iter().flat_map(|c| named(c)).collect(),
             columns: Columns::Dense(Arc::new(DMatrix::from_columns(&columns))),
             ..members[0].clone()
         };
         all.push(group);
     }
     all
+}
+
+/// Its amplitudes, told apart from those of the other members.
+fn named(c: &Candidate) -> Vec<Amplitude> {
+    let full = |a: &Amplitude| Amplitude { name: format!("{}.{}", c.spec, a.name), ..a.clone() };
+    c.amplitudes.iter().map(full).collect()
 }

@@ -42,7 +42,7 @@ fn made(mechanism: MechanismConfig, channel: String, driver: &str) -> Made {
 fn axis_wobble(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
     let phase_deg = draw.phase_deg();
     let wobble = AxisWobble { joint: draw.joint, tilt_deg: draw.size, per_turn: 3.0, phase_deg };
-    Ok(made(MechanismConfig::AxisWobble(wobble), "tilt".into(), "q1"))
+    Ok(made(MechanismConfig::AxisWobble(wobble), "tilt of the base".into(), "q1"))
 }
 
 /// Size: how far the joint is pulled 30 deg beyond where the cable gets taut.
@@ -59,7 +59,7 @@ fn worn_gap(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> 
     let worn_centre_deg = if draw.joint == 1 { 8.0 } else { -45.0 };
     let gap =
         Gap { joint: draw.joint, worn_deg: draw.size, worn_centre_deg, worn_span_deg: 8.0, ..Gap::default() };
-    let driver = format!("dir{}", draw.joint);
+    let driver = format!("s{}", draw.joint);
     let mut made = made(MechanismConfig::Gap(gap), draw.joint_channel(), &driver);
     made.alike.push(draw.at_joint("backlash"));
     Ok(made)
