@@ -147,7 +147,7 @@ pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> 
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     let unit = units(problem);
     for (i, d) in problem.dwells.iter().enumerate() {
-        let key = if weighed.probable(Noise::Memory) {
+        let key = if weighed.remembers() {
             (d.id.recording, d.id.dwell / BLOCK)
         } else if weighed.probable(Noise::Place) {
             (0, unit[i])
@@ -167,7 +167,7 @@ pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> 
 
 /// Groups to leave out: places, or stretches of time when the noise has memory (neighbours in time would tell).
 pub(crate) fn independent_groups(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
-    if weighed.probable(Noise::Memory) { clusters(problem, weighed) } else { by_place(problem) }
+    if weighed.remembers() { clusters(problem, weighed) } else { by_place(problem) }
 }
 
 /// The set that is one answer: the credible set, and everything whose signature is the same.

@@ -25,6 +25,9 @@ pub(crate) enum Noise {
     Visit,
     /// Memory over a few dwells.
     Memory,
+    /// The sensor wanders, which averaging within a dwell does not show: memory over tracked dwells on top of what is
+    /// declared for them, seated ones remembering a share.
+    Sensor,
 }
 
 impl Noise {
@@ -35,6 +38,7 @@ impl Noise {
             Noise::Place => "repeated at every visit to a place (seat or cavity errors)",
             Noise::Visit => "repeated at visits to a place within a recording",
             Noise::Memory => "correlated over a few dwells in a row",
+            Noise::Sensor => "a wandering position sensor, larger than declared",
         }
     }
 
@@ -60,6 +64,10 @@ impl Noise {
         }
         if problem.dwells.len() >= 20 {
             found.push(Noise::Memory);
+        }
+        let tracked = problem.dwells.iter().filter(|d| d.tracked).count();
+        if tracked >= 20 && tracked < problem.dwells.len() {
+            found.push(Noise::Sensor);
         }
         found
     }
@@ -88,6 +96,8 @@ struct Filter {
     /// Axis of the state.
     axis: usize,
     decay: f64,
+    /// How much of the state the row shows.
+    load: f64,
     gain: f64,
     weight: f64,
 }
@@ -99,7 +109,11 @@ impl Whitener {
             Noise::White => Whitener { kind: Kind::White, ln_det: 0.0 },
             Noise::Place => groups(problem, b, false),
             Noise::Visit => groups(problem, b, true),
-            Noise::Memory => memory(problem, b),
+            Noise::Memory => memory(problem, |_| Share::of_declared(b)),
+            Noise::Sensor => memory(problem, |dwell| match dwell.tracked {
+                true => Share { load: b, unit: 1.0 },
+                false => Share::of_declared(1.0),
+            }),
         }
     }
 
@@ -125,7 +139,7 @@ impl Whitener {
                     state.fill(0.0);
                     for f in filters {
                         let predicted = f.decay * state[f.axis];
-                        let innovation = column[f.row] - predicted;
+                        let innovation = column[f.row] - f.load * predicted;
                         state[f.axis] = predicted + f.gain * innovation;
                         column[f.row] = innovation * f.weight;
                     }
@@ -168,11 +182,11 @@ fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
 }
 
 /// State `x_i = phi^gap x_(i-1) + ...` of variance b^2, seen with unit noise; reset at each recording.
-fn memory(problem: &Problem, b: f64) -> Whitener {
+fn memory(problem: &Problem, shares: impl Fn(&DwellRow) -> Share) -> Whitener {
     let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
     order.sort_by_key(|i| problem.dwells[*i].id);
     let axes = problem.dwells.iter().map(|d| d.rows).max().unwrap_or(0);
-    let mut variance = vec![b * b; axes];
+    let mut variance = vec![1.0; axes];
     let (mut filters, mut ln_det) = (Vec::new(), 0.0);
     let mut last: Option<&DwellRow> = None;
     for i in order {
@@ -182,20 +196,34 @@ fn memory(problem: &Problem, b: f64) -> Whitener {
             _ => f64::INFINITY,
         };
         let decay = (-gap / MEMORY_DWELLS).exp();
+        let Share { load, unit } = shares(dwell);
         for (axis, state) in variance.iter_mut().enumerate() {
-            let predicted = decay * decay * *state + (1.0 - decay * decay) * b * b;
+            let predicted = decay * decay * *state + (1.0 - decay * decay);
             *state = predicted;
             if axis < dwell.rows {
-                let innovation = predicted + 1.0;
-                let share = innovation / (1.0 + b * b);
-                let gain = predicted / innovation;
-                *state = predicted * (1.0 - gain);
-                ln_det += share.ln();
-                let row = dwell.first_row + axis;
-                filters.push(Filter { row, axis, decay, gain, weight: 1.0 / share.sqrt() });
+                let innovation = load * load * predicted + 1.0;
+                let gain = load * predicted / innovation;
+                *state = predicted * (1.0 - gain * load);
+                ln_det += (innovation / unit).ln();
+                let weight = (unit / innovation).sqrt();
+                filters.push(Filter { row: dwell.first_row + axis, axis, decay, load, gain, weight });
             }
         }
         last = Some(dwell);
     }
     Whitener { kind: Kind::Memory(filters), ln_det }
+}
+
+/// How a dwell shows the state that remembers.
+struct Share {
+    /// Standard deviation of the state in the dwell (declared noise = 1).
+    load: f64,
+    /// Variance that is called one: `1 + load^2` where the state is a share of the declared noise, 1 where it adds to it.
+    unit: f64,
+}
+
+impl Share {
+    fn of_declared(load: f64) -> Share {
+        Share { load, unit: 1.0 + load * load }
+    }
 }

@@ -320,6 +320,7 @@ impl View<'_> {
                 load_kg: o.load_kg,
                 temperature_c: o.temperature_c,
                 place: places[i].clone(),
+                tracked: o.cavity().is_none(),
                 seat: whitener.columns(0, 3) * DMatrix::from_column_slice(3, 3, axes.as_slice()) * sigma_m,
                 metres: metres(whitener),
             }

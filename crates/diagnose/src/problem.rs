@@ -53,6 +53,8 @@ pub struct DwellRow {
     pub temperature_c: Option<f64>,
     /// Place that is visited again: the cavity, where there is one.
     pub place: Option<String>,
+    /// Whether the position sensor saw the tip, rather than a cavity holding it.
+    pub tracked: bool,
     /// Whitened rows of a displacement by one declared standard deviation along each axis of the board, or of the
     /// world where there is no board: `rows` x 3.
     pub seat: DMatrix<f64>,

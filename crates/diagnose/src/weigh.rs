@@ -202,7 +202,12 @@ impl Weighed {
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// How probable a kind of noise is.
+    /// Whether the noise probably remembers the dwells before.
+    pub fn remembers(&self) -> bool {
+        self.probable(Noise::Memory) || self.probable(Noise::Sensor)
+    }
+
+    /// Whether this is probably the kind of noise.
     pub fn probable(&self, noise: Noise) -> bool {
         self.p_noise.iter().any(|(n, p)| *n == noise && *p > 0.5)
     }

@@ -188,6 +188,7 @@ pub fn problem(
             load_kg: p.load,
             temperature_c: Option::None,
             place: p.place.clone(),
+            tracked: p.place.is_none(),
             seat: DMatrix::identity(3, 3),
             metres: Matrix3::identity() * SIGMA_M,
         })
