@@ -52,4 +52,4 @@ pub use linearise::{LinearAxis, Linearisation, linearise};
 pub use model_problem::ModelProblem;
 pub use noise::expected_norm_m;
 pub use outcome::*;
-pub use paired::{Pair, PairedDifference, independent_groups};
+pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};

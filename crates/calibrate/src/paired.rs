@@ -6,7 +6,7 @@ use armcal_core::Observation;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewer cavities than this are no sample of cavities: dwells then stand for themselves.
-const MIN_CAVITIES: usize = 12;
+pub const MIN_CAVITIES: usize = 12;
 
 /// What each dwell shares its luck with: its cavity, whose machining error it shares, where there are enough of them;
 /// itself otherwise. `dwells` are (name of the dwell, cavity; empty or absent when tracked).
@@ -15,6 +15,23 @@ pub fn independent_groups(dwells: &[(String, Option<&str>)]) -> Vec<String> {
     let distinct: BTreeSet<String> = dwells.iter().filter_map(|(_, c)| cavity(c)).collect();
     let by_cavity = distinct.len() >= MIN_CAVITIES;
     dwells.iter().map(|(dwell, c)| cavity(c).filter(|_| by_cavity).unwrap_or_else(|| dwell.clone())).collect()
+}
+
+/// 95 % interval of `sum of changes / sum of sizes` over independent groups, each (change summed over it, its size);
+/// infinite with fewer than two.
+///
+/// The variance is that of the group sums (cluster-robust, CR1 with Student's t on G - 1 degrees of freedom: Cameron and
+/// Miller, J. Human Resources 50, 2015, eq. 11-12).
+pub fn grouped_ci95(changes: &[(f64, f64)]) -> [f64; 2] {
+    let groups = changes.len() as f64;
+    if groups < 2.0 {
+        return [f64::NEG_INFINITY, f64::INFINITY];
+    }
+    let size: f64 = changes.iter().map(|(_, size)| size).sum();
+    let mean = changes.iter().map(|(change, _)| change).sum::<f64>() / size;
+    let square: f64 = changes.iter().map(|(change, size)| (change - mean * size).powi(2)).sum();
+    let half = t95(groups - 1.0) * (groups / (groups - 1.0) * square).sqrt() / size;
+    [mean - half, mean + half]
 }
 
 /// The error of one dwell under two models.
@@ -52,9 +69,7 @@ pub struct PairedDifference {
 impl PairedDifference {
     /// Compares pair by pair; `None` without a pair.
     ///
-    /// The variance of the mean is that of the group sums (cluster-robust, CR1 with Student's t on G - 1 degrees of
-    /// freedom: Cameron and Miller, J. Human Resources 50, 2015, eq. 11-12), because dwells in one cavity share its
-    /// machining error.
+    /// The interval is [`grouped_ci95`], because dwells in one cavity share its machining error.
     pub fn of(pairs: &[Pair]) -> Option<PairedDifference> {
         if pairs.is_empty() {
             return None;
@@ -62,26 +77,20 @@ impl PairedDifference {
         let n = pairs.len() as f64;
         let mean = |value: fn(&Pair) -> f64| pairs.iter().map(value).sum::<f64>() / n;
         let difference_m = mean(|p| p.after_m - p.before_m);
-        let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+        let mut groups: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
         for pair in pairs {
-            *sums.entry(&pair.group).or_default() += pair.after_m - pair.before_m - difference_m;
+            let (sum, size) = groups.entry(&pair.group).or_default();
+            *sum += pair.after_m - pair.before_m;
+            *size += 1.0;
         }
-        let groups = sums.len();
-        let half_m = match groups {
-            0 | 1 => f64::INFINITY,
-            _ => {
-                let g = groups as f64;
-                let variance = sums.values().map(|s| s * s).sum::<f64>() * g / (g - 1.0);
-                t95(g - 1.0) * variance.sqrt() / n
-            }
-        };
+        let changes: Vec<(f64, f64)> = groups.into_values().collect();
         Some(PairedDifference {
             n: pairs.len(),
-            groups,
+            groups: changes.len(),
             before_m: mean(|p| p.before_m),
             after_m: mean(|p| p.after_m),
             difference_m,
-            ci95_m: [difference_m - half_m, difference_m + half_m],
+            ci95_m: grouped_ci95(&changes),
             better: pairs.iter().filter(|p| p.after_m < p.before_m).count(),
             worse: pairs.iter().filter(|p| p.after_m > p.before_m).count(),
         })

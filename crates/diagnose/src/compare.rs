@@ -2,8 +2,8 @@
 
 use crate::HeldOut;
 use crate::config::DiagnosisConfig;
-use crate::crossval::{ratio_interval, sign_flip};
-use armcal_calibrate::Calibration;
+use crate::crossval::sign_flip;
+use armcal_calibrate::{Calibration, grouped_ci95};
 use armcal_core::{DwellId, Observation};
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ pub fn compare_heldout(
     Some(HeldOut {
         before: pairs.iter().map(|p| p.0).sum::<f64>() / n,
         after: pairs.iter().map(|p| p.1).sum::<f64>() / n,
-        change_ci95: ratio_interval(&changes),
+        change_ci95: grouped_ci95(&changes),
         gain: 1.0 - square(|p| p.1) / square(|p| p.0).max(1e-300),
         p: sign_flip(&falls, config),
         groups: groups.len(),

@@ -2,7 +2,8 @@
 
 use crate::config::DiagnosisConfig;
 use crate::crossval::sign_flip;
-use crate::problem::{Candidate, DwellRow, Problem, Toggle};
+use crate::problem::{Candidate, DwellRow, Problem};
+use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 

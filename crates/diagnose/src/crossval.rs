@@ -8,6 +8,7 @@ use crate::config::DiagnosisConfig;
 use crate::places::units;
 use crate::problem::Problem;
 use crate::projection::{cholesky_upper, inner};
+use armcal_calibrate::grouped_ci95;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -125,6 +126,17 @@ pub struct HeldOut {
     pub groups: usize,
 }
 
+/// What `effect` columns do to errors on the groups, each predicted without itself.
+pub(crate) fn gain(
+    problem: &Problem,
+    effect: &DMatrix<f64>,
+    groups: &[Vec<usize>],
+    config: &DiagnosisConfig,
+) -> HeldOut {
+    let (before, after) = (left_out(problem, None, groups), left_out(problem, Some(effect), groups));
+    compare(problem, &before, &after, groups, config)
+}
+
 /// Compares two sets of left-out whitened rows group by group.
 pub(crate) fn compare(
     problem: &Problem,
@@ -151,26 +163,11 @@ pub(crate) fn compare(
     HeldOut {
         before: mean(&from),
         after: mean(&to),
-        change_ci95: ratio_interval(&changes),
+        change_ci95: grouped_ci95(&changes),
         gain: if total_before > 0.0 { fall.iter().sum::<f64>() / total_before } else { 0.0 },
         p: sign_flip(&fall, config),
         groups: groups.len(),
     }
-}
-
-/// 95 % interval of `sum of changes / sum of sizes` over independent groups (linearised ratio estimator).
-pub(crate) fn ratio_interval(changes: &[(f64, f64)]) -> [f64; 2] {
-    let size: f64 = changes.iter().map(|c| c.1).sum();
-    let mean = changes.iter().map(|c| c.0).sum::<f64>() / size.max(1.0);
-    let k = changes.len() as f64;
-    if k < 2.0 {
-        return [f64::NEG_INFINITY, f64::INFINITY];
-    }
-    let square: f64 = changes.iter().map(|(d, n)| (d - mean * n).powi(2)).sum();
-    let error = (k / (k - 1.0) * square).sqrt() / size;
-    let t = statrs::distribution::StudentsT::new(0.0, 1.0, k - 1.0)
-        .map_or(crate::special::Z_975, |t| statrs::distribution::ContinuousCDF::inverse_cdf(&t, 0.975));
-    [mean - t * error, mean + t * error]
 }
 
 /// P(mean >= observed) when the sign of every group is chance; at least 999 draws.

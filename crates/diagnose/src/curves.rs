@@ -6,10 +6,8 @@
 use crate::DiagnoseError;
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::crossval::{compare, left_out};
 use crate::diagnosis::UnknownReport;
 use crate::forward::something;
-use crate::judge::independent_groups;
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms, as_candidate};
 use crate::unknown::described;
@@ -38,7 +36,7 @@ pub(crate) fn error_curves(
             break;
         }
         let Some(best) = leading(&room, &shapes, config) else { break };
-        if !predicts(&room, &best.what, config) {
+        if !room.predicts_with(&best.what.columns, config) {
             break;
         }
         shapes.push(as_candidate(&best.what, &room, config));
@@ -77,13 +75,4 @@ fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) ->
 /// Whether a joint errs over its own angle.
 fn own_angle(cell: &Unlisted) -> bool {
     cell.name.strip_prefix("joint").and_then(|rest| rest.split_once(" <- q")).is_some_and(|(a, b)| a == b)
-}
-
-/// Whether it helps on places the fit did not see.
-fn predicts(room: &Room, cell: &Unlisted, config: &DiagnosisConfig) -> bool {
-    let (problem, weighed) = (&room.problem, &room.weighed);
-    let groups = independent_groups(problem, weighed);
-    let effect = weighed.tamed(&cell.columns, problem, config);
-    let (before, after) = (left_out(problem, None, &groups), left_out(problem, Some(&effect), &groups));
-    compare(problem, &before, &after, &groups, config).p <= config.max_p_adjusted
 }

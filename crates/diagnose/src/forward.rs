@@ -2,9 +2,8 @@
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
-use crate::crossval::{compare, left_out};
 use crate::curves::{Curve, error_curves};
-use crate::judge::{Grade, Judged, independent_groups};
+use crate::judge::{Grade, Judged};
 use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms, as_candidate};
@@ -158,15 +157,11 @@ fn confirm(
 
 /// Whether something is missing: improbable as nothing, and it helps where the fit did not look.
 pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
-    let (problem, weighed) = (&room.problem, &room.weighed);
-    if weighed.p_nothing >= config.max_probability_nothing {
+    if room.weighed.p_nothing >= config.max_probability_nothing {
         return false;
     }
-    let Some((columns, _)) = weighed.best() else { return false };
-    let groups = independent_groups(problem, weighed);
-    let effect = weighed.tamed(columns, problem, config);
-    let (before, after) = (left_out(problem, None, &groups), left_out(problem, Some(&effect), &groups));
-    compare(problem, &before, &after, &groups, config).p <= config.max_p_adjusted
+    let Some((columns, _)) = room.weighed.best() else { return false };
+    room.predicts_with(columns, config)
 }
 
 /// The entry of a candidate; a scan may have moved to another shape.

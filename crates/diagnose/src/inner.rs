@@ -8,7 +8,7 @@ use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
 use crate::judge::{Grade, Judged};
 use crate::outliers::{flipped, suspects};
-use crate::problem::{Problem, Toggle};
+use crate::problem::Problem;
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters};
 use crate::rooms::{Room, Rooms};
@@ -17,6 +17,7 @@ use crate::unknown::unknown_report;
 use crate::weigh::{Weighed, weigh};
 use crate::{DiagnoseError, next};
 use armcal_core::{Severity, Stage, Warning};
+use armcal_model::Toggle;
 use nalgebra::DMatrix;
 
 /// Rounds of setting outliers aside.

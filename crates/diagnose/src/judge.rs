@@ -4,7 +4,7 @@ use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{likeness, one_step};
 use crate::contrasts::{Contrast, contrast};
-use crate::crossval::{HeldOut, by_place, by_recording, compare, left_out};
+use crate::crossval::{HeldOut, by_place, by_recording, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
 use crate::noise::Noise;
 use crate::places::units;
@@ -109,18 +109,9 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
 
     let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
     let groups = independent_groups(problem, weighed);
-    let places = compare(
-        problem,
-        &left_out(problem, None, &groups),
-        &left_out(problem, Some(&effect), &groups),
-        &groups,
-        config,
-    );
+    let places = gain(problem, &effect, &groups, config);
     let groups = by_recording(problem);
-    let recordings = (groups.len() > 1).then(|| {
-        let (before, after) = (left_out(problem, None, &groups), left_out(problem, Some(&effect), &groups));
-        compare(problem, &before, &after, &groups, config)
-    });
+    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, config));
 
     let theta = &fitted.estimate;
     let theta_sigma = (residual_variance * (theta.transpose() * &fitted.covariance * theta)[(0, 0)]).sqrt()

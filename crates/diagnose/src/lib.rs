@@ -60,6 +60,7 @@ mod tests;
 #[cfg(test)]
 extern crate self as armcal_diagnose;
 
+pub use armcal_model::Toggle;
 pub use compare::compare_heldout;
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;
@@ -70,6 +71,6 @@ pub use inner::diagnose_problem;
 pub use observed::diagnose;
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use planned::plan_dwells;
-pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan, Toggle};
+pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
 pub use refit::{LinearRefit, Refit};
 pub use structure::{LackOfFit, Structure};

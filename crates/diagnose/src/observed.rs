@@ -6,11 +6,11 @@
 
 use crate::group::with_groups;
 use crate::places::{places, thinned};
-use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan, Toggle};
+use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{Calibration, FitConfig, Linearisation, ModelProblem, fit_problem, linearise};
 use armcal_core::{DwellId, Observation, Reference, Unit};
-use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since};
+use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
 use nalgebra::{DMatrix, Matrix3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -229,24 +229,27 @@ impl View<'_> {
 
     /// Where the unknown may enter: a joint, a length of the chain, the twist between two axes, a displacement.
     fn channels(&self, linear: &Linearisation) -> Vec<Channel> {
-        let joints = (0..self.model.joint_count()).map(|j| {
-            let rows = |i: usize| {
-                let turn = self.model.joint_jacobian(self.values, &self.observations[i]);
-                turn.column(j).into_owned()
-            };
-            let name = format!("joint{}", j + 1);
-            let columns = self.displaced(linear, 1, |i, _| rows(i));
-            Channel { axes: vec![format!("q{}", j + 1)], name, unit: Unit::Radian, columns }
-        });
-        let joints: Vec<Channel> = joints.collect();
+        // One linearisation an observation serves all joints, one all lengths and twists.
+        let turns = self.each(|o| self.model.joint_jacobian(self.values, o));
+        let moves = self.each(|o| self.model.residual_with_jacobian(self.values, o).1);
+        let joint = |j: usize| Channel {
+            name: format!("joint{}", j + 1),
+            unit: Unit::Radian,
+            axes: vec![format!("q{}", j + 1)],
+            columns: self.displaced(linear, 1, |i, _| turns[i].column(j).into_owned()),
+        };
+        let joints: Vec<Channel> = (0..self.model.joint_count()).map(joint).collect();
         let chain = self.model.chain().parameters().iter().enumerate().filter(|(_, p)| {
             let length = p.unit == Unit::Metre && p.nominal.abs() > SHORTEST_M;
             length || p.name.ends_with(".alpha")
         });
         let parameters = chain.map(|(index, p)| {
-            let columns = self.displaced(linear, 1, |i, _| self.moved(index, i));
+            // The jacobian is that of measured - predicted.
+            let columns =
+                self.displaced(linear, 1, |i, _| -moves[i].fixed_view::<3, 1>(0, index).into_owned());
             Channel { name: p.name.clone(), axes: vec![p.name.clone()], unit: p.unit, columns }
         });
+        let parameters: Vec<Channel> = parameters.collect();
         let world = Channel {
             name: "world".to_owned(),
             axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
@@ -270,14 +273,11 @@ impl View<'_> {
             unit: Unit::Radian,
             columns: Arc::new(joints[1].columns.as_ref() - joints[2].columns.as_ref()),
         });
-        let parameters: Vec<Channel> = parameters.collect();
         joints.into_iter().chain(belt).chain(parameters).chain([tilt, world]).collect()
     }
 
-    /// d predicted tip / d parameter of one observation [m per SI unit].
-    fn moved(&self, parameter: usize, observation: usize) -> nalgebra::Vector3<f64> {
-        let (_, jacobian) = self.model.residual_with_jacobian(self.values, &self.observations[observation]);
-        -jacobian.fixed_view::<3, 1>(0, parameter).into_owned()
+    fn each<T>(&self, of: impl Fn(&Observation) -> T) -> Vec<T> {
+        self.observations.iter().map(of).collect()
     }
 
     /// Whitened columns from displacements of the tip in the world; orientations are left as they are.
@@ -342,18 +342,9 @@ fn words(since: &Since) -> String {
 }
 
 fn toggle(effect: &PlacedEffect) -> Toggle {
-    if effect.spec.since.is_some() {
-        return match effect.spec.since {
-            Some(Since::Dwell(_)) => Toggle::Time,
-            _ => Toggle::Recording,
-        };
-    }
-    match effect.kind.toggle {
-        armcal_model::Toggle::Direction => Toggle::Direction,
-        armcal_model::Toggle::Load => Toggle::Load,
-        armcal_model::Toggle::Time => Toggle::Time,
-        armcal_model::Toggle::Recording => Toggle::Recording,
-        armcal_model::Toggle::Temperature => Toggle::Temperature,
-        armcal_model::Toggle::None => Toggle::None,
+    match effect.spec.since {
+        Some(Since::Dwell(_)) => Toggle::Time,
+        Some(Since::Recording(_)) => Toggle::Recording,
+        None => effect.kind.toggle,
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::problem::Problem;
+use armcal_calibrate::MIN_CAVITIES;
 use armcal_core::Observation;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,9 +13,6 @@ const SAME_POSE_RAD: f64 = 0.01;
 /// Poses this close in every joint predict one another whatever is missing: they are left out together [rad]
 /// (3 deg; half the length over which joint error curves of real arms stay alike).
 const ALIKE_RAD: f64 = 0.052;
-/// Fewer places than this are no sample of places. The poses at them are the sample then: a ball in one of two sockets
-/// says nothing about the socket, everything about the arm.
-const FEWEST_PLACES: usize = 12;
 
 /// Independent unit of each dwell: its place, or its neighbourhood in joint space where places are few or unknown.
 pub(crate) fn units(problem: &Problem) -> Vec<usize> {
@@ -23,7 +21,9 @@ pub(crate) fn units(problem: &Problem) -> Vec<usize> {
         let next = known.len();
         known.entry(place).or_insert(next);
     }
-    let enough = known.len() >= FEWEST_PLACES;
+    // Where places are few, the poses at them are the sample: a ball in one of two sockets says nothing about the
+    // socket, everything about the arm.
+    let enough = known.len() >= MIN_CAVITIES;
     let mut leaders: Vec<usize> = Vec::new();
     let mut unit = Vec::with_capacity(problem.dwells.len());
     for (i, d) in problem.dwells.iter().enumerate() {

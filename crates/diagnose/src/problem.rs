@@ -3,6 +3,7 @@
 use crate::DiagnoseError;
 use crate::crossval::EFFECT_PRECISION;
 use armcal_core::{DwellId, Unit};
+use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::sync::Arc;
 
@@ -71,37 +72,6 @@ impl DwellRow {
     /// Declared standard deviation of a coordinate [m].
     pub fn sigma_m(&self) -> f64 {
         (self.metres.norm_squared() / 3.0).sqrt()
-    }
-}
-
-/// What kind of driver can be switched while the pose stays the same.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Toggle {
-    /// Arrival direction.
-    Direction,
-    /// Load.
-    Load,
-    /// Time.
-    Time,
-    /// Recording.
-    Recording,
-    /// Temperature.
-    Temperature,
-    /// None: it depends on the pose alone.
-    None,
-}
-
-impl Toggle {
-    /// In words.
-    pub fn word(self) -> &'static str {
-        match self {
-            Toggle::Direction => "arrival direction",
-            Toggle::Load => "load",
-            Toggle::Time => "time",
-            Toggle::Recording => "recording",
-            Toggle::Temperature => "temperature",
-            Toggle::None => "pose",
-        }
     }
 }
 

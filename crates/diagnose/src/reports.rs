@@ -6,8 +6,9 @@ use crate::confusion::{half_width, likeness, one_step, smallest_seen};
 use crate::crossval::{compare, left_out};
 use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
 use crate::judge::Judged;
-use crate::problem::{Amplitude, Candidate, Problem, Toggle};
+use crate::problem::{Amplitude, Candidate, Problem};
 use crate::weigh::Weighed;
+use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
 
 /// Candidates whose left-out errors are shown.

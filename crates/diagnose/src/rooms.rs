@@ -3,10 +3,12 @@
 use crate::DiagnoseError;
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::judge::{Judged, judge};
-use crate::problem::{Candidate, Columns, Problem, Toggle};
+use crate::crossval::gain;
+use crate::judge::{Judged, independent_groups, judge};
+use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
 use crate::weigh::{Weighed, weigh};
+use armcal_model::Toggle;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -34,6 +36,13 @@ impl Room {
         let judged = judge(&self.problem, &self.weighed, entry, config);
         self.judged.borrow_mut().insert(entry, judged.clone());
         judged
+    }
+
+    /// Whether columns help on groups the fit did not see.
+    pub fn predicts_with(&self, columns: &Columns, config: &DiagnosisConfig) -> bool {
+        let groups = independent_groups(&self.problem, &self.weighed);
+        let effect = self.weighed.tamed(columns, &self.problem, config);
+        gain(&self.problem, &effect, &groups, config).p <= config.max_p_adjusted
     }
 }
 

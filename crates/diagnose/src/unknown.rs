@@ -2,7 +2,7 @@
 
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::crossval::{by_place, compare, left_out};
+use crate::crossval::{by_place, gain};
 use crate::diagnosis::{ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
@@ -41,13 +41,7 @@ pub(crate) fn described(
     let variance = ((metric.projection.rss - drop) / metric.projection.dof()).max(0.0);
     let effect = weighed.tamed(&best.columns, problem, config);
     let groups = by_place(problem);
-    let places = compare(
-        problem,
-        &left_out(problem, None, &groups),
-        &left_out(problem, Some(&effect), &groups),
-        &groups,
-        config,
-    );
+    let places = gain(problem, &effect, &groups, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
     let mut shape = Vec::new();

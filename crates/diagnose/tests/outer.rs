@@ -13,34 +13,7 @@ use rand_distr::StandardNormal;
 use std::path::Path;
 
 const SIGMA_M: f64 = 0.28e-3;
-const ARM: &str = r#"
-name = "arm"
-[[rows]]
-name = "joint1"
-theta_deg = 0.0
-d_mm = 76.0
-a_mm = 0.0
-alpha_deg = 90.0
-[[rows]]
-name = "joint2"
-theta_deg = 90.0
-d_mm = 0.0
-a_mm = 400.0
-alpha_deg = 0.0
-[[rows]]
-name = "joint3"
-theta_deg = 0.0
-d_mm = -12.0
-a_mm = 0.0
-alpha_deg = 90.0
-[[rows]]
-name = "tool"
-joint = "fixed"
-theta_deg = 0.0
-d_mm = 354.3
-a_mm = 0.0
-alpha_deg = 90.0
-"#;
+const ARM: &str = include_str!("../../../pipelines/models/right_arm.toml");
 
 fn model() -> Model {
     let chain = Chain::from_dh_toml(ARM, Path::new("arm.toml")).unwrap();

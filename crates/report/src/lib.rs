@@ -32,6 +32,6 @@ pub use error::ReportError;
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
 pub use run::{RecordingRun, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
-pub use terminal::{RULED, TerminalStyle, terminal};
+pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};
 pub use write::{InputMessages, OutputConfig, write_all};

@@ -2,7 +2,8 @@
 
 use crate::proto;
 use crate::run::{Run, effects};
-use armcal_core::DwellId;
+use armcal_calibrate::{Estimate, Residual};
+use armcal_core::{DwellId, Observation};
 use armcal_recording::{Recording, RecordingError};
 use prost::Message as _;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub struct PastRun {
     pub residuals: Vec<PastResidual>,
     /// All parameters, free and fixed.
     pub parameters: Vec<PastParameter>,
-    /// Its `summary.json`.
+    /// Its `summary.json`; null for a run that has not been written.
     pub summary: serde_json::Value,
 }
 
@@ -83,14 +84,14 @@ pub enum PastRunError {
 impl PastRun {
     /// A run that has just finished, as it would be read back.
     pub fn of(run: &Run) -> PastRun {
-        let residual = |r: &armcal_calibrate::Residual| PastResidual {
+        let residual = |(o, r): (&Observation, &Residual)| PastResidual {
             recording: run.recording_name(r.dwell).to_owned(),
             dwell: r.dwell,
-            cavity: run.cavity_of(r.dwell).unwrap_or_default().to_owned(),
+            cavity: o.cavity().unwrap_or_default().to_owned(),
             held_out: r.held_out,
             error_m: r.fitted_m.norm(),
         };
-        let parameter = |e: &armcal_calibrate::Estimate| {
+        let parameter = |e: &Estimate| {
             let shown = |si: f64| e.parameter.unit.to_display(si);
             PastParameter {
                 name: e.parameter.name.clone(),
@@ -105,9 +106,9 @@ impl PastRun {
             path: PathBuf::new(),
             pipeline: run.pipeline_name.clone(),
             effects: effects(&run.calibration).into_iter().map(str::to_owned).collect(),
-            residuals: run.calibration.residuals.iter().map(residual).collect(),
+            residuals: run.observations.iter().zip(&run.calibration.residuals).map(residual).collect(),
             parameters: run.calibration.fit.estimates.iter().map(parameter).collect(),
-            summary: serde_json::from_str(&crate::summary_json(run)).unwrap_or_default(),
+            summary: serde_json::Value::Null,
         }
     }
 

@@ -110,11 +110,6 @@ impl Run {
         recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
     }
 
-    /// The cavity an observation was seated in.
-    pub(crate) fn cavity_of(&self, dwell: DwellId) -> Option<&str> {
-        self.observations.iter().find(|o| o.dwell == dwell).and_then(Observation::cavity)
-    }
-
     /// Name of the recording a dwell belongs to.
     pub(crate) fn recording_name(&self, dwell: DwellId) -> &str {
         self.recordings.get(dwell.recording).map_or("", |r| r.name.as_str())

@@ -151,7 +151,20 @@ fn severity(warning: &Warning) -> &'static str {
     }
 }
 
-pub(crate) fn number(value: impl ToString) -> Cell {
+/// A table of text without colours: a thin rule below the header and nothing else.
+pub fn plain_table() -> Table {
+    let mut table = Table::new();
+    table.load_style(RULED).force_no_tty();
+    table
+}
+
+/// A table line by line, without the blanks that fill it up.
+pub fn table_text(table: &Table) -> String {
+    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
+/// A cell set flush right.
+pub fn number(value: impl ToString) -> Cell {
     Cell::new(value).set_alignment(CellAlignment::Right)
 }
 
@@ -193,7 +206,7 @@ impl Pen {
     }
 
     pub fn render(&self, table: &Table) -> String {
-        table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+        table_text(table)
     }
 
     pub fn section(&self, title: &str, body: String) -> String {

@@ -3,8 +3,8 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use armcal_model::{EffectKind, EffectSpec, Target, catalogue};
-use armcal_report::RULED;
-use comfy_table::{ContentArrangement, Table};
+use armcal_report::{plain_table, table_text};
+use comfy_table::ContentArrangement;
 use serde_json::{Value, json};
 
 /// Prints the catalogue, or everything about one entry.
@@ -22,17 +22,16 @@ pub fn run(name: Option<&str>, json: bool) -> Result<Outcome, Error> {
 }
 
 fn overview() -> String {
-    let mut table = Table::new();
-    table.load_style(RULED).set_content_arrangement(ContentArrangement::Dynamic).set_width(100);
-    table.force_no_tty();
+    let mut table = plain_table();
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(100);
     table.set_header(["effect", "what it is"]);
     for kind in catalogue() {
         table.add_row([spec(kind), kind.summary.to_owned()]);
     }
-    let lines: String = table.lines().map(|line| format!("{}\n", line.trim_end())).collect();
     format!(
-        "{lines}\n`armcal effects NAME` explains one; JOINT is a number from 1 or a name; add @RECORDING or \
-         @RECORDING.DWELL to an event.\n"
+        "{}\n`armcal effects NAME` explains one; JOINT is a number from 1 or a name; add @RECORDING or \
+         @RECORDING.DWELL to an event.\n",
+        table_text(&table)
     )
 }
 

@@ -10,8 +10,8 @@ use crate::story::{self, Settled};
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::Arrival;
 use armcal_model::Model;
-use armcal_report::RULED;
-use comfy_table::{Cell, CellAlignment, Table};
+use armcal_report::{number, plain_table, table_text};
+use comfy_table::Cell;
 use nalgebra::Matrix3;
 use std::path::Path;
 
@@ -169,34 +169,34 @@ fn text(proposal: &Proposal, joints: &[String]) -> String {
 }
 
 fn dwells(proposal: &Proposal, joints: &[String]) -> String {
-    let mut table = plain();
+    let mut table = plain_table();
     let mut header = vec!["".to_owned(), "where".to_owned()];
     header.extend(joints.iter().map(|name| format!("{name} [deg]")));
     header.extend(["arrive", "load [kg]", "Delta"].map(str::to_owned));
     table.set_header(header);
     for (i, dwell) in proposal.dwells.iter().enumerate() {
-        let mut cells = vec![right(format!("{}", i + 1)), Cell::new(place(dwell))];
-        cells.extend(dwell.joint_deg.iter().map(|q| right(format!("{q:.1}"))));
+        let mut cells = vec![number(format!("{}", i + 1)), Cell::new(place(dwell))];
+        cells.extend(dwell.joint_deg.iter().map(|q| number(format!("{q:.1}"))));
         cells.push(Cell::new(arrival(&dwell.arrival)));
-        cells.push(right(format!("{}", dwell.load_kg)));
-        cells.push(right(format!("{:.1}", dwell.delta)));
+        cells.push(number(format!("{}", dwell.load_kg)));
+        cells.push(number(format!("{:.1}", dwell.delta)));
         table.add_row(cells);
     }
-    lines(&table)
+    table_text(&table)
 }
 
 fn pairs(proposal: &Proposal) -> String {
-    let mut table = plain();
+    let mut table = plain_table();
     table.set_header(["pair", "Delta now", "then", "motion or sensor"]);
     for pair in &proposal.pairs {
         table.add_row([
             Cell::new(pair.names.join(" or ")),
-            right(format!("{:.1}", pair.delta_before)),
-            right(format!("{:.1}", pair.delta_after)),
+            number(format!("{:.1}", pair.delta_before)),
+            number(format!("{:.1}", pair.delta_after)),
             Cell::new(pair.sensor.as_deref().unwrap_or("these dwells")),
         ]);
     }
-    lines(&table)
+    table_text(&table)
 }
 
 fn place(dwell: &Proposed) -> String {
@@ -218,20 +218,6 @@ fn arrival(sides: &[Arrival]) -> String {
         Arrival::Unknown => '.',
     };
     sides.iter().map(sign).collect()
-}
-
-fn plain() -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).force_no_tty();
-    table
-}
-
-fn right(text: String) -> Cell {
-    Cell::new(text).set_alignment(CellAlignment::Right)
-}
-
-fn lines(table: &Table) -> String {
-    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
 fn capital(sentence: &str) -> String {

@@ -2,8 +2,8 @@
 
 use super::{Judgement, Scored};
 use armcal_core::robust::median;
-use armcal_report::RULED;
-use comfy_table::{Cell, CellAlignment, Table};
+use armcal_report::{number, plain_table, table_text};
+use comfy_table::Cell;
 use serde::Serialize;
 
 /// All scenarios of one family and design.
@@ -108,21 +108,19 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
 pub fn table(rows: &[Row]) -> String {
     let used: Vec<usize> =
         (0..JUDGEMENTS.len()).filter(|k| rows.iter().any(|row| row.counts[*k] > 0)).collect();
-    let mut table = Table::new();
-    table.load_style(RULED).force_no_tty();
+    let mut table = plain_table();
     let mut header = vec!["hidden".to_owned(), "design".to_owned(), "n".to_owned()];
     header.extend(used.iter().map(|k| JUDGEMENTS[*k].1.to_owned()));
     header.extend(["before/floor", "after/floor", "at floor", "removed", "instead"].map(str::to_owned));
     table.set_header(header);
     for row in rows {
-        let number = |text: String| Cell::new(text).set_alignment(CellAlignment::Right);
         let mut cells = vec![Cell::new(&row.family), Cell::new(&row.design), number(row.n.to_string())];
         cells.extend(used.iter().map(|k| number(row.counts[*k].to_string())));
         cells.push(number(format!("{:.2}", row.before)));
         cells.push(number(format!("{:.2}", row.after)));
         cells.push(number(format!("{:.0} %", 100.0 * row.at_floor)));
         cells.push(number(if row.removed.is_nan() {
-            "-".into()
+            "-".to_owned()
         } else {
             format!("{:.0} %", 100.0 * row.removed)
         }));
@@ -130,5 +128,5 @@ pub fn table(rows: &[Row]) -> String {
         cells.push(Cell::new(instead.collect::<Vec<_>>().join("; ")));
         table.add_row(cells);
     }
-    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    table_text(&table)
 }

@@ -10,34 +10,7 @@ use std::path::Path;
 
 pub const SIGMA_M: f64 = 0.28e-3;
 
-const PAPER_ARM: &str = r#"
-name = "paper right arm"
-[[rows]]
-name = "joint1"
-theta_deg = 0.0
-d_mm = 76.0
-a_mm = 0.0
-alpha_deg = 90.0
-[[rows]]
-name = "joint2"
-theta_deg = 90.0
-d_mm = 0.0
-a_mm = 400.0
-alpha_deg = 0.0
-[[rows]]
-name = "joint3"
-theta_deg = 0.0
-d_mm = -12.0
-a_mm = 0.0
-alpha_deg = 90.0
-[[rows]]
-name = "tool"
-joint = "fixed"
-theta_deg = 0.0
-d_mm = 354.3
-a_mm = 0.0
-alpha_deg = 90.0
-"#;
+const PAPER_ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)

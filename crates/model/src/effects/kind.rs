@@ -94,6 +94,20 @@ pub enum Toggle {
     None,
 }
 
+impl Toggle {
+    /// In words: what two visits to one pose differ in.
+    pub fn word(self) -> &'static str {
+        match self {
+            Toggle::Direction => "arrival direction",
+            Toggle::Load => "load",
+            Toggle::Time => "time",
+            Toggle::Recording => "recording",
+            Toggle::Temperature => "temperature",
+            Toggle::None => "pose",
+        }
+    }
+}
+
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
