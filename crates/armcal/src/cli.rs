@@ -131,8 +131,19 @@ pub enum Command {
     },
     /// The simulated rig: recordings with known errors, and their truth in a separate file.
     Simulate {
-        /// LAB.toml.
-        lab: PathBuf,
+        /// LAB.toml: a rig described by hand.
+        #[arg(required_unless_present = "hide")]
+        lab: Option<PathBuf>,
+        /// Instead of a file: a rig drawn by the seed that hides this family, with a pipeline to calibrate it; several
+        /// joined by +, `nothing` for none. The truth goes to OUT-truth.json.
+        #[arg(long, value_name = "FAMILY", conflicts_with = "lab")]
+        hide: Option<String>,
+        /// Design of motion of such a rig.
+        #[arg(long, default_value = "free-poses", requires = "hide")]
+        design: String,
+        /// Size of what it hides: small, medium, large, drawn.
+        #[arg(long, default_value = "drawn", requires = "hide")]
+        size: String,
         /// Folder for recordings and truth; created if missing.
         #[arg(long, default_value = "lab")]
         out: PathBuf,

@@ -44,7 +44,9 @@ pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisCon
             .map(|d| channel.columns.rows(d.first_row, d.rows).norm_squared() * d.sigma_m().powi(2))
             .collect();
         for (k, driver) in drivers.iter().enumerate() {
-            if matches!(driver.kind, DriverKind::Own(j) if channel.name != format!("joint{}", j + 1)) {
+            if let DriverKind::Own(j) | DriverKind::DirectionAlong(j) = driver.kind
+                && channel.name != format!("joint{}", j + 1)
+            {
                 continue;
             }
             let mean: f64 =

@@ -5,6 +5,7 @@
 //! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
 
 use crate::config::DiagnosisConfig;
+use crate::noise::Whitener;
 use crate::places::units;
 use crate::problem::Problem;
 use crate::projection::{cholesky_upper, inner};
@@ -13,31 +14,64 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Prior precision of an effect's amplitude while it is fitted: ten typical sizes.
 pub(crate) const EFFECT_PRECISION: f64 = 0.01;
 
+/// Dwells of a stretch of time that is left out, and of what is left out before and after it.
+const STRETCH: usize = 4;
+const FORGOTTEN: usize = 4;
+
+/// Dwells that are predicted by a fit that did not see them.
+#[derive(Debug, Clone)]
+pub(crate) struct Group {
+    /// Those that are predicted.
+    pub scored: Vec<usize>,
+    /// Those the fit does not see: the same, and what is too near to them to be independent.
+    pub unseen: Vec<usize>,
+}
+
+impl From<Vec<usize>> for Group {
+    fn from(scored: Vec<usize>) -> Group {
+        Group { unseen: scored.clone(), scored }
+    }
+}
+
 /// Dwells by place, or by neighbourhood in joint space where places are few or do not repeat.
-pub(crate) fn by_place(problem: &Problem) -> Vec<Vec<usize>> {
+pub(crate) fn by_place(problem: &Problem) -> Vec<Group> {
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     units(problem).into_iter().enumerate().for_each(|(i, unit)| groups.entry(unit).or_default().push(i));
-    groups.into_values().collect()
+    groups.into_values().map(Group::from).collect()
 }
 
 /// Dwells by recording.
-pub(crate) fn by_recording(problem: &Problem) -> Vec<Vec<usize>> {
+pub(crate) fn by_recording(problem: &Problem) -> Vec<Group> {
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     problem.dwells.iter().enumerate().for_each(|(i, d)| groups.entry(d.id.recording).or_default().push(i));
-    groups.into_values().collect()
+    groups.into_values().map(Group::from).collect()
+}
+
+/// Stretches of time, with as much before and after them unseen as the noise may remember (h-block cross-validation:
+/// Burman, Chow, Nolan, Biometrika 1994).
+pub(crate) fn by_stretch(problem: &Problem) -> Vec<Group> {
+    let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    for (i, d) in problem.dwells.iter().enumerate() {
+        groups.entry((d.id.recording, d.id.dwell / STRETCH)).or_default().push(i);
+    }
+    let around = |((recording, stretch), scored): ((usize, usize), Vec<usize>)| {
+        let (from, to) = (stretch * STRETCH, (stretch + 1) * STRETCH + FORGOTTEN);
+        let near = |i: &usize| {
+            let id = problem.dwells[*i].id;
+            id.recording == recording && id.dwell + FORGOTTEN >= from && id.dwell < to
+        };
+        Group { scored, unseen: (0..problem.dwells.len()).filter(near).collect() }
+    };
+    groups.into_iter().map(around).collect()
 }
 
 /// Whitened residual rows of every dwell, each predicted without its group; `effect` columns are fitted too.
-pub(crate) fn left_out(
-    problem: &Problem,
-    effect: Option<&DMatrix<f64>>,
-    groups: &[Vec<usize>],
-) -> DVector<f64> {
+pub(crate) fn left_out(problem: &Problem, effect: Option<&DMatrix<f64>>, groups: &[Group]) -> DVector<f64> {
     let geometry = problem.geometry.ncols();
     let extra = effect.map_or(0, |e| e.ncols());
     let mut x = DMatrix::zeros(problem.rows(), geometry + extra);
@@ -57,9 +91,10 @@ pub(crate) fn left_out(
     let total: Vec<f64> = x.column_iter().map(|c| c.norm_squared()).collect();
     let factor = cholesky_upper(normal.clone());
     let beta_all = solve(&factor, &right);
-    let mut out = &problem.residual - &x * &beta_all;
+    let out = &problem.residual - &x * &beta_all;
+    let mut predicted = out.clone();
     for group in groups {
-        let rows: Vec<usize> = group.iter().flat_map(|i| problem.dwells[*i].range()).collect();
+        let rows: Vec<usize> = group.unseen.iter().flat_map(|i| problem.dwells[*i].range()).collect();
         let x_g = x.select_rows(&rows);
         let own: Vec<usize> = (0..geometry)
             .filter(|k| total[*k] > 0.0 && x_g.column(*k).norm_squared() > (1.0 - 1e-9) * total[*k])
@@ -77,9 +112,13 @@ pub(crate) fn left_out(
             }
             left
         });
-        rows.iter().zip(left.iter()).for_each(|(r, v)| out[*r] = *v);
+        let scored: BTreeSet<usize> = group.scored.iter().flat_map(|i| problem.dwells[*i].range()).collect();
+        rows.iter()
+            .zip(left.iter())
+            .filter(|(r, _)| scored.contains(r))
+            .for_each(|(r, v)| predicted[*r] = *v);
     }
-    out
+    predicted
 }
 
 /// `(I - H_gg)^-1 r_g`, r the residual of the whole fit: the same number by a small matrix.
@@ -126,15 +165,25 @@ pub struct HeldOut {
     pub groups: usize,
 }
 
-/// What `effect` columns do to errors on the groups, each predicted without itself.
+/// What `effect` columns do to errors on the groups, each predicted without itself. Where the noise remembers, whether
+/// that is chance is asked of what `memory` leaves of the errors: what neighbours in time share is no prediction.
 pub(crate) fn gain(
     problem: &Problem,
     effect: &DMatrix<f64>,
-    groups: &[Vec<usize>],
+    groups: &[Group],
+    memory: Option<&Whitener>,
     config: &DiagnosisConfig,
 ) -> HeldOut {
     let (before, after) = (left_out(problem, None, groups), left_out(problem, Some(effect), groups));
-    compare(problem, &before, &after, groups, config)
+    let plain = compare(problem, &before, &after, groups, config);
+    let Some(memory) = memory else { return plain };
+    let forgetful = problem.whitened(memory);
+    let mut effect = effect.clone();
+    memory.apply(&mut effect);
+    let before = left_out(&forgetful, None, groups);
+    let after = left_out(&forgetful, Some(&effect), groups);
+    let HeldOut { gain, p, .. } = compare(&forgetful, &before, &after, groups, config);
+    HeldOut { gain, p, ..plain }
 }
 
 /// Compares two sets of left-out whitened rows group by group.
@@ -142,7 +191,7 @@ pub(crate) fn compare(
     problem: &Problem,
     before: &DVector<f64>,
     after: &DVector<f64>,
-    groups: &[Vec<usize>],
+    groups: &[Group],
     config: &DiagnosisConfig,
 ) -> HeldOut {
     let power = |rows: &DVector<f64>, group: &[usize]| -> f64 {
@@ -151,13 +200,13 @@ pub(crate) fn compare(
             .map(|i| rows.rows(problem.dwells[*i].first_row, problem.dwells[*i].rows).norm_squared())
             .sum()
     };
-    let fall: Vec<f64> = groups.iter().map(|g| power(before, g) - power(after, g)).collect();
+    let fall: Vec<f64> = groups.iter().map(|g| power(before, &g.scored) - power(after, &g.scored)).collect();
     let (from, to) = (norms_m(problem, before), norms_m(problem, after));
     let n = problem.dwells.len().max(1) as f64;
     let mean = |v: &[f64]| v.iter().sum::<f64>() / n * 1e3;
     let changes: Vec<(f64, f64)> = groups
         .iter()
-        .map(|g| (g.iter().map(|i| to[*i] - from[*i]).sum::<f64>() * 1e3, g.len() as f64))
+        .map(|g| (g.scored.iter().map(|i| to[*i] - from[*i]).sum::<f64>() * 1e3, g.scored.len() as f64))
         .collect();
     let total_before = before.norm_squared();
     HeldOut {

@@ -6,6 +6,9 @@ use crate::structure::Structure;
 use armcal_core::{DwellId, Unit, Warning};
 use serde::Serialize;
 
+/// Stands in a set where an explanation outside the catalogue cannot be excluded.
+pub const NOT_LISTED: &str = "something not listed";
+
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -95,6 +98,19 @@ pub struct FoundEffect {
     pub recordings: Option<HeldOut>,
     /// Pairs of visits that differ in its driver.
     pub contrast: Option<Contrast>,
+    /// The best listed explanation that is not one of its names; none where no other explains anything.
+    pub rival: Option<Rival>,
+}
+
+/// What a found effect is preferred to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// Its name.
+    pub name: String,
+    /// By how much its ln evidence is less.
+    pub behind_nats: f64,
+    /// Errors with it instead, on places the fit did not see.
+    pub places: HeldOut,
 }
 
 /// One amplitude with its interval, SI.

@@ -14,8 +14,12 @@ const FINE_BINS: usize = 121;
 const LENGTHS: [f64; 2] = [0.2, 0.5];
 /// Lengths for a joint's own angle in detail: gears and encoders err on a short scale.
 const FINE_LENGTHS: [f64; 2] = [0.04, 0.12];
+/// Lengths for a direction along an angle: wear has the size of the stroke it comes from.
+const ALONG_LENGTHS: [f64; 2] = [0.1, 0.4];
+const ALONG_FUNCTIONS: usize = 16;
 /// Lengths for time: events are shorter.
-const TIME_LENGTHS: [f64; 2] = [0.08, 0.3];
+const TIME_LENGTHS: [f64; 2] = [0.05, 0.3];
+const TIME_FUNCTIONS: usize = 20;
 
 /// What varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +32,9 @@ pub(crate) enum DriverKind {
     Direction(usize),
     /// A joint's own angle in detail; enters at that joint only.
     Own(usize),
+    /// The arrival direction of a joint times functions of its angle: lost motion that is not the same everywhere.
+    /// Enters at that joint only.
+    DirectionAlong(usize),
     /// The recording.
     Recording,
     /// Load, alone and times the pose.
@@ -41,7 +48,7 @@ pub(crate) struct Driver {
     pub name: String,
     /// What it is.
     pub kind: DriverKind,
-    /// Its value at each dwell.
+    /// Its value at each dwell; of a direction along an angle, the angle.
     pub value: Vec<f64>,
     /// Functions of it at the dwells: dwells x m.
     pub basis: DMatrix<f64>,
@@ -79,6 +86,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
             let basis = with_pose(&value);
             let kind = DriverKind::Direction(j);
             all.push(Driver { name: format!("s{}", j + 1), kind, value, basis, kernel: None });
+            all.extend(direction_along(problem, j));
         }
     }
     let load = column(&|d| d.load_kg);
@@ -110,6 +118,16 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     all
 }
 
+fn direction_along(problem: &Problem, joint: usize) -> Option<Driver> {
+    let angle = problem.dwells.iter().map(|d| d.joint_rad[joint]).collect();
+    let (name, kind) = (format!("s{0}*q{0}", joint + 1), DriverKind::DirectionAlong(joint));
+    let mut driver = smooth(name, angle, kind)?;
+    for (d, mut row) in problem.dwells.iter().zip(driver.basis.row_iter_mut()) {
+        row *= d.arrival[joint];
+    }
+    Some(driver)
+}
+
 /// Joint readings with mean 0 and standard deviation 1; a joint that does not move stays 0.
 pub(crate) fn standardised_joints(problem: &Problem) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(problem.dwells.len(), problem.joints());
@@ -136,7 +154,8 @@ fn smooth(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
         return None;
     }
     let (lengths, bins, functions) = match kind {
-        DriverKind::Time => (TIME_LENGTHS, BINS, FUNCTIONS),
+        DriverKind::Time => (TIME_LENGTHS, FINE_BINS, TIME_FUNCTIONS),
+        DriverKind::DirectionAlong(_) => (ALONG_LENGTHS, FINE_BINS, ALONG_FUNCTIONS),
         DriverKind::Own(_) => (FINE_LENGTHS, FINE_BINS, FINE_FUNCTIONS),
         _ => (LENGTHS, BINS, FUNCTIONS),
     };

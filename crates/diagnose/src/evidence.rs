@@ -17,6 +17,8 @@ const BLOCK_COLUMNS: usize = 1200;
 pub(crate) struct Metric {
     /// Which noise.
     pub noise: Noise,
+    /// Its size (declared noise = 1).
+    pub amplitude: f64,
     /// Whitening by it.
     pub whitener: Whitener,
     /// Geometry projected out.
@@ -49,37 +51,50 @@ impl Metric {
 pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Vec<Metric> {
     let kinds = Noise::available(problem);
     let others = kinds.len().saturating_sub(1).max(1) as f64;
-    let mut metrics = Vec::new();
-    for noise in kinds {
+    let mut metrics: Vec<Metric> = Vec::new();
+    for noise in &kinds {
         let (prior, amplitudes) = match noise {
-            Noise::White => (1.0 - config.prior_correlated_noise, vec![0.0]),
-            _ => (config.prior_correlated_noise / others, config.amplitude_scales.clone()),
+            Noise::White => (1.0 - config.prior_correlated_noise, &[0.0][..]),
+            _ => (config.prior_correlated_noise / others, &config.amplitude_scales[..]),
         };
-        for b in &amplitudes {
-            let whitener = Whitener::new(noise, *b, problem);
-            let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
-            let mut geometry = problem.geometry.clone();
-            whitener.apply(&mut residual);
-            whitener.apply(&mut geometry);
-            let projection = Projection::new(
-                &(geometry / scale),
-                &problem.geometry_precision,
-                &problem.geometry_offset,
-                residual.column(0) / scale,
-            );
-            let ln_prior = (prior / amplitudes.len() as f64).ln();
-            metrics.push(Metric { noise, whitener, projection, ln_weight: ln_prior });
+        for b in amplitudes {
+            let metric = Metric::new(*noise, *b, problem, scale);
+            metrics.push(metric.weighed(prior / amplitudes.len() as f64, metrics.first(), config));
         }
     }
-    let white = metrics[0].projection.clone();
-    for m in &mut metrics {
-        let p = &m.projection;
-        m.ln_weight += -0.5 * (m.whitener.ln_det + p.ln_det - white.ln_det)
-            - 0.5
-                * (config.noise_prior_dof + white.dof())
-                * ((config.noise_prior_dof + p.rss) / (config.noise_prior_dof + white.rss)).ln();
+    let lead = metrics.iter().max_by(|a, b| a.ln_weight.total_cmp(&b.ln_weight));
+    if let Some((both, b)) = lead.and_then(|m| Some((m.noise.and_place(&kinds)?, m.amplitude))) {
+        let metric = Metric::new(both, b, problem, scale);
+        metrics.push(metric.weighed(config.prior_correlated_noise / others, metrics.first(), config));
     }
     metrics
+}
+
+impl Metric {
+    fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
+        let whitener = Whitener::new(noise, amplitude, problem);
+        let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
+        let mut geometry = problem.geometry.clone();
+        whitener.apply(&mut residual);
+        whitener.apply(&mut geometry);
+        let projection = Projection::new(
+            &(geometry / scale),
+            &problem.geometry_precision,
+            &problem.geometry_offset,
+            residual.column(0) / scale,
+        );
+        Metric { noise, amplitude, whitener, projection, ln_weight: 0.0 }
+    }
+
+    /// ln of its prior times the evidence of nothing in it, against white noise.
+    fn weighed(self, prior: f64, white: Option<&Metric>, config: &DiagnosisConfig) -> Metric {
+        let (p, nu) = (&self.projection, config.noise_prior_dof);
+        let white = white.map_or(p, |m| &m.projection);
+        let ln_weight = prior.ln()
+            - 0.5 * (self.whitener.ln_det + p.ln_det - white.ln_det)
+            - 0.5 * (nu + white.dof()) * ((nu + p.rss) / (nu + white.rss)).ln();
+        Metric { ln_weight, ..self }
+    }
 }
 
 /// `ln mean_a B(a)` with

@@ -136,6 +136,19 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
             e.name, e.places.before, e.places.after, e.places.change_ci95[0], e.places.change_ci95[1]
         ),
     );
+    if let Some(r) = &e.rival {
+        say(
+            &format!("{}.rival", e.name),
+            format!(
+                "the next listed explanation is {}, e^{:.1} times less probable from the data; it would leave {:.3} mm \
+                 there, {:.3} mm more",
+                r.name,
+                r.behind_nats,
+                r.places.after,
+                r.places.after - e.places.after
+            ),
+        );
+    }
     if let Some(c) = &e.contrast {
         say(
             &format!("{}.contrast", e.name),

@@ -9,6 +9,10 @@ use crate::weigh::Weighed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
+/// Frequencies tried, and their distance in units of the lowest: fine enough not to lose the phase over the range.
+const PERIODS: i32 = 192;
+const PERIOD_STEP: f64 = 0.125;
+
 /// Functions of a driver with the formula that makes them.
 struct Family {
     /// One term for each column: `a1*(q1 - 0.2)`, the parameter's name first.
@@ -90,8 +94,10 @@ pub(crate) fn expression(
 
 fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
     match driver.kind {
-        DriverKind::Smooth | DriverKind::Own(_) | DriverKind::Time => smooth_families(driver),
+        DriverKind::Smooth | DriverKind::Own(_) => smooth_families(&driver.name, driver, false),
+        DriverKind::Time => smooth_families(&driver.name, driver, true),
         DriverKind::Direction(_) => with_pose(problem, &driver.name, &driver.value),
+        DriverKind::DirectionAlong(joint) => along(problem, driver, joint),
         DriverKind::Load => {
             let (mean, _) = moments(&driver.value);
             let value: Vec<f64> = driver.value.iter().map(|v| v - mean).collect();
@@ -102,12 +108,12 @@ fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
 }
 
 /// Polynomials, harmonics, a smooth step, a bump, a warm-up.
-fn smooth_families(driver: &Driver) -> Vec<Family> {
+fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
     let value = &driver.value;
     let low = value.iter().copied().fold(f64::INFINITY, f64::min);
     let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let x = if driver.name.contains('+') { format!("({})", driver.name) } else { driver.name.clone() };
+    let x = if name.contains('+') { format!("({name})") } else { name.to_owned() };
     // Every parameter then has the channel's unit: the numbers carry the driver's.
     let shifted = standard(&x, centre, half);
     let mut all = Vec::new();
@@ -134,17 +140,20 @@ fn smooth_families(driver: &Driver) -> Vec<Family> {
         all.push(Family { terms, basis, ln_tried: tried.ln() });
     };
     // An angle has a sine of itself; of seconds and kelvins only a multiple has one.
-    if driver.name.starts_with('q') {
+    if name.starts_with('q') {
         for order in 1..=3usize {
             harmonic(&(1..=order).map(|k| k as f64).collect::<Vec<_>>(), 1.0);
         }
     }
     let fundamental = std::f64::consts::PI / (1.2 * half);
-    for step in 1..=24 {
-        harmonic(&[fundamental * 0.5 * f64::from(step)], 24.0);
-    }
     for order in 2..=5usize {
         harmonic(&(1..=order).map(|k| fundamental * k as f64).collect::<Vec<_>>(), 4.0);
+    }
+    for step in 1..=PERIODS {
+        let frequency = fundamental * PERIOD_STEP * f64::from(step);
+        harmonic(&[frequency], f64::from(PERIODS));
+        // Teeth are no sines.
+        harmonic(&[frequency, 2.0 * frequency, 3.0 * frequency], f64::from(PERIODS));
     }
     let mut shaped = |inner: String, f: &dyn Fn(f64) -> f64, tried: f64| {
         let basis = DMatrix::from_fn(rows, 1, |i, _| f(value[i]));
@@ -163,7 +172,7 @@ fn smooth_families(driver: &Driver) -> Vec<Family> {
             shaped(format!("exp(-({u}^2))"), &|v| (-((v - c) / w).powi(2)).exp(), 120.0);
         }
     }
-    if driver.kind == DriverKind::Time {
+    if time {
         for part in [0.05, 0.1, 0.2, 0.4, 0.8] {
             let constant = 2.0 * half * part;
             let inner = format!("(1 - exp(-{x}/{}))", number(constant));
@@ -171,6 +180,23 @@ fn smooth_families(driver: &Driver) -> Vec<Family> {
         }
     }
     all
+}
+
+/// A direction alone, and alone plus each smooth family of the angle times it.
+fn along(problem: &Problem, driver: &Driver, joint: usize) -> Vec<Family> {
+    let sign = format!("s{}", joint + 1);
+    let arrival = |i: usize| problem.dwells[i].arrival[joint];
+    let with_sign = |family: Family| {
+        let mut terms = vec![("c0".to_string(), format!("c0*{sign}"))];
+        terms.extend(family.terms.into_iter().map(|(name, term)| (name, format!("{sign}*{term}"))));
+        let basis = DMatrix::from_fn(family.basis.nrows(), terms.len(), |i, k| match k {
+            0 => arrival(i),
+            k => arrival(i) * family.basis[(i, k - 1)],
+        });
+        Family { terms, basis, ln_tried: family.ln_tried }
+    };
+    let angle = format!("q{}", joint + 1);
+    smooth_families(&angle, driver, false).into_iter().map(with_sign).collect()
 }
 
 /// A switched value alone, and with a part linear in each joint that moves.

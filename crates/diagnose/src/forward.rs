@@ -155,13 +155,18 @@ fn confirm(
     }
 }
 
-/// Whether something is missing: improbable as nothing, and it helps where the fit did not look.
+/// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
+/// all, the best that has a place and a driver, or the best listed one.
 pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
-    if room.weighed.p_nothing >= config.max_probability_nothing {
+    let weighed = &room.weighed;
+    if weighed.p_nothing >= config.max_probability_nothing {
         return false;
     }
-    let Some((columns, _)) = room.weighed.best() else { return false };
-    room.predicts_with(columns, config)
+    let best = weighed.best().map(|b| b.0);
+    let cell = weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats).map(|c| &c.what.columns);
+    let listed = weighed.ranking().first().map(|k| &weighed.entries[*k]);
+    let listed = listed.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
+    best.into_iter().chain(cell).chain(listed).any(|columns| room.predicts_with(columns, config))
 }
 
 /// The entry of a candidate; a scan may have moved to another shape.

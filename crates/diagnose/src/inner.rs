@@ -3,14 +3,16 @@
 use crate::config::DiagnosisConfig;
 use crate::confusion::likeness;
 use crate::crossval::{by_place, left_out, norms_m};
-use crate::diagnosis::{BeforeAfter, Diagnosis, FoundEffect, NoiseReport, UnknownReport, Verdict};
+use crate::diagnosis::{
+    BeforeAfter, Diagnosis, FoundEffect, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
+};
 use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
 use crate::judge::{Grade, Judged};
 use crate::outliers::{flipped, suspects};
 use crate::problem::Problem;
 use crate::refit::Refit;
-use crate::reports::{candidate_reports, not_testable, parameters};
+use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
 use crate::structure::structure;
 use crate::unknown::unknown_report;
@@ -59,7 +61,7 @@ fn assemble(
     config: &DiagnosisConfig,
 ) -> Diagnosis {
     let (problem, weighed) = (&first.problem, &first.weighed);
-    let effects: Vec<FoundEffect> = search.accepted.iter().map(found_effect).collect();
+    let effects: Vec<FoundEffect> = search.accepted.iter().map(|a| found_effect(a, config)).collect();
     let single = search.accepted.iter().all(|a| a.judged.set.len() == 1 && a.grade == Grade::Named);
     let verdict = match (effects.is_empty(), search.left_over) {
         (true, false) => Verdict::NothingMissing,
@@ -106,7 +108,7 @@ fn assemble(
         warnings: warnings(&noise, &set_aside, search, config),
         noise,
         set_aside,
-        tentative: search.tentative.iter().map(found_effect).collect(),
+        tentative: search.tentative.iter().map(|a| found_effect(a, config)).collect(),
         effects,
         unknown: unlisted.first().cloned(),
         unlisted,
@@ -117,12 +119,12 @@ fn assemble(
     diagnosis
 }
 
-fn found_effect(a: &Accepted) -> FoundEffect {
+fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     let (judged, weighed) = (&a.judged, &a.room.weighed);
     let name = |k: &usize| weighed.entries[*k].candidate.spec.clone();
     let mut set: Vec<String> = judged.set.iter().map(name).collect();
     if a.grade == Grade::OrUnlisted {
-        set.push("something not listed".to_string());
+        set.push(NOT_LISTED.to_string());
     }
     let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l));
     let meant = (0..weighed.entries.len()).filter(meant);
@@ -139,6 +141,7 @@ fn found_effect(a: &Accepted) -> FoundEffect {
         places: judged.places,
         recordings: judged.recordings,
         contrast: judged.contrast.clone(),
+        rival: rival(a, config),
     }
 }
 

@@ -4,7 +4,7 @@ use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{likeness, one_step};
 use crate::contrasts::{Contrast, contrast};
-use crate::crossval::{HeldOut, by_place, by_recording, gain};
+use crate::crossval::{Group, HeldOut, by_place, by_recording, by_stretch, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
 use crate::noise::Noise;
 use crate::places::units;
@@ -109,9 +109,10 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
 
     let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
     let groups = independent_groups(problem, weighed);
-    let places = gain(problem, &effect, &groups, config);
+    let memory = weighed.memory_of(&weighed.entries[entry].candidate.columns, problem, config);
+    let places = gain(problem, &effect, &groups, memory, config);
     let groups = by_recording(problem);
-    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, config));
+    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, None, config));
 
     let theta = &fitted.estimate;
     let theta_sigma = (residual_variance * (theta.transpose() * &fitted.covariance * theta)[(0, 0)]).sqrt()
@@ -157,8 +158,8 @@ pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> 
 }
 
 /// Groups to leave out: places, or stretches of time when the noise has memory (neighbours in time would tell).
-pub(crate) fn independent_groups(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
-    if weighed.remembers() { clusters(problem, weighed) } else { by_place(problem) }
+pub(crate) fn independent_groups(problem: &Problem, weighed: &Weighed) -> Vec<Group> {
+    if weighed.remembers() { by_stretch(problem) } else { by_place(problem) }
 }
 
 /// The set that is one answer: the credible set, and everything whose signature is the same.
@@ -214,7 +215,8 @@ fn answer(
 /// Margin of an entry over the cells, and the probability of unlisted explanations of another shape.
 ///
 /// A cell holds many shapes, often the entry's own. Where its fitted shape is the entry's, it is no rival but the same
-/// answer without the name, and needs no margin over it; the entry must still be more probable.
+/// answer without the name, and needs no margin over it; the entry must still be more probable, unless all that the cell
+/// says more is too small a part of the entry to be told from the detail of its shape.
 fn against_unlisted(
     problem: &Problem,
     weighed: &Weighed,
@@ -236,9 +238,11 @@ fn against_unlisted(
         let gram = projection.gram(&columns);
         let a = best_amplitude(&gram, projection.rss, projection.dof(), config);
         let (theta, _) = coefficients(&gram, a);
-        let same = likeness(projection, &columns, &theta, &own, 1.0).cosine > config.merge_cosine;
+        let cosine = likeness(projection, &columns, &theta, &own, 1.0).cosine;
+        let same = cosine > config.merge_cosine;
         let asked = if same { 0.0 } else { config.margin_nats };
-        if u.what.channel.is_some() {
+        let detail = 1.0 - cosine * cosine <= config.leftover_share;
+        if u.what.channel.is_some() && !detail {
             margin = margin.min(own_ln - u.ln_evidence - asked);
         }
         if !same {

@@ -28,6 +28,8 @@ pub(crate) enum Noise {
     /// The sensor wanders, which averaging within a dwell does not show: memory over tracked dwells on top of what is
     /// declared for them, seated ones remembering a share.
     Sensor,
+    /// The sensor wanders, and cavities are off their place.
+    SensorAndPlace,
 }
 
 impl Noise {
@@ -39,10 +41,13 @@ impl Noise {
             Noise::Visit => "repeated at visits to a place within a recording",
             Noise::Memory => "correlated over a few dwells in a row",
             Noise::Sensor => "a wandering position sensor, larger than declared",
+            Noise::SensorAndPlace => {
+                "a wandering position sensor, larger than declared, and cavities off their place"
+            }
         }
     }
 
-    /// Those the data can tell from white noise: groups need repeats.
+    /// Those the data can tell from white noise: groups need repeats. Not the one of two kinds, see [`Noise::and_place`].
     pub fn available(problem: &Problem) -> Vec<Noise> {
         let repeats = |by_recording: bool| {
             let mut count: BTreeMap<(usize, &str), usize> = BTreeMap::new();
@@ -73,6 +78,13 @@ impl Noise {
     }
 }
 
+impl Noise {
+    /// The kind that has the errors of places besides, where one is known: worth its price only where this one leads.
+    pub fn and_place(self, available: &[Noise]) -> Option<Noise> {
+        (self == Noise::Sensor && available.contains(&Noise::Place)).then_some(Noise::SensorAndPlace)
+    }
+}
+
 /// `((I + b^2 K) / (1 + b^2))^(-1/2)`, ready to be applied to columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Whitener {
@@ -88,6 +100,12 @@ enum Kind {
     Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
     /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
     Memory(Vec<Filter>),
+    /// First the memory, of rows scaled, then `x - P P'x` with what places share as the memory shows it.
+    Both {
+        scale: DVector<f64>,
+        filters: Vec<Filter>,
+        p: DMatrix<f64>,
+    },
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -95,6 +113,8 @@ struct Filter {
     row: usize,
     /// Axis of the state.
     axis: usize,
+    /// Back from the declared noise to the row in which the state's share is `load`.
+    scale: f64,
     decay: f64,
     /// How much of the state the row shows.
     load: f64,
@@ -110,10 +130,8 @@ impl Whitener {
             Noise::Place => groups(problem, b, false),
             Noise::Visit => groups(problem, b, true),
             Noise::Memory => memory(problem, |_| Share::of_declared(b)),
-            Noise::Sensor => memory(problem, |dwell| match dwell.tracked {
-                true => Share { load: b, unit: 1.0 },
-                false => Share::of_declared(1.0),
-            }),
+            Noise::Sensor => memory(problem, sensor(b)),
+            Noise::SensorAndPlace => sensor_and_place(problem, b),
         }
     }
 
@@ -132,21 +150,67 @@ impl Whitener {
                     }
                 }
             }
-            Kind::Memory(filters) => {
-                let axes = filters.iter().map(|f| f.axis + 1).max().unwrap_or(0);
-                let mut state = vec![0.0; axes];
-                for mut column in columns.column_iter_mut() {
-                    state.fill(0.0);
-                    for f in filters {
-                        let predicted = f.decay * state[f.axis];
-                        let innovation = column[f.row] - f.load * predicted;
-                        state[f.axis] = predicted + f.gain * innovation;
-                        column[f.row] = innovation * f.weight;
-                    }
-                }
+            Kind::Memory(filters) => innovations(filters, columns),
+            Kind::Both { scale, filters, p } => {
+                columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(scale));
+                innovations(filters, columns);
+                let shared = p.tr_mul(columns);
+                columns.gemm(-1.0, p, &shared, 1.0);
             }
         }
     }
+}
+
+/// Walks the filters over each column: what each row says that the rows before it did not.
+fn innovations(filters: &[Filter], columns: &mut DMatrix<f64>) {
+    let axes = filters.iter().map(|f| f.axis + 1).max().unwrap_or(0);
+    let mut state = vec![0.0; axes];
+    for mut column in columns.column_iter_mut() {
+        state.fill(0.0);
+        for f in filters {
+            let predicted = f.decay * state[f.axis];
+            let innovation = f.scale * column[f.row] - f.load * predicted;
+            state[f.axis] = predicted + f.gain * innovation;
+            column[f.row] = innovation * f.weight;
+        }
+    }
+}
+
+/// `C = D (C_sensor + Z Z') D`: seated rows, half their variance the place's, are scaled back to the declared noise.
+fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
+    let Whitener { kind, mut ln_det } = memory(problem, sensor(b));
+    let Kind::Memory(filters) = kind else { return Whitener { kind, ln_det } };
+    let seated: Vec<&DwellRow> = problem.dwells.iter().filter(|d| !d.tracked && d.place.is_some()).collect();
+    let mut place: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut scale = DVector::from_element(problem.rows(), 1.0);
+    for d in &seated {
+        let next = place.len();
+        place.entry(d.place.as_deref().unwrap_or_default()).or_insert(next);
+        scale.rows_mut(d.first_row, d.rows).fill(2f64.sqrt());
+        ln_det -= d.rows as f64 * 2f64.ln();
+    }
+    let mut shared = DMatrix::zeros(problem.rows(), 3 * place.len());
+    for d in &seated {
+        let k = 3 * place[d.place.as_deref().unwrap_or_default()];
+        shared.view_mut((d.first_row, k), (d.rows, 3)).copy_from(&d.seat);
+    }
+    innovations(&filters, &mut shared);
+    let (p, grown) = shares(&shared, 1.0);
+    Whitener { kind: Kind::Both { scale, filters, p }, ln_det: ln_det + grown }
+}
+
+/// P with `(I - P P')^2 = (I + b^2 Z Z')^-1`, and ln of the determinant of `I + b^2 Z Z'`.
+fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
+    let eigen = z.tr_mul(z).symmetric_eigen();
+    let mut p = z * &eigen.eigenvectors;
+    let mut ln_det = 0.0;
+    for (k, w) in eigen.eigenvalues.iter().enumerate() {
+        let grown = 1.0 + b * b * w.max(0.0);
+        ln_det += grown.ln();
+        let share = if *w > 1e-12 { ((1.0 - 1.0 / grown.sqrt()) / w).sqrt() } else { 0.0 };
+        p.column_mut(k).scale_mut(share);
+    }
+    (p, ln_det)
 }
 
 fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
@@ -167,15 +231,8 @@ fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
             z.rows_mut(at, d.rows).copy_from(&d.seat);
             at += d.rows;
         }
-        let eigen = z.tr_mul(&z).symmetric_eigen();
-        let mut p = &z * &eigen.eigenvectors;
-        for (k, w) in eigen.eigenvalues.iter().enumerate() {
-            let grown = 1.0 + b * b * w.max(0.0);
-            ln_det += grown.ln();
-            let share = if *w > 1e-12 { ((1.0 - 1.0 / grown.sqrt()) / w).sqrt() } else { 0.0 };
-            p.column_mut(k).scale_mut(share);
-        }
-        ln_det -= rows.len() as f64 * (1.0 + b * b).ln();
+        let (p, grown) = shares(&z, b);
+        ln_det += grown - rows.len() as f64 * (1.0 + b * b).ln();
         groups.push((rows, p));
     }
     Whitener { kind: Kind::Groups((1.0 + b * b).sqrt(), groups), ln_det }
@@ -205,13 +262,21 @@ fn memory(problem: &Problem, shares: impl Fn(&DwellRow) -> Share) -> Whitener {
                 let gain = load * predicted / innovation;
                 *state = predicted * (1.0 - gain * load);
                 ln_det += (innovation / unit).ln();
-                let weight = (unit / innovation).sqrt();
-                filters.push(Filter { row: dwell.first_row + axis, axis, decay, load, gain, weight });
+                let (scale, weight) = (unit.sqrt(), innovation.sqrt().recip());
+                filters.push(Filter { row: dwell.first_row + axis, axis, scale, decay, load, gain, weight });
             }
         }
         last = Some(dwell);
     }
     Whitener { kind: Kind::Memory(filters), ln_det }
+}
+
+/// Tracked dwells wander on top of what is declared for them; half the noise of seated ones remembers.
+fn sensor(b: f64) -> impl Fn(&DwellRow) -> Share {
+    move |dwell| match dwell.tracked {
+        true => Share { load: b, unit: 1.0 },
+        false => Share::of_declared(1.0),
+    }
 }
 
 /// How a dwell shows the state that remembers.

@@ -250,6 +250,15 @@ impl View<'_> {
             Channel { name: p.name.clone(), axes: vec![p.name.clone()], unit: p.unit, columns }
         });
         let parameters: Vec<Channel> = parameters.collect();
+        let lengths_m = self.model.lengths_m();
+        let grown =
+            |i: usize, _| lengths_m.iter().map(|(k, m)| -moves[i].fixed_view::<3, 1>(0, *k) * *m).sum();
+        let lengths = Channel {
+            name: "lengths".to_owned(),
+            axes: vec!["lengths".to_owned()],
+            unit: Unit::One,
+            columns: self.displaced(linear, 1, grown),
+        };
         let world = Channel {
             name: "world".to_owned(),
             axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
@@ -273,7 +282,7 @@ impl View<'_> {
             unit: Unit::Radian,
             columns: Arc::new(joints[1].columns.as_ref() - joints[2].columns.as_ref()),
         });
-        joints.into_iter().chain(belt).chain(parameters).chain([tilt, world]).collect()
+        joints.into_iter().chain(belt).chain(parameters).chain([lengths, tilt, world]).collect()
     }
 
     fn each<T>(&self, of: impl Fn(&Observation) -> T) -> Vec<T> {

@@ -1,7 +1,7 @@
 //! Dwells that fit nothing: set aside and reported, never silently (notes 9, DATA SUSPECT).
 
 use crate::config::DiagnosisConfig;
-use crate::crossval::left_out;
+use crate::crossval::{Group, left_out};
 use crate::drivers::standardised_joints;
 use crate::problem::Problem;
 use crate::special::chi2_tail;
@@ -21,7 +21,7 @@ const MIN_AGREEING: usize = 4;
 pub(crate) fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0);
     let effect = best.map(|b| weighed.tamed(b.0, problem, config));
-    let alone: Vec<Vec<usize>> = (0..problem.dwells.len()).map(|i| vec![i]).collect();
+    let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let left = left_out(problem, effect.as_ref(), &alone);
     // Wilson-Hilferty: the median of chi-square with k degrees of freedom is about k (1 - 2/(9k))^3.
     let reduced: Vec<f64> = problem

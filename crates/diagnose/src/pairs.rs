@@ -27,7 +27,9 @@ pub(crate) fn best_pair(problem: &Problem, weighed: &Weighed, config: &Diagnosis
             let gram = projection.gram(&columns[second]);
             let ln = ln_first + ln_bayes(&gram, projection.rss, projection.dof(), config);
             if best.is_none_or(|b| ln > b.0) {
-                best = Some((ln, first));
+                // Evidence is not additive, so a pair may win with its weaker member first.
+                let weaker = weighed.entries[second].ln_evidence > ln_first;
+                best = Some((ln, if weaker { second } else { first }));
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::crossval::EFFECT_PRECISION;
+use crate::noise::Whitener;
 use armcal_core::{DwellId, Unit};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -269,6 +270,24 @@ impl Problem {
         self.geometry_offset = extended(&self.geometry_offset, 0.0);
         self.geometry_precision = extended(&self.geometry_precision, EFFECT_PRECISION);
         self
+    }
+
+    /// The rows under another noise, without anything to weigh.
+    pub(crate) fn whitened(&self, by: &Whitener) -> Problem {
+        let mut residual = DMatrix::from_column_slice(self.rows(), 1, self.residual.as_slice());
+        let mut geometry = self.geometry.clone();
+        by.apply(&mut residual);
+        by.apply(&mut geometry);
+        Problem {
+            dwells: self.dwells.clone(),
+            residual: residual.column(0).into_owned(),
+            geometry,
+            geometry_precision: self.geometry_precision.clone(),
+            geometry_offset: self.geometry_offset.clone(),
+            candidates: Vec::new(),
+            scans: Vec::new(),
+            channels: Vec::new(),
+        }
     }
 
     /// The same problem without some dwells (`keep[i]` false).

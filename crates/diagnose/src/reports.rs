@@ -3,9 +3,11 @@
 use crate::bootstrap::Significance;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, likeness, one_step, smallest_seen};
-use crate::crossval::{compare, left_out};
-use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
+use crate::crossval::{Group, compare, gain, left_out};
+use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport, Rival};
+use crate::forward::Accepted;
 use crate::judge::Judged;
+use crate::judge::independent_groups;
 use crate::problem::{Amplitude, Candidate, Problem};
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
@@ -48,12 +50,15 @@ fn sizes(
         .collect()
 }
 
+/// An effect that must be this many times its typical size to be seen is not seen at any.
+const AT_NO_SIZE: f64 = 1e3;
+
 /// The whole catalogue against the base model, best first.
 pub(crate) fn candidate_reports(
     problem: &Problem,
     weighed: &Weighed,
     top: Option<&Judged>,
-    groups: &[Vec<usize>],
+    groups: &[Group],
     config: &DiagnosisConfig,
 ) -> Vec<CandidateReport> {
     let projection = &weighed.metrics[0].projection;
@@ -105,6 +110,27 @@ pub(crate) fn candidate_reports(
     reports
 }
 
+/// The best listed explanation that is no other name for a found effect: how far behind, and what it does to places the
+/// fit did not see.
+pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
+    let (judged, problem, weighed) = (&found.judged, &found.room.problem, &found.room.weighed);
+    let own = &weighed.entries[judged.entry];
+    let another = |k: &usize| {
+        let e = &weighed.entries[*k];
+        let of_it = e.candidate.members().any(|m| m == own.candidate.spec);
+        !of_it && judged.set.iter().all(|s| !weighed.one_name(*s, *k)) && e.ln_evidence > 0.0
+    };
+    let k = weighed.ranking().into_iter().find(another)?;
+    let columns = &weighed.entries[k].candidate.columns;
+    let groups = independent_groups(problem, weighed);
+    let memory = weighed.memory_of(columns, problem, config);
+    Some(Rival {
+        name: weighed.entries[k].candidate.spec.clone(),
+        behind_nats: own.ln_evidence - weighed.entries[k].ln_evidence,
+        places: gain(problem, &columns.dense(&problem.dwells, 1.0), &groups, memory, config),
+    })
+}
+
 /// Entries whose smallest visible size exceeds the typical one.
 pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTestable> {
     let projection = &weighed.metrics[0].projection;
@@ -123,7 +149,7 @@ pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTesta
             continue;
         }
         let size = |factor: f64| match c.amplitudes.first() {
-            Some(_) if !factor.is_finite() => "none".to_string(),
+            Some(_) if factor.is_nan() || factor > AT_NO_SIZE => "none".to_string(),
             Some(a) => format!("{:.3} {}", a.unit.to_display(a.typical * factor), a.unit.display_symbol()),
             None => String::new(),
         };

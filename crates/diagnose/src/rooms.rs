@@ -42,7 +42,8 @@ impl Room {
     pub fn predicts_with(&self, columns: &Columns, config: &DiagnosisConfig) -> bool {
         let groups = independent_groups(&self.problem, &self.weighed);
         let effect = self.weighed.tamed(columns, &self.problem, config);
-        gain(&self.problem, &effect, &groups, config).p <= config.max_p_adjusted
+        let memory = self.weighed.memory_of(columns, &self.problem, config);
+        gain(&self.problem, &effect, &groups, memory, config).p <= config.max_p_adjusted
     }
 }
 

@@ -54,6 +54,44 @@ fn whiteners_are_inverse_roots_of_their_covariance() {
     }
 }
 
+/// The covariance of a wandering sensor, with what places share or without, written out.
+fn dense_sensor(b: f64, places: bool, p: &Problem) -> DMatrix<f64> {
+    // Standard deviation of the part that remembers, and the factor back to the declared noise.
+    let share = |tracked: bool| if tracked { (b, 1.0) } else { (1.0, 0.5f64.sqrt()) };
+    DMatrix::from_fn(p.rows(), p.rows(), |row, column| {
+        let (a, c) = (&p.dwells[row / 3], &p.dwells[column / 3]);
+        if row % 3 != column % 3 {
+            return 0.0;
+        }
+        let ((load_a, back_a), (load_c, back_c)) = (share(a.tracked), share(c.tracked));
+        let gap = a.id.dwell.abs_diff(c.id.dwell) as f64;
+        let memory = f64::from(a.id.recording == c.id.recording) * (-gap / 3.0).exp();
+        let sensor = (load_a * load_c * memory + f64::from(row == column)) * back_a * back_c;
+        if !places {
+            return sensor;
+        }
+        let place = f64::from(!a.tracked && !c.tracked && a.place == c.place);
+        let half = |tracked: bool| if tracked { 1.0 } else { 0.5f64.sqrt() };
+        (sensor + place) * half(a.tracked) * half(c.tracked)
+    })
+}
+
+#[test]
+fn a_wandering_sensor_is_whitened_with_and_without_errors_of_places() {
+    let mut p = small(2);
+    p.dwells.iter_mut().skip(1).step_by(3).for_each(|d| d.tracked = true);
+    for (noise, places) in [(Noise::Sensor, false), (Noise::SensorAndPlace, true)] {
+        let whitener = Whitener::new(noise, 1.7, &p);
+        let mut w = DMatrix::identity(p.rows(), p.rows());
+        whitener.apply(&mut w);
+        let c = dense_sensor(1.7, places, &p);
+        let error = (w.tr_mul(&w) * &c - DMatrix::identity(p.rows(), p.rows())).amax();
+        assert!(error < 1e-9, "{noise:?} {error}");
+        let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+        assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+    }
+}
+
 #[test]
 fn evidence_equals_the_dense_marginal_likelihood() {
     // With nu0 + nu replaced by the number of rows, ln B is the ratio of two multivariate t densities whose scale
@@ -91,11 +129,18 @@ fn evidence_equals_the_dense_marginal_likelihood() {
 #[test]
 fn leave_group_out_is_a_refit_without_the_group() {
     let p = small(3);
-    let groups = crate::crossval::by_place(&p);
     let effect = p.candidates[0].columns.dense(&p.dwells, 1.0);
-    let found = crate::crossval::left_out(&p, Some(&effect), &groups);
-    for group in groups.iter().step_by(4) {
-        let keep: Vec<bool> = (0..p.dwells.len()).map(|i| !group.contains(&i)).collect();
+    let stretches = crate::crossval::by_stretch(&p);
+    assert!(stretches.iter().all(|g| g.scored.iter().all(|i| g.unseen.contains(i))));
+    assert!(
+        stretches.iter().any(|g| g.unseen.len() > g.scored.len()),
+        "what is near in time is not seen either"
+    );
+    let places = crate::crossval::by_place(&p);
+    let found = [&places, &stretches].map(|groups| crate::crossval::left_out(&p, Some(&effect), groups));
+    let cases = places.iter().map(|g| (g, &found[0])).step_by(4);
+    for (group, found) in cases.chain(stretches.iter().map(|g| (g, &found[1])).step_by(5)) {
+        let keep: Vec<bool> = (0..p.dwells.len()).map(|i| !group.unseen.contains(&i)).collect();
         let cut = p.without(&keep);
         // Least squares with prior rows, by singular values.
         let (n, m) = (cut.geometry.ncols(), effect.ncols());
@@ -108,7 +153,7 @@ fn leave_group_out_is_a_refit_without_the_group() {
         let mut y = DVector::zeros(rows + n + m);
         y.rows_mut(0, rows).copy_from(&cut.residual);
         let beta = x.svd(true, true).solve(&y, 1e-12).unwrap();
-        for i in group {
+        for i in &group.scored {
             for row in p.dwells[*i].range() {
                 let own = p.residual[row]
                     - (p.geometry.row(row) * beta.rows(0, n))[0]
@@ -199,7 +244,7 @@ fn with_two_sockets_the_poses_are_the_groups() {
     }
     let groups = crate::crossval::by_place(&p);
     assert!(groups.len() >= 8, "two sockets are no sample, their poses are: {}", groups.len());
-    let of = |i: usize| groups.iter().position(|g| g.contains(&i)).unwrap();
+    let of = |i: usize| groups.iter().position(|g| g.scored.contains(&i)).unwrap();
     for i in 0..p.dwells.len() {
         for j in 0..i {
             let apart = p.dwells[i].joint_rad.iter().zip(&p.dwells[j].joint_rad);

@@ -2,11 +2,12 @@
 
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::crossval::{by_place, gain};
+use crate::crossval::gain;
 use crate::diagnosis::{ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::expression;
+use crate::judge::independent_groups;
 use crate::problem::{Channel, Problem};
 use crate::weigh::{Outside, Weighed};
 use armcal_core::Unit;
@@ -40,8 +41,9 @@ pub(crate) fn described(
     let drop = theta.dot(&gram.g);
     let variance = ((metric.projection.rss - drop) / metric.projection.dof()).max(0.0);
     let effect = weighed.tamed(&best.columns, problem, config);
-    let groups = by_place(problem);
-    let places = gain(problem, &effect, &groups, config);
+    let groups = independent_groups(problem, weighed);
+    let memory = weighed.memory_of(&best.columns, problem, config);
+    let places = gain(problem, &effect, &groups, memory, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
     let mut shape = Vec::new();

@@ -5,7 +5,7 @@ use crate::config::DiagnosisConfig;
 use crate::crossval::EFFECT_PRECISION;
 use crate::drivers::{Driver, drivers};
 use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
-use crate::noise::Noise;
+use crate::noise::{Noise, Whitener};
 use crate::problem::{Candidate, Columns, Problem, Scan};
 use crate::projection::Gram;
 use crate::special::ln_sum_exp;
@@ -168,6 +168,16 @@ impl Weighed {
         &self.metrics[best]
     }
 
+    /// Whitening by the noise in which a term is explained best, where noise remembers.
+    pub fn memory_of(
+        &self,
+        columns: &Columns,
+        problem: &Problem,
+        config: &DiagnosisConfig,
+    ) -> Option<&Whitener> {
+        self.remembers().then(|| &self.metric_of(columns, problem, config).whitener)
+    }
+
     /// Whether two entries are one effect at one target, apart from the value of a searched shape.
     pub fn one_name(&self, k: usize, l: usize) -> bool {
         let placed = |k: usize| {
@@ -204,7 +214,9 @@ impl Weighed {
 
     /// Whether the noise probably remembers the dwells before.
     pub fn remembers(&self) -> bool {
-        self.probable(Noise::Memory) || self.probable(Noise::Sensor)
+        let remembering = [Noise::Memory, Noise::Sensor, Noise::SensorAndPlace];
+        let p = self.p_noise.iter().filter(|(noise, _)| remembering.contains(noise)).map(|(_, p)| p);
+        p.sum::<f64>() > 0.5
     }
 
     /// Whether this is probably the kind of noise.

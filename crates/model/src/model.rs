@@ -7,7 +7,7 @@ use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::{Chain, Frames, ModelError};
-use armcal_core::{Observation, Parameter, Pose, Reference};
+use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 
@@ -228,6 +228,16 @@ impl Model {
             jacobian.set_column(column, &twist.translation_m);
         }
         jacobian
+    }
+
+    /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].
+    pub fn lengths_m(&self) -> Vec<(usize, f64)> {
+        let chain = 0..self.chain.parameters().len();
+        let all = chain.chain(self.tip_segment().parameters.clone());
+        all.map(|index| (index, &self.parameters[index]))
+            .filter(|(_, p)| p.unit == Unit::Metre && p.nominal != 0.0)
+            .map(|(index, p)| (index, p.nominal))
+            .collect()
     }
 
     pub(crate) fn tip_segment(&self) -> &Segment {

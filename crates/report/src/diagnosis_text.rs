@@ -155,8 +155,11 @@ fn found(e: &FoundEffect) -> String {
         _ => String::new(),
     };
     let h = &e.places;
+    let rival = e.rival.as_ref().map_or(String::new(), |r| {
+        format!("; the next listed explanation, {}, would leave {:.3} mm", r.name, r.places.after)
+    });
     printable(&format!(
-        "{}{set}: {}; held out {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 %){contrast}",
+        "{}{set}: {}; held out {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 %){rival}{contrast}",
         e.name,
         sizes.join(", "),
         h.before,

@@ -44,7 +44,10 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         }
         Command::Run { pipeline, out, json } => run::run(pipeline, out, *json),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
-        Command::Simulate { lab, out, seed } => simulate::run(lab, out, *seed),
+        Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
+            simulate::hide(family, design, size, out, seed.unwrap_or(1))
+        }
+        Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
         Command::Export { pipeline, out } => export::run(pipeline, out),
     }
 }

@@ -80,7 +80,8 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
     Ok(all)
 }
 
-fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, Error> {
+/// A word of the laboratory's own vocabulary.
+pub(super) fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, Error> {
     let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
     parsed.map_err(|e| Error::Lab(LabError::Value { key: key.to_owned(), why: e.to_string() }))
 }

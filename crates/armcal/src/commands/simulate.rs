@@ -1,12 +1,15 @@
 //! `armcal simulate`: the virtual rig.
 
+use super::score::word;
 use super::{Outcome, print};
 use crate::error::Error;
+use armcal_lab::scenario::{Scenario, seal};
 use armcal_lab::{LabConfig, simulate};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Simulates a rig and writes its recordings and their truth to `out`.
-pub fn run(lab: &Path, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> {
+/// Simulates the rig that `lab` describes and writes its recordings and their truth to `out`.
+pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> {
+    let lab = lab.unwrap_or(Path::new(""));
     let text = std::fs::read_to_string(lab).map_err(|source| Error::ReadFile {
         what: "lab file",
         path: lab.to_owned(),
@@ -16,8 +19,21 @@ pub fn run(lab: &Path, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> 
     config.seed = seed.unwrap_or(config.seed);
     let folder = lab.parent().unwrap_or(Path::new(""));
     let simulated = simulate(&config, folder, out)?;
-    for path in simulated.recordings.iter().chain([&simulated.truth]) {
-        print(&format!("{}\n", path.display()));
-    }
+    list(simulated.recordings.iter().chain([&simulated.truth]));
     Ok(Outcome::Done)
+}
+
+/// Draws a rig that hides `family`, and writes what the product may see to `out` and the truth beside it.
+pub fn hide(family: &str, design: &str, size: &str, out: &Path, seed: u64) -> Result<Outcome, Error> {
+    let size = word("size", size)?;
+    let scenario = Scenario { size, ..Scenario::new(family, word("design", design)?, seed) };
+    let mut truth = out.as_os_str().to_owned();
+    truth.push("-truth.json");
+    let sealed = seal(&scenario, out, Path::new(&truth))?;
+    list(sealed.recordings.iter().chain([&sealed.pipeline, &sealed.truth]));
+    Ok(Outcome::Done)
+}
+
+fn list<'p>(paths: impl Iterator<Item = &'p PathBuf>) {
+    paths.for_each(|path| print(&format!("{}\n", path.display())));
 }

@@ -1,12 +1,15 @@
 //! An answer against the truth.
 
 use super::case::Answer;
-use armcal_diagnose::Verdict;
+use armcal_diagnose::{NOT_LISTED, Verdict};
 use armcal_lab::scenario::Hidden;
 use serde::Serialize;
 
 /// Dwells by which the moment of an event may be missed: between two dwells, nobody can tell.
 const DWELLS: usize = 2;
+
+/// A held-out error within this factor of the floor is at the floor.
+pub(super) const AT_FLOOR: f64 = 1.1;
 
 /// How right an answer was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -20,10 +23,14 @@ pub enum Judgement {
     InSet,
     /// Something outside the catalogue was called unknown, at its place and driver.
     Placed,
+    /// Something outside the catalogue was given the name of the listed effect that it is a form of, nothing else.
+    Nearest,
     /// Called unknown: with the catalogue holding it, or at another place.
     Unknown,
     /// Some of what was hidden was found, nothing wrong was claimed.
     Partial,
+    /// Something hidden went unseen, and without it the held-out error is at the floor: these data do not show it.
+    NotShown,
     /// Something hidden went unseen.
     Silent,
     /// A set that does not hold the truth.
@@ -42,7 +49,8 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
     }
     let listed: Vec<&Hidden> = hidden.iter().filter(|h| h.effect.is_some()).collect();
     if answer.verdict == Verdict::NothingMissing {
-        return Judgement::Silent;
+        let shown = answer.before_mm > AT_FLOOR * answer.floor_mm;
+        return if shown { Judgement::Silent } else { Judgement::NotShown };
     }
     if listed.is_empty() {
         return outside(answer, hidden);
@@ -68,14 +76,21 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
 }
 
 fn outside(answer: &Answer, hidden: &[Hidden]) -> Judgement {
+    let form = |name: &String| hidden.iter().flat_map(|h| &h.alike).any(|truth| same_effect(truth, name));
+    let mut names = answer.sets.iter().flatten().filter(|name| *name != NOT_LISTED);
+    if !answer.sets.is_empty() && names.all(form) {
+        return Judgement::Nearest;
+    }
     if answer.verdict == Verdict::Identified {
         return Judgement::Wrong;
     }
     if !answer.sets.is_empty() {
         return Judgement::WrongSet;
     }
+    // What drives a product of two drives the product.
+    let drives = |h: &str, said: &str| h == said || h.split('*').any(|factor| factor == said);
     let at = |(channel, driver): &(String, String)| {
-        hidden.iter().any(|h| h.channel == *channel && h.driver == *driver)
+        hidden.iter().any(|h| h.channel == *channel && drives(&h.driver, driver))
     };
     if answer.unknown.as_ref().is_some_and(at) { Judgement::Placed } else { Judgement::Unknown }
 }

@@ -1,5 +1,6 @@
 //! The confusion table.
 
+use super::judge::AT_FLOOR;
 use super::{Judgement, Scored};
 use armcal_core::robust::median;
 use armcal_report::{number, plain_table, table_text};
@@ -16,7 +17,7 @@ pub struct Row {
     /// Scenarios.
     pub n: usize,
     /// How many were judged so, in the order of [`JUDGEMENTS`].
-    pub counts: [usize; 9],
+    pub counts: [usize; 11],
     /// Median error on held-out points over the floor, before.
     pub before: f64,
     /// The same with the suggestion added.
@@ -30,13 +31,15 @@ pub struct Row {
 }
 
 /// The judgements in the order of the columns.
-pub const JUDGEMENTS: [(Judgement, &str); 9] = [
+pub const JUDGEMENTS: [(Judgement, &str); 11] = [
     (Judgement::RightlySilent, "silent, rightly"),
     (Judgement::First, "first"),
     (Judgement::InSet, "in set"),
     (Judgement::Placed, "unknown, placed"),
+    (Judgement::Nearest, "nearest listed"),
     (Judgement::Unknown, "unknown"),
     (Judgement::Partial, "partial"),
+    (Judgement::NotShown, "not shown"),
     (Judgement::Silent, "silent"),
     (Judgement::WrongSet, "wrong set"),
     (Judgement::Wrong, "wrong"),
@@ -75,7 +78,7 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
             (a.before_mm - a.after_mm) / (a.before_mm - a.floor_mm)
         })
         .collect();
-    let at_floor = own.iter().filter(|s| s.answer.after_mm <= 1.1 * s.answer.floor_mm).count();
+    let at_floor = own.iter().filter(|s| s.answer.after_mm <= AT_FLOOR * s.answer.floor_mm).count();
     let right = [Judgement::RightlySilent, Judgement::First, Judgement::Placed];
     let mut instead: Vec<(String, usize)> = Vec::new();
     for s in own.iter().filter(|s| !right.contains(&s.judgement)) {

@@ -59,7 +59,7 @@ fn worn_gap(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> 
     let worn_centre_deg = if draw.joint == 1 { 8.0 } else { -45.0 };
     let gap =
         Gap { joint: draw.joint, worn_deg: draw.size, worn_centre_deg, worn_span_deg: 8.0, ..Gap::default() };
-    let driver = format!("s{}", draw.joint);
+    let driver = format!("s{0}*q{0}", draw.joint);
     let mut made = made(MechanismConfig::Gap(gap), draw.joint_channel(), &driver);
     made.alike.push(draw.at_joint("backlash"));
     Ok(made)
@@ -86,7 +86,7 @@ fn room_temperature(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, Lab
         time_constant_s: 60.0,
         ..Default::default()
     };
-    Ok(made(MechanismConfig::RoomTemperature(room), "length".into(), "time"))
+    Ok(made(MechanismConfig::RoomTemperature(room), "lengths".into(), "t"))
 }
 
 fn soft_stop(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {

@@ -1,7 +1,8 @@
 //! A formula of the user.
 //!
 //! # What moves
-//! One joint reading, one parameter of the chain, the base or the tip, or the tip in the world.
+//! One joint reading, one parameter of the chain, the base or the tip, every length of the arm in proportion, or the tip
+//! in the world.
 //!
 //! # Equation
 //! Any, over q1.. (readings), s1.. (arrival: -1, 0, 1), tau1.. (gravity torque of the nominal masses and the load),
@@ -37,6 +38,8 @@ use armcal_core::Unit;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
+/// The name of all lengths of the arm together.
+const LENGTHS: &str = "lengths";
 /// Where a bound is given and no prior: how much of it is a typical size.
 const SIGMA_OF_BOUND: f64 = 0.3;
 
@@ -61,7 +64,8 @@ pub struct Expression {
     pub name: String,
     /// The formula.
     pub formula: String,
-    /// A joint, a parameter of the path, or `world.x`, `world.y`, `world.z`.
+    /// A joint, a parameter of the path, `lengths` (the relative growth of all of them), or `world.x`, `world.y`,
+    /// `world.z`.
     pub acts_on: String,
 }
 
@@ -79,10 +83,12 @@ enum Variable {
 }
 
 /// What a formula changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum Acts {
     Joint(usize),
     Parameter(usize),
+    /// Parameters with their nominal lengths [m].
+    Lengths(Vec<(usize, f64)>),
     World(usize),
 }
 
@@ -152,10 +158,11 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
         }
         Measure::Known(_) | Measure::Literal(_) | Measure::Anything => {}
     }
+    let in_world = matches!(acts, Acts::World(_));
     let physics = UserEffect { formula, variables, acts };
-    Ok(match acts {
-        Acts::World(_) => Placement::twisting(0, amplitudes, physics),
-        Acts::Joint(_) | Acts::Parameter(_) => Placement::new(amplitudes, physics),
+    Ok(match in_world {
+        true => Placement::twisting(0, amplitudes, physics),
+        false => Placement::new(amplitudes, physics),
     })
 }
 
@@ -219,6 +226,9 @@ fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
     if let Some(axis) = ["world.x", "world.y", "world.z"].iter().position(|name| *name == text) {
         return Ok(Acts::World(axis));
     }
+    if text == LENGTHS {
+        return Ok(Acts::Lengths(placing.model.lengths_m()));
+    }
     let model = placing.model;
     let joint_names = model.chain().joint_names();
     let reading = text.strip_prefix('q').filter(|number| number.parse::<usize>().is_ok());
@@ -230,19 +240,20 @@ fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
     }
     let on_path = (0..model.parameters().len()).filter(|index| model.is_on_path(*index));
     let names: Vec<&str> = on_path.map(|index| model.parameters()[index].name.as_str()).collect();
-    let all = names.iter().copied().chain(joint_names.iter().map(String::as_str));
+    let all = names.iter().copied().chain(joint_names.iter().map(String::as_str)).chain([LENGTHS]);
     let hint = nearest(text, all).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
     Err(format!(
-        "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of world.x, world.y, \
+        "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of lengths, world.x, world.y, \
          world.z{hint}"
     ))
 }
 
 impl Acts {
-    fn dimension(self, placing: &Placing<'_>) -> Dimension {
+    fn dimension(&self, placing: &Placing<'_>) -> Dimension {
         dimension(match self {
-            Acts::Joint(joint) => placing.joint_unit(joint),
-            Acts::Parameter(index) => placing.model.parameters()[index].unit,
+            Acts::Joint(joint) => placing.joint_unit(*joint),
+            Acts::Parameter(index) => placing.model.parameters()[*index].unit,
+            Acts::Lengths(_) => Unit::One,
             Acts::World(_) => Unit::Metre,
         })
     }
@@ -298,12 +309,15 @@ impl Physics for UserEffect {
             sum += seed * self.formula.value(&values).eps;
             values[position].0.eps = 0.0;
         }
-        match self.acts {
-            Acts::Joint(joint) => change.joint(joint, sum),
-            Acts::Parameter(index) => change.parameter(index, sum),
+        match &self.acts {
+            Acts::Joint(joint) => change.joint(*joint, sum),
+            Acts::Parameter(index) => change.parameter(*index, sum),
+            Acts::Lengths(lengths) => {
+                lengths.iter().for_each(|(index, length_m)| change.parameter(*index, sum * *length_m));
+            }
             Acts::World(axis) => {
                 let mut moved = [D::from(0.0); 3];
-                moved[axis] = sum;
+                moved[*axis] = sum;
                 change.twist(0, moved, [D::from(0.0); 3]);
             }
         }

@@ -88,7 +88,9 @@ impl Model {
                     let Some(values) = shape.values else { continue };
                     let placing = Placing { model: self, session, spec: &spec, kind, zero: &zero };
                     members.extend(
-                        values(&placing, observations).iter().map(|v| spec.clone().with(shape.name, *v)),
+                        values(&placing, observations)
+                            .iter()
+                            .map(|v| spec.clone().with(shape.name, readable(*v))),
                     );
                 }
                 members.retain(|spec| placed::place(self, session, spec, &zero, 0).is_ok());
@@ -132,6 +134,11 @@ impl Model {
         let placing = Placing { model: self, session, spec: &spec, kind, zero };
         values(&placing, &[]).iter().map(|value| spec.clone().with(shape.name, *value)).collect()
     }
+}
+
+/// Four significant digits: the value stands in a name, and no data tell it better.
+fn readable(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 impl Session {

@@ -76,17 +76,6 @@ impl Placing<'_> {
         Err("it grows with time, and all observations are of one moment".to_owned())
     }
 
-    /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].
-    pub fn lengths_m(&self) -> Vec<(usize, f64)> {
-        let parameters = self.model.parameters();
-        let chain = 0..self.model.chain().parameters().len();
-        chain
-            .chain(self.model.tip_segment().parameters.clone())
-            .filter(|&index| parameters[index].unit == Unit::Metre && parameters[index].nominal != 0.0)
-            .map(|index| (index, parameters[index].nominal))
-            .collect()
-    }
-
     /// How a joint moves.
     pub fn motion(&self, joint: usize) -> Motion {
         self.zero.joints[joint].motion

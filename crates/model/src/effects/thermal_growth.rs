@@ -54,7 +54,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
         placing.lasting()?;
         amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length over the whole session")
     };
-    let lengths = placing.lengths_m();
+    let lengths = placing.model.lengths_m();
     Ok(Placement::new(vec![growth], ThermalGrowth { lengths, thermometer }))
 }
 

@@ -57,7 +57,7 @@ struct WarmUp {
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.lasting()?;
     let growth = amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length once warm");
-    Ok(Placement::new(vec![growth], WarmUp { lengths: placing.lengths_m() }))
+    Ok(Placement::new(vec![growth], WarmUp { lengths: placing.model.lengths_m() }))
 }
 
 fn time_constants(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
