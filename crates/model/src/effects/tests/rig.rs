@@ -136,8 +136,8 @@ pub fn specs(model: &Model, observations: &[Observation]) -> Vec<EffectSpec> {
     specs
 }
 
-/// Formulas on a joint, a parameter and the world, with every driver among them.
-pub const EXPRESSIONS: [&str; 3] = [
+/// Formulas on a joint, a parameter, the world and all lengths, with every driver among them.
+pub const EXPRESSIONS: [&str; 4] = [
     "kind = 'expression'
      name = 'cable'
      formula = 'k * sin(q1) * tanh(tau2 / (T + 4)) + 0.3 * s3 * k'
@@ -155,6 +155,11 @@ pub const EXPRESSIONS: [&str; 3] = [
      formula = 'c * t * abs(effort2) * sqrt(load + 1)^2 / 1000'
      acts_on = 'world.z'
      parameters.c = { prior = 1e-6 }",
+    "kind = 'expression'
+     name = 'room'
+     formula = 'g * sin(t / 60)'
+     acts_on = 'lengths'
+     parameters.g = { unit = '1', prior = 1e-3 }",
 ];
 
 /// The spec of an `[[effects]]` table.
