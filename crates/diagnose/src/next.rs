@@ -29,6 +29,12 @@ pub(crate) fn record_next(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Strin
                 .to_string(),
         );
     }
+    if untested("takes over") {
+        all.push(format!(
+            "{} effects of realistic size could hide in these motions: `armcal plan` proposes the dwells in which they would show",
+            diagnosis.not_testable.len()
+        ));
+    }
     let recordings: BTreeSet<usize> = problem.dwells.iter().map(|d| d.id.recording).collect();
     if recordings.len() == 1 {
         all.push("record the first part again at the end: with one recording, what changes between recordings cannot be seen".to_string());
