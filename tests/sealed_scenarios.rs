@@ -1,5 +1,6 @@
-use crate::support::{armcal, number};
+use crate::support::{armcal, number, run_pipeline};
 use serde_json::Value;
+use std::ffi::OsStr;
 
 /// Scenarios scored by the program itself, on seeds nobody looked at while the rules were made. The truth is read by
 /// the scorer alone, after the answer.
@@ -85,4 +86,27 @@ fn what_is_in_no_catalogue_gets_no_confident_name() {
 fn recordings_on_disk_are_diagnosed_as_observations_are() {
     let all = scored(&["backlash", "gear_ratio", "nothing:white", "--seeds", "1", "--sealed"]);
     assert_eq!(count(&all, &["first", "rightly_silent"]), all.len());
+}
+
+/// What the page and the terminal offer to paste is all that is needed: pasted by hand, the error falls.
+#[test]
+fn the_pasted_table_of_something_unlisted_removes_most_of_the_error() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let lab = folder.path().join("lab");
+    let made = armcal(
+        ["simulate", "--hide", "outside:twist", "--seed", "7001", "--out"]
+            .map(OsStr::new)
+            .into_iter()
+            .chain([lab.as_os_str()]),
+    );
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let pipeline = lab.join("pipeline.toml");
+    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[0, 3]);
+    let table = before["diagnosis"]["unknown"]["table"].as_str().expect("a table to paste");
+    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
+    std::fs::write(&pipeline, format!("{text}\n{table}")).expect("pipeline");
+    let after = run_pipeline(&pipeline, &folder.path().join("after"), &[0, 3]);
+    let error = |summary| number(summary, "/fit/holdout/fitted_mm/mean");
+    println!("{table}\nheld out {:.3} -> {:.3} mm", error(&before), error(&after));
+    assert!(error(&after) < 0.5 * error(&before));
 }

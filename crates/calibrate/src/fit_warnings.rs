@@ -2,7 +2,7 @@
 
 use crate::outcome::{Fit, Status};
 use crate::whitened::Whitened;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Severity, Stage, Warning, listed};
 
 /// Weight below which an observation is named as an outlier.
 const OUTLIER_WEIGHT: f64 = 0.25;
@@ -12,8 +12,6 @@ const LARGE_SCALE: f64 = 1.5;
 const INADEQUATE_SCALE: f64 = 5.0;
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
-/// Names listed in one message.
-const LISTED: usize = 5;
 
 pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
@@ -50,8 +48,8 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         );
         add(Severity::Inadequate, "paper-infeasible", "fit", message);
     }
-    let at_bound: Vec<&str> =
-        fit.estimates.iter().filter(|e| e.at_bound).map(|e| e.parameter.name.as_str()).collect();
+    let at_bound: Vec<String> =
+        fit.estimates.iter().filter(|e| e.at_bound).map(|e| e.parameter.name.clone()).collect();
     if !at_bound.is_empty() {
         let message =
             "on the bound: the true value may lie outside, or a missing effect pulls there".to_string();
@@ -72,25 +70,15 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         .map(|j| white.problem.name(j))
         .collect();
     if !outliers.is_empty() {
-        let names: Vec<&str> = outliers.iter().map(String::as_str).collect();
-        let of_all = format!("{} of {} observations", names.len(), fit.weights.len());
+        let of_all = format!("{} of {} observations", outliers.len(), fit.weights.len());
         let mut message = format!("{of_all} weigh less than {OUTLIER_WEIGHT} in the fit");
-        let many = names.len() as f64 > INADEQUATE_OUTLIERS * fit.weights.len() as f64;
+        let many = outliers.len() as f64 > INADEQUATE_OUTLIERS * fit.weights.len() as f64;
         if many {
             message += ": so many are no exceptions; check the order, sign and unit of the joints, the board, and \
                         whether something moved during a recording";
         }
         let severity = if many { Severity::Inadequate } else { Severity::Notice };
-        add(severity, "outliers", &listed(&names), message);
+        add(severity, "outliers", &listed(&outliers), message);
     }
     warnings
-}
-
-/// The first few names and how many more.
-fn listed(names: &[&str]) -> String {
-    let shown = names[..names.len().min(LISTED)].join(", ");
-    match names.len().saturating_sub(LISTED) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
-    }
 }

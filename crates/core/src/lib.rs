@@ -24,4 +24,4 @@ pub use observation::{Observation, Reference, Rejection};
 pub use parameter::{Parameter, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
 pub use units::Unit;
-pub use warning::{Severity, Stage, Warning};
+pub use warning::{Severity, Stage, Warning, listed};

@@ -63,3 +63,15 @@ impl std::fmt::Display for Warning {
         write!(f, "{}: {}", self.subject, self.message)
     }
 }
+
+/// Names listed in one warning.
+const LISTED: usize = 5;
+
+/// The first few names and how many more: the subject of a warning about many.
+pub fn listed(names: &[String]) -> String {
+    let shown = names[..names.len().min(LISTED)].join(", ");
+    match names.len().saturating_sub(LISTED) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}

@@ -223,8 +223,6 @@ pub struct Expression {
     pub log_evidence: f64,
     /// Share of what the free shape removes that the formula removes too.
     pub share_of_shape: f64,
-    /// The `[[effects]]` table to paste into the pipeline.
-    pub table: String,
 }
 
 /// One parameter of an expression.
@@ -233,13 +231,11 @@ pub struct ExpressionParameter {
     /// Name.
     pub name: String,
     /// Value found.
-    pub start: f64,
-    /// Typical size: prior standard deviation.
+    pub found: f64,
+    /// Standard deviation of its prior: its size as found.
     pub prior: f64,
-    /// Lower bound.
-    pub lower: f64,
-    /// Upper bound.
-    pub upper: f64,
+    /// Bound on its size, either sign.
+    pub bound: f64,
 }
 
 /// The noise as found.

@@ -69,27 +69,23 @@ pub(crate) fn expression(
         .iter()
         .zip(theta.iter().zip(unit))
         .map(|((name, _), (t, u))| {
-            let (start, prior) = (t * u, 3.0 * (t * u).abs().max(*u));
+            let found = t * u;
             ExpressionParameter {
                 name: name.clone(),
-                start,
-                prior,
-                lower: -10.0 * prior,
-                upper: 10.0 * prior,
+                found,
+                prior: readable(found.abs().max(1e-3 * u)),
+                bound: readable(30.0 * found.abs().max(*u)),
             }
         })
         .collect();
-    let mut found = Expression {
+    Some(Expression {
         formula: family.terms.iter().map(|t| t.1.clone()).collect::<Vec<_>>().join(" + "),
         acts_on: acts_on.clone(),
         unit: channel.unit,
         parameters,
         log_evidence: value(best),
         share_of_shape: theta.dot(&gram.g),
-        table: String::new(),
-    };
-    found.table = table(&found, &driver.name);
-    Some(found)
+    })
 }
 
 fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
@@ -241,33 +237,14 @@ fn standard(x: &str, centre: f64, width: f64) -> String {
     format!("(({x} {sign} {})/{})", number(size), number(width))
 }
 
-/// The `[[effects]]` table to paste.
-fn table(e: &Expression, driver: &str) -> String {
-    let word = |text: &str| -> String {
-        text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
-    };
-    let mut text = format!(
-        "[[effects]]\nkind = \"expression\"\nname = \"{}_of_{}\"\nformula = \"{}\"\nacts_on = \"{}\"\n",
-        word(&e.acts_on),
-        word(driver),
-        e.formula,
-        e.acts_on
-    );
-    for p in &e.parameters {
-        text += &format!(
-            "parameters.{} = {{ unit = \"{}\", prior = {:.3e}, bound = {:.3e} }}\n",
-            p.name,
-            e.unit.symbol(),
-            p.prior,
-            p.upper
-        );
-    }
-    text
-}
-
 /// Six digits: a constant of a formula, not a result.
 fn number(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text.is_empty() || text == "-0" { "0".to_string() } else { text.to_string() }
+}
+
+/// Four digits: a size that a person reads and changes.
+fn readable(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -204,10 +204,14 @@ fn forward(
                 judged = other;
             }
         }
+        let entry = &weighed.entries[judged.entry];
+        // Before an unlisted shape beats it, it may show what it does at its own size.
+        if !named && entry.ln_evidence >= config.margin_nats && rooms.refine(&accepted, &entry.candidate)? {
+            continue;
+        }
         if !judged.promising(weighed, config) {
             break;
         }
-        let entry = &weighed.entries[judged.entry];
         let fall = judged.own().score * weighed.scale.powi(2);
         if let Some(first) = steps.first()
             && fall < config.leftover_share * first.fall

@@ -18,7 +18,7 @@ use crate::structure::structure;
 use crate::unknown::unknown_report;
 use crate::weigh::{Weighed, weigh};
 use crate::{DiagnoseError, next};
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DMatrix;
 
@@ -105,7 +105,7 @@ fn assemble(
         structure: structure(problem, config),
         p_nothing: weighed.p_nothing,
         holdout_mm: BeforeAfter { before: mean(problem), after: mean(&search.with_curves.problem) },
-        warnings: warnings(&noise, &set_aside, search, config),
+        warnings: warnings(&noise, &set_aside, whole.dwells.len(), search, config),
         noise,
         set_aside,
         tentative: search.tentative.iter().map(|a| found_effect(a, config)).collect(),
@@ -181,6 +181,7 @@ fn noise(rest: &Weighed) -> NoiseReport {
 fn warnings(
     noise: &NoiseReport,
     set_aside: &[armcal_core::DwellId],
+    dwells: usize,
     search: &Search,
     config: &DiagnosisConfig,
 ) -> Vec<Warning> {
@@ -188,17 +189,15 @@ fn warnings(
     let mut add = |severity, code, subject: String, message: String| {
         all.push(Warning::new(severity, Stage::Calibrate, code, subject, message));
     };
-    for id in set_aside {
-        add(
-            Severity::Notice,
-            "suspect-dwell",
-            id.to_string(),
-            format!(
-                "its error is as rare as {} sigma under every explanation at hand, so it was set aside; look for a \
-                 swapped marker, a bump or a wrong cavity",
-                config.outlier_sigma
-            ),
+    if !set_aside.is_empty() {
+        let names: Vec<String> = set_aside.iter().map(ToString::to_string).collect();
+        let message = format!(
+            "their error ({} of {dwells} dwells) is as rare as {} sigma under every explanation at hand, so they were set \
+             aside; look for swapped markers, a bump or a wrong cavity",
+            names.len(),
+            config.outlier_sigma
         );
+        add(Severity::Notice, "suspect-dwell", listed(&names), message);
     }
     if noise.sigma_ratio > SIGMA_RATIO {
         add(

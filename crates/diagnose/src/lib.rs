@@ -50,7 +50,9 @@ mod reports;
 mod rooms;
 mod special;
 mod structure;
+mod suggestion;
 mod unknown;
+mod view;
 mod weigh;
 
 #[cfg(test)]

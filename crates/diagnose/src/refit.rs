@@ -7,6 +7,14 @@ use crate::problem::{Candidate, Problem};
 pub trait Refit {
     /// The problem whose geometry includes the accepted effects, linearised at the fit with them.
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError>;
+
+    /// Refits with a candidate beside the accepted effects. Where it does not act in proportion to its size, every later
+    /// problem has its columns as they are at the size found, instead of their derivative at zero; says whether any
+    /// changed, which can happen once for each candidate.
+    fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
+        let _ = (accepted, candidate);
+        Ok(false)
+    }
 }
 
 /// Stays with one linearisation: accepted columns join the geometry.

@@ -81,6 +81,16 @@ impl<'a> Rooms<'a> {
         Ok(room)
     }
 
+    /// Whether a refit with a candidate changed what it would do: then all rooms are weighed anew.
+    pub fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
+        let named: Vec<Candidate> = accepted.iter().filter(|c| c.family != UNLISTED).cloned().collect();
+        let changed = self.refit.refine(&named, candidate)?;
+        if changed {
+            self.known.clear();
+        }
+        Ok(changed)
+    }
+
     /// The problem alone.
     pub fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =

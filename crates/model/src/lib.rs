@@ -37,7 +37,7 @@ pub use chain::Chain;
 pub use deviation::Deviation;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Extra, Family, Offered, Override, PlacedEffect,
-    Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, find,
+    Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find,
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge};

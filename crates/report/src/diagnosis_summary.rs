@@ -1,5 +1,6 @@
 //! The `diagnosis` of `summary.json`.
 
+use crate::diagnosis_text::pasted;
 use armcal_core::Unit;
 use armcal_diagnose::{
     BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, NotTestable, ParameterReport,
@@ -59,6 +60,8 @@ struct Unknown<'a> {
     driver: &'a str,
     expression: &'a str,
     acts_on: Option<&'a str>,
+    /// The `[[effects]]` table to paste into the pipeline; empty where nothing offered reaches the shape.
+    table: String,
     probability: f64,
     holdout_mm: BeforeAfter,
     unit: Unit,
@@ -112,6 +115,7 @@ fn unknown(u: &UnknownReport) -> Unknown<'_> {
         driver: &u.driver,
         expression: expression.map_or("", |e| &e.formula),
         acts_on: expression.map(|e| e.acts_on.as_str()),
+        table: pasted(u),
         probability: u.probability,
         holdout_mm: BeforeAfter { before: u.places.before, after: u.places.after },
         unit: u.unit,

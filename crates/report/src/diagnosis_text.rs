@@ -5,11 +5,14 @@ use crate::run::Run;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{in_display_unit, printable};
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, ParameterReport, UnknownReport, Verdict};
+use armcal_model::effects_toml;
 use comfy_table::Cell;
 use serde_json::Value;
 
 /// Rows of the ranking.
 const RANKED: usize = 8;
+/// Heading of the tables that add what is unlisted.
+const PASTE: &str = "To paste into the pipeline";
 
 /// The diagnosis of a run in full, ending in a newline; says so where there is none.
 pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
@@ -46,12 +49,19 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
     let sentences = d["explanations"].as_array().into_iter().flatten();
     let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), text(&e["sentence"]))));
     let next = list(&d["record_next"]).into_iter().map(|r| ("next:", r));
-    [
+    let mut sections = vec![
         pen.section(headline.trim(), pen.list(next)),
         pen.section("Candidates, best first", pen.render(&table)),
-        pen.section("The numbers, one by one", pen.list(sentences)),
-    ]
-    .join("\n")
+    ];
+    let unlisted = d["unlisted"].as_array().into_iter().flatten();
+    let safe = |table: &str| table.lines().map(|l| printable(l) + "\n").collect::<String>();
+    let tables: Vec<String> =
+        unlisted.filter_map(|u| u["table"].as_str()).filter(|table| !table.is_empty()).map(safe).collect();
+    if !tables.is_empty() {
+        sections.push(pen.section(PASTE, tables.join("\n")));
+    }
+    sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
+    sections.join("\n")
 }
 
 /// The part of a run's summary that says what is missing.
@@ -107,6 +117,10 @@ fn full(pen: &Pen, d: &Diagnosis) -> String {
             ("-", printable(&text))
         });
         sections.push(pen.section("What these data could not have shown", pen.list(rows)));
+    }
+    let tables: Vec<String> = d.unlisted.iter().map(pasted).filter(|t| !t.is_empty()).collect();
+    if !tables.is_empty() {
+        sections.push(pen.section(PASTE, tables.join("\n")));
     }
     let sentences = d.explanations.iter().map(|e| ("-", printable(&format!("{}: {}", e.number, e.sentence))));
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
@@ -167,6 +181,11 @@ fn found(e: &FoundEffect) -> String {
         h.change_ci95[0],
         h.change_ci95[1],
     ))
+}
+
+/// The `[[effects]]` table for something unlisted; empty where nothing offered reaches its shape.
+pub(crate) fn pasted(u: &UnknownReport) -> String {
+    u.effect().and_then(|effect| effects_toml(&[effect]).ok()).unwrap_or_default()
 }
 
 fn unlisted(u: &UnknownReport) -> String {

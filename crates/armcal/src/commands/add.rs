@@ -4,10 +4,10 @@ use super::{Outcome, print, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::{frames, suggestion};
+use crate::stages::frames;
 use crate::story::{self, Settled};
 use armcal_diagnose::Diagnosis;
-use armcal_model::{EffectSpec, EffectTable};
+use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::atomic;
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
 use serde::Serialize;
@@ -87,7 +87,7 @@ fn requested(
     let joints = settled.geometry.chain().joint_names();
     if words.iter().any(|word| word == SUGGESTED) {
         let diagnosis = settled.diagnose(pipeline, progress)?;
-        let suggested = diagnosis.map(|d| suggestion::of(&d, joints)).transpose()?.unwrap_or_default();
+        let suggested = diagnosis.map(|d| d.suggested(joints)).transpose()?.unwrap_or_default();
         if suggested.is_empty() {
             return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });
         }
@@ -104,12 +104,7 @@ struct Extended {
 
 /// Appends `[[effects]]` tables to the pipeline's own text, so that comments and order stay as the user wrote them.
 fn extend(pipeline: &Pipeline, request: &Request<'_>, new: &[EffectSpec]) -> Result<Extended, Error> {
-    #[derive(Serialize)]
-    struct Section {
-        effects: Vec<EffectTable>,
-    }
-    let section = Section { effects: new.iter().map(EffectTable::from).collect() };
-    let tables = toml::to_string(&section).map_err(Error::Toml)?;
+    let tables = effects_toml(new).map_err(Error::Toml)?;
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
     let path = request.write.map_or_else(|| beside(request.pipeline, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;

@@ -1,8 +1,7 @@
 //! Which explanations are to be told apart.
 
 use crate::error::Error;
-use crate::stages::suggestion;
-use armcal_diagnose::{Diagnosis, ParameterReport, Verdict};
+use armcal_diagnose::{Diagnosis, ParameterReport, UnknownReport, Verdict};
 use armcal_model::{EffectSpec, Family};
 
 /// Effects that a quiet diagnosis leaves untested, at most this many.
@@ -49,7 +48,7 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Er
         return Ok(Standing { rivals, nothing: false, certain, why });
     }
     if diagnosis.verdict == Verdict::Unknown
-        && let Some(spec) = diagnosis.unknown.as_ref().and_then(suggestion::unlisted)
+        && let Some(spec) = diagnosis.unknown.as_ref().and_then(UnknownReport::effect)
     {
         let mut rivals = vec![Rival { spec, sizes: Vec::new() }];
         for candidate in diagnosis.candidates.iter().take(3) {

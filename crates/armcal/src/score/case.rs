@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::{frames, suggestion};
+use crate::stages::frames;
 use crate::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_core::Observation;
@@ -62,7 +62,7 @@ pub fn quick(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let config = DiagnosisConfig::default();
     let diagnosis = diagnose(&model, &calibration, observations, &session, &fit, &config)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let suggested = suggestion::of(&diagnosis, model.chain().joint_names())?;
+    let suggested = diagnosis.suggested(model.chain().joint_names())?;
     let after = with(&model, &suggested, &session, observations, &fit, &holdout)?;
     let answer = answer(&diagnosis, &suggested, &calibration, after.as_ref());
     Ok((Answer { seconds, calibration_seconds, ..answer }, observed.truth.hidden))
@@ -79,7 +79,7 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let suggested = suggestion::of(&diagnosis, settled.geometry.chain().joint_names())?;
+    let suggested = diagnosis.suggested(settled.geometry.chain().joint_names())?;
     let session = frames::session(&pipeline, &settled.observations);
     let (geometry, observations) = (&settled.geometry, &settled.observations);
     let after = with(geometry, &suggested, &session, observations, &pipeline.fit, &pipeline.holdout)?;

@@ -3,4 +3,3 @@
 pub mod frames;
 pub mod observe;
 pub mod perceive;
-pub mod suggestion;

@@ -5,17 +5,18 @@
 //! drives are.
 //!
 //! # Equation
-//! `dq = c tau + a (tau/T)^3`, T the gravity torque of the nominal arm stretched out.
+//! `dq = c tau + a (tau/T)^3 + b (tau/T)^5`, T the gravity torque of the nominal arm stretched out: the spring
+//! `tau = k x + h x^3` turned round, as far as a series follows it.
 //!
 //! # Parameters and units
 //! `compliance`, `compliance_outer`, `compliance_load` [rad/(N m)] as in `compliance`; `cubic` a [rad], negative
-//! where the joint hardens.
+//! where the joint hardens; `quintic` b [rad], which then turns back.
 //!
 //! # Signature in the data
 //! A sag whose growth with the lever of gravity bends over.
 //!
 //! # Not to be confused with
-//! `compliance`, its special case a = 0; `gravity_backlash`, the extreme soft zone.
+//! `compliance`, its special case a = b = 0; `gravity_backlash`, the extreme soft zone.
 //!
 //! # Source
 //! Adv. Mech. Eng. 2015, 10.1177/1687814015590289 (piecewise linear joint compliance).
@@ -46,7 +47,7 @@ pub(super) static KIND: EffectKind = EffectKind {
 struct HardeningCompliance {
     joint: usize,
     shares: Shares,
-    /// Index of the cubic amplitude.
+    /// Index of the cubic amplitude; the quintic one follows.
     cubic: usize,
     per_torque: f64,
 }
@@ -68,13 +69,16 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let cubic = amplitudes.len();
     let meaning = "cubic part of the angle with the nominal arm stretched out";
     amplitudes.push(amplitude("cubic", Unit::Radian, 0.2 * deg, 8.0 * deg, meaning));
+    let meaning = "part of the angle of fifth power with the nominal arm stretched out";
+    amplitudes.push(amplitude("quintic", Unit::Radian, 0.1 * deg, 8.0 * deg, meaning));
     Ok(Placement::new(amplitudes, HardeningCompliance { joint, shares, cubic, per_torque }))
 }
 
 impl Physics for HardeningCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let torque = &x.torque[self.joint];
-        let cubic = (torque.total_nm() * self.per_torque).powi(3);
-        change.joint(self.joint, self.shares.torque(theta, torque) + theta[self.cubic] * cubic);
+        let relative = torque.total_nm() * self.per_torque;
+        let bent = theta[self.cubic] * relative.powi(3) + theta[self.cubic + 1] * relative.powi(5);
+        change.joint(self.joint, self.shares.torque(theta, torque) + bent);
     }
 }

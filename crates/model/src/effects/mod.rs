@@ -69,7 +69,7 @@ pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;
 pub use spec::{EffectSpec, Since};
-pub use table::{EffectTable, Extra, Override, Word};
+pub use table::{EffectTable, Extra, Override, Word, effects_toml};
 
 pub(crate) use drivers::NominalPose;
 pub(crate) use placed::Effects;

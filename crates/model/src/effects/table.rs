@@ -185,3 +185,15 @@ impl From<&EffectSpec> for EffectTable {
         }
     }
 }
+
+/// Effects as the `[[effects]]` tables of a pipeline file.
+///
+/// # Errors
+/// A value that TOML cannot hold.
+pub fn effects_toml(effects: &[EffectSpec]) -> Result<String, toml::ser::Error> {
+    #[derive(Serialize)]
+    struct Section {
+        effects: Vec<EffectTable>,
+    }
+    toml::to_string(&Section { effects: effects.iter().map(EffectTable::from).collect() })
+}

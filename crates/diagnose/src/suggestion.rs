@@ -1,0 +1,63 @@
+//! From a diagnosis to the effects that it proposes to add.
+
+use crate::diagnosis::{Diagnosis, ExpressionParameter, UnknownReport, Verdict};
+use armcal_model::{EffectSpec, Expression, ModelError, Override};
+
+/// A formula must remove this share of what the free shape removes; otherwise a whole curve is offered.
+const FORMULA_SHARE: f64 = 0.9;
+/// Harmonics of an error curve that stands for an unlisted shape over a joint's own angle.
+const HARMONICS: f64 = 30.0;
+
+impl Diagnosis {
+    /// The effects found, the most probable name of each; where none has a name, all unlisted shapes.
+    ///
+    /// # Errors
+    /// A name that the catalogue does not know on an arm with these joints.
+    pub fn suggested(&self, joint_names: &[String]) -> Result<Vec<EffectSpec>, ModelError> {
+        let named = self.effects.iter().map(|e| EffectSpec::parse(&e.name, joint_names));
+        let mut effects = named.collect::<Result<Vec<_>, ModelError>>()?;
+        if self.verdict == Verdict::Unknown {
+            effects.extend(self.unlisted.iter().filter_map(UnknownReport::effect));
+        }
+        Ok(effects)
+    }
+}
+
+impl UnknownReport {
+    /// What to add for it: the expression that was fitted, or the error curve of a joint over its own angle where no
+    /// formula follows it. `None` where neither reaches the shape.
+    pub fn effect(&self) -> Option<EffectSpec> {
+        let own_angle = self
+            .channel
+            .strip_prefix("joint")
+            .filter(|joint| self.driver == format!("q{joint}"))
+            .and_then(|joint| joint.parse::<usize>().ok()?.checked_sub(1));
+        let formula = self.expression.as_ref();
+        if let Some(joint) = own_angle
+            && formula.is_none_or(|e| e.share_of_shape < FORMULA_SHARE)
+        {
+            return Some(EffectSpec::new("error_curve").at(joint).with("harmonics", HARMONICS));
+        }
+        let formula = formula?;
+        let mut spec = EffectSpec::new("expression");
+        spec.expression = Some(Expression {
+            name: format!("{}_over_{}", word(&self.channel), word(&self.driver)),
+            formula: formula.formula.clone(),
+            acts_on: formula.acts_on.clone(),
+        });
+        let override_of = |p: &ExpressionParameter| Override {
+            unit: Some(formula.unit.symbol().to_owned()),
+            start: Some(0.0),
+            bound: Some(p.bound),
+            prior: Some(p.prior),
+            free: None,
+        };
+        spec.overrides = formula.parameters.iter().map(|p| (p.name.clone(), override_of(p))).collect();
+        Some(spec)
+    }
+}
+
+/// Letters and digits of a name.
+fn word(text: &str) -> String {
+    text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}

@@ -1,0 +1,334 @@
+//! A fitted model seen by its observations: every candidate as columns, every way in for the unknown, every dwell.
+//!
+//! All candidates enter one model at zero amplitude, so one linearisation gives every column. Families with a shape to
+//! be searched would make thousands of columns; where a shape only switches a column on (an event at a dwell) or
+//! modulates a joint (a periodic error), the columns are kept as products.
+
+use crate::DiagnoseError;
+use crate::group::with_groups;
+use crate::places::places;
+use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
+use armcal_calibrate::{FitConfig, Linearisation, linearise};
+use armcal_core::{DwellId, Observation, Reference, Unit};
+use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
+use nalgebra::{DMatrix, Matrix3};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A length of the nominal arm below this is not a way for the unknown to enter [m].
+const SHORTEST_M: f64 = 0.02;
+/// Share of what an effect does by which it may differ from its derivative at zero, and still count as proportional.
+const PROPORTIONAL: f64 = 0.02;
+
+/// A fitted model seen by its observations.
+pub(crate) struct View<'a> {
+    pub model: &'a Model,
+    pub values: &'a [f64],
+    pub observations: &'a [Observation],
+    pub session: &'a Session,
+    pub fit: &'a FitConfig,
+    pub sizes: &'a BTreeMap<String, Option<f64>>,
+}
+
+impl View<'_> {
+    pub fn problem(&self) -> Result<Problem, DiagnoseError> {
+        let mut specs = self.model.candidates(self.session);
+        specs.retain(|spec| !self.taken(spec));
+        let base = self.linearised(&[])?.1;
+        let channels = self.channels(&base);
+        Ok(Problem {
+            dwells: self.dwells(&base),
+            residual: base.residual.clone(),
+            geometry: -&base.jacobian,
+            geometry_offset: base.axes.iter().map(|a| a.offset).collect::<Vec<_>>().into(),
+            geometry_precision: base.axes.iter().map(|a| a.precision).collect::<Vec<_>>().into(),
+            candidates: with_groups(self.candidates(&specs)?),
+            scans: self.scans(&channels)?,
+            channels,
+        })
+    }
+
+    /// Whether the model has an effect already.
+    fn taken(&self, spec: &EffectSpec) -> bool {
+        self.model.effects().iter().any(|e| e.spec == *spec)
+    }
+
+    /// The model with more effects at zero, linearised at the fit.
+    fn linearised(&self, specs: &[EffectSpec]) -> Result<(Model, Linearisation), DiagnoseError> {
+        let model = self.model.with_effects(specs, self.session)?;
+        let mut values = self.values.to_vec();
+        values.extend(&model.nominal()[values.len()..]);
+        let linear = linearise(&model, self.observations, &values, self.fit)?;
+        Ok((model, linear))
+    }
+
+    fn candidates(&self, specs: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
+        if specs.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (model, linear) = self.linearised(specs)?;
+        let new = &model.effects()[self.model.effects().len()..];
+        let mut all: Vec<Candidate> =
+            new.iter().map(|effect| self.candidate(&model, effect, &linear)).collect();
+        for (candidate, effect) in all.iter_mut().zip(new) {
+            if let Some(Some(size)) = self.sizes.get(&candidate.spec) {
+                candidate.columns = Columns::Dense(Arc::new(self.secant(&effect.spec, *size)?));
+            }
+        }
+        Ok(all)
+    }
+
+    /// Whether what an effect of one amplitude does at a size is more than its derivative at zero times that size.
+    pub fn bends(&self, spec: &EffectSpec, size: f64) -> Result<bool, DiagnoseError> {
+        let tangent = self.candidates(std::slice::from_ref(spec))?;
+        let Some(Candidate { columns: Columns::Dense(tangent), .. }) = tangent.first() else {
+            return Ok(false);
+        };
+        let secant = self.secant(spec, size)?;
+        Ok((&secant - tangent.as_ref()).norm() > PROPORTIONAL * tangent.norm())
+    }
+
+    /// What an effect of one amplitude does at a size, per typical size: a whitened column.
+    fn secant(&self, spec: &EffectSpec, size: f64) -> Result<DMatrix<f64>, DiagnoseError> {
+        let model = self.model.with_effects(std::slice::from_ref(spec), self.session)?;
+        let mut values = self.values.to_vec();
+        values.extend(&model.nominal()[values.len()..]);
+        let amplitude = model.effects().last().map_or(0, |e| e.parameters.start);
+        let without = linearise(&model, self.observations, &values, self.fit)?;
+        values[amplitude] = size;
+        let with = linearise(&model, self.observations, &values, self.fit)?;
+        let typical = without.axes.iter().find(|a| a.index == amplitude).map_or(1.0, |a| a.scale);
+        let change = (without.residual - with.residual) * (typical / size);
+        Ok(DMatrix::from_column_slice(change.len(), 1, change.as_slice()))
+    }
+
+    fn candidate(&self, model: &Model, effect: &PlacedEffect, linear: &Linearisation) -> Candidate {
+        let amplitudes = effect.parameters.start..effect.parameters.start + effect.amplitudes;
+        let own: Vec<usize> =
+            (0..linear.axes.len()).filter(|c| amplitudes.contains(&linear.axes[*c].index)).collect();
+        let prefix = format!("{}.", effect.spec);
+        let amplitude = |column: &usize| {
+            let axis = &linear.axes[*column];
+            let parameter = &model.parameters()[axis.index];
+            let name = parameter.name.strip_prefix(&prefix).unwrap_or(&parameter.name).to_owned();
+            Amplitude { name, unit: parameter.unit, typical: axis.scale }
+        };
+        Candidate {
+            spec: effect.spec.to_string(),
+            family: effect.spec.kind.clone(),
+            target: self.target(&effect.spec),
+            aliases: effect.kind.aliases.iter().map(|alias| (*alias).to_owned()).collect(),
+            amplitudes: own.iter().map(amplitude).collect(),
+            toggle: toggle(effect),
+            columns: Columns::Dense(Arc::new(-linear.jacobian.select_columns(&own))),
+        }
+    }
+
+    fn target(&self, spec: &EffectSpec) -> String {
+        let joint = spec.target.and_then(|j| self.model.chain().joint_names().get(j).cloned());
+        match (joint, &spec.since) {
+            (Some(joint), None) => joint,
+            (Some(joint), Some(since)) => format!("{joint} {}", words(since)),
+            (None, Some(since)) => words(since),
+            (None, None) => "arm".to_owned(),
+        }
+    }
+
+    /// Every family with a shape: products where the shape switches or modulates, columns of their own otherwise.
+    fn scans(&self, channels: &[Channel]) -> Result<Vec<Scan>, DiagnoseError> {
+        let dwells: Vec<DwellId> = self.observations.iter().map(|o| o.dwell).collect();
+        let Some(first) = dwells.iter().min().copied() else { return Ok(Vec::new()) };
+        let mut scans = Vec::new();
+        for (family, mut members) in self.model.scans(self.session, self.observations) {
+            members.retain(|spec| !self.taken(spec));
+            let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
+            let joint = family.target.map(|j| format!("joint{}", j + 1));
+            let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
+            let points = match channel {
+                _ if steps => self.stepped(&family, first, &members, &dwells)?,
+                Some(channel) if family.kind == "periodic" => self.modulated(channel, &members)?,
+                _ => self.candidates(&members)?,
+            };
+            scans.push(Scan { name: family.to_string(), points });
+        }
+        Ok(scans)
+    }
+
+    /// One column for all steps: the effect from the first dwell on, switched on at the step.
+    fn stepped(
+        &self,
+        family: &EffectSpec,
+        first: DwellId,
+        members: &[EffectSpec],
+        dwells: &[DwellId],
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
+        let always = family.clone().since(Since::Dwell(first));
+        let whole = self.candidates(&[always])?;
+        let Some(Candidate { columns: Columns::Dense(base), .. }) = whole.first() else {
+            return Ok(Vec::new());
+        };
+        let at = |member: &EffectSpec| {
+            let since = member.since.as_ref();
+            let on = |dwell: &DwellId| f64::from(since.is_some_and(|s| s.holds(*dwell)));
+            let basis = DMatrix::from_iterator(dwells.len(), 1, dwells.iter().map(on));
+            Candidate {
+                spec: member.to_string(),
+                target: self.target(member),
+                columns: Columns::Product { base: base.clone(), basis: Arc::new(basis) },
+                ..whole[0].clone()
+            }
+        };
+        Ok(members.iter().map(at).collect())
+    }
+
+    /// A periodic error turns its joint by a sine and a cosine of the reading.
+    fn modulated(&self, channel: &Channel, members: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
+        let Some(first) = members.first() else { return Ok(Vec::new()) };
+        let like = self.candidates(std::slice::from_ref(first))?;
+        let Some(like) = like.first() else { return Ok(Vec::new()) };
+        let joint = first.target.unwrap_or_default();
+        let at = |member: &EffectSpec| {
+            let frequency = member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1);
+            let basis = DMatrix::from_fn(self.observations.len(), 2, |i, k| {
+                let (sine, cosine) = (frequency * self.observations[i].joint_rad[joint]).sin_cos();
+                like.amplitudes[k].typical * if k == 0 { sine } else { cosine }
+            });
+            Candidate {
+                spec: member.to_string(),
+                columns: Columns::Product { base: channel.columns.clone(), basis: Arc::new(basis) },
+                ..like.clone()
+            }
+        };
+        Ok(members.iter().map(at).collect())
+    }
+
+    /// Where the unknown may enter: a joint, a length of the chain, the twist between two axes, a displacement.
+    fn channels(&self, linear: &Linearisation) -> Vec<Channel> {
+        // One linearisation an observation serves all joints, one all lengths and twists.
+        let turns = self.each(|o| self.model.joint_jacobian(self.values, o));
+        let moves = self.each(|o| self.model.residual_with_jacobian(self.values, o).1);
+        let joint = |j: usize| Channel {
+            name: format!("joint{}", j + 1),
+            unit: Unit::Radian,
+            axes: vec![format!("q{}", j + 1)],
+            columns: self.displaced(linear, 1, |i, _| turns[i].column(j).into_owned()),
+        };
+        let joints: Vec<Channel> = (0..self.model.joint_count()).map(joint).collect();
+        let chain = self.model.chain().parameters().iter().enumerate().filter(|(_, p)| {
+            let length = p.unit == Unit::Metre && p.nominal.abs() > SHORTEST_M;
+            length || p.name.ends_with(".alpha")
+        });
+        let parameters = chain.map(|(index, p)| {
+            // The jacobian is that of measured - predicted.
+            let columns =
+                self.displaced(linear, 1, |i, _| -moves[i].fixed_view::<3, 1>(0, index).into_owned());
+            Channel { name: p.name.clone(), axes: vec![p.name.clone()], unit: p.unit, columns }
+        });
+        let parameters: Vec<Channel> = parameters.collect();
+        let lengths_m = self.model.lengths_m();
+        let grown =
+            |i: usize, _| lengths_m.iter().map(|(k, m)| -moves[i].fixed_view::<3, 1>(0, *k) * *m).sum();
+        let lengths = Channel {
+            name: "lengths".to_owned(),
+            axes: vec!["lengths".to_owned()],
+            unit: Unit::One,
+            columns: self.displaced(linear, 1, grown),
+        };
+        let world = Channel {
+            name: "world".to_owned(),
+            axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
+            unit: Unit::Metre,
+            columns: self.displaced(linear, 3, |_, axis| Matrix3::identity().column(axis).into_owned()),
+        };
+        // A base that gives rocks about its horizontal axes; a belt from the base keeps the forearm's direction.
+        let centre = self.model.base_in_world(self.values).translation.vector;
+        let tilt = Channel {
+            name: "tilt of the base".to_owned(),
+            axes: Vec::new(),
+            unit: Unit::Radian,
+            columns: self.displaced(linear, 2, |i, axis| {
+                let tip = self.model.predicted_tip_in_world(self.values, &self.observations[i]);
+                Matrix3::identity().column(axis).cross(&(tip - centre))
+            }),
+        };
+        let belt = (joints.len() > 2).then(|| Channel {
+            name: "joint2 with the direction of joint3 kept".to_owned(),
+            axes: Vec::new(),
+            unit: Unit::Radian,
+            columns: Arc::new(joints[1].columns.as_ref() - joints[2].columns.as_ref()),
+        });
+        joints.into_iter().chain(belt).chain(parameters).chain([lengths, tilt, world]).collect()
+    }
+
+    fn each<T>(&self, of: impl Fn(&Observation) -> T) -> Vec<T> {
+        self.observations.iter().map(of).collect()
+    }
+
+    /// Whitened columns from displacements of the tip in the world; orientations are left as they are.
+    fn displaced(
+        &self,
+        linear: &Linearisation,
+        axes: usize,
+        displacement_m: impl Fn(usize, usize) -> nalgebra::Vector3<f64>,
+    ) -> Arc<DMatrix<f64>> {
+        let mut columns = DMatrix::zeros(linear.residual.len(), axes);
+        for (i, rows) in linear.rows.iter().enumerate() {
+            for axis in 0..axes {
+                let white = linear.whitener[i].columns(0, 3) * displacement_m(i, axis);
+                columns.view_mut((rows.start, axis), (rows.len(), 1)).copy_from(&white);
+            }
+        }
+        Arc::new(columns)
+    }
+
+    fn dwells(&self, linear: &Linearisation) -> Vec<DwellRow> {
+        let places = places(self.observations);
+        let rows = self.observations.iter().zip(&linear.rows).zip(&linear.whitener).enumerate();
+        rows.map(|(i, ((o, rows), whitener))| {
+            let drivers = self.model.drivers(self.session, o);
+            let sigma_m = (o.covariance_m2.trace() / 3.0).sqrt();
+            let axes = match &o.reference {
+                Reference::Seated { .. } => self.model.board_in_world(self.values, o.dwell.recording),
+                Reference::Tracked { .. } => None,
+            };
+            let axes =
+                axes.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());
+            DwellRow {
+                id: o.dwell,
+                first_row: rows.start,
+                rows: rows.len(),
+                time_s: drivers.time_s,
+                joint_rad: o.joint_rad.clone(),
+                arrival: drivers.arrival.clone(),
+                torque_nm: drivers.torque.iter().map(|t| t.total_nm()).collect(),
+                load_kg: o.load_kg,
+                temperature_c: o.temperature_c,
+                place: places[i].clone(),
+                tracked: o.cavity().is_none(),
+                seat: whitener.columns(0, 3) * DMatrix::from_column_slice(3, 3, axes.as_slice()) * sigma_m,
+                metres: metres(whitener),
+            }
+        })
+        .collect()
+    }
+}
+
+/// Inverse of the first three rows' whitener.
+fn metres(whitener: &DMatrix<f64>) -> Matrix3<f64> {
+    whitener.fixed_view::<3, 3>(0, 0).try_inverse().unwrap_or_else(Matrix3::zeros)
+}
+
+fn words(since: &Since) -> String {
+    match since {
+        Since::Recording(recording) => format!("in recording {recording}"),
+        Since::Dwell(dwell) => format!("from {dwell} on"),
+    }
+}
+
+fn toggle(effect: &PlacedEffect) -> Toggle {
+    match effect.spec.since {
+        Some(Since::Dwell(_)) => Toggle::Time,
+        Some(Since::Recording(_)) => Toggle::Recording,
+        None => effect.kind.toggle,
+    }
+}
