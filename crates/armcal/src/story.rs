@@ -4,13 +4,13 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::perceive::Seen;
-use crate::stages::{frames, observe, perceive};
+use crate::stages::{frames, observe, perceive, suggestion};
 use armcal_calibrate::{Calibration, calibrate};
 use armcal_core::{Observation, Rejection, Severity, Stage, Warning};
 use armcal_diagnose::{Diagnosis, diagnose};
 use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
-use armcal_report::Run;
+use armcal_report::{Refit, Run};
 use armcal_table::{Association, Board};
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
@@ -22,7 +22,9 @@ const MAX_ROUNDS: usize = 4;
 pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recording>), Error> {
     let settled = settle(pipeline, progress)?;
     let diagnosis = settled.diagnose(pipeline, progress)?;
-    Ok(settled.into_run(pipeline, diagnosis))
+    let (mut run, recordings) = settled.into_run(pipeline, diagnosis);
+    add_steps(&mut run, pipeline, progress)?;
+    Ok((run, recordings))
 }
 
 /// Recordings whose dwells have found their places, and the calibration on them.
@@ -104,9 +106,11 @@ impl Settled {
             recordings: perceive::recording_runs(pipeline, self.seen, self.places, &self.rejections),
             board: self.board,
             model: self.model,
+            session: frames::session(pipeline, &self.observations),
             observations: self.observations,
             calibration: self.calibration,
             diagnosis,
+            steps: Vec::new(),
             warnings,
         };
         (run, self.recordings)
@@ -128,7 +132,37 @@ pub fn recalibrate(
     run.warnings.extend(holdout_worse(&run.calibration));
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
+    add_steps(run, pipeline, progress)
+}
+
+/// Adds what the diagnosis found to the model, one effect after the other, each time fitted anew.
+fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
+    run.steps.clear();
+    let Some(diagnosis) = &run.diagnosis else { return Ok(()) };
+    let found = suggestion::of(diagnosis, run.model.chain().joint_names())?;
+    for count in 1..=found.len() {
+        progress.step(&format!("fitting what was found ({count} of {})", found.len()));
+        match refit(run, pipeline, &found[..count]) {
+            Ok(step) => run.steps.push(step),
+            // The verdict stands without it; only the picture of this step is missing.
+            Err(e) => {
+                let message =
+                    format!("the model with it cannot be fitted on this hold-out, so it is not shown: {e}");
+                let name = found[count - 1].to_string();
+                let code = "step-not-fitted";
+                run.warnings.push(Warning::new(Severity::Notice, Stage::Calibrate, code, name, message));
+                break;
+            }
+        }
+    }
     Ok(())
+}
+
+/// The run's model with more effects, calibrated on its observations.
+fn refit(run: &Run, pipeline: &Pipeline, effects: &[EffectSpec]) -> Result<Refit, Error> {
+    let model = run.model.with_effects(effects, &run.session)?;
+    let calibration = calibrate(&model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
+    Ok(Refit { effects: effects.iter().map(EffectSpec::to_string).collect(), model, calibration })
 }
 
 fn diagnosis(

@@ -49,7 +49,7 @@ pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
 pub use frames::{align_frames, fit_frames};
 pub use linearise::{LinearAxis, Linearisation, linearise};
-pub use model_problem::ModelProblem;
+pub use model_problem::{ModelProblem, position_covariance_m2};
 pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};

@@ -8,11 +8,20 @@ use crate::problem::Problem;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::Model;
-use nalgebra::{DMatrix, DVector, Matrix3xX};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 
 /// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
 /// the fit.
 const JOINT_STEP_RAD: f64 = 1e-6;
+
+/// Covariance of measured minus predicted position of an observation at parameters `p` [m^2].
+pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matrix3<f64> {
+    let mut jacobian = model.joint_jacobian(p, o);
+    for (mut column, sigma) in jacobian.column_iter_mut().zip(&o.joint_sigma_rad) {
+        column *= *sigma;
+    }
+    o.covariance_m2 + &jacobian * jacobian.transpose()
+}
 
 /// A model and the observations it should explain.
 pub struct ModelProblem<'a> {
@@ -43,13 +52,8 @@ impl<'a> ModelProblem<'a> {
     }
 
     /// Covariance of measured minus predicted position of a block at parameters `p` [m^2].
-    pub fn position_covariance_m2(&self, block: usize, p: &[f64]) -> nalgebra::Matrix3<f64> {
-        let o = self.observations[block];
-        let mut jacobian = self.model.joint_jacobian(p, o);
-        for (mut column, sigma) in jacobian.column_iter_mut().zip(&o.joint_sigma_rad) {
-            column *= *sigma;
-        }
-        o.covariance_m2 + &jacobian * jacobian.transpose()
+    pub fn position_covariance_m2(&self, block: usize, p: &[f64]) -> Matrix3<f64> {
+        position_covariance_m2(self.model, p, self.observations[block])
     }
 
     fn rows(&self, block: usize) -> usize {

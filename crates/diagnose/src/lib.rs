@@ -13,6 +13,7 @@
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `implied`: what each dwell says about each joint, for the eye;
 //! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
@@ -33,6 +34,7 @@ mod explain;
 mod expression;
 mod forward;
 mod group;
+mod implied;
 mod inner;
 mod judge;
 mod next;
@@ -69,6 +71,7 @@ pub use contrasts::Contrast;
 pub use crossval::HeldOut;
 pub use diagnosis::*;
 pub use error::DiagnoseError;
+pub use implied::{ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
 pub use observed::diagnose;
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};

@@ -30,7 +30,7 @@ pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis};
 pub use error::ReportError;
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
-pub use run::{RecordingRun, Run, Status, VERSION};
+pub use run::{RecordingRun, Refit, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};

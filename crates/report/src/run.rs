@@ -4,7 +4,7 @@ use armcal_calibrate::Calibration;
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, Severity, Warning};
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
-use armcal_model::Model;
+use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport};
 use armcal_table::{Assignment, Association, Board, Place};
 use serde::Serialize;
@@ -31,12 +31,27 @@ pub struct Run {
     pub model: Model,
     /// What the fit saw, and the dwells held out of it.
     pub observations: Vec<Observation>,
+    /// What effects know of all observations: what drives them is worked out with it.
+    pub session: Session,
     /// The calibration; its residuals are in the order of `observations`.
     pub calibration: Calibration,
     /// Which effect the calibrated model is missing; `None` when nobody asked.
     pub diagnosis: Option<Diagnosis>,
+    /// The effects that the diagnosis found, added one after the other, each fitted and held out anew.
+    pub steps: Vec<Refit>,
     /// What concerns the run as a whole.
     pub warnings: Vec<Warning>,
+}
+
+/// The run's model with more effects, fitted to the same observations and judged on the same hold-out.
+#[derive(Debug, Clone)]
+pub struct Refit {
+    /// Everything added to the run's model, as a pipeline names it, in the order of adding.
+    pub effects: Vec<String>,
+    /// The model with them.
+    pub model: Model,
+    /// Its calibration; its residuals are in the order of [`Run::observations`].
+    pub calibration: Calibration,
 }
 
 /// One recording and what every stage made of it.

@@ -8,7 +8,7 @@ use armcal_core::{
     TipMeasurement, Warning,
 };
 use armcal_dwell::ClockAlignment;
-use armcal_model::{Chain, Frame, Frames, Model};
+use armcal_model::{Chain, Frame, Frames, Model, Session};
 use armcal_recording::Recording;
 use armcal_report::{RecordingRun, Run};
 use armcal_table::{Assignment, Association, Board, Place};
@@ -98,9 +98,11 @@ pub fn synthetic() -> Synthetic {
         recordings: runs,
         board: Some(board),
         model,
+        session: Session::of(&observations),
         observations,
         calibration,
         diagnosis: None,
+        steps: Vec::new(),
         warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
     };
     Synthetic { run, recordings, paths, folder }
