@@ -1,9 +1,9 @@
 //! A serial arm: its segments, its joints, its parameters.
 
 use crate::dh_toml::DhTable;
-use crate::segment::Segment;
+use crate::segment::{Motion, Segment};
 use crate::urdf::UrdfJoint;
-use armcal_core::Parameter;
+use armcal_core::{Parameter, Unit};
 
 /// A serial arm from base to last link, read from a DH table or a URDF.
 ///
@@ -35,6 +35,12 @@ impl Chain {
     /// The moving joints from base to tip: the order of every joint vector.
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
+    }
+
+    /// Unit of a joint's reading: radian, or metre where it slides.
+    pub fn joint_unit(&self, joint: usize) -> Unit {
+        let slides = |s: &Segment| s.joint.is_some_and(|j| j.index == joint && j.motion == Motion::Prismatic);
+        if self.segments.iter().any(slides) { Unit::Metre } else { Unit::Radian }
     }
 
     /// The geometric parameters, in the order of the chain.

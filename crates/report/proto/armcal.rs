@@ -218,6 +218,9 @@ pub struct Residual {
     /// Position the calibrated model predicts: measured_m - fitted_mm / 1000.
     #[prost(message, optional, tag = "15")]
     pub predicted_m: ::core::option::Option<Vector>,
+    /// Norm after adding what the diagnosis found, one entry an effect (topic /armcal/steps).
+    #[prost(double, repeated, tag = "16")]
+    pub step_norm_mm: ::prost::alloc::vec::Vec<f64>,
 }
 /// One parameter of the model, in SI units and as shown to people.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -384,4 +387,355 @@ pub struct ClockAlignment {
     /// tracked point are right.
     #[prost(double, tag = "10")]
     pub displacement_ratio: f64,
+}
+/// What every dwell says about one joint, alone (topics /armcal/implied/joint1, ...), one message a run: the error of
+/// this joint that best explains the dwell's residual. Parallel arrays, one entry a dwell, in the order of time. Dwells in
+/// which the joint hardly moves the tip are left out.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct JointErrors {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// Name of the joint in the model.
+    #[prost(string, tag = "2")]
+    pub joint: ::prost::alloc::string::String,
+    /// Index of the joint, from 1, as effects name it: backlash:1.
+    #[prost(uint32, tag = "3")]
+    pub number: u32,
+    /// Unit of readings and errors: deg, or mm for a prismatic joint.
+    #[prost(string, tag = "4")]
+    pub unit: ::prost::alloc::string::String,
+    #[prost(uint32, tag = "5")]
+    pub left_out: u32,
+    #[prost(uint32, repeated, tag = "6")]
+    pub recording_index: ::prost::alloc::vec::Vec<u32>,
+    #[prost(uint32, repeated, tag = "7")]
+    pub dwell: ::prost::alloc::vec::Vec<u32>,
+    /// Reading of the joint.
+    #[prost(double, repeated, tag = "8")]
+    pub reading: ::prost::alloc::vec::Vec<f64>,
+    /// Gravity torque on the joint, for links of 2.5 kg/m and the declared load (prismatic: N).
+    #[prost(double, repeated, tag = "9")]
+    pub torque_nm: ::prost::alloc::vec::Vec<f64>,
+    /// Measured effort; empty unless every dwell has it.
+    #[prost(double, repeated, tag = "10")]
+    pub effort_nm: ::prost::alloc::vec::Vec<f64>,
+    /// Recorded time; gaps between recordings are left out.
+    #[prost(double, repeated, tag = "11")]
+    pub time_min: ::prost::alloc::vec::Vec<f64>,
+    /// Direction in which the joint arrived: +1, -1, or 0 when the recording does not show it.
+    #[prost(sint32, repeated, tag = "12")]
+    pub arrival: ::prost::alloc::vec::Vec<i32>,
+    /// Implied error of the calibrated model: the link is further in +q than model and encoder say.
+    #[prost(double, repeated, tag = "13")]
+    pub error: ::prost::alloc::vec::Vec<f64>,
+    /// Standard deviation of it by the declared noise.
+    #[prost(double, repeated, tag = "14")]
+    pub sigma: ::prost::alloc::vec::Vec<f64>,
+    /// The error again, split by direction of arrival: NaN, which plots leave out, for dwells of the others.
+    #[prost(double, repeated, tag = "15")]
+    pub positive: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "16")]
+    pub negative: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "17")]
+    pub unknown: ::prost::alloc::vec::Vec<f64>,
+    /// The same of the model with everything the diagnosis found; empty when it found nothing.
+    #[prost(double, repeated, tag = "18")]
+    pub error_after: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "19")]
+    pub positive_after: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "20")]
+    pub negative_after: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "21")]
+    pub unknown_after: ::prost::alloc::vec::Vec<f64>,
+}
+/// Errors on the board of one recording, in the frame of the board (topics /armcal/board/0, ... by recording), one message
+/// a recording. Parallel arrays, one entry a visit, in the order of time; vectors are measured minus predicted.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct BoardErrors {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(string, tag = "2")]
+    pub recording: ::prost::alloc::string::String,
+    #[prost(uint32, tag = "3")]
+    pub recording_index: u32,
+    #[prost(string, repeated, tag = "4")]
+    pub cavity: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(uint32, repeated, tag = "5")]
+    pub dwell: ::prost::alloc::vec::Vec<u32>,
+    /// Where the cavity is on the board.
+    #[prost(double, repeated, tag = "6")]
+    pub x_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "7")]
+    pub y_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "8")]
+    pub nominal_x_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "9")]
+    pub nominal_y_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "10")]
+    pub nominal_z_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "11")]
+    pub fitted_x_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "12")]
+    pub fitted_y_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "13")]
+    pub fitted_z_mm: ::prost::alloc::vec::Vec<f64>,
+    /// With everything the diagnosis found; empty when it found nothing.
+    #[prost(double, repeated, tag = "14")]
+    pub after_x_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "15")]
+    pub after_y_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "16")]
+    pub after_z_mm: ::prost::alloc::vec::Vec<f64>,
+    /// Factor by which /armcal/board_map draws them, the same for all recordings of a run.
+    #[prost(double, tag = "17")]
+    pub magnification: f64,
+}
+/// Errors over recorded time (topic /armcal/course), one message a run. Parallel arrays, one entry an observation.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Course {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// Recorded time; gaps between recordings are left out.
+    #[prost(double, repeated, tag = "2")]
+    pub time_min: ::prost::alloc::vec::Vec<f64>,
+    #[prost(string, repeated, tag = "3")]
+    pub recording: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(double, repeated, tag = "4")]
+    pub nominal_mm: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "5")]
+    pub fitted_mm: ::prost::alloc::vec::Vec<f64>,
+    /// With everything the diagnosis found; empty when it found nothing.
+    #[prost(double, repeated, tag = "6")]
+    pub after_mm: ::prost::alloc::vec::Vec<f64>,
+    /// Norm expected from the declared noise alone.
+    #[prost(double, repeated, tag = "7")]
+    pub expected_mm: ::prost::alloc::vec::Vec<f64>,
+}
+/// One step on the way from the nominal model to the one with everything found.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Step {
+    /// 0: nominal. 1: calibrated as the pipeline asks. 2 and on: one effect more.
+    #[prost(uint32, tag = "1")]
+    pub number: u32,
+    /// What this step adds: nominal, calibration, or an effect as a pipeline names it.
+    #[prost(string, tag = "2")]
+    pub adds: ::prost::alloc::string::String,
+    /// On points no fit saw; where nothing was held out, on the points the fit saw.
+    #[prost(double, tag = "3")]
+    pub mean_mm: f64,
+    #[prost(double, tag = "4")]
+    pub rms_mm: f64,
+    #[prost(double, tag = "5")]
+    pub p95_mm: f64,
+    #[prost(double, tag = "6")]
+    pub max_mm: f64,
+    /// By how much less the mean is than one step before.
+    #[prost(double, tag = "7")]
+    pub falls_by_percent: f64,
+}
+/// The falling error (topic /armcal/steps), one message a run.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Steps {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub steps: ::prost::alloc::vec::Vec<Step>,
+    /// Mean error expected from the declared noise alone.
+    #[prost(double, tag = "3")]
+    pub noise_floor_mm: f64,
+    /// Whether the errors are those of held-out points.
+    #[prost(bool, tag = "4")]
+    pub held_out: bool,
+}
+/// One entry of the catalogue, weighed on its own against the calibrated model. Absent numbers were not worked out.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Candidate {
+    /// As `armcal add` takes it.
+    #[prost(string, tag = "1")]
+    pub effect: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub target: ::prost::alloc::string::String,
+    /// Size with its 95 % interval, in words.
+    #[prost(string, tag = "3")]
+    pub size: ::prost::alloc::string::String,
+    #[prost(double, tag = "4")]
+    pub probability: f64,
+    #[prost(double, optional, tag = "5")]
+    pub log_evidence: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "6")]
+    pub p_adjusted: ::core::option::Option<f64>,
+    /// Mean error on places the fit did not see.
+    #[prost(double, optional, tag = "7")]
+    pub before_mm: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub after_mm: ::core::option::Option<f64>,
+    /// Share of its signature that the fitted geometry takes over.
+    #[prost(double, optional, tag = "9")]
+    pub absorbed_percent: ::core::option::Option<f64>,
+    /// Mechanisms and entries that are the same to these data.
+    #[prost(string, tag = "10")]
+    pub same_to_the_data: ::prost::alloc::string::String,
+}
+/// All candidates, best first (topic /armcal/candidates), one message a run that was diagnosed.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Candidates {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub candidates: ::prost::alloc::vec::Vec<Candidate>,
+}
+/// An effect that belongs in the model.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct FoundEffect {
+    #[prost(string, tag = "1")]
+    pub effect: ::prost::alloc::string::String,
+    /// Names that are the same answer, the most probable first.
+    #[prost(string, tag = "2")]
+    pub one_of: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub size: ::prost::alloc::string::String,
+    #[prost(double, tag = "4")]
+    pub probability: f64,
+    #[prost(double, optional, tag = "5")]
+    pub p_adjusted: ::core::option::Option<f64>,
+    /// Mean error on places the fit did not see, the other effects in the model.
+    #[prost(double, optional, tag = "6")]
+    pub before_mm: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "7")]
+    pub after_mm: ::core::option::Option<f64>,
+    /// The best other explanation, and how far its ln evidence is behind.
+    #[prost(string, tag = "8")]
+    pub rival: ::prost::alloc::string::String,
+    #[prost(double, optional, tag = "9")]
+    pub rival_behind_nats: ::core::option::Option<f64>,
+}
+/// A number of the verdict in a sentence.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Explanation {
+    #[prost(string, tag = "1")]
+    pub number: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub sentence: ::prost::alloc::string::String,
+}
+/// An effect these data could not have shown.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct NotTestable {
+    #[prost(string, tag = "1")]
+    pub effect: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub smallest_seen: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub typical: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub why: ::prost::alloc::string::String,
+}
+/// Which effect is missing (topic /armcal/diagnosis), one message a run that was diagnosed.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Diagnosis {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// nothing_missing, identified, ambiguous, unknown.
+    #[prost(string, tag = "2")]
+    pub verdict: ::prost::alloc::string::String,
+    /// The answer in a sentence.
+    #[prost(string, tag = "3")]
+    pub sentence: ::prost::alloc::string::String,
+    #[prost(string, repeated, tag = "4")]
+    pub names: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(double, tag = "5")]
+    pub probability: f64,
+    #[prost(double, optional, tag = "6")]
+    pub p_adjusted: ::core::option::Option<f64>,
+    #[prost(double, tag = "7")]
+    pub p_nothing: f64,
+    #[prost(message, repeated, tag = "8")]
+    pub effects: ::prost::alloc::vec::Vec<FoundEffect>,
+    #[prost(string, repeated, tag = "9")]
+    pub record_next: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(message, repeated, tag = "10")]
+    pub not_testable: ::prost::alloc::vec::Vec<NotTestable>,
+    #[prost(message, repeated, tag = "11")]
+    pub explanations: ::prost::alloc::vec::Vec<Explanation>,
+    /// Pairs that are the same to these data.
+    #[prost(string, repeated, tag = "12")]
+    pub cannot_tell_apart: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+}
+/// An error that no listed effect explains, over what it depends on (topics /armcal/unlisted/1, ...), one message a run.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ErrorCurve {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// Where it enters, and what it depends on.
+    #[prost(string, tag = "2")]
+    pub channel: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub driver: ::prost::alloc::string::String,
+    /// Units of value, low and high; and of at.
+    #[prost(string, tag = "4")]
+    pub unit: ::prost::alloc::string::String,
+    #[prost(string, tag = "5")]
+    pub driver_unit: ::prost::alloc::string::String,
+    #[prost(double, repeated, tag = "6")]
+    pub at: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "7")]
+    pub value: ::prost::alloc::vec::Vec<f64>,
+    /// 95 % band.
+    #[prost(double, repeated, tag = "8")]
+    pub low: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "9")]
+    pub high: ::prost::alloc::vec::Vec<f64>,
+    /// A formula that follows it, to paste as an effect; empty where none does.
+    #[prost(string, tag = "10")]
+    pub formula: ::prost::alloc::string::String,
+}
+/// One recording and what became of its dwells.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct RecordingQuality {
+    #[prost(string, tag = "1")]
+    pub recording: ::prost::alloc::string::String,
+    #[prost(uint32, tag = "2")]
+    pub dwells: u32,
+    #[prost(uint32, tag = "3")]
+    pub used: u32,
+    #[prost(uint32, tag = "4")]
+    pub rejected: u32,
+    #[prost(double, tag = "5")]
+    pub duration_min: f64,
+    /// Rows of the position sensor that did not see the body.
+    #[prost(uint64, tag = "6")]
+    pub occluded: u64,
+    /// Parts of its files that could not be read.
+    #[prost(uint32, tag = "7")]
+    pub damaged: u32,
+    #[prost(uint32, tag = "8")]
+    pub warnings: u32,
+    /// Absent without a sensor clock.
+    #[prost(double, optional, tag = "9")]
+    pub clock_offset_ms: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "10")]
+    pub clock_offset_sigma_ms: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "11")]
+    pub clock_drift_ppm: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "12")]
+    pub clock_correlation: ::core::option::Option<f64>,
+}
+/// A dwell that does not take part, and why.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct RejectedDwell {
+    #[prost(string, tag = "1")]
+    pub recording: ::prost::alloc::string::String,
+    #[prost(uint32, tag = "2")]
+    pub dwell: u32,
+    #[prost(string, tag = "3")]
+    pub why: ::prost::alloc::string::String,
+}
+/// What the data are like (topic /armcal/quality), one message a run.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Quality {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub recordings: ::prost::alloc::vec::Vec<RecordingQuality>,
+    #[prost(message, repeated, tag = "3")]
+    pub rejected: ::prost::alloc::vec::Vec<RejectedDwell>,
 }

@@ -145,7 +145,8 @@ fn ranking(pen: &Pen, d: &Diagnosis) -> String {
     pen.render(&table)
 }
 
-fn sizes(c: &CandidateReport) -> String {
+/// Its first amplitudes with their intervals.
+pub(crate) fn sizes(c: &CandidateReport) -> String {
     let mut shown: Vec<String> = c.parameters.iter().take(3).map(size).collect();
     if c.parameters.len() > shown.len() {
         shown.push(format!("and {} more", c.parameters.len() - shown.len()));
@@ -153,7 +154,8 @@ fn sizes(c: &CandidateReport) -> String {
     printable(&shown.join(", "))
 }
 
-fn size(p: &ParameterReport) -> String {
+/// `width 0.052 ± 0.004 deg`.
+pub(crate) fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
     let shown = |si| in_display_unit(p.unit, si);
     format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol())

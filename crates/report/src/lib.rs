@@ -13,6 +13,8 @@ mod comparison;
 mod diagnosis_summary;
 mod diagnosis_text;
 mod error;
+mod findings;
+mod layouts;
 mod mcap_file;
 mod model_file;
 mod parameters;

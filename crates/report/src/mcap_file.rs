@@ -1,6 +1,7 @@
 //! `run.mcap`: the input's messages untouched, the result channels, attachments and metadata.
 
-use crate::channels::{PREFIX, messages, run_end_ns};
+use crate::channels::{PREFIX, ResultMessage, messages, run_end_ns};
+use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::{Run, VERSION};
 use armcal_core::{Severity, Stage, Warning};
@@ -24,6 +25,7 @@ pub(crate) struct Attachment<'a> {
 pub(crate) fn write_mcap(
     run: &Run,
     points: &[Point],
+    findings: &Findings,
     inputs: &[Recording],
     attachments: &[Attachment],
     path: &Path,
@@ -33,7 +35,7 @@ pub(crate) fn write_mcap(
     for input in inputs {
         copy_messages(input, &mut out)?;
     }
-    put_results(run, points, &mut out)?;
+    put_results(messages(run, points, findings), &mut out)?;
     for input in inputs {
         copy_extras(input, &mut out)?;
     }
@@ -103,12 +105,12 @@ fn copy_extras(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingE
     Ok(())
 }
 
-fn put_results(run: &Run, points: &[Point], out: &mut McapOutput) -> Result<(), RecordingError> {
-    let mut sequences: BTreeMap<&str, u32> = BTreeMap::new();
-    for m in messages(run, points) {
+fn put_results(results: Vec<ResultMessage>, out: &mut McapOutput) -> Result<(), RecordingError> {
+    let mut sequences: BTreeMap<String, u32> = BTreeMap::new();
+    for m in results {
         let schema = (m.schema.name.as_str(), m.schema.encoding.as_str(), m.schema.data.as_ref());
-        let id = out.add_channel(m.topic, Some(schema), &m.message_encoding, &BTreeMap::new())?;
-        let sequence = sequences.entry(m.topic).or_insert(0);
+        let id = out.add_channel(&m.topic, Some(schema), &m.message_encoding, &BTreeMap::new())?;
+        let sequence = sequences.entry(m.topic.clone()).or_insert(0);
         out.put(id, *sequence, m.log_ns, m.publish_ns, &m.data)?;
         *sequence += 1;
     }

@@ -17,6 +17,8 @@ pub(crate) struct Point<'a> {
     pub nominal_measured_m: Vector3<f64>,
     /// Where the nominal robot puts it.
     pub nominal_predicted_m: Vector3<f64>,
+    /// Measured minus predicted after each of the run's steps.
+    pub steps_m: Vec<Vector3<f64>>,
 }
 
 /// The points of a run, in the order of its observations.
@@ -26,7 +28,8 @@ pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
     let nominal = &run.calibration.nominal_values;
     let pairs = run.observations.iter().zip(&run.calibration.residuals);
     Ok(pairs
-        .map(|(observation, residual)| {
+        .enumerate()
+        .map(|(i, (observation, residual))| {
             let measured_m = run.model.measured_tip_in_world(&fitted, observation);
             let nominal_measured_m = run.model.measured_tip_in_world(nominal, observation);
             Point {
@@ -36,6 +39,7 @@ pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
                 predicted_m: measured_m - residual.fitted_m,
                 nominal_measured_m,
                 nominal_predicted_m: nominal_measured_m - residual.nominal_m,
+                steps_m: run.steps.iter().map(|step| step.calibration.residuals[i].fitted_m).collect(),
             }
         })
         .collect())
@@ -43,13 +47,21 @@ pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
 
 /// Lengths and dwells that belong together do.
 fn check(run: &Run) -> Result<(), ReportError> {
-    let (observations, residuals) = (&run.observations, &run.calibration.residuals);
+    let observations = &run.observations;
     let inconsistent = |what: String| Err(ReportError::Inconsistent(what));
-    if observations.len() != residuals.len() {
-        return inconsistent(format!("{} observations, {} residuals", observations.len(), residuals.len()));
-    }
-    if let Some((o, r)) = observations.iter().zip(residuals).find(|(o, r)| o.dwell != r.dwell) {
-        return inconsistent(format!("the residual of {} stands where that of {} belongs", r.dwell, o.dwell));
+    for calibration in std::iter::once(&run.calibration).chain(run.steps.iter().map(|step| &step.calibration))
+    {
+        let residuals = &calibration.residuals;
+        if observations.len() != residuals.len() {
+            let (o, r) = (observations.len(), residuals.len());
+            return inconsistent(format!("{o} observations, {r} residuals"));
+        }
+        if let Some((o, r)) = observations.iter().zip(residuals).find(|(o, r)| o.dwell != r.dwell) {
+            return inconsistent(format!(
+                "the residual of {} stands where that of {} belongs",
+                r.dwell, o.dwell
+            ));
+        }
     }
     if let Some(o) = observations.iter().find(|o| o.dwell.recording >= run.recordings.len()) {
         return inconsistent(format!("{} is of no recording", o.dwell));
@@ -60,6 +72,13 @@ fn check(run: &Run) -> Result<(), ReportError> {
     {
         if values != parameters {
             return inconsistent(format!("{values} {what} values for {parameters} parameters"));
+        }
+    }
+    for step in &run.steps {
+        let (values, parameters) = (step.calibration.fit.estimates.len(), step.model.parameters().len());
+        if values != parameters {
+            let name = step.effects.join(", ");
+            return inconsistent(format!("{values} fitted values for {parameters} parameters with {name}"));
         }
     }
     run.model.check(observations)?;

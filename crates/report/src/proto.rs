@@ -33,4 +33,19 @@ macro_rules! impl_encode {
     };
 }
 
-impl_encode!(Dwell, Assignment, Residual, Parameters, Calibration, ClockAlignment);
+impl_encode!(
+    Dwell,
+    Assignment,
+    Residual,
+    Parameters,
+    Calibration,
+    ClockAlignment,
+    JointErrors,
+    BoardErrors,
+    Course,
+    Steps,
+    Candidates,
+    Diagnosis,
+    ErrorCurve,
+    Quality
+);

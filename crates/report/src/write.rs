@@ -1,5 +1,7 @@
 //! All files of a run, in one folder.
 
+use crate::findings::Findings;
+use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
 use crate::model_file::model_file;
 use crate::parameters::parameters_toml;
@@ -11,6 +13,10 @@ use armcal_recording::{Recording, RecordingError};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+
+/// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
+const LAYOUT: &str = "foxglove-layout.json";
+const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
 
 /// The `[output]` section of a pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -31,8 +37,8 @@ pub enum InputMessages {
     Reference,
 }
 
-/// Writes `run.mcap`, `summary.json`, `parameters.toml`, the calibrated model and the Parquet tables into
-/// `out_dir`, which is made if need be; returns their paths.
+/// Writes `run.mcap`, `summary.json`, `parameters.toml`, the calibrated model, Foxglove layouts and the Parquet tables
+/// into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
 /// [`InputMessages::Copy`]. Files of an earlier run are replaced, each at once.
@@ -55,11 +61,19 @@ pub fn write_all(
     let parameters = parameters_toml(run)?;
     let summary = summary_json(run);
     let tables = parquet_files(run, &points)?;
+    let findings = Findings::of(run, &points);
+    let layouts = layouts(run, &points, &findings);
 
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let mut staged = Vec::new();
-    let texts = [("summary.json", &summary), ("parameters.toml", &parameters), (model.name, &model.text)];
+    let texts = [
+        ("summary.json", &summary),
+        ("parameters.toml", &parameters),
+        (model.name, &model.text),
+        (LAYOUT, &layouts.current),
+        (LAYOUT_LEGACY, &layouts.legacy),
+    ];
     for (name, text) in texts {
         staged.push(stage(&out_dir.join(name), text.as_bytes())?);
     }
@@ -72,13 +86,15 @@ pub fn write_all(
         Attachment { name: "summary.json", media_type: "application/json", text: &summary },
         Attachment { name: "parameters.toml", media_type: "application/toml", text: &parameters },
         Attachment { name: model.name, media_type: model.media_type, text: &model.text },
+        Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
+        Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];
     let to_copy = match config.input {
         InputMessages::Copy => recordings,
         InputMessages::Reference => &[],
     };
     let mcap_path = out_dir.join("run.mcap");
-    write_mcap(run, &points, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
+    write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
 
     let mut written = vec![mcap_path];
     for file in staged {

@@ -1,6 +1,6 @@
 //! The facts as protobuf messages of `proto/armcal.proto`.
 
-use super::{Messages, run_start_ns, start_ns, to_sensor_ns, unsigned};
+use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use crate::points::Point;
 use crate::proto;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
@@ -129,6 +129,7 @@ fn residual(run: &Run, point: &Point) -> proto::Residual {
         expected_norm_mm: r.expected_norm_m * 1e3,
         measured_m: Some(vector(&point.measured_m)),
         predicted_m: Some(vector(&point.predicted_m)),
+        step_norm_mm: point.steps_m.iter().map(|r| r.norm() * 1e3).collect(),
     }
 }
 
@@ -228,12 +229,8 @@ fn vector(v: &Vector3<f64>) -> proto::Vector {
     proto::Vector { x: v.x, y: v.y, z: v.z }
 }
 
-fn time(time_ns: i64) -> Option<prost_types::Timestamp> {
+pub(super) fn time(time_ns: i64) -> Option<prost_types::Timestamp> {
     let time_ns = unsigned(time_ns);
     let seconds = i64::try_from(time_ns / 1_000_000_000).unwrap_or(i64::MAX);
     Some(prost_types::Timestamp { seconds, nanos: (time_ns % 1_000_000_000) as i32 })
-}
-
-fn count(n: usize) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
 }

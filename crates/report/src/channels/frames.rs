@@ -1,11 +1,22 @@
 //! The transform tree: `world` -> `nominal/...` and `calibrated/...`, link by link, and `board/<recording>`.
 
 use super::shapes::{quaternion, vector};
-use super::{Messages, WORLD, timestamp};
+use super::{Messages, WORLD, run_start_ns, timestamp};
 use crate::run::Run;
 use armcal_core::{Dwell, Pose};
 use foxglove::messages as fox;
 use std::collections::BTreeSet;
+
+/// What stands still, before the first dwell: the frame of the map of boards.
+pub(super) fn put_standing(run: &Run, out: &mut Messages) {
+    let begin_ns = run_start_ns(run);
+    out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: vec![board_map(begin_ns)] });
+}
+
+/// The map of boards is a drawing, so where it lies does not matter.
+fn board_map(time_ns: i64) -> fox::FrameTransform {
+    transform(time_ns, WORLD, super::board_map::FRAME, &Pose::identity())
+}
 
 /// The tree at one dwell, complete.
 pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, out: &mut Messages) {
@@ -14,7 +25,7 @@ pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, out: &mut Messages
     }
     let fitted = run.calibration.fit.values();
     let time_ns = dwell.mid_ns();
-    let mut transforms = Vec::new();
+    let mut transforms = vec![board_map(time_ns)];
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
         let mut parent_name = WORLD.to_owned();
         let mut names = BTreeSet::new();

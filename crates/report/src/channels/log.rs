@@ -1,6 +1,7 @@
 //! Milestones and warnings as `foxglove.Log`.
 
 use super::{Messages, run_end_ns, run_start_ns, start_ns, timestamp};
+use crate::findings::Findings;
 use crate::run::{Run, VERSION};
 use crate::text::conclusion;
 use armcal_core::{Severity, Stage, Warning};
@@ -9,7 +10,7 @@ use foxglove::messages::log::Level;
 
 const TOPIC: &str = "/armcal/log";
 
-pub(super) fn milestones(run: &Run, out: &mut Messages) {
+pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     let opening = format!("armcal {VERSION}, pipeline {}", run.pipeline_name);
     put(out, begin_ns, Level::Info, "armcal", &run.pipeline_name, opening);
@@ -37,6 +38,25 @@ pub(super) fn milestones(run: &Run, out: &mut Messages) {
         }
     }
     put(out, run_end_ns(run), Level::Info, "armcal.calibrate", "", conclusion(&run.calibration));
+    verdict(run_end_ns(run), findings, out);
+}
+
+/// What the diagnosis says, what each step brought, and what to record next.
+fn verdict(time_ns: i64, findings: &Findings, out: &mut Messages) {
+    let Some((diagnosis, _)) = &findings.diagnosis else { return };
+    let mut say = |level, subject: &str, words| put(out, time_ns, level, "armcal.diagnose", subject, words);
+    let level = if diagnosis.verdict == "nothing_missing" { Level::Info } else { Level::Warning };
+    say(level, &diagnosis.verdict, diagnosis.sentence.clone());
+    for step in findings.steps.steps.iter().skip(2) {
+        let falls = format!(
+            "with {} the mean error is {:.3} mm ({:.1} % less)",
+            step.adds, step.mean_mm, step.falls_by_percent
+        );
+        say(Level::Info, &step.adds, falls);
+    }
+    for next in &diagnosis.record_next {
+        say(Level::Info, "record next", next.clone());
+    }
 }
 
 fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {

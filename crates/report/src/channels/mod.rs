@@ -2,9 +2,12 @@
 //!
 //! | topic | schema | messages |
 //! |---|---|---|
-//! | `/armcal/scene` | `foxglove.SceneUpdate` | one a recording: board, points, error arrows, their scale |
+//! | `/armcal/scene` | `foxglove.SceneUpdate` | one a recording: board, points, scale of the arrows |
+//! | `/armcal/arrows_nominal`, `_calibrated`, `_after` | `foxglove.SceneUpdate` | one a recording: error arrows; `after` \
+//!   with everything found |
+//! | `/armcal/board_map` | `foxglove.SceneUpdate` | one a run: all boards from above, side by side, with error arrows |
 //! | `/armcal/arms` | `foxglove.SceneUpdate` | one a dwell: nominal and calibrated arm, measured tip |
-//! | `/armcal/tf` | `foxglove.FrameTransforms` | one a dwell: both arms link by link, the board |
+//! | `/armcal/tf` | `foxglove.FrameTransforms` | one a dwell: both arms link by link, the board; the frame of the map |
 //! | `/armcal/path_measured`, `_nominal`, `_calibrated` | `foxglove.PosesInFrame` | one a recording |
 //! | `/armcal/tip_measured` | `foxglove.PoseInFrame` | one an observation |
 //! | `/armcal/dwells` | `armcal.Dwell` | one a dwell |
@@ -13,6 +16,13 @@
 //! | `/armcal/parameters` | `armcal.Parameters` | one a run |
 //! | `/armcal/report` | `armcal.Calibration` | one a run |
 //! | `/armcal/clock` | `armcal.ClockAlignment` | one a recording with a sensor clock |
+//! | `/armcal/implied/joint1`, ... | `armcal.JointErrors` | one a run: error against angle, by direction of arrival |
+//! | `/armcal/board/0`, ... | `armcal.BoardErrors` | one a recording with a board: error vectors on it |
+//! | `/armcal/course` | `armcal.Course` | one a run: error over recorded time |
+//! | `/armcal/steps` | `armcal.Steps` | one a run: the falling error |
+//! | `/armcal/diagnosis`, `/armcal/candidates` | `armcal.Diagnosis`, `armcal.Candidates` | one a diagnosed run |
+//! | `/armcal/unlisted/1`, ... | `armcal.ErrorCurve` | one an error without a name |
+//! | `/armcal/quality` | `armcal.Quality` | one a run: clocks, occlusion, dwells not used |
 //! | `/armcal/log` | `foxglove.Log` | warnings and milestones |
 //!
 //! A viewer that seeks shows the latest message of each topic and nothing before it. So every message
@@ -22,13 +32,19 @@
 //! run is logged at its beginning. The publish time is the same, except where the position sensor saw
 //! the tip: there it is the sensor's own stamp.
 
+mod arrows;
+pub(crate) mod board_map;
 mod facts;
+mod findings;
 mod frames;
 mod log;
 mod paths;
 mod scene;
 mod shapes;
 
+pub(crate) use findings::{curve_topic, implied_topic};
+
+use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::{RecordingRun, Run};
 use armcal_dwell::ClockAlignment;
@@ -42,7 +58,7 @@ pub(crate) const WORLD: &str = "world";
 
 /// One message, ready to be written.
 pub(crate) struct ResultMessage {
-    pub topic: &'static str,
+    pub topic: String,
     pub schema: Schema,
     pub message_encoding: String,
     pub log_ns: u64,
@@ -51,15 +67,20 @@ pub(crate) struct ResultMessage {
 }
 
 /// All result messages in the order of their log times.
-pub(crate) fn messages(run: &Run, points: &[Point]) -> Vec<ResultMessage> {
+pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<ResultMessage> {
     let mut out = Messages::default();
-    log::milestones(run, &mut out);
+    log::milestones(run, findings, &mut out);
     facts::put(run, points, &mut out);
+    findings::put(run, findings, &mut out);
+    frames::put_standing(run, &mut out);
+    board_map::put(run, findings, &mut out);
+    let drawing = arrows::Drawing::of(run, points);
     for (index, recording) in run.recordings.iter().enumerate() {
         let of_recording: Vec<&Point> =
             points.iter().filter(|p| p.observation.dwell.recording == index).collect();
         paths::put(recording, &of_recording, &mut out);
-        scene::standing(run, index, &of_recording, points, &mut out);
+        scene::standing(run, index, &of_recording, &drawing, &mut out);
+        arrows::put(run, index, &of_recording, &drawing, &mut out);
         for dwell in &recording.dwells {
             frames::put(run, index, dwell, &mut out);
             scene::arms(run, dwell, &of_recording, &mut out);
@@ -93,15 +114,21 @@ struct Messages {
 }
 
 impl Messages {
-    fn put<T: Encode>(&mut self, topic: &'static str, time_ns: i64, message: &T) {
+    fn put<T: Encode>(&mut self, topic: impl Into<String>, time_ns: i64, message: &T) {
         self.put_published(topic, time_ns, time_ns, message);
     }
 
-    fn put_published<T: Encode>(&mut self, topic: &'static str, log_ns: i64, publish_ns: i64, message: &T) {
+    fn put_published<T: Encode>(
+        &mut self,
+        topic: impl Into<String>,
+        log_ns: i64,
+        publish_ns: i64,
+        message: &T,
+    ) {
         let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(0));
         message.encode(&mut data).expect("a vector grows to any length");
         self.messages.push(ResultMessage {
-            topic,
+            topic: topic.into(),
             schema: T::get_schema().expect("protobuf messages have a schema"),
             message_encoding: T::get_message_encoding(),
             log_ns: unsigned(log_ns),
@@ -109,6 +136,11 @@ impl Messages {
             data,
         });
     }
+}
+
+/// Counts and indices as protobuf has them.
+pub(crate) fn count(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// MCAP has no time before 1970.

@@ -62,6 +62,11 @@ pub(super) fn disc(place: &Pose, diameter_m: f64, height_m: f64, rgba: Rgba) -> 
     }
 }
 
+/// A box about `centre`.
+pub(super) fn plate(centre: &Pose, size_m: &Vector3<f64>, rgba: Rgba) -> fox::CubePrimitive {
+    fox::CubePrimitive { pose: Some(pose(centre)), size: Some(vector(size_m)), color: Some(colour(rgba)) }
+}
+
 /// Text that turns towards the viewer; its height is in metres.
 pub(super) fn text(
     position_m: &Vector3<f64>,

@@ -95,19 +95,32 @@ fn every_result_message_decodes_with_the_schema_it_carries() {
     }
     let expected = [
         ("/armcal/arms", 18),
+        ("/armcal/arrows_calibrated", 3),
+        ("/armcal/arrows_nominal", 3),
         ("/armcal/assignments", 18),
+        ("/armcal/board/0", 1),
+        ("/armcal/board/1", 1),
+        ("/armcal/board/2", 1),
+        ("/armcal/board_map", 1),
         ("/armcal/clock", 1),
+        ("/armcal/course", 1),
         ("/armcal/dwells", 18),
+        ("/armcal/implied/joint1", 1),
+        ("/armcal/implied/joint2", 1),
+        ("/armcal/implied/joint3", 1),
         // 1 opening, 3 recordings, 5 rejections, 3 warnings (association, gap, earlier results), 1 conclusion.
         ("/armcal/log", 13),
         ("/armcal/parameters", 1),
         ("/armcal/path_calibrated", 3),
         ("/armcal/path_measured", 3),
         ("/armcal/path_nominal", 3),
+        ("/armcal/quality", 1),
         ("/armcal/report", 1),
         ("/armcal/residuals", 13),
         ("/armcal/scene", 3),
-        ("/armcal/tf", 18),
+        ("/armcal/steps", 1),
+        // One a dwell, and one before them all.
+        ("/armcal/tf", 19),
         ("/armcal/tip_measured", 13),
     ];
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);
@@ -151,6 +164,8 @@ fn attachments_and_metadata_are_the_inputs_and_ours() {
         ("armcal/summary.json", file("summary.json")),
         ("armcal/parameters.toml", file("parameters.toml")),
         ("armcal/calibrated.toml", file("calibrated.toml")),
+        ("armcal/foxglove-layout.json", file("foxglove-layout.json")),
+        ("armcal/foxglove-layout-legacy.json", file("foxglove-layout-legacy.json")),
     ];
     assert_eq!(attachments, expected.map(|(name, data)| (name.to_owned(), data)));
 
@@ -170,18 +185,19 @@ fn arrows_lead_from_the_measured_to_the_predicted_tip() {
     let messages = read(&write(&s, InputMessages::Reference, "out").join("run.mcap"));
     let model = &s.run.model;
     let sets = [
-        ("errors/nominal", s.run.calibration.nominal_values.clone()),
-        ("errors/calibrated", s.run.calibration.fit.values()),
+        ("/armcal/arrows_nominal", s.run.calibration.nominal_values.clone()),
+        ("/armcal/arrows_calibrated", s.run.calibration.fit.values()),
     ];
     for (recording, scene) in own(&messages, "/armcal/scene").iter().enumerate() {
         let entities = list(scene, "entities");
-        let entity = |id: &str| entities.iter().find(|e| string(e, "id") == id).unwrap();
-        let legend = string(&list(entity("scale"), "texts")[0], "text");
+        let scale = entities.iter().find(|e| string(e, "id") == "scale").unwrap();
+        let legend = string(&list(scale, "texts")[0], "text");
         for (id, p) in &sets {
-            let factor: f64 = string(&list(entity(id), "metadata")[0], "value").parse().unwrap();
+            let entity = &list(&own(&messages, id)[recording], "entities")[0];
+            let factor: f64 = string(&list(entity, "metadata")[0], "value").parse().unwrap();
             assert!(factor > 1.0 && legend.contains(&format!("errors x {factor}")), "{legend}");
             let own = s.run.observations.iter().filter(|o| o.dwell.recording == recording);
-            let arrows = list(entity(id), "arrows");
+            let arrows = list(entity, "arrows");
             assert_eq!(arrows.len(), own.clone().count());
             for (arrow, o) in arrows.iter().zip(own) {
                 let measured = model.measured_tip_in_world(p, o);
@@ -282,7 +298,7 @@ fn the_same_run_gives_the_same_bytes() {
         let (a, b) = (write(&s, input, "a"), write(&s, input, "b"));
         let mut names: Vec<_> = std::fs::read_dir(&a).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
-        assert_eq!(names.len(), 7);
+        assert_eq!(names.len(), 9);
         for name in names {
             let same = std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap();
             assert!(same, "{} differs", name.display());

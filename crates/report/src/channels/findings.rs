@@ -1,0 +1,48 @@
+//! What was found, at the beginning of the run (of the recording, where it is about one).
+
+use super::facts::time;
+use super::{Messages, run_start_ns, start_ns};
+use crate::findings::Findings;
+use crate::run::Run;
+
+pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
+    let begin_ns = run_start_ns(run);
+    let stamp = || time(begin_ns);
+    for joint in &f.joints {
+        let topic = implied_topic(joint.number);
+        out.put(topic, begin_ns, &crate::proto::JointErrors { timestamp: stamp(), ..joint.clone() });
+    }
+    for board in &f.boards {
+        let start_ns = start_ns(&run.recordings[board.recording_index as usize]);
+        let message = crate::proto::BoardErrors { timestamp: time(start_ns), ..board.clone() };
+        out.put(board_topic(board.recording_index), start_ns, &message);
+    }
+    out.put("/armcal/course", begin_ns, &crate::proto::Course { timestamp: stamp(), ..f.course.clone() });
+    out.put("/armcal/steps", begin_ns, &crate::proto::Steps { timestamp: stamp(), ..f.steps.clone() });
+    if let Some((diagnosis, candidates)) = &f.diagnosis {
+        let diagnosis = crate::proto::Diagnosis { timestamp: stamp(), ..diagnosis.clone() };
+        out.put("/armcal/diagnosis", begin_ns, &diagnosis);
+        let candidates = crate::proto::Candidates { timestamp: stamp(), ..candidates.clone() };
+        out.put("/armcal/candidates", begin_ns, &candidates);
+    }
+    for (number, curve) in (1..).zip(&f.curves) {
+        let message = crate::proto::ErrorCurve { timestamp: stamp(), ..curve.clone() };
+        out.put(curve_topic(number), begin_ns, &message);
+    }
+    out.put("/armcal/quality", begin_ns, &crate::proto::Quality { timestamp: stamp(), ..f.quality.clone() });
+}
+
+/// Topic of what is implied about a joint, by its number from 1.
+pub(crate) fn implied_topic(number: u32) -> String {
+    format!("/armcal/implied/joint{number}")
+}
+
+/// Topic of the errors on the board of a recording, by its index.
+pub(crate) fn board_topic(recording_index: u32) -> String {
+    format!("/armcal/board/{recording_index}")
+}
+
+/// Topic of an unlisted error, by its number from 1.
+pub(crate) fn curve_topic(number: usize) -> String {
+    format!("/armcal/unlisted/{number}")
+}

@@ -1,0 +1,49 @@
+//! Errors over recorded time.
+
+use crate::points::Point;
+use crate::proto::Course;
+use crate::run::Run;
+
+pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
+    let time_min = recorded_min(run, points);
+    let mut m = Course::default();
+    for &i in in_time {
+        let p = &points[i];
+        let norms_m = [p.residual.nominal_m.norm(), p.residual.fitted_m.norm(), p.residual.expected_norm_m];
+        let after_m = p.steps_m.last().map(|r| r.norm());
+        if !norms_m.iter().copied().chain(after_m).all(f64::is_finite) {
+            continue;
+        }
+        m.time_min.push(time_min[i]);
+        m.recording.push(run.recording_name(p.observation.dwell).to_owned());
+        m.nominal_mm.push(norms_m[0] * 1e3);
+        m.fitted_mm.push(norms_m[1] * 1e3);
+        m.expected_mm.push(norms_m[2] * 1e3);
+        m.after_mm.extend(after_m.map(|after_m| after_m * 1e3));
+    }
+    m
+}
+
+/// When each point was taken, in minutes of recorded time: recordings follow one another in the order of their first
+/// points, without the gaps between them.
+pub(super) fn recorded_min(run: &Run, points: &[Point]) -> Vec<f64> {
+    let mut spans: Vec<(i64, i64, usize)> = (0..run.recordings.len())
+        .filter_map(|r| {
+            let times =
+                || points.iter().map(|p| p.observation).filter(|o| o.dwell.recording == r).map(|o| o.time_ns);
+            Some((times().min()?, times().max()?, r))
+        })
+        .collect();
+    spans.sort_unstable();
+    let mut begins = vec![(0_i64, 0.0); run.recordings.len()];
+    let mut elapsed_min = 0.0;
+    for (first_ns, last_ns, r) in spans {
+        begins[r] = (first_ns, elapsed_min);
+        elapsed_min += (last_ns - first_ns) as f64 / 60e9;
+    }
+    let at = |p: &Point| {
+        let (first_ns, before_min) = begins[p.observation.dwell.recording];
+        before_min + (p.observation.time_ns - first_ns) as f64 / 60e9
+    };
+    points.iter().map(at).collect()
+}

@@ -1,0 +1,77 @@
+//! The verdict and what it was weighed against, in rows that a table panel shows.
+
+use super::{finite, or_zero};
+use crate::diagnosis_text::{headline, size, sizes};
+use crate::proto;
+use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, Verdict};
+
+pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
+    let not_testable = d.not_testable.iter().map(|n| proto::NotTestable {
+        effect: n.effect.clone(),
+        smallest_seen: n.smallest_seen.clone(),
+        typical: n.typical.clone(),
+        why: n.why.clone(),
+    });
+    let explanations = d
+        .explanations
+        .iter()
+        .map(|e| proto::Explanation { number: e.number.clone(), sentence: e.sentence.clone() });
+    proto::Diagnosis {
+        timestamp: None,
+        verdict: verdict_word(d.verdict).into(),
+        sentence: headline(d),
+        names: d.names.clone(),
+        probability: or_zero(d.probability),
+        p_adjusted: finite(d.p_adjusted),
+        p_nothing: or_zero(d.p_nothing),
+        effects: d.effects.iter().map(found).collect(),
+        record_next: d.record_next.clone(),
+        not_testable: not_testable.collect(),
+        explanations: explanations.collect(),
+        cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
+    }
+}
+
+pub(super) fn candidates(d: &Diagnosis) -> proto::Candidates {
+    proto::Candidates { timestamp: None, candidates: d.candidates.iter().map(candidate).collect() }
+}
+
+fn candidate(c: &CandidateReport) -> proto::Candidate {
+    proto::Candidate {
+        effect: c.spec.clone(),
+        target: c.target.clone(),
+        size: sizes(c),
+        probability: or_zero(c.probability),
+        log_evidence: finite(c.log_evidence),
+        p_adjusted: finite(c.p_adjusted),
+        before_mm: c.holdout_mm.and_then(|h| finite(h.before)),
+        after_mm: c.holdout_mm.and_then(|h| finite(h.after)),
+        absorbed_percent: finite(100.0 * c.absorbed),
+        same_to_the_data: c.same_to_the_data.join(", "),
+    }
+}
+
+fn found(e: &FoundEffect) -> proto::FoundEffect {
+    let sizes: Vec<String> = e.parameters.iter().map(size).collect();
+    proto::FoundEffect {
+        effect: e.name.clone(),
+        one_of: if e.set.len() > 1 { e.set.join(", ") } else { String::new() },
+        size: sizes.join(", "),
+        probability: or_zero(e.probability),
+        p_adjusted: finite(e.p_adjusted),
+        before_mm: finite(e.places.before),
+        after_mm: finite(e.places.after),
+        rival: e.rival.as_ref().map(|r| r.name.clone()).unwrap_or_default(),
+        rival_behind_nats: e.rival.as_ref().and_then(|r| finite(r.behind_nats)),
+    }
+}
+
+/// As `summary.json` spells it.
+pub(crate) fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => "nothing_missing",
+        Verdict::Identified => "identified",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unknown => "unknown",
+    }
+}

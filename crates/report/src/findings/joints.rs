@@ -1,0 +1,102 @@
+//! What every dwell says about each joint, by direction of arrival: hysteresis opens into two branches.
+
+use super::course::recorded_min;
+use crate::channels::count;
+use crate::points::Point;
+use crate::proto::JointErrors;
+use crate::run::Run;
+use armcal_core::Observation;
+use armcal_core::robust::median;
+use armcal_diagnose::{ImpliedError, implied_joint_errors};
+use nalgebra::Vector3;
+
+/// A dwell is drawn where the noise hides the joint no more than this many times its usual.
+const BLURRED: f64 = 4.0;
+
+/// What one dwell says about all joints.
+struct Seen {
+    before: Vec<Option<ImpliedError>>,
+    /// With everything found; as `before` when nothing was.
+    after: Vec<Option<ImpliedError>>,
+    torque_nm: Vec<f64>,
+}
+
+pub(super) fn joint_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<JointErrors> {
+    let fitted = run.calibration.fit.values();
+    let after = run.steps.last().map(|step| (&step.model, step.calibration.fit.values()));
+    let seen: Vec<Seen> = points
+        .iter()
+        .map(|point| {
+            let o = point.observation;
+            let implied = |model, p: &[f64], r: &Vector3<f64>| implied_joint_errors(model, p, o, r);
+            let before = implied(&run.model, &fitted, &point.residual.fitted_m);
+            let after = match (&after, point.steps_m.last()) {
+                (Some((model, p)), Some(residual_m)) => implied(model, p, residual_m),
+                _ => before.clone(),
+            };
+            let torque = run.model.drivers(&run.session, o).torque;
+            Seen { before, after, torque_nm: torque.iter().map(|t| t.total_nm()).collect() }
+        })
+        .collect();
+    let time_min = recorded_min(run, points);
+    let of_joint = |j: usize| joint(run, j, points, in_time, &seen, &time_min);
+    (0..run.model.joint_count()).map(of_joint).collect()
+}
+
+fn joint(
+    run: &Run,
+    j: usize,
+    points: &[Point],
+    in_time: &[usize],
+    seen: &[Seen],
+    time_min: &[f64],
+) -> JointErrors {
+    let sigmas: Vec<f64> = seen.iter().filter_map(|s| s.before[j].map(|e| e.sigma)).collect();
+    let usual = median(&sigmas);
+    let sharp = |i: usize| {
+        let implied = seen[i].before[j].zip(seen[i].after[j])?;
+        (implied.0.sigma <= BLURRED * usual && points[i].observation.joint_rad[j].is_finite())
+            .then_some(implied)
+    };
+    let drawn: Vec<usize> = in_time.iter().copied().filter(|&i| sharp(i).is_some()).collect();
+    let unit = run.model.chain().joint_unit(j);
+    let mut m = JointErrors {
+        joint: run.model.chain().joint_names()[j].clone(),
+        number: count(j + 1),
+        unit: unit.display_symbol().into(),
+        left_out: count(points.len() - drawn.len()),
+        effort_nm: drawn.iter().filter_map(|&i| effort_nm(points[i].observation, j)).collect(),
+        ..Default::default()
+    };
+    if m.effort_nm.len() < drawn.len() {
+        m.effort_nm.clear();
+    }
+    for i in drawn {
+        let Some((before, after)) = sharp(i) else { continue };
+        let o = points[i].observation;
+        m.recording_index.push(count(o.dwell.recording));
+        m.dwell.push(count(o.dwell.dwell));
+        m.reading.push(unit.to_display(o.joint_rad[j]));
+        m.torque_nm.push(super::or_zero(seen[i].torque_nm[j]));
+        m.time_min.push(time_min[i]);
+        m.arrival.push(o.arrival.get(j).map_or(0, |a| a.sign() as i32));
+        m.error.push(unit.to_display(before.error));
+        m.sigma.push(unit.to_display(before.sigma));
+        if !run.steps.is_empty() {
+            m.error_after.push(unit.to_display(after.error));
+        }
+    }
+    [m.positive, m.negative, m.unknown] = [1, -1, 0].map(|sign| of_arrival(sign, &m.arrival, &m.error));
+    [m.positive_after, m.negative_after, m.unknown_after] =
+        [1, -1, 0].map(|sign| of_arrival(sign, &m.arrival, &m.error_after));
+    m
+}
+
+/// The errors of one direction of arrival, NaN in the place of the others: a plot has one x for all its series.
+fn of_arrival(sign: i32, arrival: &[i32], error: &[f64]) -> Vec<f64> {
+    error.iter().zip(arrival).map(|(e, s)| if *s == sign { *e } else { f64::NAN }).collect()
+}
+
+fn effort_nm(o: &Observation, j: usize) -> Option<f64> {
+    o.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite())
+}

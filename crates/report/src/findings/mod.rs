@@ -1,0 +1,69 @@
+//! What a run found, worked out once as the messages that say it: channels write them, layouts point at them.
+//!
+//! All of it is about the whole run or a whole recording, so each is one message; arrays in one message are parallel,
+//! ready for a scatter plot.
+
+mod boards;
+mod course;
+mod curves;
+mod diagnosis;
+mod joints;
+mod quality;
+mod steps;
+
+pub(crate) use boards::round_factor;
+
+use crate::points::Point;
+use crate::proto;
+use crate::run::Run;
+
+/// Everything a run found.
+pub(crate) struct Findings {
+    /// One entry a joint of the model.
+    pub joints: Vec<proto::JointErrors>,
+    /// One entry a recording with a board that was visited.
+    pub boards: Vec<proto::BoardErrors>,
+    /// Errors over recorded time.
+    pub course: proto::Course,
+    /// The falling error.
+    pub steps: proto::Steps,
+    /// The verdict, and what it was weighed against; `None` when nobody asked.
+    pub diagnosis: Option<(proto::Diagnosis, proto::Candidates)>,
+    /// What no name explains.
+    pub curves: Vec<proto::ErrorCurve>,
+    /// What the data are like.
+    pub quality: proto::Quality,
+}
+
+impl Findings {
+    /// Works everything out. `points` are those of the run.
+    pub fn of(run: &Run, points: &[Point]) -> Findings {
+        let in_time = in_time(points);
+        Findings {
+            joints: joints::joint_errors(run, points, &in_time),
+            boards: boards::board_errors(run, points, &in_time),
+            course: course::course(run, points, &in_time),
+            steps: steps::steps(run),
+            diagnosis: run.diagnosis.as_ref().map(|d| (diagnosis::diagnosis(d), diagnosis::candidates(d))),
+            curves: run.diagnosis.iter().flat_map(|d| &d.unlisted).map(curves::error_curve).collect(),
+            quality: quality::quality(run),
+        }
+    }
+}
+
+/// Indices of the points in the order of time.
+fn in_time(points: &[Point]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by_key(|&i| (points[i].observation.time_ns, points[i].observation.dwell));
+    order
+}
+
+/// A number that is one.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// Zero for what is not a number, in fields that cannot be absent.
+fn or_zero(value: f64) -> f64 {
+    finite(value).unwrap_or(0.0)
+}

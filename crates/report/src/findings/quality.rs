@@ -1,0 +1,40 @@
+//! What the data are like: clocks, occlusion, damage, and dwells that do not take part.
+
+use super::finite;
+use crate::channels::count;
+use crate::proto::{Quality, RecordingQuality, RejectedDwell};
+use crate::run::{RecordingRun, Run};
+
+pub(super) fn quality(run: &Run) -> Quality {
+    let recordings = run.recordings.iter().enumerate().map(|(index, r)| recording(run, index, r)).collect();
+    let rejected = run.recordings.iter().flat_map(|r| {
+        r.rejections.iter().map(|rejection| RejectedDwell {
+            recording: r.name.clone(),
+            dwell: count(rejection.dwell.dwell),
+            why: rejection.why.clone(),
+        })
+    });
+    Quality { timestamp: None, recordings, rejected: rejected.collect() }
+}
+
+fn recording(run: &Run, index: usize, r: &RecordingRun) -> RecordingQuality {
+    let used = |d: &&armcal_core::Dwell| run.observations.iter().any(|o| o.dwell == d.id);
+    let first_ns = r.report.channels.iter().map(|c| c.first_ns).min();
+    let last_ns = r.report.channels.iter().map(|c| c.last_ns).max();
+    let duration_min =
+        first_ns.zip(last_ns).map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 / 60e9);
+    RecordingQuality {
+        recording: run.recordings[index].name.clone(),
+        dwells: count(r.dwells.len()),
+        used: count(r.dwells.iter().filter(used).count()),
+        rejected: count(r.rejections.len()),
+        duration_min,
+        occluded: r.report.streams.iter().map(|s| s.occluded.total()).sum(),
+        damaged: count(r.report.files.iter().map(|f| f.damaged.len()).sum()),
+        warnings: count(r.all_warnings().len()),
+        clock_offset_ms: r.clock.as_ref().and_then(|c| finite(c.offset_s * 1e3)),
+        clock_offset_sigma_ms: r.clock.as_ref().and_then(|c| finite(c.offset_sigma_s * 1e3)),
+        clock_drift_ppm: r.clock.as_ref().and_then(|c| finite(c.drift * 1e6)),
+        clock_correlation: r.clock.as_ref().and_then(|c| finite(c.correlation)),
+    }
+}

@@ -1,0 +1,75 @@
+//! The format of Foxglove Studio, which Lichtblick reads: panels in a map by name, and a binary tree of names.
+
+use super::config::config;
+use super::spec::{Content, Direction, Kind};
+use serde_json::{Map, Value, json};
+
+pub(super) fn layout(content: &Content) -> Value {
+    let mut panels = Map::new();
+    let tree = node(content, &mut panels);
+    json!({
+        "configById": panels,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": { "speed": 1 },
+        "layout": tree,
+    })
+}
+
+/// Adds the panels of the content and returns the tree of their names.
+fn node(content: &Content, panels: &mut Map<String, Value>) -> Value {
+    match content {
+        Content::Panel(panel) => {
+            let mut settings = config(&panel.kind);
+            settings.insert("foxglovePanelTitle".into(), json!(panel.title));
+            if matches!(panel.kind, Kind::Plot(_)) {
+                settings.insert("sidebarDimension".into(), json!(240));
+            }
+            json!(add(panel_type(&panel.kind), settings, panels))
+        }
+        Content::Split(direction, items) => split(*direction, items, panels),
+        Content::Tabs(tabs) => {
+            let tabs: Vec<Value> = tabs
+                .iter()
+                .map(|(title, content)| json!({ "title": title, "layout": node(content, panels) }))
+                .collect();
+            let settings = Map::from_iter([("activeTabIdx".into(), json!(0)), ("tabs".into(), json!(tabs))]);
+            json!(add("Tab", settings, panels))
+        }
+    }
+}
+
+/// The first item against the rest.
+fn split(direction: Direction, items: &[(f64, Content)], panels: &mut Map<String, Value>) -> Value {
+    let Some(((share, first), rest)) = items.split_first() else { return Value::Null };
+    let first = node(first, panels);
+    if rest.is_empty() {
+        return first;
+    }
+    let all = share + rest.iter().map(|(share, _)| share).sum::<f64>();
+    json!({
+        "first": first,
+        "second": split(direction, rest, panels),
+        "direction": direction.word(),
+        "splitPercentage": (1000.0 * share / all).round() / 10.0,
+    })
+}
+
+/// Names the panel by its type and how many there are.
+fn add(panel_type: &str, settings: Map<String, Value>, panels: &mut Map<String, Value>) -> String {
+    let name = format!("{panel_type}!armcal{}", panels.len() + 1);
+    panels.insert(name.clone(), Value::Object(settings));
+    name
+}
+
+fn panel_type(kind: &Kind) -> &'static str {
+    match kind {
+        Kind::Plot(_) => "Plot",
+        Kind::View(_) => "3D",
+        Kind::Table(_) => "Table",
+        Kind::Raw(_) => "RawMessages",
+        Kind::Indicator(..) => "Indicator",
+        Kind::Log(_) => "RosOut",
+        Kind::States(_) => "StateTransitions",
+    }
+}

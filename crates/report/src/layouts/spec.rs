@@ -1,0 +1,89 @@
+//! What a layout consists of, whatever format it is written in.
+
+/// A tree of panels.
+pub(super) enum Content {
+    Panel(Panel),
+    /// Side by side (`row`) or one above the other (`column`), with their shares of the space.
+    Split(Direction, Vec<(f64, Content)>),
+    Tabs(Vec<(&'static str, Content)>),
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Direction {
+    Row,
+    Column,
+}
+
+impl Direction {
+    pub fn word(self) -> &'static str {
+        match self {
+            Direction::Row => "row",
+            Direction::Column => "column",
+        }
+    }
+}
+
+/// One panel under its title.
+pub(super) struct Panel {
+    pub title: String,
+    pub kind: Kind,
+}
+
+pub(super) enum Kind {
+    Plot(Plot),
+    View(View),
+    /// An array of messages, by its path.
+    Table(String),
+    /// A message or a field of one, by its path.
+    Raw(String),
+    /// A lamp: path, and value, colour and label of each rule.
+    Indicator(String, Vec<[&'static str; 3]>),
+    /// The topic of a log.
+    Log(&'static str),
+    /// Values over time, each with its path and label.
+    States(Vec<[&'static str; 2]>),
+}
+
+/// Numbers against time, or arrays of one message against an array of the same message.
+pub(super) struct Plot {
+    pub x: X,
+    pub y_label: String,
+    pub series: Vec<Series>,
+}
+
+pub(super) enum X {
+    Time,
+    /// Path of the array, and the label of the axis.
+    Array(String, String),
+}
+
+pub(super) struct Series {
+    /// A path, or a number for a level line.
+    pub path: String,
+    pub label: String,
+    pub colour: &'static str,
+    pub line: bool,
+}
+
+/// A 3D panel.
+pub(super) struct View {
+    /// The frame it looks at.
+    pub frame: &'static str,
+    pub target_m: [f64; 3],
+    pub distance_m: f64,
+    /// Straight down, without perspective.
+    pub from_above: bool,
+    /// Topics, and whether they are shown at first.
+    pub topics: Vec<(&'static str, bool)>,
+}
+
+impl Content {
+    pub fn panel(title: impl Into<String>, kind: Kind) -> Content {
+        Content::Panel(Panel { title: title.into(), kind })
+    }
+
+    /// Equal shares.
+    pub fn even(direction: Direction, items: Vec<Content>) -> Content {
+        Content::Split(direction, items.into_iter().map(|item| (1.0, item)).collect())
+    }
+}
