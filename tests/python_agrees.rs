@@ -50,3 +50,41 @@ fn python_decodes_every_message_of_the_output() {
     // Cavities are held out in turn, so every observation is on both sides and has one residual.
     assert_eq!(number(&decoded["counts"], "/~1armcal~1residuals"), number(&summary, "/fit/train/n"));
 }
+
+/// Runs `check_layouts.py` on a run's results: every path of both layouts resolves in `run.mcap`, with the type that its
+/// panel draws and as many numbers as its x; keys are those of the formats; both show the same.
+fn layouts_resolve(python: &Path, out: &Path) -> Vec<String> {
+    let checked = script(python, "check_layouts.py", out);
+    println!("{checked}");
+    assert!(number(&checked, "/messages") < 5000.0, "too many messages for a viewer: {checked}");
+    let titles = checked["titles"].as_array().expect("titles");
+    titles.iter().map(|t| t.as_str().expect("a title").to_owned()).collect()
+}
+
+#[test]
+fn every_path_of_the_layouts_resolves() {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
+    let titles = layouts_resolve(&python, out.path());
+    assert!(titles.iter().any(|t| t == "Errors on the boards, from above"));
+    assert!(!titles.iter().any(|t| t.contains("what the effects do")), "nothing was found: {titles:?}");
+}
+
+#[test]
+fn the_layout_of_a_hidden_effect_shows_what_it_does() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let rig = folder.path().join("rig");
+    let hidden = ["--hide", "backlash", "--design", "free-poses", "--size", "medium", "--seed", "3"];
+    let arguments = ["simulate"].into_iter().chain(hidden).map(std::ffi::OsStr::new);
+    let output = armcal(arguments.chain(["--out".as_ref(), rig.as_os_str()]));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let out = folder.path().join("out");
+    let summary = run_pipeline(&rig.join("pipeline.toml"), &out, &[0, 3]);
+    assert_eq!(summary["diagnosis"]["names"][0], "backlash:1", "{}", summary["diagnosis"]["names"]);
+    let titles = layouts_resolve(&python, &out);
+    for title in ["joint1, what the effects do, over its angle", "joint1, what is left, over its angle"] {
+        assert!(titles.iter().any(|t| t == title), "no {title} in {titles:?}");
+    }
+}

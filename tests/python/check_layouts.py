@@ -18,7 +18,7 @@ from mcap_protobuf.decoder import DecoderFactory
 TOPIC = r'(/[A-Za-z0-9_\-]+(?:/[A-Za-z0-9_\-]+)*|"(?:[^"\\]|\\["\\])*")'
 FIELD = r'\.([A-Za-z0-9_]+)(?:\[(-?\d+|-?\d*:-?\d*)\])?'
 PLOT = {"paths", "xAxisVal", "xAxisPath", "xAxisLabel", "yAxisLabel", "isSynced", "showLegend", "legendDisplay",
-        "showPlotValuesInLegend", "showXAxisLabels", "showYAxisLabels"}
+        "showPlotValuesInLegend", "showXAxisLabels", "showYAxisLabels", "minYValue", "maxYValue"}
 SERIES = {"value", "enabled", "label", "color", "timestampMethod", "showLine", "lineSize"}
 VIEW = {"cameraState", "followTf", "followMode", "scene", "transforms", "topics", "layers"}
 CAMERA = {"perspective", "distance", "phi", "thetaOffset", "targetOffset", "target", "targetOrientation", "fovy", "near",

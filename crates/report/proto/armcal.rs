@@ -447,6 +447,16 @@ pub struct JointErrors {
     pub negative_after: ::prost::alloc::vec::Vec<f64>,
     #[prost(double, repeated, tag = "21")]
     pub unknown_after: ::prost::alloc::vec::Vec<f64>,
+    /// What the effects found do to this joint (and what is left): the implied error of the model fitted with them, once
+    /// they are taken out again. Here an effect has its own shape, which the calibrated geometry has bent to hide.
+    #[prost(double, repeated, tag = "22")]
+    pub effect: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "23")]
+    pub positive_effect: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "24")]
+    pub negative_effect: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "25")]
+    pub unknown_effect: ::prost::alloc::vec::Vec<f64>,
 }
 /// Errors on the board of one recording, in the frame of the board (topics /armcal/board/0, ... by recording), one message
 /// a recording. Parallel arrays, one entry a visit, in the order of time; vectors are measured minus predicted.
@@ -510,6 +520,12 @@ pub struct Course {
     /// Norm expected from the declared noise alone.
     #[prost(double, repeated, tag = "7")]
     pub expected_mm: ::prost::alloc::vec::Vec<f64>,
+    /// Component of the calibrated error away from the base: growing lengths show in it.
+    #[prost(double, repeated, tag = "8")]
+    pub outward_mm: ::prost::alloc::vec::Vec<f64>,
+    /// What the effects found do to it (and what is left); empty when nothing was found.
+    #[prost(double, repeated, tag = "9")]
+    pub effect_outward_mm: ::prost::alloc::vec::Vec<f64>,
 }
 /// One step on the way from the nominal model to the one with everything found.
 #[derive(Clone, PartialEq, ::prost::Message)]

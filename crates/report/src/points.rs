@@ -19,6 +19,8 @@ pub(crate) struct Point<'a> {
     pub nominal_predicted_m: Vector3<f64>,
     /// Measured minus predicted after each of the run's steps.
     pub steps_m: Vec<Vector3<f64>>,
+    /// What the effects of the last step do to this observation, and what is left: measured minus predicted without them.
+    pub effect_m: Option<Vector3<f64>>,
 }
 
 /// The points of a run, in the order of its observations.
@@ -26,6 +28,7 @@ pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
     check(run)?;
     let fitted = run.calibration.fit.values();
     let nominal = &run.calibration.nominal_values;
+    let without = run.steps.last().map(|step| (&step.model, step.values_without_effects(&run.model)));
     let pairs = run.observations.iter().zip(&run.calibration.residuals);
     Ok(pairs
         .enumerate()
@@ -40,6 +43,7 @@ pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
                 nominal_measured_m,
                 nominal_predicted_m: nominal_measured_m - residual.nominal_m,
                 steps_m: run.steps.iter().map(|step| step.calibration.residuals[i].fitted_m).collect(),
+                effect_m: without.as_ref().map(|(model, p)| model.residual(p, observation).position_m),
             }
         })
         .collect())

@@ -54,6 +54,18 @@ pub struct Refit {
     pub calibration: Calibration,
 }
 
+impl Refit {
+    /// Its parameters with the effects it adds to `base` taken out again. Residuals there are what these effects do (and
+    /// what is left), in the geometry that was fitted with them: partial residuals (Larsen and McCleary 1972,
+    /// Technometrics 14:781). The calibration of `base` has bent the geometry towards the effects and hides their shape.
+    pub fn values_without_effects(&self, base: &Model) -> Vec<f64> {
+        let mut values = self.calibration.fit.values();
+        let added = base.parameters().len()..values.len();
+        values[added.clone()].copy_from_slice(&self.model.nominal()[added]);
+        values
+    }
+}
+
 /// One recording and what every stage made of it.
 #[derive(Debug, Clone)]
 pub struct RecordingRun {

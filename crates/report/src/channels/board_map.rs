@@ -33,10 +33,7 @@ struct Vectors<'a> {
 pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
     let Some(first) = findings.boards.first() else { return };
     let time_ns = run_start_ns(run);
-    let large_mm = |v: fn(&BoardErrors) -> &Vec<f64>| {
-        findings.boards.iter().flat_map(v).fold(0.0, |most: f64, x| most.max(x.abs()))
-    };
-    let extent_m = Vector3::new(large_mm(|b| &b.x_mm), large_mm(|b| &b.y_mm), 0.0) * 2e-3;
+    let extent_m = extent_m(findings);
     let scale = Scale::of(run, findings);
     let mut entities = Vec::new();
     for (column, board) in findings.boards.iter().enumerate() {
@@ -53,13 +50,30 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
         millimetres(scale.large_m)
     );
     let mut legend = entity("scale", time_ns);
-    let at_m = Vector3::new(0.0, extent_m.y / 2.0 + GAP_M, 0.0);
+    let at_m = Vector3::new(middle_and_side_m(findings).0[0], extent_m.y / 2.0 + GAP_M, 0.0);
     legend.texts.push(text(&at_m, TEXT_HEIGHT_M, INK, words));
     entities.push(legend);
     for entity in &mut entities {
         entity.frame_id = FRAME.into();
     }
     out.put("/armcal/board_map", time_ns, &fox::SceneUpdate { deletions: Vec::new(), entities });
+}
+
+/// Middle of the map and its longer side [m], for a camera that shows all of it.
+pub(crate) fn middle_and_side_m(findings: &Findings) -> ([f64; 3], f64) {
+    let columns = findings.boards.len().max(1) as f64;
+    let rows = findings.boards.first().map_or(1, |b| rows(b).len()).max(1) as f64;
+    let step_m = extent_m(findings) + Vector3::new(GAP_M, GAP_M, 0.0);
+    let middle_m = [(columns - 1.0) * step_m.x / 2.0, -(rows - 1.0) * step_m.y / 2.0, 0.0];
+    (middle_m, (columns * step_m.x).max((rows + 1.0) * step_m.y))
+}
+
+/// Width and height of one board [m].
+fn extent_m(findings: &Findings) -> Vector3<f64> {
+    let large_mm = |v: fn(&BoardErrors) -> &Vec<f64>| {
+        findings.boards.iter().flat_map(v).fold(0.0, |most: f64, x| most.max(x.abs()))
+    };
+    Vector3::new(large_mm(|b| &b.x_mm), large_mm(|b| &b.y_mm), 0.0) * 2e-3
 }
 
 fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {

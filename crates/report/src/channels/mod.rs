@@ -90,10 +90,11 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
     out.messages
 }
 
-/// When a recording's first dwell begins [ns]; without dwells, its first message.
+/// When a recording begins [ns]: its first message or dwell, so that a viewer that opens the file has at once what is
+/// true of all of it.
 pub(crate) fn start_ns(recording: &RecordingRun) -> i64 {
-    let dwells = recording.dwells.iter().map(|d| d.start_ns).min();
-    dwells.or_else(|| recording.report.channels.iter().map(|c| c.first_ns).min()).unwrap_or(0)
+    let messages = recording.report.channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns);
+    recording.dwells.iter().map(|d| d.start_ns).chain(messages).min().unwrap_or(0)
 }
 
 /// When the first recording begins [ns].

@@ -18,24 +18,33 @@ struct Seen {
     before: Vec<Option<ImpliedError>>,
     /// With everything found; as `before` when nothing was.
     after: Vec<Option<ImpliedError>>,
+    /// What the effects found do; as `before` when nothing was.
+    effect: Vec<Option<ImpliedError>>,
     torque_nm: Vec<f64>,
 }
 
 pub(super) fn joint_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<JointErrors> {
     let fitted = run.calibration.fit.values();
-    let after = run.steps.last().map(|step| (&step.model, step.calibration.fit.values()));
+    let last = run
+        .steps
+        .last()
+        .map(|step| (&step.model, step.calibration.fit.values(), step.values_without_effects(&run.model)));
     let seen: Vec<Seen> = points
         .iter()
         .map(|point| {
             let o = point.observation;
             let implied = |model, p: &[f64], r: &Vector3<f64>| implied_joint_errors(model, p, o, r);
             let before = implied(&run.model, &fitted, &point.residual.fitted_m);
-            let after = match (&after, point.steps_m.last()) {
-                (Some((model, p)), Some(residual_m)) => implied(model, p, residual_m),
+            let after = match (&last, point.steps_m.last()) {
+                (Some((model, p, _)), Some(residual_m)) => implied(model, p, residual_m),
+                _ => before.clone(),
+            };
+            let effect = match (&last, &point.effect_m) {
+                (Some((model, _, p)), Some(effect_m)) => implied(model, p, effect_m),
                 _ => before.clone(),
             };
             let torque = run.model.drivers(&run.session, o).torque;
-            Seen { before, after, torque_nm: torque.iter().map(|t| t.total_nm()).collect() }
+            Seen { before, after, effect, torque_nm: torque.iter().map(|t| t.total_nm()).collect() }
         })
         .collect();
     let time_min = recorded_min(run, points);
@@ -54,7 +63,7 @@ fn joint(
     let sigmas: Vec<f64> = seen.iter().filter_map(|s| s.before[j].map(|e| e.sigma)).collect();
     let usual = median(&sigmas);
     let sharp = |i: usize| {
-        let implied = seen[i].before[j].zip(seen[i].after[j])?;
+        let implied = (seen[i].before[j]?, seen[i].after[j]?, seen[i].effect[j]?);
         (implied.0.sigma <= BLURRED * usual && points[i].observation.joint_rad[j].is_finite())
             .then_some(implied)
     };
@@ -72,7 +81,7 @@ fn joint(
         m.effort_nm.clear();
     }
     for i in drawn {
-        let Some((before, after)) = sharp(i) else { continue };
+        let Some((before, after, effect)) = sharp(i) else { continue };
         let o = points[i].observation;
         m.recording_index.push(count(o.dwell.recording));
         m.dwell.push(count(o.dwell.dwell));
@@ -84,11 +93,14 @@ fn joint(
         m.sigma.push(unit.to_display(before.sigma));
         if !run.steps.is_empty() {
             m.error_after.push(unit.to_display(after.error));
+            m.effect.push(unit.to_display(effect.error));
         }
     }
     [m.positive, m.negative, m.unknown] = [1, -1, 0].map(|sign| of_arrival(sign, &m.arrival, &m.error));
     [m.positive_after, m.negative_after, m.unknown_after] =
         [1, -1, 0].map(|sign| of_arrival(sign, &m.arrival, &m.error_after));
+    [m.positive_effect, m.negative_effect, m.unknown_effect] =
+        [1, -1, 0].map(|sign| of_arrival(sign, &m.arrival, &m.effect));
     m
 }
 

@@ -41,6 +41,10 @@ fn plot_config(plot: &Plot) -> Value {
         "showXAxisLabels": true,
         "showYAxisLabels": true,
     });
+    if let Some([least, most]) = plot.y_range {
+        config["minYValue"] = json!(least);
+        config["maxYValue"] = json!(most);
+    }
     if let X::Array(path, label) = &plot.x {
         config["xAxisVal"] = json!("currentCustom");
         config["xAxisPath"] = json!({ "value": path, "enabled": true });
@@ -63,11 +67,14 @@ fn series(s: &Series) -> Value {
 }
 
 fn view_config(view: &View) -> Value {
-    let topics: Map<String, Value> = view
-        .topics
-        .iter()
-        .map(|(topic, visible)| ((*topic).to_owned(), json!({ "visible": visible })))
-        .collect();
+    let topic = |(topic, visible): &(&str, bool)| {
+        let settings = match topic.contains("/path_") {
+            true => json!({ "visible": visible, "type": "line", "lineWidth": 0.001 }),
+            false => json!({ "visible": visible }),
+        };
+        ((*topic).to_owned(), settings)
+    };
+    let topics: Map<String, Value> = view.topics.iter().map(topic).collect();
     let [x, y, z] = view.target_m;
     json!({
         "cameraState": {

@@ -48,6 +48,8 @@ pub(super) enum Kind {
 pub(super) struct Plot {
     pub x: X,
     pub y_label: String,
+    /// Where panels are compared: their common range. Otherwise that of the data.
+    pub y_range: Option<[f64; 2]>,
     pub series: Vec<Series>,
 }
 

@@ -7,6 +7,7 @@ use crate::points::Point;
 use crate::proto::{ErrorCurve, JointErrors};
 use crate::run::Run;
 use Direction::{Column, Row};
+use armcal_core::robust::percentile;
 use nalgebra::Vector3;
 
 // Okabe and Ito's palette, which colour-blind people can tell apart.
@@ -17,6 +18,10 @@ const GREEN: &str = "#009E73";
 const PURPLE: &str = "#CC79A7";
 const SKY: &str = "#56B4E9";
 const GREY: &str = "#999999";
+/// A joint that gravity loads by less than this share of the most loaded one is not drawn over its torque.
+const UNLOADED: f64 = 0.05;
+/// A joint on which the effects found act by less than this share of the largest is not drawn again.
+const MOVED: f64 = 0.3;
 /// Steps after the calibration, in their order; the last ones share the last colour.
 const STEPS: [&str; 4] = [GREEN, SKY, BLUE, PURPLE];
 
@@ -43,25 +48,21 @@ fn overview(run: &Run, points: &[Point], f: &Findings) -> Content {
     Content::Split(Row, vec![(3.0, scene), (2.0, Content::Split(Column, right))])
 }
 
-/// One row a joint: over its angle, where play and eccentricity show, and over its torque, where compliance does.
+/// One row a joint: over its angle, where play and eccentricity show, and over its torque, where compliance does. All on
+/// one scale, so that the joint that errs stands out.
 fn where_it_fails(f: &Findings) -> Content {
     let mut left = Vec::new();
     if !f.boards.is_empty() {
-        left.push((3.0, Content::panel("Errors on the boards, from above", Kind::View(map()))));
+        left.push((3.0, Content::panel("Errors on the boards, from above", Kind::View(map(f)))));
     }
     left.push((2.0, over_recorded_time(f)));
-    let joint = |m: &JointErrors| {
-        let angle = joint_plot(m, "angle", "reading", &format!("reading [{}]", m.unit), "");
-        let torque = joint_plot(m, "torque", "torque_nm", "gravity torque [N m]", "");
-        Content::even(Row, vec![angle, torque])
-    };
-    let joints: Vec<Content> = f.joints.iter().map(joint).collect();
+    left.push((2.0, outward("Error away from the base over recorded time", "outward_mm", "calibrated")));
+    let joints: Vec<Content> = drawn(f).map(|m| Content::even(Row, joint_row(f, m, Split::Error))).collect();
     let left = Content::Split(Column, left);
     if joints.is_empty() {
-        left
-    } else {
-        Content::Split(Row, vec![(2.0, left), (3.0, Content::even(Column, joints))])
+        return left;
     }
+    Content::Split(Row, vec![(2.0, left), (3.0, Content::even(Column, joints))])
 }
 
 fn what_is_missing(run: &Run, f: &Findings) -> Content {
@@ -83,7 +84,9 @@ fn what_is_missing(run: &Run, f: &Findings) -> Content {
     ];
     pictures.extend((1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve)));
     if !run.steps.is_empty() {
-        pictures.extend(f.joints.iter().map(before_and_after));
+        pictures.extend(what_effects_do(f));
+        let title = "What the effects do away from the base, over recorded time";
+        pictures.push(outward(title, "effect_outward_mm", "effects found, and what is left"));
     }
     Content::Split(Row, vec![(1.0, answer), (1.0, Content::even(Column, pictures))])
 }
@@ -146,7 +149,10 @@ fn errors_in_time(title: &str, run: &Run, nominal: bool) -> Content {
         series.push(dots(format!("/armcal/residuals.step_norm_mm[{k}]"), format!("+ {added}"), colour));
     }
     series.push(dots("/armcal/residuals.expected_norm_mm", "noise alone", PURPLE));
-    Content::panel(title, Kind::Plot(Plot { x: X::Time, y_label: "error [mm]".into(), series }))
+    Content::panel(
+        title,
+        Kind::Plot(Plot { x: X::Time, y_label: "error [mm]".into(), y_range: None, series }),
+    )
 }
 
 /// The mean error after each step, without the nominal one, which would hide the others.
@@ -158,7 +164,7 @@ fn falling_error(f: &Findings) -> Content {
     ];
     let title = if f.steps.held_out { "Falling error on held-out points" } else { "Falling error" };
     let x = X::Array(path("number"), "1: calibrated; then one effect more each".into());
-    Content::panel(title, Kind::Plot(Plot { x, y_label: "mean error [mm]".into(), series }))
+    Content::panel(title, Kind::Plot(Plot { x, y_label: "mean error [mm]".into(), y_range: None, series }))
 }
 
 fn over_recorded_time(f: &Findings) -> Content {
@@ -169,12 +175,80 @@ fn over_recorded_time(f: &Findings) -> Content {
     }
     series.push(dots(path("expected_mm"), "noise alone", PURPLE));
     let x = X::Array(path("time_min"), "recorded time [min]".into());
-    let plot = Plot { x, y_label: "error [mm]".into(), series };
+    let plot = Plot { x, y_label: "error [mm]".into(), y_range: None, series };
     Content::panel("Error over recorded time", Kind::Plot(plot))
 }
 
-/// Implied error by direction of arrival, against one of the arrays; `suffix` tells before from after.
-fn joint_plot(m: &JointErrors, against: &str, x: &str, x_label: &str, suffix: &str) -> Content {
+fn outward(title: &str, field: &str, label: &str) -> Content {
+    let path = |field: &str| format!("/armcal/course.{field}[:]");
+    let series = vec![dots(path(field), label, ORANGE), line("0", "none", GREY)];
+    let x = X::Array(path("time_min"), "recorded time [min]".into());
+    Content::panel(title, Kind::Plot(Plot { x, y_label: "error [mm]".into(), y_range: None, series }))
+}
+
+/// What is drawn of a joint, split by direction of arrival.
+#[derive(Clone, Copy)]
+enum Split {
+    /// Of the calibrated model.
+    Error,
+    /// With everything found.
+    After,
+    /// What the effects found do.
+    Effect,
+}
+
+impl Split {
+    /// All directions together, for the scale.
+    fn whole(self, m: &JointErrors) -> &[f64] {
+        match self {
+            Split::Error => &m.error,
+            Split::After => &m.error_after,
+            Split::Effect => &m.effect,
+        }
+    }
+
+    fn suffix(self) -> &'static str {
+        match self {
+            Split::Error => "",
+            Split::After => "_after",
+            Split::Effect => "_effect",
+        }
+    }
+}
+
+/// The joints that move the tip in at least one dwell.
+fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
+    f.joints.iter().filter(|m| !m.reading.is_empty())
+}
+
+/// Over its angle and, where gravity loads it, over its torque.
+fn joint_row(f: &Findings, m: &JointErrors, split: Split) -> Vec<Content> {
+    let what = match split {
+        Split::Error => m.joint.clone(),
+        Split::After => format!("{}, what is left", m.joint),
+        Split::Effect => format!("{}, what the effects do", m.joint),
+    };
+    let range = common_range(f, m, split);
+    let angle =
+        joint_plot(m, format!("{what}, over its angle"), ("reading", "reading", &m.unit), split, range);
+    let mut row = vec![angle];
+    let span = |m: &JointErrors| m.torque_nm.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
+    let largest = f.joints.iter().map(span).fold(0.0, f64::max);
+    if span(m) > UNLOADED * largest {
+        let torque = ("torque_nm", "gravity torque", "N m");
+        row.push(joint_plot(m, format!("{what}, over its torque"), torque, split, range));
+    }
+    row
+}
+
+/// Implied error by direction of arrival against one of the arrays: field, name and unit.
+fn joint_plot(
+    m: &JointErrors,
+    title: String,
+    (x, x_name, x_unit): (&str, &str, &str),
+    split: Split,
+    y_range: Option<[f64; 2]>,
+) -> Content {
     let path = |field: &str| format!("{}.{field}[:]", implied_topic(m.number));
     let arrivals = [
         ("positive", 1, "arrived in +q", BLUE),
@@ -182,20 +256,38 @@ fn joint_plot(m: &JointErrors, against: &str, x: &str, x_label: &str, suffix: &s
         ("unknown", 0, "arrival unknown", GREY),
     ];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
-    let series = seen.map(|(field, _, label, colour)| dots(path(&format!("{field}{suffix}")), label, colour));
-    let plot = Plot {
-        x: X::Array(path(x), x_label.into()),
-        y_label: format!("implied error [{}]", m.unit),
-        series: series.collect(),
+    let dots_of = |(field, _, label, colour): (&str, i32, &str, &'static str)| {
+        dots(path(&format!("{field}{}", split.suffix())), label, colour)
     };
-    let what = if suffix.is_empty() { "" } else { ", with what was found" };
-    Content::panel(format!("{} over its {against}{what}", m.joint), Kind::Plot(plot))
+    let plot = Plot {
+        x: X::Array(path(x), format!("{x_name} [{x_unit}]")),
+        y_label: format!("implied error [{}]", m.unit),
+        y_range,
+        series: seen.map(dots_of).collect(),
+    };
+    Content::panel(title, Kind::Plot(plot))
 }
 
-fn before_and_after(m: &JointErrors) -> Content {
-    let label = format!("reading [{}]", m.unit);
-    let of = |suffix| joint_plot(m, "angle", "reading", &label, suffix);
-    Content::even(Row, vec![of(""), of("_after")])
+/// The same for all joints of a unit; what is left keeps the scale of what the effects do.
+fn common_range(f: &Findings, m: &JointErrors, split: Split) -> Option<[f64; 2]> {
+    let scale = if matches!(split, Split::After) { Split::Effect } else { split };
+    let same = f.joints.iter().filter(|other| other.unit == m.unit);
+    let errors: Vec<f64> = same.flat_map(|m| scale.whole(m)).map(|e| e.abs()).collect();
+    let large = 1.3 * percentile(&errors, 0.98);
+    (large > 0.0).then_some([-large, large])
+}
+
+/// The joints the effects found act on most, each with what they do and what is left.
+fn what_effects_do(f: &Findings) -> Vec<Content> {
+    let size = |m: &JointErrors| percentile(&m.effect.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.9);
+    let largest = |unit: &str| f.joints.iter().filter(|m| m.unit == unit).map(size).fold(0.0, f64::max);
+    let moved = drawn(f).filter(|m| size(m) >= MOVED * largest(&m.unit));
+    let row = |m: &JointErrors| {
+        let mut row = joint_row(f, m, Split::Effect);
+        row.push(joint_row(f, m, Split::After).swap_remove(0));
+        Content::even(Row, row)
+    };
+    moved.map(row).collect()
 }
 
 fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
@@ -206,7 +298,7 @@ fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
         line(path("high"), "95 % band", GREY),
     ];
     let x = X::Array(path("at"), format!("{} [{}]", curve.driver, curve.driver_unit));
-    let plot = Plot { x, y_label: format!("error [{}]", curve.unit), series };
+    let plot = Plot { x, y_label: format!("error [{}]", curve.unit), y_range: None, series };
     Content::panel(format!("Unlisted error of {} over {}", curve.channel, curve.driver), Kind::Plot(plot))
 }
 
@@ -222,7 +314,7 @@ fn world(run: &Run, points: &[Point]) -> View {
         ("/armcal/arrows_nominal", false),
         ("/armcal/arrows_calibrated", true),
         ("/armcal/board_map", false),
-        ("/armcal/path_measured", false),
+        ("/armcal/path_measured", true),
         ("/armcal/path_nominal", false),
         ("/armcal/path_calibrated", false),
         ("/armcal/tip_measured", true),
@@ -235,7 +327,8 @@ fn world(run: &Run, points: &[Point]) -> View {
     View { frame: "world", target_m: centre_m.into(), distance_m, from_above: false, topics }
 }
 
-fn map() -> View {
+fn map(f: &Findings) -> View {
+    let (target_m, side_m) = board_map::middle_and_side_m(f);
     let topics = vec![("/armcal/board_map", true), ("/armcal/scene", false), ("/armcal/arms", false)];
-    View { frame: board_map::FRAME, target_m: [0.2, 0.0, 0.0], distance_m: 1.0, from_above: true, topics }
+    View { frame: board_map::FRAME, target_m, distance_m: 1.3 * side_m, from_above: true, topics }
 }

@@ -8,6 +8,9 @@ mod synthetic;
 /// The checked-in protobuf code is current.
 mod proto_is_current;
 
+/// What was found: arrays to plot, maps to look at, layouts that point at them.
+mod findings;
+
 /// `run.mcap`: input untouched, every message decodable, pictures in the right place.
 mod recording;
 

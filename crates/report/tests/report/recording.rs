@@ -7,8 +7,8 @@ use std::path::Path;
 
 /// A message with everything that belongs to it.
 #[derive(Debug, Clone, PartialEq)]
-struct Full {
-    topic: String,
+pub struct Full {
+    pub topic: String,
     schema: Option<(String, String, Vec<u8>)>,
     encoding: String,
     metadata: BTreeMap<String, String>,
@@ -18,7 +18,7 @@ struct Full {
     data: Vec<u8>,
 }
 
-fn read(path: &Path) -> Vec<Full> {
+pub fn read(path: &Path) -> Vec<Full> {
     let bytes = std::fs::read(path).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(|m| {
         let m = m.unwrap();
@@ -36,7 +36,7 @@ fn read(path: &Path) -> Vec<Full> {
     messages.collect()
 }
 
-fn write(s: &Synthetic, input: InputMessages, folder: &str) -> std::path::PathBuf {
+pub fn write(s: &Synthetic, input: InputMessages, folder: &str) -> std::path::PathBuf {
     let out = s.folder.path().join(folder);
     write_all(&s.run, &s.recordings, &out, &OutputConfig { input }).unwrap();
     out
@@ -53,34 +53,34 @@ fn decode(m: &Full) -> DynamicMessage {
     message
 }
 
-fn own(messages: &[Full], topic: &str) -> Vec<DynamicMessage> {
+pub fn own(messages: &[Full], topic: &str) -> Vec<DynamicMessage> {
     messages.iter().filter(|m| m.topic == topic).map(decode).collect()
 }
 
-fn get(message: &DynamicMessage, path: &str) -> Value {
+pub fn get(message: &DynamicMessage, path: &str) -> Value {
     let (first, rest) = path.split_once('.').unwrap_or((path, ""));
     let value = message.get_field_by_name(first).unwrap_or_else(|| panic!("no field {first}")).into_owned();
     if rest.is_empty() { value } else { get(value.as_message().unwrap(), rest) }
 }
 
-fn number(message: &DynamicMessage, path: &str) -> f64 {
+pub fn number(message: &DynamicMessage, path: &str) -> f64 {
     get(message, path).as_f64().unwrap()
 }
 
-fn string(message: &DynamicMessage, path: &str) -> String {
+pub fn string(message: &DynamicMessage, path: &str) -> String {
     get(message, path).as_str().unwrap().to_owned()
 }
 
-fn vector(message: &DynamicMessage, path: &str) -> Vector3<f64> {
+pub fn vector(message: &DynamicMessage, path: &str) -> Vector3<f64> {
     Vector3::from_iterator(["x", "y", "z"].iter().map(|axis| number(message, &format!("{path}.{axis}"))))
 }
 
-fn rotation(message: &DynamicMessage, path: &str) -> UnitQuaternion<f64> {
+pub fn rotation(message: &DynamicMessage, path: &str) -> UnitQuaternion<f64> {
     let q = ["w", "x", "y", "z"].map(|c| number(message, &format!("{path}.{c}")));
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
 }
 
-fn list(message: &DynamicMessage, path: &str) -> Vec<DynamicMessage> {
+pub fn list(message: &DynamicMessage, path: &str) -> Vec<DynamicMessage> {
     get(message, path).as_list().unwrap().iter().map(|v| v.as_message().unwrap().clone()).collect()
 }
 
