@@ -22,6 +22,8 @@ const GREY: &str = "#999999";
 const UNLOADED: f64 = 0.05;
 /// A joint on which the effects found act by less than this share of the largest is not drawn again.
 const MOVED: f64 = 0.3;
+/// Nor is one on which they act by less than this many times what is left.
+const ABOVE_REST: f64 = 1.5;
 /// Steps after the calibration, in their order; the last ones share the last colour.
 const STEPS: [&str; 4] = [GREEN, SKY, BLUE, PURPLE];
 
@@ -164,7 +166,9 @@ fn falling_error(f: &Findings) -> Content {
     ];
     let title = if f.steps.held_out { "Falling error on held-out points" } else { "Falling error" };
     let x = X::Array(path("number"), "1: calibrated; then one effect more each".into());
-    Content::panel(title, Kind::Plot(Plot { x, y_label: "mean error [mm]".into(), y_range: None, series }))
+    let shown = f.steps.steps.iter().skip(1).map(|step| step.mean_mm).chain([f.steps.noise_floor_mm]);
+    let y_range = Some([0.0, 1.1 * shown.fold(1e-6, f64::max)]);
+    Content::panel(title, Kind::Plot(Plot { x, y_label: "mean error [mm]".into(), y_range, series }))
 }
 
 fn over_recorded_time(f: &Findings) -> Content {
@@ -279,9 +283,13 @@ fn common_range(f: &Findings, m: &JointErrors, split: Split) -> Option<[f64; 2]>
 
 /// The joints the effects found act on most, each with what they do and what is left.
 fn what_effects_do(f: &Findings) -> Vec<Content> {
-    let size = |m: &JointErrors| percentile(&m.effect.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.9);
-    let largest = |unit: &str| f.joints.iter().filter(|m| m.unit == unit).map(size).fold(0.0, f64::max);
-    let moved = drawn(f).filter(|m| size(m) >= MOVED * largest(&m.unit));
+    let size = |m: &JointErrors, split: Split| {
+        percentile(&split.whole(m).iter().map(|e| e.abs()).collect::<Vec<f64>>(), 0.9)
+    };
+    let effect = |m: &JointErrors| size(m, Split::Effect);
+    let largest = |unit: &str| f.joints.iter().filter(|m| m.unit == unit).map(effect).fold(0.0, f64::max);
+    let moved = drawn(f)
+        .filter(|m| effect(m) >= MOVED * largest(&m.unit) && effect(m) > ABOVE_REST * size(m, Split::After));
     let row = |m: &JointErrors| {
         let mut row = joint_row(f, m, Split::Effect);
         row.push(joint_row(f, m, Split::After).swap_remove(0));
