@@ -46,3 +46,6 @@ mod docs;
 
 /// Does the plan propose dwells that, recorded, settle what the recording at hand leaves open?
 mod plan;
+
+/// Does the report open offline in a real browser, show what the summary says, and refit live?
+mod report_page;

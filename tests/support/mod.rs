@@ -1,5 +1,6 @@
 //! What several end-to-end tests share.
 
+pub mod browser;
 pub mod conformance;
 
 use serde_json::Value;

@@ -101,9 +101,21 @@ pub enum Command {
         before: PathBuf,
         /// Result after.
         after: PathBuf,
+        /// Write a page too.
+        #[arg(long, value_name = "FILE")]
+        html: Option<PathBuf>,
         /// Print JSON.
         #[arg(long)]
         json: bool,
+    },
+    /// The report of a run, served to this machine's browser only: any combination of effects and any hold-out is
+    /// refitted as you choose it.
+    View {
+        /// Results of `armcal run` or `armcal add` (their folder), or a pipeline file.
+        input: PathBuf,
+        /// Port on 127.0.0.1; any free one when 0.
+        #[arg(long, default_value_t = 0)]
+        port: u16,
     },
     /// How often the diagnosis is right: sealed scenarios, diagnosed without their truth, then judged by it.
     Score {

@@ -133,6 +133,41 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A folder of results does not say which pipeline made it.
+    #[error(
+        "{} does not say which pipeline made it (view.toml: {source}); name the pipeline file instead",
+        folder.display()
+    )]
+    NoSource {
+        /// The folder.
+        folder: PathBuf,
+        /// What is wrong with the note.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// An effect of the pipeline was switched off, which appending cannot express.
+    #[error("{effect} is in {} itself; remove its [[effects]] table there by hand", path.display())]
+    OwnEffect {
+        /// The effect.
+        effect: String,
+        /// The pipeline.
+        path: PathBuf,
+    },
+    /// Nothing was added to the pipeline.
+    #[error("nothing to keep: {} has these effects already", path.display())]
+    NothingToKeep {
+        /// The pipeline.
+        path: PathBuf,
+    },
+    /// The page cannot be served.
+    #[error("{what} on 127.0.0.1, port {port}: {source}; choose another --port")]
+    Serve {
+        /// What was being done.
+        what: &'static str,
+        /// The port.
+        port: u16,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// Writing an effect as TOML.
     #[error("writing the effect as TOML: {0}")]
     Toml(toml::ser::Error),

@@ -12,18 +12,31 @@ use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
 use armcal_report::{Refit, Run};
 use armcal_table::{Association, Board};
+use rayon::prelude::*;
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
 const MAX_ROUNDS: usize = 4;
+
+/// Candidates that are refitted for the report.
+const ALTERNATIVES: usize = 8;
 
 /// Runs a pipeline up to its results in memory; nothing is written.
 ///
 /// Returns the run and the opened recordings, which the writers pass through to the output.
 pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recording>), Error> {
     let settled = settle(pipeline, progress)?;
+    finish(settled, pipeline, progress)
+}
+
+/// Diagnoses what has settled, and fits what the diagnosis proposes.
+pub fn finish(
+    settled: Settled,
+    pipeline: &Pipeline,
+    progress: &Progress,
+) -> Result<(Run, Vec<Recording>), Error> {
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let (mut run, recordings) = settled.into_run(pipeline, diagnosis);
-    add_steps(&mut run, pipeline, progress)?;
+    add_refits(&mut run, pipeline, progress)?;
     Ok((run, recordings))
 }
 
@@ -111,6 +124,7 @@ impl Settled {
             calibration: self.calibration,
             diagnosis,
             steps: Vec::new(),
+            alternatives: Vec::new(),
             warnings,
         };
         (run, self.recordings)
@@ -132,7 +146,15 @@ pub fn recalibrate(
     run.warnings.extend(holdout_worse(&run.calibration));
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
-    add_steps(run, pipeline, progress)
+    add_refits(run, pipeline, progress)
+}
+
+/// What the run's model would become: with what was found, and with each of the best candidates.
+fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
+    add_steps(run, pipeline, progress)?;
+    progress.step("fitting the best candidates");
+    run.alternatives = alternatives(run, pipeline);
+    Ok(())
 }
 
 /// Adds what the diagnosis found to the model, one effect after the other, each time fitted anew.
@@ -158,8 +180,26 @@ fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<
     Ok(())
 }
 
+/// The most probable candidates, each alone in the run's model; not those that are a step already.
+///
+/// One that cannot be fitted on this hold-out has no refit; the ranking says what is known about it.
+fn alternatives(run: &Run, pipeline: &Pipeline) -> Vec<Refit> {
+    let Some(diagnosis) = &run.diagnosis else { return Vec::new() };
+    let members = |spec: &str| -> Vec<String> { spec.split('+').map(str::to_owned).collect() };
+    let best = diagnosis.candidates.iter().map(|c| members(&c.spec));
+    let wanted: Vec<Vec<String>> = best
+        .filter(|effects| run.steps.iter().all(|step| step.effects != *effects))
+        .take(ALTERNATIVES)
+        .collect();
+    let refit = |effects: &Vec<String>| {
+        let specs = effects.iter().map(|spec| run.model.effect(spec)).collect::<Result<Vec<_>, _>>().ok()?;
+        refit(run, pipeline, &specs).ok()
+    };
+    wanted.par_iter().filter_map(refit).collect()
+}
+
 /// The run's model with more effects, calibrated on its observations.
-fn refit(run: &Run, pipeline: &Pipeline, effects: &[EffectSpec]) -> Result<Refit, Error> {
+pub fn refit(run: &Run, pipeline: &Pipeline, effects: &[EffectSpec]) -> Result<Refit, Error> {
     let model = run.model.with_effects(effects, &run.session)?;
     let calibration = calibrate(&model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
     Ok(Refit { effects: effects.iter().map(EffectSpec::to_string).collect(), model, calibration })

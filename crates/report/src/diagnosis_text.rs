@@ -161,7 +161,7 @@ pub(crate) fn size(p: &ParameterReport) -> String {
     format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol())
 }
 
-fn found(e: &FoundEffect) -> String {
+pub(crate) fn found(e: &FoundEffect) -> String {
     let sizes: Vec<String> = e.parameters.iter().map(size).collect();
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let contrast = match &e.contrast {
@@ -190,7 +190,7 @@ pub(crate) fn pasted(u: &UnknownReport) -> String {
     u.effect().and_then(|effect| effects_toml(&[effect]).ok()).unwrap_or_default()
 }
 
-fn unlisted(u: &UnknownReport) -> String {
+pub(crate) fn unlisted(u: &UnknownReport) -> String {
     let range = match (u.shape.first(), u.shape.last()) {
         (Some(from), Some(to)) => format!(", known for {} from {:.3} to {:.3}", u.driver, from.at, to.at),
         _ => String::new(),

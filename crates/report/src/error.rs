@@ -36,6 +36,12 @@ pub enum ReportError {
     /// The calibrated model cannot be written.
     #[error("writing the calibrated model: {0}")]
     Model(#[source] Box<armcal_model::ModelError>),
+    /// The page's document cannot be written as JSON.
+    #[error("encoding the report's data as JSON: {0}")]
+    Page(#[source] serde_json::Error),
+    /// The page's template cannot be filled in.
+    #[error("writing the report page: {0}")]
+    Template(#[from] askama::Error),
     /// The run contradicts itself; a bug of whoever put it together.
     #[error("the run is inconsistent: {0}")]
     Inconsistent(String),

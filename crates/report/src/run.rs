@@ -39,6 +39,8 @@ pub struct Run {
     pub diagnosis: Option<Diagnosis>,
     /// The effects that the diagnosis found, added one after the other, each fitted and held out anew.
     pub steps: Vec<Refit>,
+    /// What the most probable candidates would do, each alone in the run's model; those that are no step already.
+    pub alternatives: Vec<Refit>,
     /// What concerns the run as a whole.
     pub warnings: Vec<Warning>,
 }
@@ -123,6 +125,11 @@ impl Run {
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));
         own.into_iter().cloned().collect()
+    }
+
+    /// Every other calibration of the observations: the steps, then the alternatives.
+    pub fn refits(&self) -> impl Iterator<Item = &Refit> {
+        self.steps.iter().chain(&self.alternatives)
     }
 
     /// Dwells of a recording that were seated in a cavity; without a board, those the fit could use.

@@ -8,7 +8,7 @@
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
 use crate::diagnosis_summary::DiagnosisSummary;
-use crate::run::{RecordingRun, Run, Status, VERSION};
+use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{Dwell, ErrorStats, Unit, Warning};
@@ -33,6 +33,9 @@ struct Summary<'a> {
     status: Status,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
+    /// The same observations and hold-out with more effects in the model: what was found, step by step, then the best
+    /// candidates, each alone.
+    refits: Vec<RefitSummary<'a>>,
     /// `null` when the pipeline asks for no diagnosis.
     diagnosis: Option<DiagnosisSummary<'a>>,
     conclusion: String,
@@ -129,6 +132,15 @@ struct ParameterSummary<'a> {
     role: &'static str,
 }
 
+#[derive(Debug, Clone, Serialize)]
+struct RefitSummary<'a> {
+    /// What was added to the run's model.
+    effects: &'a [String],
+    noise_floor_mm: f64,
+    train: SideSummary,
+    holdout: SideSummary,
+}
+
 /// Eq. 4 of the paper, when that objective was asked for.
 #[derive(Debug, Clone, Serialize)]
 struct PaperSummary {
@@ -146,6 +158,7 @@ impl<'a> Summary<'a> {
             status: run.status(),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
+            refits: run.refits().map(refit).collect(),
             diagnosis: run.diagnosis.as_ref().map(DiagnosisSummary::of),
             conclusion: conclusion(&run.calibration),
             warnings: run.overall_warnings(),
@@ -194,6 +207,16 @@ fn place<'a>(dwell: &Dwell, assignment: Option<&'a Assignment>) -> DwellPlace<'a
         place,
         cavity,
         confidence,
+    }
+}
+
+fn refit(refit: &Refit) -> RefitSummary<'_> {
+    let c = &refit.calibration;
+    RefitSummary {
+        effects: &refit.effects,
+        noise_floor_mm: c.noise_floor_m * 1e3,
+        train: side(&c.train),
+        holdout: side(&c.holdout),
     }
 }
 

@@ -4,6 +4,7 @@ use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
 use crate::model_file::model_file;
+use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::points::points;
 use crate::tables::parquet_files;
@@ -37,8 +38,8 @@ pub enum InputMessages {
     Reference,
 }
 
-/// Writes `run.mcap`, `summary.json`, `parameters.toml`, the calibrated model, Foxglove layouts and the Parquet tables
-/// into `out_dir`, which is made if need be; returns their paths.
+/// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model, Foxglove layouts and the
+/// Parquet tables into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
 /// [`InputMessages::Copy`]. Files of an earlier run are replaced, each at once.
@@ -63,11 +64,13 @@ pub fn write_all(
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
     let layouts = layouts(run, &points, &findings);
+    let page = report_html(run, &Basis::of(run), PageKind::File)?;
 
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let mut staged = Vec::new();
     let texts = [
+        ("report.html", &page),
         ("summary.json", &summary),
         ("parameters.toml", &parameters),
         (model.name, &model.text),

@@ -6,6 +6,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story::{self, Settled};
+use crate::view;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::atomic;
@@ -46,7 +47,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
     let new = requested(request.effects, &pipeline, &settled, &progress)?;
-    let extended = extend(&pipeline, request, &new)?;
+    let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
     let geometry = settled.geometry.clone();
@@ -60,6 +61,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
     write_all(&run, &recordings, request.out, &extended.pipeline.output)?;
+    view::remember(request.out, &extended.path)?;
     progress.finish();
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
@@ -97,16 +99,25 @@ fn requested(
 }
 
 /// A pipeline with more effects, and where it is written.
-struct Extended {
-    pipeline: Pipeline,
-    path: PathBuf,
+pub struct Extended {
+    /// The pipeline.
+    pub pipeline: Pipeline,
+    /// Its file.
+    pub path: PathBuf,
 }
 
 /// Appends `[[effects]]` tables to the pipeline's own text, so that comments and order stay as the user wrote them.
-fn extend(pipeline: &Pipeline, request: &Request<'_>, new: &[EffectSpec]) -> Result<Extended, Error> {
+///
+/// `original` is the pipeline's file; the extended one goes to `write`, or beside it.
+pub fn extend(
+    pipeline: &Pipeline,
+    original: &Path,
+    write: Option<&Path>,
+    new: &[EffectSpec],
+) -> Result<Extended, Error> {
     let tables = effects_toml(new).map_err(Error::Toml)?;
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
-    let path = request.write.map_or_else(|| beside(request.pipeline, new), Path::to_owned);
+    let path = write.map_or_else(|| beside(original, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
     if std::fs::read_to_string(&path).is_ok_and(|existing| existing != pipeline.text) {
         return Err(Error::WouldOverwrite { path });

@@ -2,12 +2,17 @@
 
 use super::{Outcome, print, style};
 use crate::error::Error;
-use armcal_report::{Comparison, PastRun};
+use armcal_recording::atomic;
+use armcal_report::{Comparison, PastRun, comparison_html};
 use std::path::Path;
 
-/// Compares two results and prints the table (or JSON).
-pub fn run(before: &Path, after: &Path, json: bool) -> Result<Outcome, Error> {
-    let comparison = Comparison::of(&PastRun::open(before)?, &PastRun::open(after)?);
+/// Compares two results, prints the table (or JSON), and writes the page if one is wanted.
+pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Result<Outcome, Error> {
+    let (before, after) = (PastRun::open(before)?, PastRun::open(after)?);
+    if let Some(path) = html {
+        atomic::write(path, comparison_html(&before, &after)?.as_bytes()).map_err(Error::Output)?;
+    }
+    let comparison = Comparison::of(&before, &after);
     if json {
         print(&super::json_text(&comparison)?);
     } else {

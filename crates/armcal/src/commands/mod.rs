@@ -1,6 +1,6 @@
 //! One command, one file.
 
-mod add;
+pub mod add;
 mod compare;
 mod diagnose;
 mod effects;
@@ -10,6 +10,7 @@ mod plan;
 mod run;
 mod score;
 mod simulate;
+mod view;
 
 use crate::cli::{Cli, Command};
 use crate::error::Error;
@@ -28,7 +29,7 @@ pub enum Outcome {
 /// Runs the command a user typed.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
-        Command::Compare { before, after, json } => compare::run(before, after, *json),
+        Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Diagnose { input, json } => diagnose::run(input, *json),
         Command::Add { effects, pipeline, write, out, json } => {
             add::run(&add::Request { effects, pipeline, write: write.as_deref(), out, json: *json })
@@ -48,6 +49,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))
         }
         Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
+        Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
     }
 }

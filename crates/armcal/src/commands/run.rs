@@ -4,17 +4,18 @@ use super::{Outcome, print, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story;
+use crate::{story, view};
 use armcal_report::{Status, summary_json, terminal, write_all};
 use std::path::Path;
 
 /// Runs a pipeline, writes all results to `out`, prints the table (or the summary as JSON).
-pub fn run(pipeline: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(pipeline)?;
+pub fn run(path: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(path)?;
     let progress = Progress::new();
     let (run, recordings) = story::run(&pipeline, &progress)?;
     progress.step("writing results");
     let written = write_all(&run, &recordings, out, &pipeline.output)?;
+    view::remember(out, path)?;
     progress.finish();
 
     if json {

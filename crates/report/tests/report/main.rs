@@ -17,6 +17,9 @@ mod recording;
 /// `summary.json` keeps its contract and its numbers.
 mod summary;
 
+/// `report.html`: what it embeds, and what a name from outside can do to it.
+mod page;
+
 /// Parquet tables, parameters, the calibrated model.
 mod tables;
 

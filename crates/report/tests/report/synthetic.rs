@@ -103,6 +103,7 @@ pub fn synthetic() -> Synthetic {
         calibration,
         diagnosis: None,
         steps: Vec::new(),
+        alternatives: Vec::new(),
         warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
     };
     Synthetic { run, recordings, paths, folder }

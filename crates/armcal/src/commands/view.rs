@@ -1,0 +1,27 @@
+//! `armcal view`: the report, live.
+
+use super::{Outcome, print};
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::view::{Bench, pipeline_of, serve};
+use armcal_report::summary_json;
+use std::path::Path;
+
+/// Runs the pipeline behind `input` and serves its report until the user stops it.
+pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
+    let path = pipeline_of(input)?;
+    let progress = Progress::new();
+    let bench = Bench::of(&path, &progress)?;
+    progress.finish();
+    let written = std::fs::read_to_string(input.join("summary.json"));
+    if written.is_ok_and(|text| text != summary_json(bench.run())) {
+        print(&format!(
+            "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
+            input.display()
+        ));
+    }
+    serve(bench, port, |address| {
+        print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display()));
+    })?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,117 @@
+//! A run on the workbench: every question of the page is a refit of its observations.
+
+use super::requests::{Choices, Wanted};
+use crate::commands::add;
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::stages::frames;
+use crate::story;
+use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_model::{EffectSpec, Model, catalogue};
+use armcal_recording::atomic;
+use armcal_report::{Basis, PageKind, Refit, Run, refit_json, report_html};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A finished run, ready to be refitted.
+pub struct Bench {
+    pipeline: Pipeline,
+    path: PathBuf,
+    /// The arm without effects.
+    geometry: Model,
+    /// The pipeline's own effects.
+    own: Vec<EffectSpec>,
+    run: Run,
+    basis: Basis,
+}
+
+impl Bench {
+    /// Runs a pipeline; its results stay in memory.
+    pub fn of(path: &Path, progress: &Progress) -> Result<Bench, Error> {
+        let pipeline = Pipeline::load(path)?;
+        let settled = story::settle(&pipeline, progress)?;
+        let geometry = settled.geometry.clone();
+        let own = frames::effect_specs(&pipeline, &geometry)?;
+        let run = story::finish(settled, &pipeline, progress)?.0;
+        let basis = Basis::of(&run);
+        Ok(Bench { pipeline, path: path.to_owned(), geometry, own, run, basis })
+    }
+
+    /// The run.
+    pub fn run(&self) -> &Run {
+        &self.run
+    }
+
+    /// The page.
+    pub fn html(&self) -> Result<String, Error> {
+        Ok(report_html(&self.run, &self.basis, PageKind::Live)?)
+    }
+
+    /// What can be chosen.
+    pub(super) fn choices(&self) -> Choices {
+        let mut holdouts = vec![("as in the pipeline".to_owned(), self.pipeline.holdout.clone())];
+        let several = self.run.recordings.len() > 1;
+        if several {
+            holdouts.push(("each recording in turn".into(), HoldoutConfig::EachRecording));
+        }
+        holdouts.push(("places, in 5 turns".into(), HoldoutConfig::CavityFolds { k: 5 }));
+        holdouts.push(("a fifth of the dwells".into(), HoldoutConfig::Random { share: 0.2, seed: 0 }));
+        for (index, recording) in self.run.recordings.iter().enumerate().filter(|_| several) {
+            let recordings = vec![armcal_calibrate::RecordingKey::Index(index)];
+            holdouts
+                .push((format!("recording {}", recording.name), HoldoutConfig::Recordings { recordings }));
+        }
+        holdouts.push(("nothing".into(), HoldoutConfig::None));
+        let offered = self.geometry.candidates(&self.run.session);
+        let mut effects: Vec<String> = offered.iter().map(EffectSpec::to_string).collect();
+        effects.extend(
+            catalogue()
+                .iter()
+                .map(|k| k.name.to_owned())
+                .filter(|n| !effects.iter().any(|e| e.starts_with(n)))
+                .collect::<Vec<_>>(),
+        );
+        Choices { effects, holdouts }
+    }
+
+    /// Refits with what is wanted: the answer as the page reads it.
+    pub(super) fn refit(&self, wanted: &Wanted) -> Result<String, Error> {
+        let begun = Instant::now();
+        let specs = self.specs(wanted)?;
+        let model = self.geometry.with_effects(&specs, &self.run.session)?;
+        let holdout = wanted.holdout.as_ref().unwrap_or(&self.pipeline.holdout);
+        let calibration = calibrate(&model, &self.run.observations, &self.pipeline.fit, holdout)?;
+        let added = specs.iter().filter(|s| !self.own.contains(s)).map(EffectSpec::to_string).collect();
+        let refit = Refit { effects: added, model, calibration };
+        let shown = refit_json(&self.run, &self.basis, &refit)?;
+        let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+        Ok(format!("{{\"milliseconds\":{milliseconds:.1},\"shown\":{shown}}}"))
+    }
+
+    /// Writes the pipeline with what is wanted, beside the original, as `armcal add` would.
+    pub(super) fn keep(&self, wanted: &Wanted) -> Result<PathBuf, Error> {
+        let specs = self.specs(wanted)?;
+        if let Some(gone) = self.own.iter().find(|own| !specs.contains(own)) {
+            return Err(Error::OwnEffect { effect: gone.to_string(), path: self.path.clone() });
+        }
+        let new: Vec<EffectSpec> = specs.into_iter().filter(|s| !self.own.contains(s)).collect();
+        if new.is_empty() {
+            return Err(Error::NothingToKeep { path: self.path.clone() });
+        }
+        let extended = add::extend(&self.pipeline, &self.path, None, &new)?;
+        atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
+        Ok(extended.path)
+    }
+
+    /// The effects by name: the pipeline's own as it has them, others from the catalogue, then formulas.
+    fn specs(&self, wanted: &Wanted) -> Result<Vec<EffectSpec>, Error> {
+        let named = wanted.effects.iter().map(|name| {
+            let own = self.own.iter().find(|own| own.to_string() == *name).cloned();
+            own.map_or_else(|| self.geometry.effect(name), Ok)
+        });
+        let joints = self.geometry.chain().joint_names();
+        let formulas = wanted.expressions.iter().map(|e| e.table().spec(joints));
+        Ok(named.chain(formulas).collect::<Result<Vec<_>, _>>()?)
+    }
+}

@@ -1,0 +1,15 @@
+//! `armcal view`: the report of a run, served to this machine's browser, where any combination of effects and any
+//! hold-out is refitted as it is chosen.
+//!
+//! * [`Bench`]: the run, ready to be refitted; `requests`: what the page may ask of it;
+//! * `guard`: who may ask; `server`: the few routes; `source`: which pipeline made a folder of results.
+
+mod bench;
+mod guard;
+mod requests;
+mod server;
+mod source;
+
+pub use bench::Bench;
+pub use server::serve;
+pub use source::{pipeline_of, remember};

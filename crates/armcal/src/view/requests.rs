@@ -1,0 +1,56 @@
+//! What the page may ask for.
+
+use armcal_calibrate::HoldoutConfig;
+use armcal_model::{EffectTable, Override};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Effects and hold-out of a refit.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wanted {
+    /// All effects of the model, as `armcal add` names them.
+    #[serde(default)]
+    pub effects: Vec<String>,
+    /// Formulas beside them.
+    #[serde(default)]
+    pub expressions: Vec<Formula>,
+    /// What the fit must not see; the pipeline's own when absent.
+    pub holdout: Option<HoldoutConfig>,
+}
+
+/// A formula of the user: an `[[effects]]` table of kind `expression`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Formula {
+    name: String,
+    formula: String,
+    acts_on: String,
+    #[serde(default)]
+    parameters: BTreeMap<String, Override>,
+}
+
+impl Formula {
+    /// As the pipeline file writes it.
+    pub fn table(&self) -> EffectTable {
+        EffectTable {
+            kind: "expression".into(),
+            target: None,
+            since: None,
+            name: Some(self.name.clone()),
+            formula: Some(self.formula.clone()),
+            acts_on: Some(self.acts_on.clone()),
+            shape: BTreeMap::new(),
+            parameters: self.parameters.clone(),
+        }
+    }
+}
+
+/// What can be chosen.
+#[derive(Debug, Serialize)]
+pub(super) struct Choices {
+    /// Effects that this arm and these dwells could show.
+    pub effects: Vec<String>,
+    /// Hold-outs with their names.
+    pub holdouts: Vec<(String, HoldoutConfig)>,
+}

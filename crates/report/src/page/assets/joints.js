@@ -1,0 +1,40 @@
+// Implied errors of each joint, and of all lengths: over angle, torque and time, by direction of arrival.
+
+function channelFigure(k) {
+  const c = colours();
+  const channel = doc.channels[k], keys = doc.drawn[k];
+  const data = [];
+  const more = {};
+  const y = view.shown.implied[k];
+  keys.forEach((key, panel) => {
+    const suffix = panel === 0 ? "" : String(panel + 1), x = driver(key);
+    const axes = { xaxis: "x" + suffix, yaxis: "y" };
+    if (!isBase()) data.push({ type: "scatter", mode: "markers", x: x.values, y: base().implied[k], marker: { color: c.ghost, size: pointSize - 1 },
+      hoverinfo: "skip", showlegend: false, ...axes });
+    data.push(...byDirection(channel.joint, (own, look) => ({
+      type: "scatter", mode: "markers", name: look.name, legendgroup: look.name, showlegend: panel === 0 && channel.joint !== null,
+      x: own.map((i) => x.values[i]), y: own.map((i) => y[i]), marker: marker(look, pointSize, 0.55),
+      text: own.map((i) => plain(dwellName(i))), hovertemplate: "%{text}<br>%{x}, %{y}<extra></extra>", ...axes,
+    })));
+    for (const band of view.shown.bands.filter((b) => b.channel === k && b.driver === key)) {
+      const look = band.direction === null ? { colour: "plus" } : direction[band.direction];
+      data.push({ type: "scatter", mode: "lines", x: band.x, y: band.mean, line: { color: c[look.colour], width: 2.5 }, showlegend: false,
+        error_y: { type: "data", array: band.half, color: c[look.colour], thickness: 1.5, width: 3 }, hoverinfo: "skip", ...axes });
+    }
+    const width = 1 / keys.length, gap = 0.025;
+    more["xaxis" + suffix] = axis(plain(x.label), { domain: [panel * width + (panel ? gap : 0), (panel + 1) * width - gap / 2], anchor: "y" });
+  });
+  const range = rescaled() ? span([y]) : span([base().implied[k], y]);
+  more.yaxis = axis(plain(channel.label) + " [" + channel.unit + "]", { range, zeroline: true, zerolinewidth: 1.5 });
+  return { data, layout: layout({ height: 300, showlegend: true, ...more }) };
+}
+
+function channelBoxes() {
+  doc.drawn.forEach((keys, k) => {
+    const box = element("div", undefined, "plot");
+    box.dataset.channel = doc.channels[k].key;
+    box.style.minHeight = "300px";
+    $("joints").append(box);
+    chart(box, () => channelFigure(k));
+  });
+}

@@ -1,0 +1,95 @@
+// Served by `armcal view`: combinations, formulas and hold-outs, refitted as they are chosen. Then the page starts.
+
+function live() {
+  const chosen = new Map(doc.own_effects.map((spec) => [spec, { spec, on: true }]));
+  for (const c of doc.candidates) for (const spec of c.spec.split("+")) if (!chosen.has(spec)) chosen.set(spec, { spec, on: false });
+  let asked = 0;
+
+  const draw = () => {
+    $("effects").replaceChildren(...[...chosen.entries()].map(([name, effect]) => {
+      const box = document.createElement("input");
+      box.type = "checkbox";
+      box.checked = effect.on;
+      box.value = name;
+      box.addEventListener("change", () => { effect.on = box.checked; refit(); });
+      const label = document.createElement("label");
+      label.append(box, " " + name);
+      return label;
+    }));
+  };
+  const request = () => {
+    const on = [...chosen.values()].filter((e) => e.on);
+    return { effects: on.filter((e) => e.spec).map((e) => e.spec), expressions: on.filter((e) => e.expression).map((e) => e.expression),
+      holdout: JSON.parse($("holdout").value) };
+  };
+  const ask = async (what, body) => {
+    const answer = await fetch(what, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+    const value = await answer.json();
+    if (!answer.ok) throw new Error(value.error);
+    return value;
+  };
+  const refit = async () => {
+    const own = ++asked;
+    $("live-status").textContent = "refitting …";
+    try {
+      const value = await ask("refit", request());
+      if (own !== asked) return; // Somebody clicked on.
+      $("live-status").textContent = "refitted in " + value.milliseconds.toFixed(0) + " ms";
+      const names = value.shown.effects.join(" + ");
+      show(value.shown, names ? "with " + names : "geometry alone");
+    } catch (error) {
+      if (own === asked) $("live-status").textContent = error.message;
+    }
+  };
+  const parameters = (text) => Object.fromEntries(text.split(";").map((p) => p.trim().split(/\s+/)).filter((p) => p[0])
+    .map(([name, unit, prior]) => [name, { unit, prior: Number(prior) }]));
+
+  $("add-other").addEventListener("click", () => {
+    const spec = $("other").value.trim();
+    if (!spec) return;
+    chosen.set(spec, { spec, on: true });
+    $("other").value = "";
+    draw();
+    refit();
+  });
+  $("add-formula").addEventListener("click", () => {
+    const expression = { name: $("x-name").value.trim(), formula: $("x-formula").value, acts_on: $("x-acts").value.trim(), parameters: parameters($("x-parameters").value) };
+    chosen.set("expression " + expression.name, { expression, on: true });
+    draw();
+    refit();
+  });
+  $("workbench").addEventListener("submit", (event) => event.preventDefault());
+  $("holdout").addEventListener("change", refit);
+  $("keep").addEventListener("click", async () => {
+    try {
+      const value = await ask("keep", request());
+      $("live-status").textContent = "written: " + value.pipeline;
+    } catch (error) {
+      $("live-status").textContent = error.message;
+    }
+  });
+  fetch("choices").then((answer) => answer.json()).then((choices) => {
+    $("catalogue").replaceChildren(...choices.effects.map((spec) => { const option = document.createElement("option"); option.value = spec; return option; }));
+    $("holdout").replaceChildren(...choices.holdouts.map(([name, value]) => { const option = element("option", name); option.value = JSON.stringify(value); return option; }));
+  });
+  draw();
+}
+
+function start() {
+  candidateTable();
+  unlistedBoxes();
+  channelBoxes();
+  mapBoxes();
+  chart($("path"), pathFigure);
+  chart($("time"), timeFigure);
+  chart($("groups"), groupFigure);
+  part(redraw);
+  if ($("live")) live();
+  $("reset").addEventListener("click", () => show(base(), "as calibrated"));
+  $("rescale").addEventListener("change", redraw);
+  dark.addEventListener("change", redraw);
+  window.addEventListener("beforeprint", drawAll);
+  printing.addEventListener("change", () => drawAll());
+  show(base(), "as calibrated");
+  document.documentElement.dataset.ready = "yes";
+}

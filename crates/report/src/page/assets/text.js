@@ -1,0 +1,36 @@
+// The document, and how text is made. No statistics here: every number was worked out by armcal and only finds its place.
+
+const doc = JSON.parse(document.getElementById("data").textContent);
+const $ = (id) => document.getElementById(id);
+
+// An element with text; names from outside are only ever text.
+function element(tag, text, className) {
+  const made = document.createElement(tag);
+  if (text !== undefined) made.textContent = text;
+  if (className) made.className = className;
+  return made;
+}
+
+function row(cells, tag = "td") {
+  const made = document.createElement("tr");
+  for (const cell of cells) {
+    const own = cell instanceof Node ? cell : String(cell);
+    const box = element(tag);
+    box.append(own);
+    if (typeof cell === "string" && /^[+−-]?[\d.]+(e-?\d+)?( ?%)?$/.test(cell)) box.className = "num";
+    made.append(box);
+  }
+  return made;
+}
+
+// The charts read a little HTML: what could be taken for it is spelt out.
+const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+
+// Millimetres as armcal writes them: two decimals, more where two would hide what matters.
+function mm(value) {
+  if (value === null || value === undefined) return "–";
+  const size = Math.abs(value);
+  const decimals = size >= 0.095 || size < 1e-9 ? 2 : size >= 0.0095 ? 3 : 4;
+  return value.toFixed(decimals).replace("-", "−");
+}
+const signed = (value) => (value > 0 ? "+" : "") + mm(value);

@@ -1,0 +1,174 @@
+//! The page of `armcal compare`: two results, dwell by dwell.
+
+use super::embed;
+use crate::ReportError;
+use crate::comparison::{Comparison, Difference};
+use crate::past_run::{PastResidual, PastRun};
+use crate::run::VERSION;
+use crate::text::millimetres;
+use askama::Template;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Two results as one HTML page.
+///
+/// # Errors
+/// A template or document that cannot be written.
+pub fn comparison_html(before: &PastRun, after: &PastRun) -> Result<String, ReportError> {
+    let comparison = Comparison::of(before, after);
+    let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("assets/compared.js")]);
+    let page = ComparePage {
+        policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
+        style: embed::STYLE,
+        plotly: embed::PLOTLY,
+        data: embed::json_for_html(&Document::of(before, after, &comparison))?,
+        script: &script,
+        version: VERSION,
+        before: &before.pipeline,
+        after: &after.pipeline,
+        effects: (comparison.effects[0].join(", "), comparison.effects[1].join(", ")),
+        sentence: comparison.sentence(),
+        differences: differences(&comparison).into_iter().map(DifferenceRow::of).collect(),
+        moved: comparison.moved.iter().map(moved).collect(),
+        comparison: &comparison,
+    };
+    Ok(page.render()?)
+}
+
+#[derive(Template)]
+#[template(path = "compare.html")]
+struct ComparePage<'a> {
+    policy: String,
+    style: &'a str,
+    plotly: &'a str,
+    data: String,
+    script: &'a str,
+    version: &'a str,
+    before: &'a str,
+    after: &'a str,
+    effects: (String, String),
+    sentence: String,
+    differences: Vec<DifferenceRow>,
+    moved: Vec<MovedRow>,
+    comparison: &'a Comparison,
+}
+
+struct DifferenceRow {
+    name: String,
+    of: Difference,
+    before: String,
+    after: String,
+    change: String,
+    interval: String,
+}
+
+struct MovedRow {
+    name: String,
+    unit: String,
+    before: String,
+    after: String,
+    change: String,
+    widths: String,
+}
+
+/// What the page's scripts draw.
+#[derive(Serialize)]
+struct Document {
+    recordings: Vec<RecordingName>,
+    pairs: Vec<PairRow>,
+    /// Indices into `pairs`, the most improved first.
+    by_change: Vec<usize>,
+    differences: Vec<NamedDifference>,
+}
+
+#[derive(Serialize)]
+struct RecordingName {
+    name: String,
+}
+
+#[derive(Serialize)]
+struct PairRow {
+    recording: usize,
+    dwell: usize,
+    cavity: String,
+    before_mm: f64,
+    after_mm: f64,
+}
+
+#[derive(Serialize)]
+struct NamedDifference {
+    name: String,
+    difference_mm: f64,
+    ci95_mm: Option<[f64; 2]>,
+}
+
+impl Document {
+    fn of(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Document {
+        let mut recordings: Vec<RecordingName> = Vec::new();
+        let key = |r: &PastResidual| (r.recording.clone(), r.dwell.dwell);
+        let earlier: BTreeMap<(String, usize), f64> =
+            before.residuals.iter().map(|r| (key(r), r.error_m)).collect();
+        let mut pairs = Vec::new();
+        for r in &after.residuals {
+            let Some(before_m) = earlier.get(&key(r)) else { continue };
+            let recording =
+                recordings.iter().position(|known| known.name == r.recording).unwrap_or_else(|| {
+                    recordings.push(RecordingName { name: r.recording.clone() });
+                    recordings.len() - 1
+                });
+            let (before_mm, after_mm) = (before_m * 1e3, r.error_m * 1e3);
+            pairs.push(PairRow {
+                recording,
+                dwell: r.dwell.dwell,
+                cavity: r.cavity.clone(),
+                before_mm,
+                after_mm,
+            });
+        }
+        let change = |k: &usize| pairs[*k].after_mm - pairs[*k].before_mm;
+        let mut by_change: Vec<usize> = (0..pairs.len()).collect();
+        by_change.sort_by(|a, b| change(a).total_cmp(&change(b)));
+        let named = |(name, d): (String, Difference)| NamedDifference {
+            name,
+            difference_mm: d.difference_mm,
+            ci95_mm: d.ci95_mm,
+        };
+        Document {
+            differences: differences(comparison).into_iter().map(named).collect(),
+            by_change,
+            recordings,
+            pairs,
+        }
+    }
+}
+
+/// Held out, all, then each recording.
+fn differences(comparison: &Comparison) -> Vec<(String, Difference)> {
+    let whole = [("held out", comparison.held_out), ("all", comparison.all)];
+    let whole = whole.into_iter().filter_map(|(name, d)| Some((name.to_owned(), d?)));
+    whole.chain(comparison.recordings.iter().cloned()).collect()
+}
+
+impl DifferenceRow {
+    fn of((name, of): (String, Difference)) -> DifferenceRow {
+        DifferenceRow {
+            name,
+            of,
+            before: millimetres(of.before_mm * 1e-3),
+            after: millimetres(of.after_mm * 1e-3),
+            change: format!("{:+.3}", of.difference_mm),
+            interval: of.ci95_mm.map_or("–".into(), |[low, high]| format!("{low:+.3} to {high:+.3}")),
+        }
+    }
+}
+
+fn moved(m: &crate::Moved) -> MovedRow {
+    MovedRow {
+        name: m.name.clone(),
+        unit: m.unit.clone(),
+        before: format!("{:.4}", m.before),
+        after: format!("{:.4}", m.after),
+        change: format!("{:+.4}", m.after - m.before),
+        widths: format!("{:.1}", m.in_half_widths),
+    }
+}

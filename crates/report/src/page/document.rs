@@ -1,0 +1,212 @@
+//! The one JSON document of the page: everything its scripts draw, worked out already.
+
+use super::basis::{Basis, Driver, joint_units};
+use super::levers::Channel;
+use super::numbers::Column;
+use super::shown::{Shown, drawn_drivers, effect_names};
+use crate::diagnosis_text::sizes;
+use crate::run::{Refit, Run};
+use armcal_core::Unit;
+use armcal_diagnose::{CandidateReport, Diagnosis, UnknownReport};
+use armcal_model::find;
+use serde::Serialize;
+
+/// Rows of the ranking.
+const RANKED: usize = 12;
+
+/// The document.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Document {
+    /// Joints and the other places where an error may enter.
+    pub channels: Vec<Channel>,
+    /// Drivers drawn for each of the first channels.
+    pub drawn: Vec<Vec<String>>,
+    /// What errors may follow.
+    pub drivers: Vec<Driver>,
+    /// Direction of arrival, `[joint][dwell]`.
+    pub arrival: Vec<Vec<i8>>,
+    /// Names of the recordings.
+    pub recordings: Vec<String>,
+    /// The dwells that became observations.
+    pub dwells: Dwells,
+    /// Boards with seated dwells.
+    pub boards: Vec<BoardMap>,
+    /// The run's own calibration, then every refit.
+    pub refits: Vec<Shown>,
+    /// Geometry and what was found, one effect after the other, by index into `refits`.
+    pub path: Vec<usize>,
+    /// The ranking.
+    pub candidates: Vec<CandidateRow>,
+    /// Shapes without a listed cause.
+    pub unlisted: Vec<UnlistedShape>,
+    /// Effects that the run's own model has.
+    pub own_effects: Vec<String>,
+}
+
+/// Columns over dwells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Dwells {
+    pub recording: Vec<usize>,
+    pub dwell: Vec<usize>,
+    pub cavity: Vec<Option<String>>,
+    /// Measured tip in the world [mm]: x, y, z.
+    pub world_mm: [Column; 3],
+    /// Measured tip from the base: distance from its vertical axis and height above it [mm].
+    pub reach_mm: [Column; 2],
+    /// Cavity in its board [mm]: x, y.
+    pub board_mm: [Column; 2],
+}
+
+/// A board as one recording saw it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct BoardMap {
+    pub recording: usize,
+    /// Cavities [mm]: x, y.
+    pub cavities_mm: [Column; 2],
+    pub names: Vec<String>,
+}
+
+/// One row of the ranking.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct CandidateRow {
+    pub spec: String,
+    pub summary: String,
+    pub size: String,
+    pub probability: f64,
+    pub p_adjusted: f64,
+    pub log_evidence: f64,
+    pub absorbed: f64,
+    pub also: Vec<String>,
+    /// Whether the diagnosis holds it to be missing.
+    pub found: bool,
+    /// Index into `refits`.
+    pub refit: Option<usize>,
+}
+
+/// A shape without a listed cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct UnlistedShape {
+    pub channel: String,
+    pub driver: String,
+    pub driver_unit: &'static str,
+    pub unit: &'static str,
+    pub at: Column,
+    pub value: Column,
+    pub half: Column,
+}
+
+impl Document {
+    /// Of a run, its steps and its alternatives.
+    pub fn of(run: &Run, basis: &Basis) -> Document {
+        let all: Vec<&Refit> = run.refits().collect();
+        let mut refits = vec![Shown::of_run(run, basis)];
+        refits.extend(all.iter().map(|refit| Shown::of(run, basis, refit)));
+        let index_of = |effects: &[String]| all.iter().position(|r| r.effects == effects).map(|k| k + 1);
+        let path = [0].into_iter().chain(run.steps.iter().filter_map(|s| index_of(&s.effects))).collect();
+        let candidates = run.diagnosis.iter().flat_map(|d| ranking(d, &index_of)).collect();
+        let joint_units = joint_units(run);
+        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
+        Document {
+            channels: basis.levers.channels.clone(),
+            drawn: drawn_drivers(basis),
+            drivers: basis.drivers.clone(),
+            arrival: basis.arrival.clone(),
+            recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
+            dwells: dwells(run),
+            boards: boards(run),
+            refits,
+            path,
+            candidates,
+            unlisted: unlisted.map(|u| unlisted_shape(u, &joint_units)).collect(),
+            own_effects: effect_names(&run.model),
+        }
+    }
+}
+
+/// The best entries, and below them whatever was found.
+fn ranking(d: &Diagnosis, index_of: &dyn Fn(&[String]) -> Option<usize>) -> Vec<CandidateRow> {
+    let found = |spec: &str| spec.split('+').all(|s| d.effects.iter().any(|e| e.set.iter().any(|n| n == s)));
+    let row = |c: &CandidateReport| {
+        let specs: Vec<String> = c.spec.split('+').map(str::to_owned).collect();
+        CandidateRow {
+            summary: find(&c.effect).map_or(String::new(), |kind| kind.summary.to_owned()),
+            size: sizes(c),
+            probability: c.probability,
+            p_adjusted: c.p_adjusted,
+            log_evidence: c.log_evidence,
+            absorbed: c.absorbed,
+            also: c.same_to_the_data.clone(),
+            found: found(&c.spec),
+            refit: index_of(&specs),
+            spec: c.spec.clone(),
+        }
+    };
+    let best = d.candidates.iter().take(RANKED);
+    let rest = d.candidates.iter().skip(RANKED).filter(|c| found(&c.spec));
+    best.chain(rest).map(row).collect()
+}
+
+fn dwells(run: &Run) -> Dwells {
+    let values = run.calibration.fit.values();
+    let base = run.model.base_in_world(&values);
+    let measured_m: Vec<_> =
+        run.observations.iter().map(|o| run.model.measured_tip_in_world(&values, o)).collect();
+    let in_base_m: Vec<_> = measured_m.iter().map(|m| base.inverse() * nalgebra::Point3::from(*m)).collect();
+    let cavity_mm = |axis: usize| {
+        Column::of(run.observations.iter().map(|o| match &o.reference {
+            armcal_core::Reference::Seated { in_board_m, .. } => Some(in_board_m[axis] * 1e3),
+            armcal_core::Reference::Tracked { .. } => None,
+        }))
+    };
+    Dwells {
+        recording: run.observations.iter().map(|o| o.dwell.recording).collect(),
+        dwell: run.observations.iter().map(|o| o.dwell.dwell).collect(),
+        cavity: run.observations.iter().map(|o| o.cavity().map(str::to_owned)).collect(),
+        world_mm: [0, 1, 2].map(|axis| Column::of_all(measured_m.iter().map(|m| m[axis] * 1e3))),
+        reach_mm: [
+            Column::of_all(in_base_m.iter().map(|m| m.x.hypot(m.y) * 1e3)),
+            Column::of_all(in_base_m.iter().map(|m| m.z * 1e3)),
+        ],
+        board_mm: [cavity_mm(0), cavity_mm(1)],
+    }
+}
+
+fn boards(run: &Run) -> Vec<BoardMap> {
+    let Some(board) = &run.board else { return Vec::new() };
+    let seen =
+        |index: usize| run.observations.iter().any(|o| o.dwell.recording == index && o.cavity().is_some());
+    let of_axis = |axis: usize| Column::of_all(board.cavities.iter().map(|c| c.in_board_m[axis] * 1e3));
+    let map = |recording: usize| BoardMap {
+        recording,
+        cavities_mm: [of_axis(0), of_axis(1)],
+        names: board.cavities.iter().map(|c| c.name.clone()).collect(),
+    };
+    (0..run.recordings.len()).filter(|index| seen(*index)).map(map).collect()
+}
+
+fn unlisted_shape(u: &UnknownReport, joint_units: &[Unit]) -> UnlistedShape {
+    let driver_unit = driver_unit(&u.driver, joint_units);
+    UnlistedShape {
+        channel: u.channel.clone(),
+        driver: u.driver.clone(),
+        driver_unit: driver_unit.map_or("", Unit::display_symbol),
+        unit: u.unit.display_symbol(),
+        at: Column::of_all(u.shape.iter().map(|p| driver_unit.map_or(p.at, |unit| unit.to_display(p.at)))),
+        value: Column::of_all(u.shape.iter().map(|p| u.unit.to_display(p.value))),
+        half: Column::of_all(u.shape.iter().map(|p| 1.96 * u.unit.to_display(p.sigma))),
+    }
+}
+
+/// Unit of a driver as the diagnosis names it: `q1`, `tau1`, `t`, `load`, `temperature`.
+fn driver_unit(driver: &str, joint_units: &[Unit]) -> Option<Unit> {
+    let joint = |prefix: &str| driver.strip_prefix(prefix)?.parse::<usize>().ok()?.checked_sub(1);
+    if let Some(j) = joint("q") {
+        return joint_units.get(j).copied();
+    }
+    match driver {
+        _ if joint("tau").is_some() => Some(Unit::NewtonMetre),
+        "t" | "time" => Some(Unit::Second),
+        "load" => Some(Unit::Kilogram),
+        _ => None,
+    }
+}

@@ -1,0 +1,149 @@
+//! `report.html`: a run on one page that needs no network and no manual; served by `armcal view` it refits live.
+//!
+//! The numbers are worked out here and embedded as one JSON document; the page's scripts only draw. The page that is
+//! opened from disk and the one that is served are the same; the served one may ask for refits.
+//!
+//! * [`Basis`]: what all refits share, with `levers` (implied errors of joints and lengths);
+//! * `shown`: one calibration as it is drawn, with `bands`, `groups`, `signature`;
+//! * `document`: all of it as one value; `embed`: how it gets into the page; `quality`: the tables about the data;
+//! * `compared`: the page of `armcal compare`.
+
+mod bands;
+mod basis;
+mod compared;
+mod document;
+mod embed;
+mod groups;
+mod levers;
+mod numbers;
+mod quality;
+mod shown;
+mod signature;
+
+pub use basis::Basis;
+pub use compared::comparison_html;
+
+use crate::diagnosis_text::{found, headline, unlisted};
+use crate::run::{Refit, Run, Status, VERSION};
+use crate::{ReportError, conclusion};
+use askama::Template;
+use document::Document;
+use shown::Shown;
+
+/// The page's own scripts, in the order in which they use each other.
+const SCRIPTS: [&str; 11] = [
+    embed::TEXT,
+    embed::CHART,
+    include_str!("assets/page.js"),
+    include_str!("assets/headline.js"),
+    include_str!("assets/path.js"),
+    include_str!("assets/candidates.js"),
+    include_str!("assets/signature.js"),
+    include_str!("assets/joints.js"),
+    include_str!("assets/where.js"),
+    include_str!("assets/parameters.js"),
+    include_str!("assets/live.js"),
+];
+
+/// Whether a page stands alone or has a server that refits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PageKind {
+    /// A file that is opened from disk.
+    File,
+    /// Served by `armcal view`.
+    Live,
+}
+
+/// The run as one HTML page.
+///
+/// # Errors
+/// A template or document that cannot be written.
+pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, ReportError> {
+    let script = own_script();
+    let connect = if kind == PageKind::Live { "'self'" } else { "'none'" };
+    let page = ReportPage {
+        policy: embed::policy(&[embed::PLOTLY, &script], connect),
+        style: embed::STYLE,
+        plotly: embed::PLOTLY,
+        data: embed::json_for_html(&Document::of(run, basis))?,
+        script: &script,
+        live: kind == PageKind::Live,
+        title: &run.pipeline_name,
+        version: VERSION,
+        status: match run.status() {
+            Status::Ok => "ok",
+            Status::Inadequate => "inadequate",
+            Status::DataLost => "data lost",
+        },
+        conclusion: conclusion(&run.calibration),
+        verdict: verdict(run),
+        run,
+        recordings: quality::recordings(run),
+        rejections: quality::rejections(run),
+        warnings: quality::warnings(run),
+    };
+    Ok(page.render()?)
+}
+
+/// A refit of the run as JSON, as the page's document holds it.
+///
+/// # Errors
+/// A document that cannot be written.
+pub fn refit_json(run: &Run, basis: &Basis, refit: &Refit) -> Result<String, ReportError> {
+    serde_json::to_string(&Shown::of(run, basis, refit)).map_err(ReportError::Page)
+}
+
+fn own_script() -> String {
+    embed::script(&SCRIPTS)
+}
+
+#[derive(Template)]
+#[template(path = "report.html")]
+struct ReportPage<'a> {
+    policy: String,
+    style: &'a str,
+    plotly: &'a str,
+    data: String,
+    script: &'a str,
+    live: bool,
+    title: &'a str,
+    version: &'a str,
+    status: &'a str,
+    conclusion: String,
+    verdict: Verdict,
+    run: &'a Run,
+    recordings: Vec<quality::RecordingRow>,
+    rejections: Vec<quality::RejectionRow>,
+    warnings: Vec<quality::WarningRow>,
+}
+
+/// What the diagnosis says, in sentences.
+struct Verdict {
+    sentence: String,
+    found: Vec<String>,
+    next: Vec<String>,
+    same: Vec<[String; 2]>,
+    unseen: Vec<armcal_diagnose::NotTestable>,
+    explanations: Vec<armcal_diagnose::Explanation>,
+}
+
+fn verdict(run: &Run) -> Verdict {
+    let Some(d) = &run.diagnosis else {
+        return Verdict {
+            sentence: "Nobody asked what is missing ([diagnosis] enabled = false).".into(),
+            found: Vec::new(),
+            next: Vec::new(),
+            same: Vec::new(),
+            unseen: Vec::new(),
+            explanations: Vec::new(),
+        };
+    };
+    Verdict {
+        sentence: headline(d),
+        found: d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).collect(),
+        next: d.record_next.clone(),
+        same: d.cannot_tell_apart.clone(),
+        unseen: d.not_testable.clone(),
+        explanations: d.explanations.clone(),
+    }
+}

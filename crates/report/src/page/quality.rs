@@ -1,0 +1,156 @@
+//! What the page's tables say about the data themselves.
+
+use crate::run::{RecordingRun, Run};
+use armcal_core::{Severity, Warning};
+use armcal_recording::StreamReport;
+
+/// One recording.
+pub(crate) struct RecordingRow {
+    pub name: String,
+    pub dwells: usize,
+    pub used: usize,
+    pub rejected: usize,
+    pub clock: String,
+    pub drift: String,
+    pub files: Vec<FileRow>,
+    pub streams: Vec<StreamRow>,
+}
+
+/// One of its files.
+pub(crate) struct FileRow {
+    pub path: String,
+    pub sha256: String,
+    pub bytes: u64,
+    pub damage: String,
+}
+
+/// One of its streams.
+pub(crate) struct StreamRow {
+    pub role: String,
+    pub topic: String,
+    pub rows: usize,
+    pub rate: String,
+    pub gap: String,
+    pub occluded: String,
+    pub dropped: u64,
+    pub clock: String,
+}
+
+/// Dwells of one recording that were rejected for one reason.
+pub(crate) struct RejectionRow {
+    pub recording: String,
+    pub why: String,
+    pub dwells: String,
+}
+
+/// A warning and how much it matters.
+pub(crate) struct WarningRow {
+    pub severity: &'static str,
+    /// Class of its style.
+    pub class: &'static str,
+    pub subject: String,
+    pub message: String,
+}
+
+/// All recordings.
+pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow> {
+    run.recordings.iter().map(|r| recording(run, r)).collect()
+}
+
+fn recording(run: &Run, r: &RecordingRun) -> RecordingRow {
+    let clock = r.clock.as_ref();
+    let ms = |s: f64| s * 1e3;
+    RecordingRow {
+        name: r.name.clone(),
+        dwells: r.dwells.len(),
+        used: run.observations.iter().filter(|o| run.recording_name(o.dwell) == r.name).count(),
+        rejected: r.rejections.len(),
+        clock: clock
+            .map_or("one clock".into(), |c| format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s))),
+        drift: clock.map_or("–".into(), |c| format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6)),
+        files: r
+            .report
+            .files
+            .iter()
+            .map(|f| FileRow {
+                path: r.given_path(f).to_string_lossy().into_owned(),
+                sha256: f.sha256.clone(),
+                bytes: f.bytes,
+                damage: match (f.truncated_at, f.damaged.len()) {
+                    (None, 0) => "none".into(),
+                    (cut, parts) => {
+                        let cut = cut.map_or(String::new(), |at| format!("cut off at byte {at}; "));
+                        format!("{cut}{parts} damaged parts")
+                    }
+                },
+            })
+            .collect(),
+        streams: r.report.streams.iter().map(stream).collect(),
+    }
+}
+
+fn stream(s: &StreamReport) -> StreamRow {
+    let seen = s.rows as u64 + s.occluded.total();
+    let share = if seen > 0 { 100.0 * s.occluded.total() as f64 / seen as f64 } else { 0.0 };
+    StreamRow {
+        role: s.role.clone(),
+        topic: s.topic.clone(),
+        rows: s.rows,
+        rate: format!("{:.1}", s.rate_hz),
+        gap: format!("{:.3}", s.largest_gap_s),
+        occluded: format!("{} ({share:.1} %)", s.occluded.total()),
+        dropped: s.undecodable
+            + s.non_finite
+            + s.impossible
+            + s.unstamped
+            + s.stray_stamps
+            + s.duplicate_stamps,
+        clock: format!("{}: {}", clock_word(s.clock), s.clock_reason),
+    }
+}
+
+fn clock_word(clock: armcal_recording::Clock) -> &'static str {
+    match clock {
+        armcal_recording::Clock::Header => "header",
+        armcal_recording::Clock::Publish => "publish",
+        armcal_recording::Clock::Log => "log",
+    }
+}
+
+/// Rejected dwells, by reason.
+pub(crate) fn rejections(run: &Run) -> Vec<RejectionRow> {
+    let mut rows: Vec<(String, String, Vec<String>)> = Vec::new();
+    for r in &run.recordings {
+        for rejection in &r.rejections {
+            let dwell = rejection.dwell.dwell.to_string();
+            match rows.iter_mut().find(|(name, why, _)| *name == r.name && *why == rejection.why) {
+                Some((.., dwells)) => dwells.push(dwell),
+                None => rows.push((r.name.clone(), rejection.why.clone(), vec![dwell])),
+            }
+        }
+    }
+    rows.into_iter()
+        .map(|(recording, why, dwells)| RejectionRow { recording, why, dwells: dwells.join(", ") })
+        .collect()
+}
+
+/// All warnings, the gravest first.
+pub(crate) fn warnings(run: &Run) -> Vec<WarningRow> {
+    let overall = run.overall_warnings();
+    let named = |name: &str, w: &Warning| (w.severity, format!("{name}{}", w.subject), w.message.clone());
+    let of_recordings = run.recordings.iter().flat_map(|r| {
+        r.all_warnings().into_iter().map(|w| named(&format!("{}: ", r.name), w)).collect::<Vec<_>>()
+    });
+    let mut all: Vec<_> = of_recordings.chain(overall.iter().map(|w| named("", w))).collect();
+    all.sort_by_key(|w| std::cmp::Reverse(w.0));
+    let words = |severity| match severity {
+        Severity::Notice => ("notice", "notice"),
+        Severity::Inadequate => ("inadequate", "grave"),
+        Severity::DataLost => ("data lost", "grave"),
+    };
+    let row = |(severity, subject, message)| {
+        let (severity, class) = words(severity);
+        WarningRow { severity, class, subject, message }
+    };
+    all.into_iter().map(row).collect()
+}

@@ -1,0 +1,198 @@
+//! One calibration as the page shows it: the run's own, a candidate's, or one asked for live.
+
+use super::bands::{Band, bands, drivers_of};
+use super::basis::Basis;
+use super::groups::{Group, groups};
+use super::numbers::Column;
+use super::signature::{Signature, signatures};
+use crate::run::{Refit, Run, role_word};
+use crate::text::{conclusion, in_display_unit, millimetres};
+use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
+use armcal_core::ErrorStats;
+use armcal_model::Model;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+/// Everything on the page that depends on the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Shown {
+    /// Effects in the model beyond the run's own.
+    pub added: Vec<String>,
+    /// All effects in the model.
+    pub effects: Vec<String>,
+    /// The result in one sentence.
+    pub sentence: String,
+    /// Errors on points that the fit saw.
+    pub train: Side,
+    /// Errors on points that it did not.
+    pub holdout: Side,
+    /// Mean error expected from the declared noise alone [mm].
+    pub noise_floor_mm: f64,
+    /// Against the run's own calibration, on the points both judge.
+    pub change: Option<Change>,
+    /// 1 where the fit that predicted a dwell did not see it.
+    pub held_out: Vec<u8>,
+    /// Size of the error of each dwell [mm].
+    pub error_mm: Column,
+    /// Measured minus predicted, in the world [mm]: x, y, z.
+    pub world_mm: [Column; 3],
+    /// The same along the arm, from the base to the tip [mm].
+    pub outward_mm: Column,
+    /// The same in the board's frame [mm]: x, y; `null` for a tracked tip.
+    pub board_mm: [Column; 2],
+    /// Implied error of each channel that is drawn.
+    pub implied: Vec<Column>,
+    /// Their means along the drivers.
+    pub bands: Vec<Band>,
+    /// Mean errors of groups of dwells.
+    pub groups: Vec<Group>,
+    /// Every effect by itself.
+    pub signatures: Vec<Signature>,
+    /// All parameters.
+    pub parameters: Vec<ParameterRow>,
+}
+
+/// Errors of one side of the hold-out [mm].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Side {
+    pub n: usize,
+    pub nominal_mm: Option<Errors>,
+    pub fitted_mm: Option<Errors>,
+}
+
+/// Statistics of error norms [mm], and the mean as people read it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Errors {
+    pub mean: f64,
+    pub rms: f64,
+    pub p95: f64,
+    pub max: f64,
+    pub mean_text: String,
+}
+
+/// Paired difference to the run's own calibration [mm].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Change {
+    pub difference_mm: f64,
+    pub ci95_mm: Option<[f64; 2]>,
+    pub better: usize,
+    pub worse: usize,
+}
+
+/// A parameter in the unit shown to people.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct ParameterRow {
+    pub name: String,
+    pub meaning: String,
+    pub unit: &'static str,
+    pub nominal: String,
+    pub value: String,
+    pub change: String,
+    /// Half of the 95 % interval; empty for a fixed one.
+    pub half: String,
+    pub role: &'static str,
+    pub free: bool,
+    pub determined: bool,
+    pub at_bound: bool,
+}
+
+impl Shown {
+    /// The run's own calibration.
+    pub fn of_run(run: &Run, basis: &Basis) -> Shown {
+        let own =
+            Refit { effects: Vec::new(), model: run.model.clone(), calibration: run.calibration.clone() };
+        Shown::of(run, basis, &own)
+    }
+
+    /// Another calibration of the run's observations.
+    pub fn of(run: &Run, basis: &Basis, refit: &Refit) -> Shown {
+        let Refit { effects: added, model, calibration } = refit;
+        let residuals_m: Vec<Vector3<f64>> = calibration.residuals.iter().map(|r| r.fitted_m).collect();
+        let error_mm: Vec<f64> = residuals_m.iter().map(|r| r.norm() * 1e3).collect();
+        let any_held_out = calibration.residuals.iter().any(|r| r.held_out);
+        let judged = calibration.residuals.iter().zip(&error_mm);
+        let judged: Vec<Option<f64>> =
+            judged.map(|(r, e)| (r.held_out || !any_held_out).then_some(*e)).collect();
+        let channels = basis.levers.channels.len();
+        let drawn: Vec<usize> =
+            (0..channels).filter(|c| !basis.levers.channels[*c].key.starts_with("world")).collect();
+        let implied: Vec<Vec<Option<f64>>> =
+            drawn.iter().map(|c| basis.levers.implied(*c, &residuals_m)).collect();
+        let in_board = |axis: usize| {
+            let each = residuals_m.iter().zip(&basis.into_board);
+            Column::of(each.map(|(r, turn)| turn.as_ref().map(|turn| (turn * r)[axis] * 1e3)))
+        };
+        Shown {
+            added: added.clone(),
+            effects: effect_names(model),
+            sentence: conclusion(calibration),
+            train: side(&calibration.train),
+            holdout: side(&calibration.holdout),
+            noise_floor_mm: calibration.noise_floor_m * 1e3,
+            change: change(run, calibration),
+            held_out: calibration.residuals.iter().map(|r| u8::from(r.held_out)).collect(),
+            error_mm: Column::of_all(error_mm),
+            world_mm: [0, 1, 2].map(|axis| Column::of_all(residuals_m.iter().map(|r| r[axis] * 1e3))),
+            outward_mm: Column::of_all(residuals_m.iter().zip(&basis.outwards).map(|(r, d)| r.dot(d) * 1e3)),
+            board_mm: [in_board(0), in_board(1)],
+            bands: drawn.iter().zip(&implied).flat_map(|(c, i)| bands(basis, *c, i)).collect(),
+            implied: implied.into_iter().map(Column::of).collect(),
+            groups: groups(run, basis, &judged),
+            signatures: signatures(run, basis, refit),
+            parameters: calibration.fit.estimates.iter().map(parameter).collect(),
+        }
+    }
+}
+
+/// Drivers drawn for each channel that has implied errors on the page.
+pub(crate) fn drawn_drivers(basis: &Basis) -> Vec<Vec<String>> {
+    let drawn = basis.levers.channels.iter().take_while(|c| !c.key.starts_with("world"));
+    drawn.enumerate().map(|(c, _)| drivers_of(basis, c)).collect()
+}
+
+/// The effects of a model as a pipeline names them.
+pub(crate) fn effect_names(model: &Model) -> Vec<String> {
+    model.effects().iter().map(|e| e.spec.to_string()).collect()
+}
+
+fn side(errors: &SideErrors) -> Side {
+    let of = |stats: &ErrorStats| {
+        (stats.n > 0).then(|| Errors {
+            mean: stats.mean_m * 1e3,
+            rms: stats.rms_m * 1e3,
+            p95: stats.p95_m * 1e3,
+            max: stats.max_m * 1e3,
+            mean_text: millimetres(stats.mean_m),
+        })
+    };
+    Side { n: errors.fitted.n, nominal_mm: of(&errors.nominal), fitted_mm: of(&errors.fitted) }
+}
+
+fn change(run: &Run, after: &Calibration) -> Option<Change> {
+    let d = PairedDifference::between(&run.observations, &run.calibration, after)?;
+    let mm = |m: f64| m * 1e3;
+    Some(Change {
+        difference_mm: mm(d.difference_m),
+        ci95_mm: d.ci95_m[0].is_finite().then_some(d.ci95_m.map(mm)),
+        better: d.better,
+        worse: d.worse,
+    })
+}
+
+fn parameter(e: &Estimate) -> ParameterRow {
+    let p = &e.parameter;
+    let shown = |si| in_display_unit(p.unit, si);
+    ParameterRow {
+        name: p.name.clone(),
+        meaning: p.meaning.clone(),
+        unit: p.unit.display_symbol(),
+        nominal: shown(p.nominal),
+        value: shown(e.value),
+        change: shown(e.value - p.nominal),
+        half: if p.free { shown((e.ci95[1] - e.ci95[0]) / 2.0) } else { String::new() },
+        role: role_word(p.role),
+        free: p.free,
+        determined: e.determined,
+        at_bound: e.at_bound,
+    }
+}

@@ -1,0 +1,92 @@
+//! `report.html` read as text: what it embeds, and what a name from outside can do to it.
+
+use crate::synthetic::{HOSTILE, synthetic};
+use armcal_report::{Basis, PageKind, report_html, summary_json};
+use serde_json::Value;
+
+const DATA: &str = "<script type=\"application/json\" id=\"data\">";
+
+/// The document in a page.
+fn document(page: &str) -> Value {
+    let from = page.find(DATA).expect("the document's element") + DATA.len();
+    let to = from + page[from..].find("</script>").expect("its end");
+    serde_json::from_str(&page[from..to]).expect("JSON")
+}
+
+#[test]
+fn the_page_shows_the_numbers_of_the_summary() {
+    let run = synthetic().run;
+    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    let (document, summary) = (document(&page), serde_json::from_str::<Value>(&summary_json(&run)).unwrap());
+    for side in ["train", "holdout"] {
+        for model in ["nominal_mm", "fitted_mm"] {
+            for statistic in ["mean", "rms", "p95", "max"] {
+                let shown = &document["refits"][0][side][model][statistic];
+                assert_eq!(shown, &summary["fit"][side][model][statistic], "{side} {model} {statistic}");
+            }
+        }
+    }
+    let n = run.observations.len();
+    assert!(n > 0 && document["dwells"]["dwell"].as_array().unwrap().len() == n);
+    // Errors on the page are those of the calibration, to the digits kept.
+    let errors = document["refits"][0]["error_mm"].as_array().unwrap();
+    for (shown, r) in errors.iter().zip(&run.calibration.residuals) {
+        let (shown, mm) = (shown.as_f64().unwrap(), r.fitted_m.norm() * 1e3);
+        assert!((shown - mm).abs() < 1e-3 * mm.max(0.1), "{shown} {mm}");
+    }
+    // Every joint and the lengths have an implied error for each dwell.
+    let implied = document["refits"][0]["implied"].as_array().unwrap();
+    assert_eq!(implied.len(), run.model.joint_count() + 1);
+    assert!(implied.iter().all(|c| c.as_array().unwrap().len() == n));
+}
+
+/// A joint that is off by the same small angle everywhere is seen as that angle on the page.
+#[test]
+fn a_joint_that_is_off_is_seen_off_by_as_much() {
+    let mut run = synthetic().run;
+    let p = run.calibration.fit.values();
+    let offset_rad = 3e-3;
+    for (o, r) in run.observations.iter().zip(&mut run.calibration.residuals) {
+        let mut turned = o.clone();
+        turned.joint_rad[1] += offset_rad;
+        // Where the tip is when the link is further than the encoder says.
+        r.fitted_m = run.model.predicted_tip_in_world(&p, &turned) - run.model.predicted_tip_in_world(&p, o);
+    }
+    let page = document(&report_html(&run, &Basis::of(&run), PageKind::File).unwrap());
+    assert_eq!(page["channels"][1]["unit"], "deg");
+    let implied = page["refits"][0]["implied"][1].as_array().unwrap();
+    assert!(!implied.is_empty());
+    for shown in implied {
+        let shown = shown.as_f64().unwrap();
+        assert!((shown - offset_rad.to_degrees()).abs() < 2e-3 * offset_rad.to_degrees(), "{shown}");
+    }
+}
+
+#[test]
+fn no_name_becomes_markup() {
+    let mut run = synthetic().run;
+    run.pipeline_name = HOSTILE.into();
+    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    // Three scripts: the document, the charting library, the page's own.
+    assert_eq!(page.matches("<script").count(), 3 + page.matches("\"<script").count());
+    assert!(!page.contains("</script>\n/../"), "the name ended an element");
+    let names: Vec<&str> =
+        run.recordings.iter().map(|r| r.name.as_str()).filter(|name| name.contains("</script>")).collect();
+    assert!(!names.is_empty(), "no hostile recording among the fixtures");
+    let shown = document(&page)["recordings"].clone();
+    assert!(names.iter().all(|name| shown.as_array().unwrap().iter().any(|s| s == name)));
+}
+
+#[test]
+fn a_page_from_disk_may_talk_to_nobody() {
+    let run = synthetic().run;
+    let basis = Basis::of(&run);
+    let policy = |kind| {
+        let page = report_html(&run, &basis, kind).unwrap();
+        let from = page.find("Content-Security-Policy").unwrap();
+        page[from..from + 400].to_owned()
+    };
+    let (file, live) = (policy(PageKind::File), policy(PageKind::Live));
+    assert!(file.contains("default-src ") && file.contains("connect-src &#39;none&#39;"), "{file}");
+    assert!(live.contains("connect-src &#39;self&#39;"), "{live}");
+}

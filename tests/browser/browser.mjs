@@ -1,0 +1,47 @@
+// A fresh headless Chromium that notes everything a page asks for and complains about.
+
+import { chromium } from "playwright-core";
+import { existsSync } from "node:fs";
+
+const PLACES = [process.env.ARMCAL_CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+  "--disable-component-update", "--disable-sync"];
+
+export async function launch() {
+  const executablePath = PLACES.find((place) => place && existsSync(place));
+  if (!executablePath) throw new Error("no Chromium; set ARMCAL_CHROMIUM");
+  return chromium.launch({ executablePath, args: FLAGS, headless: true });
+}
+
+// A page as wide as a laptop's; `seen` collects its requests and complaints.
+export async function open(browser, address, { colorScheme = "light" } = {}) {
+  const context = await browser.newContext({ viewport: { width: 1366, height: 820 }, colorScheme });
+  const page = await context.newPage();
+  const seen = { requests: [], complaints: [] };
+  page.on("request", (request) => seen.requests.push(request.url()));
+  page.on("console", (message) => {
+    if (["error", "warning"].includes(message.type())) seen.complaints.push(message.text());
+  });
+  page.on("pageerror", (error) => seen.complaints.push(String(error)));
+  await page.goto(address);
+  await page.waitForSelector("html[data-ready=yes]", { timeout: 60000 });
+  return { page, seen };
+}
+
+// Brings every chart into sight, so that all are drawn, and returns to the top.
+export async function drawn(page) {
+  await page.evaluate(async () => {
+    for (const box of document.querySelectorAll(".plot")) {
+      box.scrollIntoView({ block: "center" });
+      await new Promise((done) => setTimeout(done, 60));
+    }
+    scrollTo(0, 0);
+  });
+  await page.waitForFunction(() => [...document.querySelectorAll(".plot")].every((box) => box.data), null, { timeout: 60000 });
+}
+
+// The numbers behind a chart.
+export const data = (page, selector) =>
+  page.$eval(selector, (box) => box.data.map((t) => ({ name: t.name, x: [...(t.x || [])], y: [...(t.y || [])] })));
+
+export const number = (page, selector) => page.$eval(selector, (e) => Number(e.dataset.mm));

@@ -1,0 +1,75 @@
+// usage: report.mjs REPORT.html SUMMARY.json FOLDER
+// The report from disk: silent, offline, and a click shows the refit with the numbers of summary.json.
+
+import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+import { data, drawn, launch, number, open } from "./browser.mjs";
+
+const [report, summaryPath, folder] = process.argv.slice(2);
+const summary = JSON.parse(readFileSync(summaryPath, "utf8"));
+const address = pathToFileURL(report).href;
+const side = (fit) => (fit.holdout.n > 0 ? fit.holdout : fit.train);
+
+const browser = await launch();
+try {
+  const { page, seen } = await open(browser, address);
+  await drawn(page);
+  assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);
+  assert.equal(await number(page, "#n-before"), side(summary.fit).fitted_mm.mean);
+  assert.equal(await number(page, "#n-nominal"), side(summary.fit).nominal_mm.mean);
+
+  const buttons = page.locator("#candidates button");
+  const count = await buttons.count();
+  assert.ok(count >= 3, `${count} candidates can be clicked`);
+  const before = await data(page, "#time");
+  const joint = await data(page, "#joints .plot");
+  for (let k = 0; k < count; k++) {
+    await buttons.nth(k).click();
+    const spec = await buttons.nth(k).textContent();
+    const refit = summary.refits.find((r) => r.effects.join("+") === spec);
+    assert.ok(refit, `summary.json has the refit with ${spec}`);
+    assert.equal(await number(page, "#n-after"), side(refit).fitted_mm.mean, spec);
+    assert.ok((await page.textContent("#sentence")).includes(`to ${(await page.textContent("#n-after")).replace(" mm", "")} mm`));
+    await page.locator("#time").scrollIntoViewIfNeeded();
+    await page.waitForTimeout(150);
+    const after = await data(page, "#time");
+    assert.notDeepEqual(after, before, `${spec} changes the plot over time`);
+    // What is drawn is what the headline averages.
+    const errors = after.filter((t) => t.name && t.name.startsWith("+") && t.name.endsWith("held out")).flatMap((t) => t.y).slice(0, refit.holdout.n);
+    if (refit.holdout.n > 0) {
+      const mean = errors.reduce((a, b) => a + b, 0) / errors.length;
+      assert.ok(Math.abs(mean - refit.holdout.fitted_mm.mean) < 2e-3 * mean + 1e-4, `${mean} and ${refit.holdout.fitted_mm.mean}`);
+    }
+    await page.locator("#joints .plot").first().scrollIntoViewIfNeeded();
+    await page.waitForTimeout(150);
+    assert.notDeepEqual(await data(page, "#joints .plot"), joint, `${spec} changes the joints`);
+    assert.ok(await page.locator(`tr.selected[data-spec="${spec}"]`).count() === 1);
+    console.log(`${spec}: ${await page.textContent("#n-after")} on screen, ${side(refit).fitted_mm.mean} in summary.json`);
+  }
+  await buttons.first().click();
+  await page.evaluate(() => scrollTo(0, 0));
+  await page.waitForTimeout(300);
+  await page.screenshot({ path: join(folder, "candidate.png"), fullPage: true });
+  await page.click("#reset");
+  assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);
+  await drawn(page);
+  await page.screenshot({ path: join(folder, "light.png"), fullPage: true });
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, "no sideways scrolling on a laptop");
+  writeFileSync(join(folder, "print.pdf"), await page.pdf({ format: "A4", landscape: true, printBackground: true }));
+  await page.emulateMedia({ media: "print" });
+  await page.waitForTimeout(400);
+  await page.screenshot({ path: join(folder, "print.png"), fullPage: true });
+
+  const night = await open(browser, address, { colorScheme: "dark" });
+  await drawn(night.page);
+  await night.page.screenshot({ path: join(folder, "dark.png"), fullPage: true });
+  for (const { requests, complaints } of [seen, night.seen]) {
+    assert.deepEqual(requests.filter((url) => url !== address && !url.startsWith("data:") && !url.startsWith("blob:")), []);
+    assert.deepEqual(complaints, []);
+  }
+  console.log(`no request but ${address}, no complaint in the console`);
+} finally {
+  await browser.close();
+}
