@@ -192,6 +192,10 @@ pub(crate) fn pasted(u: &UnknownReport) -> String {
 
 pub(crate) fn unlisted(u: &UnknownReport) -> String {
     let range = match (u.shape.first(), u.shape.last()) {
+        (Some(from), Some(to)) if u.driver.starts_with('q') => {
+            let deg = |at: f64| at.to_degrees();
+            format!(", known for {} from {:.0} to {:.0} deg", u.driver, deg(from.at), deg(to.at))
+        }
         (Some(from), Some(to)) => format!(", known for {} from {:.3} to {:.3}", u.driver, from.at, to.at),
         _ => String::new(),
     };
