@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::perceive::Seen;
-use crate::stages::{frames, observe, perceive, suggestion};
+use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate};
 use armcal_core::{Observation, Rejection, Severity, Stage, Warning};
 use armcal_diagnose::{Diagnosis, diagnose};
@@ -161,7 +161,7 @@ fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result
 fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
     run.steps.clear();
     let Some(diagnosis) = &run.diagnosis else { return Ok(()) };
-    let found = suggestion::of(diagnosis, run.model.chain().joint_names())?;
+    let found = diagnosis.suggested(run.model.chain().joint_names())?;
     for count in 1..=found.len() {
         progress.step(&format!("fitting what was found ({count} of {})", found.len()));
         match refit(run, pipeline, &found[..count]) {

@@ -6,9 +6,12 @@
 
 mod config;
 mod current;
+mod joints;
 mod legacy;
+mod panels;
 mod spec;
 mod tabs;
+mod views;
 
 use crate::findings::Findings;
 use crate::points::Point;
