@@ -157,12 +157,16 @@ fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result
     Ok(())
 }
 
-/// Adds what the diagnosis found to the model, one effect after the other, each time fitted anew.
+/// Adds what the diagnosis found to the model, each time fitted anew: one named effect after the other, then all that has
+/// no name at once.
 fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
     run.steps.clear();
     let Some(diagnosis) = &run.diagnosis else { return Ok(()) };
     let found = diagnosis.suggested(run.model.chain().joint_names())?;
-    for count in 1..=found.len() {
+    let named = diagnosis.effects.len().min(found.len());
+    let mut counts: Vec<usize> = (1..=named).chain([found.len()]).collect();
+    counts.dedup();
+    for count in counts.into_iter().filter(|count| *count > 0) {
         progress.step(&format!("fitting what was found ({count} of {})", found.len()));
         match refit(run, pipeline, &found[..count]) {
             Ok(step) => run.steps.push(step),

@@ -37,7 +37,7 @@ pub struct Run {
     pub calibration: Calibration,
     /// Which effect the calibrated model is missing; `None` when nobody asked.
     pub diagnosis: Option<Diagnosis>,
-    /// The effects that the diagnosis found, added one after the other, each fitted and held out anew.
+    /// What the diagnosis found, added one effect after the other (what has no name at once), fitted and held out anew.
     pub steps: Vec<Refit>,
     /// What the most probable candidates would do, each alone in the run's model; those that are no step already.
     pub alternatives: Vec<Refit>,
@@ -142,6 +142,14 @@ impl Run {
                 .count();
         }
         recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
+    }
+
+    /// What each of the steps adds to the one before.
+    pub(crate) fn step_names(&self) -> Vec<String> {
+        let before = std::iter::once(0).chain(self.steps.iter().map(|step| step.effects.len()));
+        let added =
+            |(step, before): (&Refit, usize)| step.effects[before.min(step.effects.len())..].join(" + ");
+        self.steps.iter().zip(before).map(added).collect()
     }
 
     /// Name of the recording a dwell belongs to.

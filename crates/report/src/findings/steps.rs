@@ -15,8 +15,8 @@ pub(super) fn steps(run: &Run) -> Steps {
         ("nominal".to_owned(), side(calibration).nominal),
         ("calibration".to_owned(), side(calibration).fitted),
     ];
-    for step in &run.steps {
-        rows.push((step.effects.last().cloned().unwrap_or_default(), side(&step.calibration).fitted));
+    for (step, name) in run.steps.iter().zip(run.step_names()) {
+        rows.push((name, side(&step.calibration).fitted));
     }
     let before = std::iter::once(None).chain(rows.iter().map(|(_, errors)| Some(errors.mean_m)));
     let steps = rows

@@ -51,8 +51,7 @@ pub(super) fn errors_in_time(title: &str, run: &Run, nominal: bool) -> Content {
         series.push(dots("/armcal/residuals.nominal_norm_mm", "nominal", GREY));
     }
     series.push(dots("/armcal/residuals.fitted_norm_mm", "calibrated", ORANGE));
-    for (k, step) in run.steps.iter().enumerate() {
-        let added = step.effects.last().map_or("", String::as_str);
+    for (k, added) in run.step_names().into_iter().enumerate() {
         let colour = STEPS[k.min(STEPS.len() - 1)];
         series.push(dots(format!("/armcal/residuals.step_norm_mm[{k}]"), format!("+ {added}"), colour));
     }
