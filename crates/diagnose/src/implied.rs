@@ -54,6 +54,7 @@ pub fn implied_joint_errors(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
 mod tests {
     use super::*;
     use armcal_core::{Arrival, DwellId, Reference};
