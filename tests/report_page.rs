@@ -80,6 +80,24 @@ fn a_combination_is_refitted_live_and_kept() {
     assert!(pair.iter().all(|e| effects.iter().any(|own| own == e)), "{effects:?}");
 }
 
+#[test]
+fn a_comparison_is_a_page_too() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let crippled = folder.path().join("crippled.toml");
+    let fixed = "\n[[parameters]]\nname = \"joint?.a\"\nfree = false\n[diagnosis]\nenabled = false\n";
+    std::fs::write(&crippled, paper_pipeline(&root().join("fixtures/paper")) + fixed).expect("pipeline");
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    run_pipeline(&crippled, &a, &[0, 3]);
+    run_pipeline(&root().join("pipelines/paper.toml"), &b, &[0]);
+    let page = folder.path().join("compare.html");
+    let output = armcal([Path::new("compare"), &a, &b, Path::new("--json"), Path::new("--html"), &page]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let json = folder.path().join("compare.json");
+    std::fs::write(&json, &output.stdout).expect("JSON");
+    println!("{}", scripted(&browser, "compare.mjs", &[&page, &json, &screenshots("compare")]));
+}
+
 /// A server that ends with the test.
 struct Server(Child);
 

@@ -49,8 +49,7 @@ try {
     console.log(`${spec}: ${await page.textContent("#n-after")} on screen, ${side(refit).fitted_mm.mean} in summary.json`);
   }
   await buttons.first().click();
-  await page.evaluate(() => scrollTo(0, 0));
-  await page.waitForTimeout(300);
+  await drawn(page);
   await page.screenshot({ path: join(folder, "candidate.png"), fullPage: true });
   await page.click("#reset");
   assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);

@@ -36,6 +36,7 @@ try {
   await page.locator("#time").scrollIntoViewIfNeeded();
   await page.waitForTimeout(300);
   assert.ok((await data(page, "#time")).some((t) => t.name && t.name.includes(specs.join(" + "))), "the plot shows the combination");
+  await drawn(page);
   await page.screenshot({ path: join(folder, "view.png"), fullPage: true });
 
   // Another hold-out gives another error.

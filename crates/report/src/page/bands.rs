@@ -9,6 +9,8 @@ use serde::Serialize;
 const POINTS: usize = 6;
 /// Bins at most.
 const BINS: usize = 10;
+/// No bin reaches across a gap wider than this share of the driver's range: nothing is known inside it.
+const GAP: f64 = 0.12;
 
 /// Bin means of one channel over one driver for one direction of arrival.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,51 +53,51 @@ pub(crate) fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Op
         Some(_) => [1, -1, 0].map(Some).to_vec(),
         None => vec![None],
     };
-    // Nothing is known of the time between two recordings, so no line leads across it.
-    let stretches: Vec<Option<usize>> = match key {
-        "time" => (0..=basis.recording.iter().copied().max().unwrap_or(0)).map(Some).collect(),
-        _ => vec![None],
-    };
     let mut all = Vec::new();
-    for (direction, stretch) in directions.iter().flat_map(|d| stretches.iter().map(move |s| (*d, *s))) {
-        let of_it = |i: usize| {
-            direction.is_none_or(|d| joint.is_some_and(|j| basis.arrival[j][i] == d))
-                && stretch.is_none_or(|recording| basis.recording[i] == recording)
-        };
+    for direction in directions {
+        let of_it = |i: usize| direction.is_none_or(|d| joint.is_some_and(|j| basis.arrival[j][i] == d));
         let points = (0..implied.len()).filter(|i| of_it(*i)).filter_map(|i| Some((x[i]?, implied[i]?)));
-        let (x, mean, half) = binned(points.collect());
+        let [x, mean, half] = binned(points.collect());
         if !x.is_empty() {
-            let (x, mean, half) = (Column::of_all(x), Column::of_all(mean), Column::of(half));
+            let (x, mean, half) = (Column::of(x), Column::of(mean), Column::of(half));
             all.push(Band { channel, driver: key.to_owned(), direction, x, mean, half });
         }
     }
     all
 }
 
-/// Bins of as many points each, never parting equal drivers: mean driver, mean, half of its 95 % interval.
-fn binned(mut points: Vec<(f64, f64)>) -> (Vec<f64>, Vec<f64>, Vec<Option<f64>>) {
+/// Bins of as many points each, never parting equal drivers nor reaching across a gap: mean driver, mean, half of its 95 %
+/// interval. `None` stands for a gap, so that no line leads across.
+fn binned(mut points: Vec<(f64, f64)>) -> [Vec<Option<f64>>; 3] {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let bins = (points.len() / POINTS).min(BINS);
-    let (mut x, mut mean, mut half) = (Vec::new(), Vec::new(), Vec::new());
-    let mut from = 0;
-    for bin in 0..bins {
-        let mut to = (points.len() * (bin + 1)) / bins;
-        while to < points.len() && points[to].0 == points[to.max(1) - 1].0 {
-            to += 1;
+    let range = points.last().map_or(0.0, |last| last.0 - points[0].0);
+    let size = points.len().div_ceil(BINS).max(POINTS);
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    let mut put = |row: [Option<f64>; 3]| columns.iter_mut().zip(row).for_each(|(all, one)| all.push(one));
+    let mut begun = false;
+    for stretch in points.chunk_by(|a, b| b.0 - a.0 <= GAP * range) {
+        let bins = (stretch.len() / size).max(usize::from(stretch.len() >= POINTS));
+        if bins > 0 && std::mem::replace(&mut begun, true) {
+            put([None; 3]);
         }
-        if to <= from {
-            continue;
+        let mut from = 0;
+        for bin in 0..bins {
+            let mut to = (stretch.len() * (bin + 1)) / bins;
+            while to < stretch.len() && stretch[to].0 == stretch[to.max(1) - 1].0 {
+                to += 1;
+            }
+            if to <= from {
+                continue;
+            }
+            let own = &stretch[from..to];
+            let n = own.len() as f64;
+            let [low, high] = grouped_ci95(&own.iter().map(|(_, y)| (*y, 1.0)).collect::<Vec<_>>());
+            let mean = |of: fn(&(f64, f64)) -> f64| own.iter().map(of).sum::<f64>() / n;
+            put([Some(mean(|p| p.0)), Some(mean(|p| p.1)), Some((high - low) / 2.0)]);
+            from = to;
         }
-        let own = &points[from..to];
-        let n = own.len() as f64;
-        let changes: Vec<(f64, f64)> = own.iter().map(|(_, y)| (*y, 1.0)).collect();
-        let [low, high] = grouped_ci95(&changes);
-        x.push(own.iter().map(|p| p.0).sum::<f64>() / n);
-        mean.push(own.iter().map(|p| p.1).sum::<f64>() / n);
-        half.push(Some((high - low) / 2.0));
-        from = to;
     }
-    (x, mean, half)
+    columns
 }
 
 #[cfg(test)]
@@ -105,8 +107,8 @@ mod tests {
     #[test]
     fn bins_hold_equal_shares_and_their_interval_is_students() {
         let points: Vec<(f64, f64)> = (0..12).rev().map(|i| (f64::from(i), f64::from(i % 6))).collect();
-        let (x, mean, half) = binned(points);
-        assert_eq!((x, mean), (vec![2.5, 8.5], vec![2.5, 2.5]));
+        let [x, mean, half] = binned(points);
+        assert_eq!((x, mean), (vec![Some(2.5), Some(8.5)], vec![Some(2.5), Some(2.5)]));
         // t(0.975, 5) * sd / sqrt(6), sd of 0..5 = 1.8708.
         assert!((half[0].expect("interval") - 2.570_582 * 1.870_829 / 6f64.sqrt()).abs() < 1e-5);
     }
@@ -114,8 +116,19 @@ mod tests {
     #[test]
     fn equal_drivers_stay_in_one_bin() {
         let points = (0..30).map(|i| (f64::from(i / 20), 1.0)).collect();
-        let (x, ..) = binned(points);
-        assert_eq!(x, [0.0, 1.0]);
-        assert!(binned(vec![(0.0, 1.0); 3]).0.is_empty());
+        let [x, ..] = binned(points);
+        assert_eq!(x, [Some(0.0), None, Some(1.0)]);
+    }
+
+    #[test]
+    fn no_bin_reaches_across_a_gap() {
+        let points = (0..21).map(|i| (f64::from(i) + if i < 9 { 0.0 } else { 50.0 }, 1.0)).collect();
+        let [x, ..] = binned(points);
+        assert_eq!(x, [Some(4.0), None, Some(61.5), Some(67.5)]);
+    }
+
+    #[test]
+    fn few_points_have_no_bin() {
+        assert!(binned(vec![(0.0, 1.0); 3])[0].is_empty());
     }
 }

@@ -20,8 +20,6 @@ pub struct Basis {
     pub(super) drivers: Vec<Driver>,
     /// Direction of arrival, `[joint][observation]`: 1, -1, or 0 where it is not known.
     pub(super) arrival: Vec<Vec<i8>>,
-    /// Index of the recording of each observation.
-    pub(super) recording: Vec<usize>,
     /// Rotates the world into the board of a seated observation's recording.
     pub(super) into_board: Vec<Option<nalgebra::UnitQuaternion<f64>>>,
     /// From the base to the tip, of unit length.
@@ -53,7 +51,6 @@ impl Basis {
             levers: Levers::of(run),
             drivers: drivers(run),
             arrival: joints.map(|j| observations.iter().map(|o| sign(o, j)).collect()).collect(),
-            recording: observations.iter().map(|o| o.dwell.recording).collect(),
             into_board: observations
                 .iter()
                 .map(|o| {

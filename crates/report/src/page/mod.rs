@@ -23,9 +23,14 @@ mod signature;
 pub use basis::Basis;
 pub use compared::comparison_html;
 
-use crate::diagnosis_text::{found, headline, unlisted};
+use crate::diagnosis_text::{headline, pasted, size, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
+use crate::text::millimetres;
 use crate::{ReportError, conclusion};
+use armcal_calibrate::Calibration;
+use armcal_core::ErrorStats;
+use armcal_diagnose::FoundEffect;
+use armcal_model::find;
 use askama::Template;
 use document::Document;
 use shown::Shown;
@@ -121,6 +126,8 @@ struct ReportPage<'a> {
 struct Verdict {
     sentence: String,
     found: Vec<String>,
+    /// Tables to paste into the pipeline for what is unlisted.
+    paste: Vec<String>,
     next: Vec<String>,
     same: Vec<[String; 2]>,
     unseen: Vec<armcal_diagnose::NotTestable>,
@@ -132,6 +139,7 @@ fn verdict(run: &Run) -> Verdict {
         return Verdict {
             sentence: "Nobody asked what is missing ([diagnosis] enabled = false).".into(),
             found: Vec::new(),
+            paste: Vec::new(),
             next: Vec::new(),
             same: Vec::new(),
             unseen: Vec::new(),
@@ -140,10 +148,40 @@ fn verdict(run: &Run) -> Verdict {
     };
     Verdict {
         sentence: headline(d),
-        found: d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).collect(),
+        found: d.effects.iter().map(|e| found(run, e)).chain(d.unlisted.iter().map(unlisted)).collect(),
+        paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
         next: d.record_next.clone(),
         same: d.cannot_tell_apart.clone(),
         unseen: d.not_testable.clone(),
         explanations: d.explanations.clone(),
     }
+}
+
+/// A found effect in sentences; its errors are those of the refits that the page shows, not those of the weighing.
+fn found(run: &Run, e: &FoundEffect) -> String {
+    let kind = e.name.split([':', '@', ',']).next().and_then(find);
+    let summary = kind.map_or(String::new(), |kind| format!(": {}", kind.summary));
+    let sizes: Vec<String> = e.parameters.iter().map(size).collect();
+    let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
+    let step = run.steps.iter().position(|step| step.effects.last() == Some(&e.name));
+    let fall = step.map_or(String::new(), |k| {
+        let before = k.checked_sub(1).map_or(&run.calibration, |k| &run.steps[k].calibration);
+        let after = &run.steps[k].calibration;
+        let mean = |c: &Calibration| millimetres(judged(c).mean_m);
+        format!(" With it the mean error goes from {} to {} mm.", mean(before), mean(after))
+    });
+    let rival =
+        e.rival.as_ref().map_or(String::new(), |r| format!(" The next best explanation is {}.", r.name));
+    let pairs = match &e.contrast {
+        Some(c) if c.agrees => {
+            format!(" {} pairs of dwells that differ only in {} confirm it.", c.pairs, c.differs)
+        }
+        _ => String::new(),
+    };
+    format!("{}{set}{summary}. Its size: {}.{fall}{rival}{pairs}", e.name, sizes.join(", "))
+}
+
+/// Errors on points that the fit never saw, or on all where nothing was held out.
+fn judged(c: &Calibration) -> &ErrorStats {
+    if c.holdout.fitted.n > 0 { &c.holdout.fitted } else { &c.train.fitted }
 }

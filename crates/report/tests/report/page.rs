@@ -1,7 +1,8 @@
 //! `report.html` read as text: what it embeds, and what a name from outside can do to it.
 
 use crate::synthetic::{HOSTILE, synthetic};
-use armcal_report::{Basis, PageKind, report_html, summary_json};
+use armcal_core::DwellId;
+use armcal_report::{Basis, PageKind, Refit, report_html, summary_json};
 use serde_json::Value;
 
 const DATA: &str = "<script type=\"application/json\" id=\"data\">";
@@ -89,4 +90,33 @@ fn a_page_from_disk_may_talk_to_nobody() {
     let (file, live) = (policy(PageKind::File), policy(PageKind::Live));
     assert!(file.contains("default-src ") && file.contains("connect-src &#39;none&#39;"), "{file}");
     assert!(live.contains("connect-src &#39;self&#39;"), "{live}");
+}
+
+/// A long session with every refit that a run embeds; left where a browser can be pointed at it.
+#[test]
+fn two_thousand_dwells_stay_under_five_megabytes() {
+    let mut run = synthetic().run;
+    let (seen, residuals) = (run.observations.clone(), run.calibration.residuals.clone());
+    run.observations.clear();
+    run.calibration.residuals.clear();
+    for k in 0..2000 {
+        let (mut o, mut r) = (seen[k % seen.len()].clone(), residuals[k % seen.len()].clone());
+        let wave = (k as f64).sin();
+        o.dwell = DwellId { recording: o.dwell.recording, dwell: k };
+        o.time_ns += k as i64 * 5_000_000_000;
+        o.joint_rad.iter_mut().for_each(|q| *q += 0.2 * wave);
+        r.dwell = o.dwell;
+        r.fitted_m *= 1.0 + 0.3 * wave;
+        run.observations.push(o);
+        run.calibration.residuals.push(r);
+    }
+    let refit = |k: usize| {
+        let (mut calibration, model) = (run.calibration.clone(), run.model.clone());
+        calibration.residuals.iter_mut().for_each(|r| r.fitted_m *= 1.0 - 0.07 * k as f64);
+        Refit { effects: vec![format!("refit {k}")], model, calibration }
+    };
+    run.alternatives = (1..=10).map(refit).collect();
+    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-2000.html"), page).unwrap();
 }

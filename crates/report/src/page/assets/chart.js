@@ -67,6 +67,8 @@ const sight = new IntersectionObserver((entries) => {
 function draw(box, own) {
   own.stale = false;
   const { data, layout } = own.figure();
+  // Said outright, so that print media cannot fold the box under its drawing.
+  box.style.height = layout.height + "px";
   Plotly.react(box, data, layout, config);
 }
 

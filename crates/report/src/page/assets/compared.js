@@ -15,7 +15,7 @@ function pairsFigure() {
   });
   return { data, layout: layout({ height: 440, showlegend: true, xaxis: axis("error before [mm]", { range: [0, top] }),
     yaxis: axis("error after [mm]", { range: [0, top] }),
-    annotations: [{ x: 0.98 * top, y: 0.03 * top, text: "below the line: better after", showarrow: false, xanchor: "right", font: { color: c.soft } }] }) };
+    annotations: [{ x: 0.02 * top, y: 0.97 * top, text: "above the line: worse after, below it: better", showarrow: false, xanchor: "left", font: { color: c.soft } }] }) };
 }
 
 function changesFigure() {

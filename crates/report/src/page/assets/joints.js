@@ -33,7 +33,6 @@ function channelBoxes() {
   doc.drawn.forEach((keys, k) => {
     const box = element("div", undefined, "plot");
     box.dataset.channel = doc.channels[k].key;
-    box.style.minHeight = "300px";
     $("joints").append(box);
     chart(box, () => channelFigure(k));
   });

@@ -1,10 +1,13 @@
 // Geometry, then what was found, one effect after the other: bars that fall towards the noise floor.
 
+// A long name on several lines.
+const wrapped = (text, width) => (text.match(new RegExp(".{1," + width + "}", "g")) || [""]).slice(0, 3).map(plain).join("<br>");
+
 function pathFigure() {
   const c = colours();
   const steps = doc.path.map((k) => doc.refits[k]);
   const names = steps.map((s, k) => k === 0 ? (doc.own_effects.length ? "with " + doc.own_effects.join(", ") : "geometry")
-    : "+ " + s.added[s.added.length - 1]);
+    : "+ " + s.added.slice(steps[k - 1].added.length).join(", "));
   const means = steps.map((s) => judged(s).fitted_mm.mean);
   if (!steps.includes(view.shown) && !isBase()) {
     names.push("shown: " + view.name);
@@ -18,7 +21,7 @@ function pathFigure() {
   }];
   return { data, layout: layout({
     height: 290, margin: { l: 54, r: 10, t: 34, b: 56 },
-    xaxis: axis("", { tickvals: names.map((_, i) => i), ticktext: names.map((n) => plain(n.length > 26 ? n.slice(0, 25) + "…" : n)), gridcolor: "rgba(0,0,0,0)", range: [-0.6, Math.max(names.length, 3) - 0.4] }),
+    xaxis: axis("", { tickvals: names.map((_, i) => i), tickangle: 0, ticktext: names.map((n) => wrapped(n, 15)), gridcolor: "rgba(0,0,0,0)", range: [-0.6, Math.max(names.length, 3) - 0.4] }),
     yaxis: axis("mean error [mm]", { rangemode: "tozero", range: [0, 1.15 * Math.max(...means, floor)] }),
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, width: 2, dash: "dash" } }],
     annotations: [{ xref: "paper", yref: "paper", x: 1, y: 1.12, text: "- - noise floor " + mm(floor) + " mm", showarrow: false, xanchor: "right", font: { color: c.floor, size: 12 } }],

@@ -64,7 +64,6 @@ function mapBoxes() {
   const add = (figure, name) => {
     const box = element("div", undefined, "plot");
     box.dataset.map = name;
-    box.style.minHeight = "360px";
     $("maps").append(box);
     chart(box, figure);
   };
