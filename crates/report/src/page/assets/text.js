@@ -33,4 +33,8 @@ function mm(value) {
   const decimals = size >= 0.095 || size < 1e-9 ? 2 : size >= 0.0095 ? 3 : 4;
   return value.toFixed(decimals).replace("-", "−");
 }
-const signed = (value) => (value > 0 ? "+" : "") + mm(value);
+// A change, to a thousandth; what rounds to nothing has no sign.
+function signed(value) {
+  const text = Math.abs(value).toFixed(3);
+  return (Number(text) === 0 ? "" : value > 0 ? "+" : "−") + text;
+}
