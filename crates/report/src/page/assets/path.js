@@ -21,7 +21,7 @@ function pathFigure() {
   }];
   return { data, layout: layout({
     height: 290, margin: { l: 54, r: 10, t: 34, b: 56 },
-    xaxis: axis("", { tickvals: names.map((_, i) => i), tickangle: 0, ticktext: names.map((n) => wrapped(n, 15)), gridcolor: "rgba(0,0,0,0)", range: [-0.6, Math.max(names.length, 3) - 0.4] }),
+    xaxis: axis("", { tickvals: names.map((_, i) => i), tickangle: 0, ticktext: names.map((n) => wrapped(n, 12)), gridcolor: "rgba(0,0,0,0)", range: [-0.6, Math.max(names.length, 3) - 0.4] }),
     yaxis: axis("mean error [mm]", { rangemode: "tozero", range: [0, 1.15 * Math.max(...means, floor)] }),
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, width: 2, dash: "dash" } }],
     annotations: [{ xref: "paper", yref: "paper", x: 1, y: 1.12, text: "- - noise floor " + mm(floor) + " mm", showarrow: false, xanchor: "right", font: { color: c.floor, size: 12 } }],
