@@ -8,6 +8,7 @@ use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms, as_candidate};
 use crate::weigh::Weighed;
+use armcal_model::Toggle;
 use std::rc::Rc;
 
 /// Steps none of which had a name at once, and which together say less than one unlisted shape: no more are tried.
@@ -215,6 +216,7 @@ fn forward(
         let fall = judged.own().score * weighed.scale.powi(2);
         if let Some(first) = steps.first()
             && fall < config.leftover_share * first.fall
+            && switches_alike(&first.candidate, &entry.candidate)
         {
             may_be_shape = true;
             break;
@@ -240,6 +242,13 @@ fn forward(
         }
     }
     Ok((steps, may_be_shape))
+}
+
+/// Whether what one effect leaves behind could look like the other: an effect that turns over with the direction, or
+/// begins with a dwell or a recording, leaves only what does so too.
+fn switches_alike(first: &Candidate, next: &Candidate) -> bool {
+    let switches = matches!(first.toggle, Toggle::Direction | Toggle::Time | Toggle::Recording);
+    !switches || first.toggle == next.toggle
 }
 
 /// A group enters as its members, each of which is then judged among the others.
