@@ -17,8 +17,10 @@ use rayon::prelude::*;
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
 const MAX_ROUNDS: usize = 4;
 
-/// Candidates that are refitted for the report.
-const ALTERNATIVES: usize = 8;
+/// Candidates that are refitted for the report, at most and at least.
+const ALTERNATIVES: [usize; 2] = [8, 2];
+/// Observations fitted for all of them together: thousands of poses make every refit slow.
+const REFITTED_OBSERVATIONS: usize = 4000;
 
 /// Runs a pipeline up to its results in memory; nothing is written.
 ///
@@ -191,10 +193,10 @@ fn alternatives(run: &Run, pipeline: &Pipeline) -> Vec<Refit> {
     let Some(diagnosis) = &run.diagnosis else { return Vec::new() };
     let members = |spec: &str| -> Vec<String> { spec.split('+').map(str::to_owned).collect() };
     let best = diagnosis.candidates.iter().map(|c| members(&c.spec));
-    let wanted: Vec<Vec<String>> = best
-        .filter(|effects| run.steps.iter().all(|step| step.effects != *effects))
-        .take(ALTERNATIVES)
-        .collect();
+    let [most, fewest] = ALTERNATIVES;
+    let count = (REFITTED_OBSERVATIONS / run.observations.len().max(1)).clamp(fewest, most);
+    let wanted: Vec<Vec<String>> =
+        best.filter(|effects| run.steps.iter().all(|step| step.effects != *effects)).take(count).collect();
     let refit = |effects: &Vec<String>| {
         let specs = effects.iter().map(|spec| run.model.effect(spec)).collect::<Result<Vec<_>, _>>().ok()?;
         refit(run, pipeline, &specs).ok()

@@ -21,6 +21,7 @@ use crate::{CalibrateError, FitConfig, HoldoutConfig, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// Calibrates `model` on `observations` and judges it on those held out.
 pub fn calibrate(
@@ -36,8 +37,10 @@ pub fn calibrate(
     let frame_names = frames::frame_names(model);
     let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
     let judge = Judge { model, observations, config };
-    let turns =
-        holdout.turns.iter().map(|turn| judge.turn(turn)).collect::<Result<Vec<Turn>, CalibrateError>>()?;
+    // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
+    let turns: Vec<Result<Turn, CalibrateError>> =
+        holdout.turns.par_iter().map(|turn| judge.turn(turn)).collect();
+    let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
     let last = match (holdout.in_turn, turns.first()) {
         (false, Some(turn)) => turn.clone(),
         _ => judge.turn(&[])?,
