@@ -26,20 +26,20 @@ const REFITTED_OBSERVATIONS: usize = 4000;
 ///
 /// Returns the run and the opened recordings, which the writers pass through to the output.
 pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recording>), Error> {
-    let settled = settle(pipeline, progress)?;
-    finish(settled, pipeline, progress)
+    let (mut run, recordings) = diagnosed(settle(pipeline, progress)?, pipeline, progress)?;
+    add_refits(&mut run, pipeline, progress)?;
+    Ok((run, recordings))
 }
 
-/// Diagnoses what has settled, and fits what the diagnosis proposes.
-pub fn finish(
+/// What has settled, with its diagnosis. What that proposes is not fitted, which takes longer than all before: only a
+/// report shows it ([`add_refits`]).
+pub fn diagnosed(
     settled: Settled,
     pipeline: &Pipeline,
     progress: &Progress,
 ) -> Result<(Run, Vec<Recording>), Error> {
     let diagnosis = settled.diagnose(pipeline, progress)?;
-    let (mut run, recordings) = settled.into_run(pipeline, diagnosis);
-    add_refits(&mut run, pipeline, progress)?;
-    Ok((run, recordings))
+    Ok(settled.into_run(pipeline, diagnosis))
 }
 
 /// Recordings whose dwells have found their places, and the calibration on them.
@@ -152,7 +152,7 @@ pub fn recalibrate(
 }
 
 /// What the run's model would become: with what was found, and with each of the best candidates.
-fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
+pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
     add_steps(run, pipeline, progress)?;
     progress.step("fitting the best candidates");
     run.alternatives = alternatives(run, pipeline);

@@ -14,6 +14,17 @@ pub enum Severity {
     DataLost,
 }
 
+impl Severity {
+    /// For people.
+    pub fn word(self) -> &'static str {
+        match self {
+            Severity::Notice => "notice",
+            Severity::Inadequate => "inadequate",
+            Severity::DataLost => "data lost",
+        }
+    }
+}
+
 /// The stage of the story that noticed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]

@@ -18,6 +18,9 @@ use nalgebra::Vector3;
 /// A joint that moves the tip by less than this does not move it: rounding [m/rad] (prismatic: [m/m]).
 const NO_LEVER: f64 = 1e-9;
 
+/// Where a joint's implied error is this many times as uncertain as usual (median), the dwell says nothing about it.
+pub const BLURRED: f64 = 4.0;
+
 /// What one dwell says about one joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpliedError {

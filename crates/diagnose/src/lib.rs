@@ -71,7 +71,7 @@ pub use contrasts::Contrast;
 pub use crossval::HeldOut;
 pub use diagnosis::*;
 pub use error::DiagnoseError;
-pub use implied::{ImpliedError, implied_joint_errors};
+pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
 pub use observed::diagnose;
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};

@@ -29,6 +29,7 @@ pub fn diagnose(
         weighed: &weighed,
         session,
         fit,
+        fits: BTreeMap::new(),
         known: BTreeMap::new(),
         sizes: BTreeMap::new(),
     };
@@ -44,6 +45,9 @@ struct ModelRefit<'a> {
     weighed: &'a [Observation],
     session: &'a Session,
     fit: &'a FitConfig,
+    /// Every set of effects fitted so far.
+    fits: BTreeMap<Vec<String>, (Model, Vec<f64>)>,
+    /// The problems around those fits, with candidates at the sizes known so far.
     known: BTreeMap<Vec<String>, Problem>,
     /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
     sizes: BTreeMap<String, Option<f64>>,
@@ -51,7 +55,10 @@ struct ModelRefit<'a> {
 
 impl ModelRefit<'_> {
     /// The model with effects, and its parameters fitted to all observations.
-    fn fitted(&self, names: &[String]) -> Result<(Model, Vec<f64>), DiagnoseError> {
+    fn fitted(&mut self, names: &[String]) -> Result<(Model, Vec<f64>), DiagnoseError> {
+        if let Some(fit) = self.fits.get(names) {
+            return Ok(fit.clone());
+        }
         let specs = names.iter().map(|name| self.model.effect(name)).collect::<Result<Vec<_>, _>>()?;
         let model = self.model.with_effects(&specs, self.session)?;
         let mut values = self.values.clone();
@@ -60,6 +67,7 @@ impl ModelRefit<'_> {
             let problem = ModelProblem::new(&model, self.observations, self.fit)?;
             values = fit_problem(&problem, &values, &|p| p.free, self.fit)?.values();
         }
+        self.fits.insert(names.to_vec(), (model.clone(), values.clone()));
         Ok((model, values))
     }
 

@@ -70,6 +70,17 @@ pub enum Clock {
     Log,
 }
 
+impl Clock {
+    /// As the pipeline spells it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Clock::Header => "header",
+            Clock::Publish => "publish",
+            Clock::Log => "log",
+        }
+    }
+}
+
 /// What was read for one stream of the pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StreamReport {

@@ -85,14 +85,21 @@ pub struct Moved {
     pub in_half_widths: f64,
 }
 
+/// Dwells that are in both results, before and after, in the order of the second.
+pub(crate) fn matched<'r>(
+    before: &'r PastRun,
+    after: &'r PastRun,
+) -> Vec<(&'r PastResidual, &'r PastResidual)> {
+    let key = |r: &PastResidual| (r.recording.clone(), r.dwell.dwell);
+    let first: BTreeMap<(String, usize), &PastResidual> =
+        before.residuals.iter().map(|r| (key(r), r)).collect();
+    after.residuals.iter().filter_map(|a| first.get(&key(a)).map(|b| (*b, a))).collect()
+}
+
 impl Comparison {
     /// Compares dwell by dwell: same recording name, same index.
     pub fn of(before: &PastRun, after: &PastRun) -> Comparison {
-        let key = |r: &PastResidual| (r.recording.clone(), r.dwell.dwell);
-        let first: BTreeMap<(String, usize), &PastResidual> =
-            before.residuals.iter().map(|r| (key(r), r)).collect();
-        let matched: Vec<(&PastResidual, &PastResidual)> =
-            after.residuals.iter().filter_map(|a| first.get(&key(a)).map(|b| (*b, a))).collect();
+        let matched = matched(before, after);
         let held: Vec<_> = matched.iter().copied().filter(|(b, a)| b.held_out && a.held_out).collect();
         let judged = if held.is_empty() { &matched } else { &held };
         let unmatched = before.residuals.len() + after.residuals.len() - 2 * matched.len();

@@ -141,6 +141,11 @@ impl Run {
                 .filter(|a| matches!(a.place, Place::Seated { .. }))
                 .count();
         }
+        self.used(recording)
+    }
+
+    /// Dwells of a recording that the fit could use.
+    pub(crate) fn used(&self, recording: &RecordingRun) -> usize {
         recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
     }
 

@@ -4,7 +4,7 @@ use crate::diagnosis_text::brief;
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::text::{conclusion, in_display_unit, millimetres, printable};
 use armcal_calibrate::{Calibration, Estimate};
-use armcal_core::{ErrorStats, Severity, Warning};
+use armcal_core::{ErrorStats, Warning};
 use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Widest line.
@@ -132,23 +132,17 @@ fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<String> {
 
 fn warnings(pen: &Pen, run: &Run) -> Option<String> {
     let of_recordings = run.recordings.iter().flat_map(|r| {
-        r.all_warnings().into_iter().map(|w| (severity(w), format!("{}: {}", printable(&r.name), text(w))))
+        r.all_warnings()
+            .into_iter()
+            .map(|w| (w.severity.word(), format!("{}: {}", printable(&r.name), text(w))))
     });
-    let overall = run.overall_warnings().into_iter().map(|w| (severity(&w), text(&w)));
+    let overall = run.overall_warnings().into_iter().map(|w| (w.severity.word(), text(&w)));
     let all: Vec<_> = of_recordings.chain(overall).collect();
     (!all.is_empty()).then(|| pen.section("Warnings", pen.list(all.into_iter())))
 }
 
 fn text(warning: &Warning) -> String {
     printable(&warning.to_string())
-}
-
-fn severity(warning: &Warning) -> &'static str {
-    match warning.severity {
-        Severity::Notice => "notice",
-        Severity::Inadequate => "inadequate",
-        Severity::DataLost => "data lost",
-    }
 }
 
 /// A table of text without colours: a thin rule below the header and nothing else.

@@ -9,10 +9,11 @@ use std::path::Path;
 /// Compares two results, prints the table (or JSON), and writes the page if one is wanted.
 pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Result<Outcome, Error> {
     let (before, after) = (PastRun::open(before)?, PastRun::open(after)?);
-    if let Some(path) = html {
-        atomic::write(path, comparison_html(&before, &after)?.as_bytes()).map_err(Error::Output)?;
-    }
     let comparison = Comparison::of(&before, &after);
+    if let Some(path) = html {
+        let page = comparison_html(&before, &after, &comparison)?;
+        atomic::write(path, page.as_bytes()).map_err(Error::Output)?;
+    }
     if json {
         print(&super::json_text(&comparison)?);
     } else {

@@ -21,7 +21,8 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
-    let (run, _) = story::run(&pipeline, &progress)?;
+    let settled = story::settle(&pipeline, &progress)?;
+    let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;

@@ -17,7 +17,8 @@ use std::path::Path;
 pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(pipeline)?;
     let progress = Progress::new();
-    let (run, _) = story::run(&pipeline, &progress)?;
+    let settled = story::settle(&pipeline, &progress)?;
+    let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
     progress.finish();
     let text = format!("{:#}\n", problem(&run, &pipeline.fit)?);
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;

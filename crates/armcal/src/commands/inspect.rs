@@ -68,7 +68,8 @@ fn text(name: &str, report: &RecordingReport) -> String {
     if !report.streams.is_empty() {
         let _ = writeln!(out, "{}", streams(&report.streams));
         for stream in &report.streams {
-            let _ = writeln!(out, "  {}: {} clock, {}", stream.role, clock_name(stream), stream.clock_reason);
+            let _ =
+                writeln!(out, "  {}: {} clock, {}", stream.role, stream.clock.word(), stream.clock_reason);
         }
     }
     for warning in &report.warnings {
@@ -153,12 +154,4 @@ fn streams(streams: &[StreamReport]) -> Table {
         ]);
     }
     table
-}
-
-fn clock_name(stream: &StreamReport) -> &'static str {
-    match stream.clock {
-        armcal_recording::Clock::Header => "header",
-        armcal_recording::Clock::Publish => "publish",
-        armcal_recording::Clock::Log => "log",
-    }
 }

@@ -33,7 +33,8 @@ impl Bench {
         let settled = story::settle(&pipeline, progress)?;
         let geometry = settled.geometry.clone();
         let own = frames::effect_specs(&pipeline, &geometry)?;
-        let run = story::finish(settled, &pipeline, progress)?.0;
+        let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
+        story::add_refits(&mut run, &pipeline, progress)?;
         let basis = Basis::of(&run);
         Ok(Bench { pipeline, path: path.to_owned(), geometry, own, run, basis })
     }

@@ -3,12 +3,14 @@
 use crate::proto::ErrorCurve;
 use armcal_core::Unit;
 use armcal_diagnose::UnknownReport;
+use armcal_model::Chain;
 
 /// Standard deviations on each side of a 95 % band.
 const BAND: f64 = 1.96;
 
-pub(super) fn error_curve(u: &UnknownReport) -> ErrorCurve {
-    let (driver_unit, driver_symbol) = driver_unit(&u.driver);
+/// The shape over its driver in the units that people read.
+pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
+    let (driver_unit, driver_symbol) = driver_unit(&u.driver, chain);
     let mut m = ErrorCurve {
         timestamp: None,
         channel: u.channel.clone(),
@@ -28,14 +30,20 @@ pub(super) fn error_curve(u: &UnknownReport) -> ErrorCurve {
     m
 }
 
-/// Unit of a driver as formulas name it: `q2`, `q2+q3`, `tau1`, `t`, `temperature`, `load`, `s1`, `recording`.
-fn driver_unit(driver: &str) -> (Unit, &'static str) {
+/// Unit of a driver as formulas name it: `q2`, `q2+q3`, `s1*q1`, `tau1`, `t`, `temperature`, `load`, `s1`, `recording`.
+fn driver_unit(driver: &str, chain: &Chain) -> (Unit, &'static str) {
+    // An angle that counts with the direction of arrival is an angle.
+    let angle = driver.split_once('*').map_or(driver, |(_, angle)| angle);
+    if let Some(joint) = angle.strip_prefix('q') {
+        let number = joint.split('+').next().and_then(|n| n.parse::<usize>().ok());
+        let unit = chain.joint_unit(number.map_or(0, |n| n.saturating_sub(1)));
+        return (unit, unit.display_symbol());
+    }
     match driver.trim_end_matches(|c: char| c.is_ascii_digit()) {
         "t" => (Unit::Second, "s"),
         "tau" => (Unit::NewtonMetre, "N*m"),
         "load" => (Unit::Kilogram, "kg"),
         "temperature" => (Unit::One, "degC"),
-        angle if angle.starts_with('q') => (Unit::Radian, "deg"),
         _ => (Unit::One, ""),
     }
 }
@@ -44,9 +52,27 @@ fn driver_unit(driver: &str) -> (Unit, &'static str) {
 mod tests {
     use super::*;
 
+    const ARM: &str = r#"
+        name = "two"
+        [[rows]]
+        name = "joint1"
+        theta_deg = 0.0
+        d_mm = 0.0
+        a_mm = 400.0
+        alpha_deg = 0.0
+        [[rows]]
+        name = "joint2"
+        theta_deg = 0.0
+        d_mm = 0.0
+        a_mm = 300.0
+        alpha_deg = 0.0
+    "#;
+
     #[test]
     fn angles_are_shown_in_degrees_and_directions_as_they_are() {
-        let units = ["q2", "q2+q3", "t", "tau1", "s3", "recording", "load"].map(|d| driver_unit(d).1);
-        assert_eq!(units, ["deg", "deg", "s", "N*m", "", "", "kg"]);
+        let chain = Chain::from_dh_toml(ARM, std::path::Path::new("arm.toml")).expect("arm");
+        let drivers = ["q2", "q1+q2", "s1*q1", "t", "tau1", "s3", "recording", "load"];
+        let units = drivers.map(|d| driver_unit(d, &chain).1);
+        assert_eq!(units, ["deg", "deg", "deg", "s", "N*m", "", "", "kg"]);
     }
 }

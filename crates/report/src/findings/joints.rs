@@ -7,11 +7,8 @@ use crate::proto::JointErrors;
 use crate::run::Run;
 use armcal_core::Observation;
 use armcal_core::robust::median;
-use armcal_diagnose::{ImpliedError, implied_joint_errors};
+use armcal_diagnose::{BLURRED, ImpliedError, implied_joint_errors};
 use nalgebra::Vector3;
-
-/// A dwell is drawn where the noise hides the joint no more than this many times its usual.
-const BLURRED: f64 = 4.0;
 
 /// What one dwell says about all joints.
 struct Seen {

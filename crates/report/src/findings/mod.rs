@@ -12,6 +12,7 @@ mod quality;
 mod steps;
 
 pub(crate) use boards::round_factor;
+pub(crate) use curves::error_curve;
 
 use crate::points::Point;
 use crate::proto;
@@ -39,13 +40,14 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
+        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             boards: boards::board_errors(run, points, &in_time),
             course: course::course(run, points, &in_time),
             steps: steps::steps(run),
             diagnosis: run.diagnosis.as_ref().map(|d| (diagnosis::diagnosis(d), diagnosis::candidates(d))),
-            curves: run.diagnosis.iter().flat_map(|d| &d.unlisted).map(curves::error_curve).collect(),
+            curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
             quality: quality::quality(run),
         }
     }

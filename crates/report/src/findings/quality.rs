@@ -6,7 +6,7 @@ use crate::proto::{Quality, RecordingQuality, RejectedDwell};
 use crate::run::{RecordingRun, Run};
 
 pub(super) fn quality(run: &Run) -> Quality {
-    let recordings = run.recordings.iter().enumerate().map(|(index, r)| recording(run, index, r)).collect();
+    let recordings = run.recordings.iter().map(|r| recording(run, r)).collect();
     let rejected = run.recordings.iter().flat_map(|r| {
         r.rejections.iter().map(|rejection| RejectedDwell {
             recording: r.name.clone(),
@@ -17,16 +17,15 @@ pub(super) fn quality(run: &Run) -> Quality {
     Quality { timestamp: None, recordings, rejected: rejected.collect() }
 }
 
-fn recording(run: &Run, index: usize, r: &RecordingRun) -> RecordingQuality {
-    let used = |d: &&armcal_core::Dwell| run.observations.iter().any(|o| o.dwell == d.id);
+fn recording(run: &Run, r: &RecordingRun) -> RecordingQuality {
     let first_ns = r.report.channels.iter().map(|c| c.first_ns).min();
     let last_ns = r.report.channels.iter().map(|c| c.last_ns).max();
     let duration_min =
         first_ns.zip(last_ns).map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 / 60e9);
     RecordingQuality {
-        recording: run.recordings[index].name.clone(),
+        recording: r.name.clone(),
         dwells: count(r.dwells.len()),
-        used: count(r.dwells.iter().filter(used).count()),
+        used: count(run.used(r)),
         rejected: count(r.rejections.len()),
         duration_min,
         occluded: r.report.streams.iter().map(|s| s.occluded.total()).sum(),

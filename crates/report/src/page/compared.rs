@@ -2,35 +2,37 @@
 
 use super::embed;
 use crate::ReportError;
-use crate::comparison::{Comparison, Difference};
-use crate::past_run::{PastResidual, PastRun};
+use crate::comparison::{Comparison, Difference, matched};
+use crate::past_run::PastRun;
 use crate::run::VERSION;
 use crate::text::millimetres;
 use askama::Template;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
-/// Two results as one HTML page.
+/// Two results, compared already, as one HTML page.
 ///
 /// # Errors
 /// A template or document that cannot be written.
-pub fn comparison_html(before: &PastRun, after: &PastRun) -> Result<String, ReportError> {
-    let comparison = Comparison::of(before, after);
+pub fn comparison_html(
+    before: &PastRun,
+    after: &PastRun,
+    comparison: &Comparison,
+) -> Result<String, ReportError> {
     let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("assets/compared.js")]);
     let page = ComparePage {
         policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
         style: embed::STYLE,
         plotly: embed::PLOTLY,
-        data: embed::json_for_html(&Document::of(before, after, &comparison))?,
+        data: embed::json_for_html(&Document::of(before, after, comparison))?,
         script: &script,
         version: VERSION,
         before: &before.pipeline,
         after: &after.pipeline,
         effects: (comparison.effects[0].join(", "), comparison.effects[1].join(", ")),
         sentence: comparison.sentence(),
-        differences: differences(&comparison).into_iter().map(DifferenceRow::of).collect(),
+        differences: differences(comparison).into_iter().map(DifferenceRow::of).collect(),
         moved: comparison.moved.iter().map(moved).collect(),
-        comparison: &comparison,
+        comparison,
     };
     Ok(page.render()?)
 }
@@ -105,18 +107,14 @@ struct NamedDifference {
 impl Document {
     fn of(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Document {
         let mut recordings: Vec<RecordingName> = Vec::new();
-        let key = |r: &PastResidual| (r.recording.clone(), r.dwell.dwell);
-        let earlier: BTreeMap<(String, usize), f64> =
-            before.residuals.iter().map(|r| (key(r), r.error_m)).collect();
         let mut pairs = Vec::new();
-        for r in &after.residuals {
-            let Some(before_m) = earlier.get(&key(r)) else { continue };
+        for (earlier, r) in matched(before, after) {
             let recording =
                 recordings.iter().position(|known| known.name == r.recording).unwrap_or_else(|| {
                     recordings.push(RecordingName { name: r.recording.clone() });
                     recordings.len() - 1
                 });
-            let (before_mm, after_mm) = (before_m * 1e3, r.error_m * 1e3);
+            let (before_mm, after_mm) = (earlier.error_m * 1e3, r.error_m * 1e3);
             pairs.push(PairRow {
                 recording,
                 dwell: r.dwell.dwell,

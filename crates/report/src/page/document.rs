@@ -1,14 +1,14 @@
 //! The one JSON document of the page: everything its scripts draw, worked out already.
 
-use super::basis::{Basis, Driver, joint_units};
+use super::basis::{Basis, Driver};
 use super::levers::Channel;
 use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
 use crate::diagnosis_text::sizes;
+use crate::findings::error_curve;
 use crate::run::{Refit, Run};
-use armcal_core::Unit;
 use armcal_diagnose::{CandidateReport, Diagnosis, UnknownReport};
-use armcal_model::find;
+use armcal_model::{Chain, find};
 use serde::Serialize;
 
 /// Rows of the ranking.
@@ -88,8 +88,8 @@ pub(crate) struct CandidateRow {
 pub(crate) struct UnlistedShape {
     pub channel: String,
     pub driver: String,
-    pub driver_unit: &'static str,
-    pub unit: &'static str,
+    pub driver_unit: String,
+    pub unit: String,
     pub at: Column,
     pub value: Column,
     pub half: Column,
@@ -104,7 +104,6 @@ impl Document {
         let index_of = |effects: &[String]| all.iter().position(|r| r.effects == effects).map(|k| k + 1);
         let path = [0].into_iter().chain(run.steps.iter().filter_map(|s| index_of(&s.effects))).collect();
         let candidates = run.diagnosis.iter().flat_map(|d| ranking(d, &index_of)).collect();
-        let joint_units = joint_units(run);
         let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
         Document {
             channels: basis.levers.channels.clone(),
@@ -117,7 +116,7 @@ impl Document {
             refits,
             path,
             candidates,
-            unlisted: unlisted.map(|u| unlisted_shape(u, &joint_units)).collect(),
+            unlisted: unlisted.map(|u| unlisted_shape(u, run.model.chain())).collect(),
             own_effects: effect_names(&run.model),
         }
     }
@@ -184,29 +183,17 @@ fn boards(run: &Run) -> Vec<BoardMap> {
     (0..run.recordings.len()).filter(|index| seen(*index)).map(map).collect()
 }
 
-fn unlisted_shape(u: &UnknownReport, joint_units: &[Unit]) -> UnlistedShape {
-    let driver_unit = driver_unit(&u.driver, joint_units);
+/// The curve that Foxglove plots, as a line with half its band.
+fn unlisted_shape(u: &UnknownReport, chain: &Chain) -> UnlistedShape {
+    let curve = error_curve(u, chain);
+    let half = curve.high.iter().zip(&curve.low).map(|(high, low)| (high - low) / 2.0);
     UnlistedShape {
-        channel: u.channel.clone(),
-        driver: u.driver.clone(),
-        driver_unit: driver_unit.map_or("", Unit::display_symbol),
-        unit: u.unit.display_symbol(),
-        at: Column::of_all(u.shape.iter().map(|p| driver_unit.map_or(p.at, |unit| unit.to_display(p.at)))),
-        value: Column::of_all(u.shape.iter().map(|p| u.unit.to_display(p.value))),
-        half: Column::of_all(u.shape.iter().map(|p| 1.96 * u.unit.to_display(p.sigma))),
-    }
-}
-
-/// Unit of a driver as the diagnosis names it: `q1`, `tau1`, `t`, `load`, `temperature`.
-fn driver_unit(driver: &str, joint_units: &[Unit]) -> Option<Unit> {
-    let joint = |prefix: &str| driver.strip_prefix(prefix)?.parse::<usize>().ok()?.checked_sub(1);
-    if let Some(j) = joint("q") {
-        return joint_units.get(j).copied();
-    }
-    match driver {
-        _ if joint("tau").is_some() => Some(Unit::NewtonMetre),
-        "t" | "time" => Some(Unit::Second),
-        "load" => Some(Unit::Kilogram),
-        _ => None,
+        half: Column::of_all(half),
+        channel: curve.channel,
+        driver: curve.driver,
+        driver_unit: curve.driver_unit,
+        unit: curve.unit,
+        at: Column::of_all(curve.at),
+        value: Column::of_all(curve.value),
     }
 }

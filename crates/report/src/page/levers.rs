@@ -7,12 +7,10 @@ use super::basis::joint_units;
 use crate::run::Run;
 use armcal_calibrate::position_covariance_m2;
 use armcal_core::Observation;
-use armcal_diagnose::implied_joint_errors;
+use armcal_core::robust::median;
+use armcal_diagnose::{BLURRED, implied_joint_errors};
 use nalgebra::Vector3;
 use serde::Serialize;
-
-/// Where a lever is so short that its implied error is this many times as uncertain as usual, it says nothing.
-const UNCERTAIN: f64 = 4.0;
 
 /// One place where an error may enter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -130,11 +128,10 @@ fn along(axis: usize, o: &Observation) -> Lever {
 }
 
 fn drop_uncertain(levers: &mut [Option<Lever>]) {
-    let mut sigmas: Vec<f64> = levers.iter().flatten().map(|l| l.sigma).collect();
-    sigmas.sort_by(f64::total_cmp);
-    let Some(median) = sigmas.get(sigmas.len() / 2).copied() else { return };
+    let sigmas: Vec<f64> = levers.iter().flatten().map(|l| l.sigma).collect();
+    let usual = median(&sigmas);
     for lever in levers {
-        if lever.is_some_and(|l| l.sigma > UNCERTAIN * median) {
+        if lever.is_some_and(|l| l.sigma > BLURRED * usual) {
             *lever = None;
         }
     }

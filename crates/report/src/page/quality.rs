@@ -63,7 +63,7 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingRow {
     RecordingRow {
         name: r.name.clone(),
         dwells: r.dwells.len(),
-        used: run.observations.iter().filter(|o| run.recording_name(o.dwell) == r.name).count(),
+        used: run.used(r),
         rejected: r.rejections.len(),
         clock: clock
             .map_or("one clock".into(), |c| format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s))),
@@ -105,15 +105,7 @@ fn stream(s: &StreamReport) -> StreamRow {
             + s.unstamped
             + s.stray_stamps
             + s.duplicate_stamps,
-        clock: format!("{}: {}", clock_word(s.clock), s.clock_reason),
-    }
-}
-
-fn clock_word(clock: armcal_recording::Clock) -> &'static str {
-    match clock {
-        armcal_recording::Clock::Header => "header",
-        armcal_recording::Clock::Publish => "publish",
-        armcal_recording::Clock::Log => "log",
+        clock: format!("{}: {}", s.clock.word(), s.clock_reason),
     }
 }
 
@@ -143,14 +135,9 @@ pub(crate) fn warnings(run: &Run) -> Vec<WarningRow> {
     });
     let mut all: Vec<_> = of_recordings.chain(overall.iter().map(|w| named("", w))).collect();
     all.sort_by_key(|w| std::cmp::Reverse(w.0));
-    let words = |severity| match severity {
-        Severity::Notice => ("notice", "notice"),
-        Severity::Inadequate => ("inadequate", "grave"),
-        Severity::DataLost => ("data lost", "grave"),
-    };
-    let row = |(severity, subject, message)| {
-        let (severity, class) = words(severity);
-        WarningRow { severity, class, subject, message }
+    let row = |(severity, subject, message): (Severity, String, String)| {
+        let class = if severity == Severity::Notice { "notice" } else { "grave" };
+        WarningRow { severity: severity.word(), class, subject, message }
     };
     all.into_iter().map(row).collect()
 }
