@@ -11,13 +11,14 @@
 //! **Nominal errors** are those of nominal robot parameters after fitting only the frames that nobody could know
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
+use crate::fit::{Near, fit_near};
 use crate::frames::{self, is_of};
 use crate::holdout::{self, Holdout};
 use crate::model_problem::ModelProblem;
 use crate::noise::expected_norm_m;
-use crate::outcome::{Calibration, Fit, Residual, SideErrors};
+use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::problem::Problem as _;
-use crate::{CalibrateError, FitConfig, HoldoutConfig, fit_problem};
+use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
@@ -37,14 +38,17 @@ pub fn calibrate(
     let frame_names = frames::frame_names(model);
     let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
     let judge = Judge { model, observations, config };
+    if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
+        let turn = judge.turn(held, None)?;
+        return judge.pool(&holdout, std::slice::from_ref(&turn), turn.clone());
+    }
+    let last = judge.turn(&[], None)?;
+    // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
+    let near = (config.objective != Objective::Paper).then_some(&last.fit);
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turns: Vec<Result<Turn, CalibrateError>> =
-        holdout.turns.par_iter().map(|turn| judge.turn(turn)).collect();
+        holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
-    let last = match (holdout.in_turn, turns.first()) {
-        (false, Some(turn)) => turn.clone(),
-        _ => judge.turn(&[])?,
-    };
     judge.pool(&holdout, &turns, last)
 }
 
@@ -65,8 +69,8 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// Fits without the observations `held`.
-    fn turn(&self, held: &[usize]) -> Result<Turn, CalibrateError> {
+    /// Fits without the observations `held`, from nominal or from `near`.
+    fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
             let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
@@ -76,7 +80,11 @@ impl Judge<'_> {
         let unseen = self.frames_only_in(&test, &train);
         let of_unseen = |p: &Parameter| unseen.iter().any(|frame| is_of(p, frame));
         let mut nominal_values = frames::fit_on(&train, self.model, self.config)?;
-        let mut fit = fit_problem(&train, &nominal_values, &|p| p.free && !of_unseen(p), self.config)?;
+        let free = |p: &Parameter| p.free && !of_unseen(p);
+        let mut fit = match near.map(|fit| self.near(fit, &nominal_values, &of_unseen)) {
+            Some(near) => fit_near(&train, &near, &free, self.config)?,
+            None => fit_problem(&train, &nominal_values, &free, self.config)?,
+        };
         let mut warnings = Vec::new();
         if !unseen.is_empty() {
             nominal_values = frames::fit_some(&test, self.model, nominal_values, self.config, &of_unseen)?;
@@ -89,6 +97,13 @@ impl Judge<'_> {
         let weight_of =
             (0..self.observations.len()).map(|i| if is_held(i) { None } else { seen.next() }).collect();
         Ok(Turn { fit, nominal_values, weight_of, warnings })
+    }
+
+    /// Where a fit ended, as a start; what the turn must not know of is at nominal.
+    fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
+        let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
+        let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
+        Near { values, sigma_scale: fit.sigma_scale }
     }
 
     /// Estimated frames that `test` says something about and `train` does not.

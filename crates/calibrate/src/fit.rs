@@ -42,10 +42,39 @@ pub fn fit_problem(
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
+    fit_from(problem, start, None, free, config)
+}
+
+/// [`fit_problem`] from where another fit ended, at the scale it found: the same minimum in a few steps when most of the
+/// blocks are the same. Not for eq. 4, which ends anywhere within its limit, so that the start is part of the answer.
+pub(crate) fn fit_near(
+    problem: &dyn Problem,
+    near: &Near,
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Fit, CalibrateError> {
+    fit_from(problem, &near.values, Some(near.sigma_scale), free, config)
+}
+
+/// Where another fit ended.
+pub(crate) struct Near {
+    /// All parameters.
+    pub values: Vec<f64>,
+    /// Scale of the residuals in units of the declared noise.
+    pub sigma_scale: f64,
+}
+
+fn fit_from(
+    problem: &dyn Problem,
+    start: &[f64],
+    sigma_scale: Option<f64>,
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Fit, CalibrateError> {
     config.check()?;
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
-    let solved = solve(&white, config)?;
+    let solved = solve(&white, sigma_scale, config)?;
     let (residual, jacobian) = white.linearised(&solved.x)?;
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
@@ -92,10 +121,14 @@ impl Solved {
     }
 }
 
-/// Minimises the objective asked for.
-pub(crate) fn solve(white: &Whitened<'_>, config: &FitConfig) -> Result<Solved, CalibrateError> {
+/// Minimises the objective asked for; `sigma_scale` where it is known roughly.
+pub(crate) fn solve(
+    white: &Whitened<'_>,
+    sigma_scale: Option<f64>,
+    config: &FitConfig,
+) -> Result<Solved, CalibrateError> {
     if config.objective != Objective::Paper {
-        return solve_robust(white, config);
+        return solve_robust(white, sigma_scale, config);
     }
     let solution = paper::minimise(white, config)?;
     let mut solved = Solved {
@@ -113,16 +146,21 @@ pub(crate) fn solve(white: &Whitened<'_>, config: &FitConfig) -> Result<Solved, 
 
 /// Alternates between the fit at a scale and the scale of its residuals, never below the declared noise. The first,
 /// rough rounds begin with all but gross outliers in the square part of the loss and end with outliers in the linear
-/// one; the accurate ones confirm the scale.
-fn solve_robust(white: &Whitened<'_>, config: &FitConfig) -> Result<Solved, CalibrateError> {
+/// one; the accurate ones confirm the scale. Where the scale is `known` roughly, so are the parameters: no rough rounds.
+fn solve_robust(
+    white: &Whitened<'_>,
+    known: Option<f64>,
+    config: &FitConfig,
+) -> Result<Solved, CalibrateError> {
     let estimated = config.objective == Objective::Robust && config.scale == Scale::Estimated;
     let mut x = white.start();
-    let mut sigma_scale = 1.0;
-    if estimated {
-        sigma_scale = (GENEROUS * median_scale(white, &white.residual(&x)?)).max(1.0);
-    }
+    let mut sigma_scale = match known {
+        _ if !estimated => 1.0,
+        Some(scale) => scale.max(1.0),
+        None => (GENEROUS * median_scale(white, &white.residual(&x)?)).max(1.0),
+    };
     let mut iterations = 0;
-    let mut round = 0;
+    let mut round = if known.is_some() { ROUGH_ROUNDS } else { 0 };
     loop {
         round += 1;
         let rough = estimated && round <= ROUGH_ROUNDS;

@@ -68,7 +68,7 @@ pub(crate) fn fit_some(
     let white = Whitened::new(Box::new(problem), &start, &free, config)?;
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
-    let solved = fit::solve(&white, &FitConfig { objective, ..config.clone() })?;
+    let solved = fit::solve(&white, None, &FitConfig { objective, ..config.clone() })?;
     Ok(white.parameters_at(&solved.x))
 }
 

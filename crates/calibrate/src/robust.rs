@@ -4,6 +4,7 @@
 //! the residuals in units of the declared noise, and w the prior precision (1 in units of its own standard deviation).
 
 use crate::loss::{Loss, chi_median};
+use crate::products::inner;
 use crate::solver::{Cost, Quadratic};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective};
@@ -75,9 +76,9 @@ impl Cost for RobustCost<'_, '_> {
             }
         }
         let gradient = jacobian.tr_mul(&weighted) + precision.component_mul(x);
-        let mut hessian = jacobian.tr_mul(&jacobian);
+        let mut hessian = inner(&jacobian, &jacobian);
         let damping = hessian.diagonal() + &precision;
-        hessian -= removed.tr_mul(&removed);
+        hessian -= inner(&removed, &removed);
         for k in 0..n {
             hessian[(k, k)] += precision[k];
         }

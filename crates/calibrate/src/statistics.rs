@@ -19,6 +19,7 @@
 //! same: the zero of joint 1 is as wide as the yaw of a measured base leaves it.
 
 use crate::CalibrateError;
+use crate::products::inner;
 use crate::robust::RobustCost;
 use crate::whitened::Axis;
 use nalgebra::{DMatrix, DVector};
@@ -51,7 +52,7 @@ pub(crate) fn uncertainty(
     name: &dyn Fn(usize) -> String,
 ) -> Result<Uncertainty, CalibrateError> {
     let axes = &cost.white.axes;
-    let gram = jacobian.tr_mul(jacobian);
+    let gram = inner(jacobian, jacobian);
     let declared = posterior(&gram, axes, cost.sigma_scale.powi(2).recip(), name)?;
     let fitted = fitted_directions(&declared, axes);
     let freedom = (cost.white.rows() as f64 - fitted).max(1.0);

@@ -3,8 +3,9 @@
 use crate::config::DiagnosisConfig;
 use crate::noise::{Noise, Whitener};
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, Projection, cholesky_upper, eigen, inner};
+use crate::projection::{Gram, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
+use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
 
 /// Above this many columns a factor for each amplitude is cheaper than one eigen-decomposition.

@@ -10,10 +10,8 @@
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
 //! 2015), which is as orthogonal as Householder's and a matrix product fast.
 
+use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
-
-/// Up to this many columns dot products are faster than a transposed copy.
-const NARROW: usize = 4;
 
 /// Geometry projected out of one set of whitened rows.
 #[derive(Debug, Clone)]
@@ -103,11 +101,6 @@ impl Projection {
     pub fn cross(&self, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
         inner(a, b) - inner(&self.q, a).tr_mul(&inner(&self.q, b))
     }
-}
-
-/// `a'b`; by the blocked product where it is large, as nalgebra's `tr_mul` takes one dot product for each entry.
-pub(crate) fn inner(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    if a.ncols().min(b.ncols()) <= NARROW { a.tr_mul(b) } else { a.transpose() * b }
 }
 
 /// Upper Cholesky factor of a positive semi-definite matrix, with a ridge that grows until it exists.
