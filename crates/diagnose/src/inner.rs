@@ -192,8 +192,8 @@ fn warnings(
     if !set_aside.is_empty() {
         let names: Vec<String> = set_aside.iter().map(ToString::to_string).collect();
         let message = format!(
-            "their error ({} of {dwells} dwells) is as rare as {} sigma under every explanation at hand, so they were set \
-             aside; look for swapped markers, a bump or a wrong cavity",
+            "{} of {dwells} dwells set aside: an error as rare as {} sigma under every explanation at hand; look for swapped \
+             markers, a bump or a wrong cavity",
             names.len(),
             config.outlier_sigma
         );

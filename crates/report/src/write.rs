@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+const PAGE: &str = "report.html";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
 const LAYOUT: &str = "foxglove-layout.json";
 const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
@@ -70,7 +71,7 @@ pub fn write_all(
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let mut staged = Vec::new();
     let texts = [
-        ("report.html", &page),
+        (PAGE, &page),
         ("summary.json", &summary),
         ("parameters.toml", &parameters),
         (model.name, &model.text),
@@ -86,6 +87,7 @@ pub fn write_all(
 
     let attachments = [
         Attachment { name: "pipeline.toml", media_type: "application/toml", text: &run.pipeline_text },
+        Attachment { name: PAGE, media_type: "text/html", text: &page },
         Attachment { name: "summary.json", media_type: "application/json", text: &summary },
         Attachment { name: "parameters.toml", media_type: "application/toml", text: &parameters },
         Attachment { name: model.name, media_type: model.media_type, text: &model.text },

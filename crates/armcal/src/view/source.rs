@@ -13,9 +13,12 @@ struct Source {
     pipeline: PathBuf,
 }
 
-/// Leaves a note in `out` of where its pipeline is. A path that no text can hold is not noted.
+/// Leaves a note in `out` of where its pipeline is, as seen from there: both may move together, and the note does not
+/// depend on where they are. A path that no text can hold is not noted.
 pub fn remember(out: &Path, pipeline: &Path) -> Result<(), Error> {
-    let path = std::path::absolute(pipeline).unwrap_or_else(|_| pipeline.to_owned());
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let (folder, pipeline) = (real(out), real(pipeline));
+    let path = pathdiff::diff_paths(&pipeline, folder).unwrap_or(pipeline);
     let Ok(text) = toml::to_string(&Source { pipeline: path }) else { return Ok(()) };
     let text = format!("# Where `armcal view` finds the pipeline of these results.\n{text}");
     atomic::write(&out.join(FILE), text.as_bytes()).map_err(Error::Output)
@@ -31,5 +34,5 @@ pub fn pipeline_of(input: &Path) -> Result<PathBuf, Error> {
         .map_err(|source| Error::NoSource { folder: input.to_owned(), source: Box::new(source) })?;
     let source: Source = toml::from_str(&text)
         .map_err(|e| Error::NoSource { folder: input.to_owned(), source: Box::new(e) })?;
-    Ok(source.pipeline)
+    Ok(input.join(source.pipeline))
 }
