@@ -161,6 +161,7 @@ fn attachments_and_metadata_are_the_inputs_and_ours() {
         ("notes/\"a\".txt", b"attached to 1".to_vec()),
         ("notes/\"a\".txt", b"attached to 2".to_vec()),
         ("armcal/pipeline.toml", crate::synthetic::PIPELINE.into()),
+        ("armcal/report.html", file("report.html")),
         ("armcal/summary.json", file("summary.json")),
         ("armcal/parameters.toml", file("parameters.toml")),
         ("armcal/calibrated.toml", file("calibrated.toml")),
