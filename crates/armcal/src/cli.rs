@@ -108,6 +108,19 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// A calibrated model on recordings it never saw: errors at points and along paths, before and after, with intervals.
+    Verify {
+        /// Result of `armcal run`: a run.mcap or the folder it is in.
+        result: PathBuf,
+        /// Pipeline file of the new recordings, with the same nominal arm.
+        pipeline: PathBuf,
+        /// Folder for verification.json and paths.parquet.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// The report of a run, served to this machine's browser only: any combination of effects and any hold-out is
     /// refitted as you choose it.
     View {

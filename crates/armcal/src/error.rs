@@ -105,6 +105,36 @@ pub enum Error {
     /// Reading back the result of an earlier run.
     #[error(transparent)]
     PastRun(#[from] armcal_report::PastRunError),
+    /// Reading back the calibrated model of an earlier run.
+    #[error(transparent)]
+    PastModel(#[from] armcal_report::PastModelError),
+    /// The result lacks a parameter of the arm.
+    #[error(
+        "{} has no parameter {parameter}: its arm is not the one of this pipeline; name the [model] it was calibrated with",
+        result.display()
+    )]
+    NotInResult {
+        /// The result.
+        result: PathBuf,
+        /// The parameter.
+        parameter: String,
+    },
+    /// The result calibrated another nominal arm.
+    #[error(
+        "{} calibrated an arm whose nominal {parameter} is {then}, this pipeline's is {now} (SI); name the [model] it was \
+         calibrated with",
+        result.display()
+    )]
+    OtherArm {
+        /// The result.
+        result: PathBuf,
+        /// The parameter.
+        parameter: String,
+        /// Nominal value in the result.
+        then: f64,
+        /// Nominal value in the pipeline.
+        now: f64,
+    },
     /// Looking for the missing effect.
     #[error(transparent)]
     Diagnose(#[from] armcal_diagnose::DiagnoseError),
@@ -165,6 +195,14 @@ pub enum Error {
         what: &'static str,
         /// The port.
         port: u16,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A folder for results cannot be made.
+    #[error("making the folder {}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
         /// What the system said.
         source: std::io::Error,
     },

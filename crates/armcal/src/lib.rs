@@ -12,6 +12,7 @@ pub mod progress;
 pub mod score;
 pub mod stages;
 pub mod story;
+pub mod verify;
 pub mod view;
 
 pub use error::Error;

@@ -70,11 +70,11 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     let (model_text, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
-    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress)?;
+    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |_, _| Ok(()))?;
 
     let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
-    let mut places = observe::associate_all(pipeline, board.as_ref(), &geometry, None, &seen)?;
+    let mut places = observe::associate_all(pipeline, board.as_ref(), &geometry, &geometry.nominal(), false, &seen)?;
     let mut rounds = 0;
     loop {
         rounds += 1;
@@ -85,7 +85,7 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
         let model = with_effects(pipeline, &geometry, &effects, &observations)?;
         let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
         let values = calibration.fit.values();
-        let again = observe::associate_all(pipeline, board.as_ref(), &model, Some(&values), &seen)?;
+        let again = observe::associate_all(pipeline, board.as_ref(), &model, &values, true, &seen)?;
         if observe::same_places(&again, &places) || rounds == MAX_ROUNDS {
             return Ok(Settled {
                 recordings,

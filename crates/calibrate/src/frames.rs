@@ -41,6 +41,19 @@ pub fn fit_frames(
     fit_on(&ModelProblem::new(model, observations, config)?, model, config)
 }
 
+/// The same from given values of all parameters, for those frames `which` accepts; the arm stays as `start` has it.
+pub fn fit_frames_from(
+    model: &Model,
+    observations: &[Observation],
+    start: Vec<f64>,
+    config: &FitConfig,
+    which: &dyn Fn(&Parameter) -> bool,
+) -> Result<Vec<f64>, CalibrateError> {
+    let problem = ModelProblem::new(model, observations, config)?;
+    let touched = touched_frames(model, problem.observations());
+    fit_some(&problem, model, start, config, &|p| which(p) && touched.iter().any(|t| is_of(p, t)))
+}
+
 /// [`fit_frames`] on observations already checked.
 pub(crate) fn fit_on(
     problem: &ModelProblem<'_>,

@@ -48,7 +48,7 @@ pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
-pub use frames::{align_frames, fit_frames};
+pub use frames::{align_frames, fit_frames, fit_frames_from};
 pub use linearise::{LinearAxis, Linearisation, linearise};
 pub use model_problem::{ModelProblem, position_covariance_m2};
 pub use noise::expected_norm_m;

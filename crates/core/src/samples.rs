@@ -76,6 +76,8 @@ pub struct ScalarSamples {
 pub struct Samples {
     /// Encoder readings.
     pub joints: JointSamples,
+    /// What the controller asked of the joints, on the robot's clock.
+    pub set_points: Option<JointSamples>,
     /// The tip (or the marker on the end effector).
     pub tip: Option<PoseSamples>,
     /// The robot's base.

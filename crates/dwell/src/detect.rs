@@ -1,13 +1,11 @@
 //! The dwells of one recording.
 
-use armcal_core::{Arrival, Dwell, DwellId, Samples, Severity, Stage, TipMeasurement, Warning};
+use armcal_core::{Dwell, DwellId, Samples, Severity, Stage, TipMeasurement, Warning};
 use std::ops::Range;
 
-use crate::arrival::Past;
-use crate::memory::path_memory;
+use crate::history::History;
 use crate::pauses::{Encoders, Pauses, Tip, pauses};
 use crate::series::{check_joints, check_order, check_poses, seconds_between};
-use crate::stats::Mean;
 use crate::summary::{effective_of, effort_means, joint_means, temperature, tip_measurement};
 use crate::{ClockAlignment, DwellConfig, DwellError};
 
@@ -44,12 +42,12 @@ pub fn detect_dwells(
     let found = pauses(&encoders, tip.as_ref().filter(|_| config.use_tip), config);
 
     let summary = Summary { samples, encoders: &encoders, tip: tip.as_ref(), clock, config };
-    let past: Vec<Past> = samples.joints.joint_rad.iter().map(|column| Past::of(column)).collect();
+    let history = History::of(&encoders, config);
     let dwells: Vec<Dwell> = found
         .rows
         .iter()
         .enumerate()
-        .map(|(dwell, rows)| summary.dwell(DwellId { recording, dwell }, rows, &past))
+        .map(|(dwell, rows)| summary.dwell(DwellId { recording, dwell }, rows, &history))
         .collect();
     let warnings = summary.warnings(&found, &dwells);
     Ok((dwells, warnings))
@@ -64,81 +62,29 @@ struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    fn dwell(&self, id: DwellId, rows: &Range<usize>, past: &[Past]) -> Dwell {
+    fn dwell(&self, id: DwellId, rows: &Range<usize>, history: &History<'_>) -> Dwell {
         let joints = &self.samples.joints;
         let (start_ns, end_ns) = (joints.time_ns[rows.start], joints.time_ns[rows.end - 1]);
         let means = joint_means(joints, rows, &self.encoders.step_rad);
+        let joint_rad: Vec<f64> = means.iter().map(|m| m.mean).collect();
         let stream = self.samples.temperature.as_ref();
         Dwell {
             id,
             start_ns,
             end_ns,
-            joint_rad: means.iter().map(|m| m.mean).collect(),
             joint_spread_rad: means.iter().map(|m| m.spread).collect(),
             joint_sigma_rad: means.iter().map(|m| m.sigma).collect(),
             effort_nm: effort_means(joints, rows),
             samples: rows.len(),
             effective_samples: effective_of(&means),
-            arrival: past
-                .iter()
-                .zip(&means)
-                .zip(&self.encoders.step_rad)
-                .map(|((past, mean), step)| self.arrival(past, rows.start, mean.mean, *step))
-                .collect(),
-            path_memory_rad: joints
-                .joint_rad
-                .iter()
-                .zip(&means)
-                .zip(&self.encoders.step_rad)
-                .map(|((column, mean), step)| self.path_memory(column, rows.start, mean.mean, *step))
-                .collect(),
-            pair_memory_rad: (1..means.len())
-                .map(|joint| self.pair_memory(joint, rows.start, &means))
-                .collect(),
+            arrival: history.arrival(rows.start, &joint_rad),
+            path_memory_rad: history.path_memory(rows.start, &joint_rad),
+            pair_memory_rad: history.pair_memory(rows.start, &joint_rad),
+            joint_rad,
             tip: self.tip_of(start_ns, end_ns),
             temperature_c: stream
                 .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
         }
-    }
-
-    fn arrival(&self, past: &Past, start: usize, rest_rad: f64, step_rad: f64) -> Arrival {
-        let away_rad = self
-            .config
-            .arrival_threshold_deg
-            .to_radians()
-            .max(self.config.arrival_threshold_counts * step_rad);
-        past.arrival(self.unbroken_since(start), start, rest_rad, away_rad)
-    }
-
-    fn path_memory(&self, column: &[f64], start: usize, rest_rad: f64, step_rad: f64) -> Vec<f64> {
-        path_memory(
-            column[self.unbroken_since(start)..start].iter().copied(),
-            rest_rad,
-            self.deadband_rad(step_rad),
-        )
-    }
-
-    /// Sum and difference of a joint and the one before it.
-    fn pair_memory(&self, joint: usize, start: usize, means: &[Mean]) -> [Vec<f64>; 2] {
-        let columns = [&self.samples.joints.joint_rad[joint - 1], &self.samples.joints.joint_rad[joint]];
-        let past = self.unbroken_since(start)..start;
-        let step_rad = self.encoders.step_rad[joint - 1] + self.encoders.step_rad[joint];
-        [1.0, -1.0].map(|sense| {
-            let together = past.clone().map(|row| columns[1][row] + sense * columns[0][row]);
-            let rest_rad = means[joint].mean + sense * means[joint - 1].mean;
-            path_memory(together, rest_rad, self.deadband_rad(step_rad))
-        })
-    }
-
-    /// Tremor and quantisation at rest are no turning points [rad].
-    fn deadband_rad(&self, step_rad: f64) -> f64 {
-        (0.1 * self.config.arrival_threshold_deg.to_radians())
-            .max(self.config.arrival_threshold_counts * step_rad)
-    }
-
-    /// First row of the stretch without gaps that a row is in.
-    fn unbroken_since(&self, row: usize) -> usize {
-        self.encoders.stretches.iter().find(|s| s.contains(&row)).map_or(row, |s| s.start)
     }
 
     /// The tip frames whose time lies in the dwell for certain, the error of the alignment considered.

@@ -3,6 +3,7 @@
 //! ```text
 //! joints, tip --align_clocks--> ClockAlignment --detect_dwells--> [Dwell] (mean, spread, standard error,
 //!                                                                          arrival direction, tip, n_eff)
+//! joints, tip, dwells --track------> [Moment] (the moving tip, with the joints at that moment)
 //! table, base --mean_pose-----> MeanPose (with a warning when the body moved)
 //! ```
 //!
@@ -14,6 +15,7 @@ mod clock;
 mod config;
 mod detect;
 mod error;
+mod history;
 mod memory;
 mod pauses;
 mod series;
@@ -23,6 +25,7 @@ mod stillness;
 mod summary;
 #[cfg(test)]
 mod testkit;
+mod track;
 
 pub use align::align_clocks;
 pub use clock::ClockAlignment;
@@ -30,3 +33,4 @@ pub use config::{ClockConfig, DwellConfig};
 pub use detect::detect_dwells;
 pub use error::DwellError;
 pub use static_pose::{MeanPose, mean_pose};
+pub use track::{Moment, track};

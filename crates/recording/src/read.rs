@@ -4,7 +4,7 @@ use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
 use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
-use crate::{Clock, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams};
+use crate::{Clock, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams};
 use crate::{joints, poses};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
 
@@ -24,13 +24,17 @@ impl Recording {
         streams: &Streams,
     ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {
         joints::check_config(&streams.joints)?;
+        streams.set_points.as_ref().map(joints::check_config).transpose()?;
         let requests = requests(streams);
         let gathered = gather(self, &requests)?;
         let (mut samples, mut reports, mut warnings) = (Samples::default(), Vec::new(), Vec::new());
         for (request, stream) in requests.iter().zip(&gathered) {
             let mut stage = Reading::new(request, stream, &mut warnings);
             match request.role {
-                "joints" => samples.joints = stage.joints(streams)?,
+                "joints" => samples.joints = stage.joints(&streams.joints)?,
+                "set_points" => {
+                    samples.set_points = streams.set_points.as_ref().map(|s| stage.joints(s)).transpose()?
+                }
                 "temperature" => {
                     samples.temperature =
                         streams.temperature.as_ref().map(|s| stage.scalars(s)).transpose()?
@@ -46,8 +50,10 @@ impl Recording {
 }
 
 fn requests(streams: &Streams) -> Vec<Request<'_>> {
-    let joints = Kind::Joints { wanted: &streams.joints.names };
-    let mut requests = vec![Request { role: "joints", topic: &streams.joints.topic, kind: joints }];
+    let of_joints =
+        |role, s: &'_ JointStream| Request { role, topic: &s.topic, kind: Kind::Joints { wanted: &s.names } };
+    let mut requests = vec![of_joints("joints", &streams.joints)];
+    requests.extend(streams.set_points.as_ref().map(|s| of_joints("set_points", s)));
     for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
         requests.extend(stream.iter().map(|s| Request {
             role,
@@ -63,6 +69,7 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
 
 /// One stream on its way from rows to columns.
 struct Reading<'a> {
+    role: &'static str,
     gathered: &'a Gathered,
     report: StreamReport,
     warnings: &'a mut Vec<Warning>,
@@ -90,18 +97,18 @@ impl<'a> Reading<'a> {
             largest_gap_s: 0.0,
             quantisation_rad: Vec::new(),
         };
-        Reading { gathered, report, warnings }
+        Reading { role: request.role, gathered, report, warnings }
     }
 
-    fn joints(&mut self, streams: &Streams) -> Result<JointSamples, RecordingError> {
-        let (stream, table) = (&streams.joints, &self.gathered.joints);
-        self.refuse_undecoded("joints")?;
+    fn joints(&mut self, stream: &JointStream) -> Result<JointSamples, RecordingError> {
+        let (role, table) = (self.role, &self.gathered.joints);
+        self.refuse_undecoded(role)?;
         if self.gathered.messages > 0 && table.position.is_empty() {
             return Err(table.none_selected(stream, self.gathered.messages));
         }
         let n = stream.names.len();
         let finite = |i: usize| table.position[i * n..(i + 1) * n].iter().all(|x| x.is_finite());
-        let (mut rows, mut counts) = in_time_order(&self.time("joints", stream.clock)?, finite);
+        let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, finite);
         drop_duplicates(&mut rows, &mut counts);
         let readings = |rows: &[(i64, usize)]| {
             joints::to_rad(table, &rows.iter().map(|(_, i)| *i).collect::<Vec<_>>(), stream)
@@ -111,7 +118,7 @@ impl<'a> Reading<'a> {
         self.drop_impossible(&mut rows, |i| joints::is_possible(&joint_rad, i, stream));
         let joint_rad = if self.report.impossible > 0 { readings(&rows) } else { joint_rad };
         let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
-        self.finish("joints", &time_ns, counts)?;
+        self.finish(role, &time_ns, counts)?;
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
         let effort_nm = joints::effort(table, &rows, n);
@@ -126,7 +133,7 @@ impl<'a> Reading<'a> {
     }
 
     fn poses(&mut self, stream: &PoseStream) -> Result<PoseSamples, RecordingError> {
-        let role = role_name(&self.report.role);
+        let role = self.role;
         let table = &self.gathered.poses;
         self.refuse_undecoded(role)?;
         if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
@@ -317,12 +324,4 @@ impl<'a> Reading<'a> {
 
 fn subject(report: &StreamReport) -> String {
     format!("stream {} ({})", report.role, report.topic)
-}
-
-fn role_name(role: &str) -> &'static str {
-    match role {
-        "tip" => "tip",
-        "base" => "base",
-        _ => "table",
-    }
 }

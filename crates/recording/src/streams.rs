@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Streams {
     /// Encoder readings.
     pub joints: JointStream,
+    /// What the controller asked of the joints; where it is recorded, paths are compared with what was planned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub set_points: Option<JointStream>,
     /// The tip, or the marker body on the end effector.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<PoseStream>,

@@ -19,23 +19,30 @@ mod mcap_file;
 mod model_file;
 mod page;
 mod parameters;
+mod past_model;
 mod past_run;
 mod points;
 mod proto;
 mod run;
+mod session_summary;
 mod summary;
 mod tables;
 mod terminal;
 mod text;
+mod verification;
 mod write;
 
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis};
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
+pub use past_model::{PastModel, PastModelError, PastValue};
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
 pub use run::{RecordingRun, Refit, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};
+pub use verification::{
+    PathSample, Verification, VerifiedRecording, verification_files, verification_json, verification_text,
+};
 pub use write::{InputMessages, OutputConfig, write_all};

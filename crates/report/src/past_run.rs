@@ -114,7 +114,7 @@ impl PastRun {
 
     /// Reads `run.mcap`, given itself or the folder it is in.
     pub fn open(path: &Path) -> Result<PastRun, PastRunError> {
-        let path = if path.is_dir() { path.join("run.mcap") } else { path.to_owned() };
+        let path = result_file(path);
         let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
         let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
         let mut residuals = Vec::new();
@@ -147,6 +147,11 @@ impl PastRun {
             path,
         })
     }
+}
+
+/// The `run.mcap` of a result, given itself or the folder it is in.
+pub(crate) fn result_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("run.mcap") } else { path.to_owned() }
 }
 
 impl From<proto::Residual> for PastResidual {

@@ -120,16 +120,16 @@ fn assignment<'a>(run: &'a Run, o: &Observation) -> Option<&'a Assignment> {
 
 /// A table under construction, column by column.
 #[derive(Default)]
-struct Columns {
+pub(crate) struct Columns {
     columns: Vec<Column>,
 }
 
 impl Columns {
-    fn number(&mut self, name: impl Into<String>, values: impl Iterator<Item = Option<f64>>) {
+    pub fn number(&mut self, name: impl Into<String>, values: impl Iterator<Item = Option<f64>>) {
         self.push(name, |name| Series::new(name, values.collect::<Vec<_>>()));
     }
 
-    fn integer(&mut self, name: &str, values: impl Iterator<Item = i64>) {
+    pub fn integer(&mut self, name: &str, values: impl Iterator<Item = i64>) {
         self.push(name, |name| Series::new(name, values.collect::<Vec<_>>()));
     }
 
@@ -137,12 +137,12 @@ impl Columns {
         self.push(name, |name| Series::new(name, values.collect::<Vec<_>>()));
     }
 
-    fn text<'a>(&mut self, name: &str, values: impl Iterator<Item = Option<&'a str>>) {
+    pub fn text<'a>(&mut self, name: &str, values: impl Iterator<Item = Option<&'a str>>) {
         self.push(name, |name| Series::new(name, values.collect::<Vec<_>>()));
     }
 
     /// Three columns: `<name>_x<unit>` and so on.
-    fn vector(&mut self, name: &str, unit: &str, values: impl Iterator<Item = Vector3<f64>>) {
+    pub fn vector(&mut self, name: &str, unit: &str, values: impl Iterator<Item = Vector3<f64>>) {
         let values: Vec<Vector3<f64>> = values.collect();
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
             self.number(format!("{name}_{letter}{unit}"), values.iter().map(|v| Some(v[axis])));
@@ -181,7 +181,7 @@ impl Columns {
         self.columns.push(Column::from(series(name.into().into())));
     }
 
-    fn encode(self, table: &'static str) -> Result<Vec<u8>, ReportError> {
+    pub fn encode(self, table: &'static str) -> Result<Vec<u8>, ReportError> {
         let failed = |e: PolarsError| ReportError::Parquet { table, source: Box::new(e) };
         parquet(self.columns).map_err(failed)
     }

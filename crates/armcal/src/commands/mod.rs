@@ -10,6 +10,7 @@ mod plan;
 mod run;
 mod score;
 mod simulate;
+mod verify;
 mod view;
 
 use crate::cli::{Cli, Command};
@@ -49,6 +50,9 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))
         }
         Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
+        Command::Verify { result, pipeline, out, json } => {
+            verify::run(result, pipeline, out.as_deref(), *json)
+        }
         Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
     }

@@ -2,4 +2,5 @@
 
 pub mod frames;
 pub mod observe;
+pub mod past;
 pub mod perceive;

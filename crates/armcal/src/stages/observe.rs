@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
 use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, DwellId, Observation, Reference, Rejection};
+use armcal_dwell::Moment;
 use armcal_model::Model;
 use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
 use nalgebra::{Matrix3, Vector3};
@@ -18,24 +19,24 @@ pub struct Observed {
 
 /// Associates the dwells of every recording to the board; `None` where there is no table.
 ///
-/// `values` are the model's parameters that predict the tips; nominal when absent.
+/// `p` are the model's parameters that predict the tips; `boards_fitted` says whether they place the boards even where the
+/// pipeline leaves that to be estimated.
 pub fn associate_all(
     pipeline: &Pipeline,
     board: Option<&Board>,
     model: &Model,
-    values: Option<&[f64]>,
+    p: &[f64],
+    boards_fitted: bool,
     seen: &[Seen],
 ) -> Result<Vec<Option<Association>>, Error> {
     let (Some(board), Some(table)) = (board, &pipeline.table) else {
         return Ok(seen.iter().map(|_| None).collect());
     };
-    let nominal = model.nominal();
-    let p = values.unwrap_or(&nominal);
     seen.iter()
         .enumerate()
         .map(|(recording, seen)| {
             let tips: Vec<DwellTip> = seen.dwells.iter().map(|d| dwell_tip(model, p, d)).collect();
-            let known = table.pose != BoardPose::Estimated || values.is_some();
+            let known = table.pose != BoardPose::Estimated || boards_fitted;
             let start = match model.board_in_world(p, recording) {
                 Some(pose) if known => BoardStart::Known(pose),
                 _ => BoardStart::Unknown,
@@ -87,6 +88,30 @@ pub fn observations(
         return Err(Error::NoObservations { dwells: observed.rejections.len(), hint });
     }
     Ok(observed)
+}
+
+/// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.
+pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, load_kg: f64, m: &Moment) -> Observation {
+    let sigma_m = pipeline.observations.sensor_sigma_mm * 1e-3;
+    Observation {
+        dwell: DwellId { recording, dwell: index },
+        time_ns: m.time_ns,
+        joint_rad: m.joint_rad.clone(),
+        joint_sigma_rad: vec![0.0; m.joint_rad.len()],
+        arrival: m.arrival.clone(),
+        path_memory_rad: Some(m.path_memory_rad.clone()),
+        pair_memory_rad: Some(m.pair_memory_rad.clone()),
+        joint_velocity_radps: Some(m.joint_velocity_radps.clone()),
+        effort_nm: m.effort_nm.clone(),
+        temperature_c: m.temperature_c,
+        load_kg,
+        reference: Reference::Tracked {
+            position_m: m.position_m,
+            orientation: None,
+            orientation_sigma_rad: f64::INFINITY,
+        },
+        covariance_m2: Matrix3::from_diagonal(&Vector3::from_element(sigma_m * sigma_m)),
+    }
 }
 
 fn dwell_tip(model: &Model, p: &[f64], dwell: &Dwell) -> DwellTip {

@@ -44,19 +44,23 @@ pub fn open_all(pipeline: &Pipeline, progress: &Progress) -> Result<Vec<Recordin
         .collect()
 }
 
-/// Reads every recording and finds its dwells.
+/// Reads every recording and finds its dwells. `look` sees the samples of each before they are dropped.
 pub fn dwells_of_all(
     pipeline: &Pipeline,
     chain: &Chain,
     recordings: &[Recording],
     progress: &Progress,
+    look: &mut dyn FnMut(&Samples, &Seen) -> Result<(), Error>,
 ) -> Result<Vec<Seen>, Error> {
     let speed_model = Model::new(chain.clone(), Frames::of_bare_arm())?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
     entries
         .map(|(index, (entry, recording))| {
             progress.step(&format!("reading {}", entry.name()));
-            dwells_of_one(pipeline, &speed_model, index, entry.load_kg, &entry.name(), recording)
+            let (samples, seen) =
+                dwells_of_one(pipeline, &speed_model, index, entry.load_kg, &entry.name(), recording)?;
+            look(&samples, &seen)?;
+            Ok(seen)
         })
         .collect()
 }
@@ -92,7 +96,7 @@ fn dwells_of_one(
     load_kg: f64,
     name: &str,
     recording: &Recording,
-) -> Result<Seen, Error> {
+) -> Result<(Samples, Seen), Error> {
     let in_recording = |source| Error::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
@@ -114,7 +118,8 @@ fn dwells_of_one(
 
     let mut report = recording.report().clone();
     report.streams = streams;
-    Ok(Seen { name: name.to_owned(), load_kg, report, clock, dwells, base, table, warnings })
+    let seen = Seen { name: name.to_owned(), load_kg, report, clock, dwells, base, table, warnings };
+    Ok((samples, seen))
 }
 
 /// Mean poses of the base and the table, where the pipeline uses them.

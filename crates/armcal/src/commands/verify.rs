@@ -1,0 +1,32 @@
+//! `armcal verify`: a calibrated model on recordings it never saw.
+
+use super::{Outcome, print, style};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::verify::verify;
+use armcal_recording::atomic;
+use armcal_report::{Status, verification_files, verification_json, verification_text};
+use std::path::Path;
+
+/// Verifies a result, prints the tables (or JSON), and writes files where a folder is given.
+pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(pipeline)?;
+    let progress = Progress::new();
+    let verification = verify(result, &pipeline, &progress)?;
+    let files = out.map(|_| verification_files(&verification)).transpose()?;
+    progress.finish();
+    if let (Some(folder), Some(files)) = (out, files) {
+        std::fs::create_dir_all(folder)
+            .map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
+        for (name, bytes) in files {
+            atomic::write(&folder.join(name), &bytes).map_err(Error::Output)?;
+        }
+    }
+    if json {
+        print(&verification_json(&verification));
+    } else {
+        print(&verification_text(&verification, style()));
+    }
+    Ok(if verification.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+}

@@ -1,0 +1,114 @@
+//! A calibrated model of an earlier run among the frames of other recordings.
+
+use crate::error::Error;
+use crate::pipeline::{FramePose, Pipeline};
+use crate::stages::frames;
+use armcal_core::{Pose, Role, Severity, Stage, Warning};
+use armcal_model::{EffectSpec, Family, Model, catalogue};
+use armcal_report::PastModel;
+
+/// The model of the past in new surroundings.
+pub struct Placed {
+    /// Its arm and effects between the frames of the new recordings.
+    pub model: Model,
+    /// Nominal arm without effects, frames as the new recordings know them.
+    pub nominal: Vec<f64>,
+    /// The arm and its effects as calibrated, the same frames.
+    pub calibrated: Vec<f64>,
+    /// What could not be carried over.
+    pub warnings: Vec<Warning>,
+}
+
+/// Puts the calibrated arm and its effects into `surroundings`: the nominal arm without effects, base and boards where
+/// the pipeline of the new recordings knows them.
+///
+/// What calibration learned about the base is kept: where the base is measured again, its correction relative to the
+/// measured pose; where it is to be estimated, its calibrated pose; a given pose stays as given.
+///
+/// # Errors
+/// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.
+pub fn place(past: &PastModel, pipeline: &Pipeline, surroundings: &Model) -> Result<Placed, Error> {
+    let then = Pipeline::parse(&past.path, past.pipeline_text.clone(), &pipeline.folder)?;
+    let mut warnings = Vec::new();
+    let specs = frames::effect_specs(&then, surroundings)?;
+    let lasting: Vec<EffectSpec> = specs.into_iter().filter(|s| lasts(s, &mut warnings)).collect();
+    let model = if lasting.is_empty() {
+        surroundings.clone()
+    } else {
+        surroundings.with_effects(&lasting, &past.session)?
+    };
+    let nominal = model.nominal();
+    let mut calibrated = nominal.clone();
+    for (at, parameter) in model.parameters().iter().enumerate() {
+        let carried = matches!(parameter.role, Role::Robot | Role::Effect) || parameter.name.starts_with("tip.");
+        if !carried {
+            continue;
+        }
+        let known = past.parameters.get(&parameter.name).ok_or_else(|| Error::NotInResult {
+            result: past.path.clone(),
+            parameter: parameter.name.clone(),
+        })?;
+        if parameter.role == Role::Robot && (known.nominal - parameter.nominal).abs() > 1e-9 {
+            return Err(Error::OtherArm {
+                result: past.path.clone(),
+                parameter: parameter.name.clone(),
+                then: known.nominal,
+                now: parameter.nominal,
+            });
+        }
+        calibrated[at] = known.value;
+    }
+    put_base(&model, &base(past, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
+    Ok(Placed { model, nominal, calibrated, warnings })
+}
+
+/// Whether an effect holds beyond the recordings it was fitted on; what time does to it is doubtful.
+fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
+    let mut say = |code, message: &str| {
+        warnings.push(Warning::new(
+            Severity::Notice,
+            Stage::Calibrate,
+            code,
+            spec.to_string(),
+            message.to_owned(),
+        ));
+    };
+    if spec.since.is_some() {
+        say("event-not-carried-over", "happened in a recording of the calibration: left out here");
+        return false;
+    }
+    let family = catalogue().iter().find(|kind| kind.name == spec.kind).map(|kind| kind.family);
+    if family == Some(Family::Drift) {
+        say("drift-extrapolated", "was fitted over the time of the calibration and is extrapolated to this one");
+    }
+    true
+}
+
+/// The base as far as calibration and the new recordings know it together.
+fn base(past: &PastModel, pipeline: &Pipeline, now: &Pose) -> Pose {
+    match pipeline.frames.base.pose {
+        FramePose::Given => *now,
+        FramePose::Measured => now * past.nominal_base.inverse() * past.fitted_base,
+        FramePose::Estimated => past.fitted_base,
+    }
+}
+
+/// Writes a pose into the base's parameters: position, and the rotation vector that turns nominal into it.
+fn put_base(model: &Model, pose: &Pose, values: &mut [f64]) {
+    let nominal = model.base_in_world(&model.nominal());
+    let turn_rad = (nominal.rotation.inverse() * pose.rotation).scaled_axis();
+    let at_m = pose.translation.vector;
+    let entries = [
+        ("base.x", at_m.x),
+        ("base.y", at_m.y),
+        ("base.z", at_m.z),
+        ("base.rx", turn_rad.x),
+        ("base.ry", turn_rad.y),
+        ("base.rz", turn_rad.z),
+    ];
+    for (name, value) in entries {
+        if let Some(at) = model.index(name) {
+            values[at] = value;
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! `armcal verify`: what a calibrated model is worth on recordings that its calibration never saw.
+//!
+//! `PastModel -> placed among the new recordings' frames -> points (dwells) + motion (everything between) -> Verification`
+
+mod motion;
+mod point;
+
+use crate::error::Error;
+use crate::pipeline::{BoardPose, Pipeline};
+use crate::progress::Progress;
+use crate::stages::past::{Placed, place};
+use crate::stages::perceive::Seen;
+use crate::stages::{frames, observe, perceive};
+use armcal_calibrate::fit_frames_from;
+use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
+use armcal_model::{Chain, Model};
+use armcal_report::{PastModel, VerifiedRecording, Verification};
+use armcal_table::{Association, Board};
+use std::path::Path;
+
+/// Verifies the result of an earlier run on the recordings of a pipeline.
+pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result<Verification, Error> {
+    let past = PastModel::open(result)?;
+    let (_, chain) = frames::nominal_chain(pipeline)?;
+    let board = frames::board(pipeline)?;
+    let recordings = perceive::open_all(pipeline, progress)?;
+    let mut motions = Vec::new();
+    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |samples, seen| {
+        motions.push(motion::follow(pipeline, samples, seen)?);
+        Ok(())
+    })?;
+    progress.step("comparing");
+    let surroundings = Surroundings { past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
+    let (placed, observations, mut warnings) = surroundings.settle()?;
+    let names: Vec<String> = seen.iter().map(|s| s.name.clone()).collect();
+    let joints = placed.model.chain().joint_names().to_vec();
+    let points = point::errors(&placed, &observations);
+    let paths = motion::compare(pipeline, &placed, &seen, &motions, &names);
+    warnings.extend(same_files(&past, &seen));
+    warnings.extend(seen.iter().flat_map(|s| s.warnings.iter().chain(&s.report.warnings).cloned()));
+    warnings.extend(placed.warnings.iter().cloned());
+    Ok(Verification {
+        pipeline: pipeline.name.clone(),
+        result: past.path.clone(),
+        effects: placed.model.effects().iter().map(|e| e.spec.to_string()).collect(),
+        recordings: seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect(),
+        points: armcal_verify::points(&points, &names, &joints),
+        paths: paths.rows,
+        samples: paths.samples,
+        parameters: past.parameters.into_iter().collect(),
+        warnings,
+    })
+}
+
+fn recording(seen: &Seen, motion: &motion::Motion) -> VerifiedRecording {
+    VerifiedRecording {
+        name: seen.name.clone(),
+        dwells: seen.dwells.len(),
+        moving_samples: motion.moments.len(),
+        clock_offset_s: seen.clock.as_ref().map(|c| c.offset_s),
+        clock_sigma_s: motion.clock_sigma_s,
+    }
+}
+
+/// The new recordings, and what is put among them.
+struct Surroundings<'a> {
+    past: &'a PastModel,
+    pipeline: &'a Pipeline,
+    chain: &'a Chain,
+    board: Option<&'a Board>,
+    seen: &'a [Seen],
+}
+
+impl Surroundings<'_> {
+    /// The calibrated model in its place, and the dwells in theirs.
+    ///
+    /// Frames that nobody could know without these dwells (a board whose pose is estimated; for the nominal arm also an
+    /// estimated base and tip) are fitted to them, the arm left alone.
+    fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
+        let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
+        let mut placed = place(self.past, self.pipeline, &model)?;
+        let mut places = self.associate(&placed, false)?;
+        if self.pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated) {
+            frames::start_frames(self.pipeline, &mut model, &places);
+            placed = place(self.past, self.pipeline, &model)?;
+        }
+        let mut observations = self.observations(&places)?;
+        let fitted = self.fit_frames(&mut placed, &observations)?;
+        if !fitted.is_empty() {
+            places = self.associate(&placed, true)?;
+            observations = self.observations(&places)?;
+            self.fit_frames(&mut placed, &observations)?;
+        }
+        Ok((placed, observations, fitted))
+    }
+
+    fn associate(&self, placed: &Placed, boards_fitted: bool) -> Result<Vec<Option<Association>>, Error> {
+        let p = &placed.calibrated;
+        observe::associate_all(self.pipeline, self.board, &placed.model, p, boards_fitted, self.seen)
+    }
+
+    fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {
+        Ok(observe::observations(self.pipeline, self.board, self.seen, places)?.observations)
+    }
+
+    fn fit_frames(&self, placed: &mut Placed, observations: &[Observation]) -> Result<Vec<Warning>, Error> {
+        let (model, fit) = (&placed.model, &self.pipeline.fit);
+        let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
+        let of_board = |p: &Parameter| estimated(p) && p.name.starts_with("board.");
+        if !model.parameters().iter().any(estimated) {
+            return Ok(Vec::new());
+        }
+        placed.nominal =
+            fit_frames_from(model, observations, placed.nominal.clone(), fit, &estimated)?;
+        placed.calibrated =
+            fit_frames_from(model, observations, placed.calibrated.clone(), fit, &of_board)?;
+        Ok(vec![frames_fitted(model)])
+    }
+}
+
+fn frames_fitted(model: &Model) -> Warning {
+    let frames: Vec<&str> = model
+        .parameters()
+        .iter()
+        .filter(|p| p.role == Role::EstimatedFrame)
+        .filter_map(|p| p.name.strip_suffix(".x"))
+        .collect();
+    let message = "nobody knows this frame beforehand: it is fitted to the dwells that are judged, with the arm left alone \
+                   (for the nominal arm likewise)"
+        .to_owned();
+    Warning::new(Severity::Notice, Stage::Calibrate, "frame-fitted-on-verification", frames.join(", "), message)
+}
+
+/// A recording that the calibration saw proves nothing.
+fn same_files(past: &PastModel, seen: &[Seen]) -> Vec<Warning> {
+    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| past.inputs_sha256.contains(&f.sha256));
+    let warn = |s: &Seen| {
+        let message = "the calibration was made from this recording: its error here says nothing about new ones";
+        Warning::new(
+            Severity::Inadequate,
+            Stage::Recording,
+            "not-held-out",
+            format!("recording `{}`", s.name),
+            message.to_owned(),
+        )
+    };
+    seen.iter().filter(seen_before).map(warn).collect()
+}

@@ -1,0 +1,80 @@
+//! A verification for programs.
+
+use super::{PathSample, Verification, VerifiedRecording};
+use crate::ReportError;
+use crate::run::{Status, VERSION};
+use crate::tables::Columns;
+use armcal_core::Warning;
+use armcal_verify::{PathRow, PointsRow};
+use serde::Serialize;
+
+/// Version of the contract of `verification.json`.
+const SCHEMA: &str = "armcal.verification/1";
+
+#[derive(Serialize)]
+struct File<'a> {
+    schema: &'static str,
+    version: &'static str,
+    pipeline: &'a str,
+    result: String,
+    status: Status,
+    conclusion: String,
+    effects: &'a [String],
+    recordings: &'a [VerifiedRecording],
+    points: &'a [PointsRow],
+    paths: &'a [PathRow],
+    parameters: Vec<Parameter<'a>>,
+    warnings: &'a [Warning],
+}
+
+#[derive(Serialize)]
+struct Parameter<'a> {
+    name: &'a str,
+    nominal: f64,
+    value: f64,
+    sigma: f64,
+}
+
+/// `verification.json`: every row of every table in SI, indented, with a final newline. `before` is the nominal arm,
+/// `after` the calibrated one.
+pub fn verification_json(v: &Verification) -> String {
+    let file = File {
+        schema: SCHEMA,
+        version: VERSION,
+        pipeline: &v.pipeline,
+        result: v.result.to_string_lossy().into_owned(),
+        status: v.status(),
+        conclusion: super::terminal::conclusion(v),
+        effects: &v.effects,
+        recordings: &v.recordings,
+        points: &v.points,
+        paths: &v.paths,
+        parameters: v
+            .parameters
+            .iter()
+            .map(|(name, p)| Parameter { name, nominal: p.nominal, value: p.value, sigma: p.sigma })
+            .collect(),
+        warnings: &v.warnings,
+    };
+    let json = serde_json::to_string_pretty(&file);
+    json.expect("strings, numbers and lists under literal names always serialise") + "\n"
+}
+
+/// Files of a verification, by name: `verification.json`, and `paths.parquet` with the moving tip frame by frame.
+pub fn verification_files(v: &Verification) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
+    Ok(vec![
+        ("verification.json", verification_json(v).into_bytes()),
+        ("paths.parquet", path_columns(&v.samples).encode("paths.parquet")?),
+    ])
+}
+
+fn path_columns(samples: &[PathSample]) -> Columns {
+    let mut c = Columns::default();
+    c.text("recording", samples.iter().map(|s| Some(s.recording.as_str())));
+    c.integer("motion", samples.iter().map(|s| s.motion as i64));
+    c.integer("time_ns", samples.iter().map(|s| s.time_ns));
+    c.vector("measured", "_m", samples.iter().map(|s| s.measured_m));
+    c.vector("nominal", "_m", samples.iter().map(|s| s.nominal_m));
+    c.vector("calibrated", "_m", samples.iter().map(|s| s.calibrated_m));
+    c
+}

@@ -1,0 +1,95 @@
+//! What `armcal verify` found: one value, shown as terminal text, JSON and Parquet.
+
+mod files;
+mod terminal;
+
+pub use files::{verification_files, verification_json};
+pub use terminal::verification_text;
+
+use crate::past_model::PastValue;
+use crate::run::Status;
+use armcal_core::{Severity, Warning};
+use armcal_verify::{PathError, PathRow, PointsRow};
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// A calibrated model against recordings it never saw.
+#[derive(Debug, Clone)]
+pub struct Verification {
+    /// Name of the pipeline of the new recordings.
+    pub pipeline: String,
+    /// The result whose model was verified.
+    pub result: PathBuf,
+    /// Its effects beyond geometry that hold here.
+    pub effects: Vec<String>,
+    /// The new recordings.
+    pub recordings: Vec<VerifiedRecording>,
+    /// Errors at points (Table 4 of the source paper).
+    pub points: Vec<PointsRow>,
+    /// Errors along paths (Table 6, figures 6, 7 and 10).
+    pub paths: Vec<PathRow>,
+    /// The moving tip, frame by frame.
+    pub samples: Vec<PathSample>,
+    /// Old and new parameters (Table 5), by name.
+    pub parameters: Vec<(String, PastValue)>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// One new recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerifiedRecording {
+    /// Its name.
+    pub name: String,
+    /// Pauses found.
+    pub dwells: usize,
+    /// Frames of the moving tip.
+    pub moving_samples: usize,
+    /// Offset of the sensor's clock [s], where there are two clocks.
+    pub clock_offset_s: Option<f64>,
+    /// Its standard error in the middle of the recording [s].
+    pub clock_sigma_s: Option<f64>,
+}
+
+/// The moving tip at one moment, in the calibrated base frame [m].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathSample {
+    /// Name of the recording.
+    pub recording: String,
+    /// Motion within it, from 0.
+    pub motion: usize,
+    /// Time on the robot's clock [ns].
+    pub time_ns: i64,
+    /// Where the sensor saw it.
+    pub measured_m: Vector3<f64>,
+    /// Where the nominal model puts it.
+    pub nominal_m: Vector3<f64>,
+    /// Where the calibrated model puts it.
+    pub calibrated_m: Vector3<f64>,
+}
+
+impl PathSample {
+    /// A moment with the name of its recording.
+    pub fn of(e: &PathError, recordings: &[String]) -> PathSample {
+        PathSample {
+            recording: recordings.get(e.motion.recording).cloned().unwrap_or_default(),
+            motion: e.motion.dwell,
+            time_ns: e.time_ns,
+            measured_m: e.measured_m,
+            nominal_m: e.before_m,
+            calibrated_m: e.after_m,
+        }
+    }
+}
+
+impl Verification {
+    /// The gravest thing any warning says.
+    pub fn status(&self) -> Status {
+        match self.warnings.iter().map(|w| w.severity).max() {
+            None | Some(Severity::Notice) => Status::Ok,
+            Some(Severity::Inadequate) => Status::Inadequate,
+            Some(Severity::DataLost) => Status::DataLost,
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! A verification for people, at most 100 columns wide.
+
+use super::{Verification, VerifiedRecording};
+use crate::run::VERSION;
+use crate::terminal::{Pen, TerminalStyle, number};
+use crate::text::{millimetres, printable};
+use armcal_verify::{Against, Compared, Estimate, PathRow, Plane};
+use armcal_verify::{By, PointsRow};
+use comfy_table::Cell;
+
+const HEADER: [&str; 7] = ["n", "before", "± 95 %", "after", "± 95 %", "difference 95 %", "better by"];
+
+/// The tables and one sentence, ending in a newline.
+pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
+    let pen = Pen { style };
+    let name = printable(&v.pipeline);
+    let effects = if v.effects.is_empty() { "geometry alone".into() } else { v.effects.join(", ") };
+    let mut sections = vec![format!(
+        "armcal {VERSION}   verifying {} on {name}\nmodel: {}\n",
+        printable(&v.result.to_string_lossy()),
+        printable(&effects)
+    )];
+    sections.push(pen.section("Recordings", recordings(&pen, &v.recordings)));
+    if !v.points.is_empty() {
+        sections.push(pen.section("Error at points [mm]", points(&pen, &v.points)));
+    }
+    let of = |against| v.paths.iter().filter(move |r: &&PathRow| r.against == against);
+    for (against, title) in [
+        (Against::Encoders, "Error along paths, at each moment [mm]"),
+        (Against::Planned, "Distance from the planned path [mm]"),
+    ] {
+        if of(against).next().is_some() {
+            sections.push(pen.section(title, paths(&pen, of(against))));
+        }
+    }
+    if !v.warnings.is_empty() {
+        let texts = v.warnings.iter().map(|w| (w.severity.word(), printable(&w.to_string())));
+        sections.push(pen.section("Warnings", pen.list(texts)));
+    }
+    sections.push(pen.bold(&conclusion(v)) + "\n");
+    sections.join("\n")
+}
+
+/// What it comes to, in one sentence.
+pub(super) fn conclusion(v: &Verification) -> String {
+    let points = v.points.iter().find(|r| r.by == By::All).map(|r| ("points", &r.errors));
+    let along =
+        |r: &&PathRow| r.subject == "all" && r.plane == Plane::Space && r.against == Against::Encoders;
+    let path = v.paths.iter().find(along).map(|r| ("frames of moving paths", &r.errors));
+    let parts: Vec<String> = [points, path].into_iter().flatten().map(|(what, c)| part(what, c)).collect();
+    if parts.is_empty() {
+        return "These recordings hold neither a dwell nor a motion of a tracked tip: nothing is verified.".into();
+    }
+    format!("Calibration was not told of these recordings: {}.", parts.join("; "))
+}
+
+fn part(what: &str, c: &Compared) -> String {
+    let (before, after) = (millimetres(c.before.mean_m), millimetres(c.after.mean_m));
+    let percent = 100.0 * c.improvement;
+    let moved = if percent >= 0.0 { "falls" } else { "rises" };
+    format!("on {} {what} the mean error {moved} from {before} to {after} mm ({percent:.1} %)", c.n)
+}
+
+fn recordings(pen: &Pen, all: &[VerifiedRecording]) -> String {
+    let mut table = pen.table(&["recording", "dwells", "moving frames", "clock offset [ms]"]);
+    for r in all {
+        let clock = r.clock_offset_s.zip(r.clock_sigma_s);
+        let clock = clock.map_or("-".into(), |(o, s)| format!("{:.2} ± {:.2}", o * 1e3, s * 1e3));
+        table.add_row(vec![
+            Cell::new(printable(&r.name)),
+            number(r.dwells),
+            number(r.moving_samples),
+            number(clock),
+        ]);
+    }
+    pen.render(&table)
+}
+
+fn points(pen: &Pen, rows: &[PointsRow]) -> String {
+    let mut table = pen.table(&[&["points"][..], &HEADER].concat());
+    for row in rows {
+        let subject = match row.by {
+            By::All | By::Recording | By::Reference => printable(&row.subject),
+            By::Arrival => format!("{} arriving {}", row.subject.trim_end_matches([' ', '+', '-']), side(row)),
+            By::Axis => format!("along {} (signed)", row.subject),
+        };
+        table.add_row(cells(subject, &row.errors, row.by != By::Axis));
+    }
+    pen.render(&table)
+}
+
+fn side(row: &PointsRow) -> &'static str {
+    if row.subject.ends_with('+') { "upwards" } else { "downwards" }
+}
+
+fn paths<'a>(pen: &Pen, rows: impl Iterator<Item = &'a PathRow>) -> String {
+    let mut table = pen.table(&[&["path"][..], &HEADER].concat());
+    for row in rows {
+        let subject = match row.plane {
+            Plane::Space => printable(&row.subject),
+            plane => format!("  in {}", plane.word()),
+        };
+        table.add_row(cells(subject, &row.errors, true));
+    }
+    pen.render(&table)
+}
+
+fn cells(subject: String, c: &Compared, sizes: bool) -> Vec<Cell> {
+    let half = |e: &Estimate| e.ci95_m.map_or("-".into(), |[low, high]| millimetres(0.5 * (high - low)));
+    let interval = c.difference_ci95_m;
+    let difference = interval.map_or("-".into(), |[low, high]| {
+        format!("{} .. {}", millimetres(low), millimetres(high))
+    });
+    // A signed mean that falls in size may do so by turning its sign: a share says nothing there.
+    let better = if sizes { format!("{:.1} %", 100.0 * c.improvement) } else { String::new() };
+    vec![
+        Cell::new(subject),
+        number(c.n),
+        number(millimetres(c.before.mean_m)),
+        number(half(&c.before)),
+        number(millimetres(c.after.mean_m)),
+        number(half(&c.after)),
+        number(difference),
+        number(better),
+    ]
+}

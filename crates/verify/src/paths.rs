@@ -1,0 +1,238 @@
+//! Errors along paths: Table 6 of the source paper, and its figures 6, 7 and 10.
+
+use crate::compared::{Compared, Error, Estimate};
+use crate::plane::Plane;
+use crate::polyline::Polyline;
+use armcal_core::DwellId;
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Neighbouring samples of a path share their error; stretches of this length are taken to be independent [s]: longer
+/// than a joint stays in one gap or on one flank, much shorter than a recording.
+const STRETCH_S: f64 = 2.0;
+/// 97.5 % quantile of the normal distribution, for the error of the clock.
+const NORMAL_95: f64 = 1.959_964;
+
+/// Where the tip was at one moment of a motion, and where it should have been. All in the robot's base frame [m].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathError {
+    /// Recording, and motion within it.
+    pub motion: DwellId,
+    /// Time on the robot's clock [ns].
+    pub time_ns: i64,
+    /// Where the sensor saw the tip.
+    pub measured_m: Vector3<f64>,
+    /// Where the nominal model puts it, from the encoder readings of that moment.
+    pub before_m: Vector3<f64>,
+    /// Where the calibrated model puts it.
+    pub after_m: Vector3<f64>,
+}
+
+/// What one standard error of the sensor's clock changes in the mean errors of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClockError {
+    /// Standard error of the clock's offset, the recording's middle [s].
+    pub sigma_s: f64,
+    /// Change of the mean error before [m].
+    pub before_m: f64,
+    /// Change of the mean error after [m].
+    pub after_m: f64,
+}
+
+/// Paths as the controller planned them: set-points, through the nominal and through the calibrated model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// The path that the nominal model believes it commands.
+    pub before: Polyline,
+    /// The path that the calibrated model says was commanded.
+    pub after: Polyline,
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PathRow {
+    /// Recording; `all` for all of them.
+    pub subject: String,
+    /// In space, or in a plane of the base frame.
+    pub plane: Plane,
+    /// What is compared with what.
+    pub against: Against,
+    /// Errors before and after, the clock's uncertainty in the intervals.
+    #[serde(flatten)]
+    pub errors: Compared,
+    /// What the clock's uncertainty changes; absent where one clock stamped everything.
+    pub clock: Option<ClockError>,
+}
+
+/// What the measured path is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// The position that the model predicts from the encoders at the same moment.
+    Encoders,
+    /// The nearest place of the path that the set-points command.
+    Planned,
+}
+
+/// Rows for all recordings together and each alone, in every view. `clocks` has one entry a recording.
+///
+/// Rows against the planned path exist for the motions in `planned`.
+pub fn paths(
+    errors: &[PathError],
+    recordings: &[String],
+    clocks: &[Option<ClockError>],
+    planned: &BTreeMap<DwellId, Planned>,
+) -> Vec<PathRow> {
+    let mut rows = Vec::new();
+    let one = (0..recordings.len()).map(Some);
+    for recording in std::iter::once(None).chain(one.filter(|_| recordings.len() > 1)) {
+        let chosen: Vec<&PathError> =
+            errors.iter().filter(|e| recording.is_none_or(|r| e.motion.recording == r)).collect();
+        let subject = recording.map_or("all", |r| recordings[r].as_str());
+        let clock = match recording {
+            Some(r) => clocks.get(r).copied().flatten(),
+            None => together(&chosen, clocks),
+        };
+        for plane in Plane::ALL {
+            rows.extend(row(subject, plane, &chosen, clock, None));
+        }
+        for plane in Plane::ALL {
+            rows.extend(row(subject, plane, &chosen, clock, Some(planned)));
+        }
+    }
+    rows
+}
+
+fn row(
+    subject: &str,
+    plane: Plane,
+    errors: &[&PathError],
+    clock: Option<ClockError>,
+    planned: Option<&BTreeMap<DwellId, Planned>>,
+) -> Option<PathRow> {
+    let stretches: Vec<String> = errors.iter().map(|e| stretch(e)).collect();
+    let pairs: Vec<Error<'_>> = errors
+        .iter()
+        .zip(&stretches)
+        .filter_map(|(e, group)| {
+            let apart = |model: &Vector3<f64>| plane.seen(&(e.measured_m - model)).norm();
+            let (before_m, after_m) = match planned {
+                None => (apart(&e.before_m), apart(&e.after_m)),
+                Some(planned) => {
+                    let path = planned.get(&e.motion)?;
+                    let from = |path: &Polyline| path.distance_m(&e.measured_m, plane);
+                    (from(&path.before), from(&path.after))
+                }
+            };
+            Some(Error { group, before_m, after_m })
+        })
+        .collect();
+    let mut compared = Compared::of(&pairs)?;
+    // Where a path lies in space does not depend on when.
+    let clock = clock.filter(|_| planned.is_none());
+    if let Some(clock) = clock {
+        widen(&mut compared.before, clock.before_m);
+        widen(&mut compared.after, clock.after_m);
+        let change_m = clock.after_m - clock.before_m;
+        compared.difference_ci95_m = compared.difference_ci95_m.map(|i| wider(i, change_m));
+    }
+    let against = if planned.is_some() { Against::Planned } else { Against::Encoders };
+    Some(PathRow { subject: subject.to_owned(), plane, against, errors: compared, clock })
+}
+
+/// Recording, motion, and which stretch of time.
+fn stretch(e: &PathError) -> String {
+    let at = e.time_ns.div_euclid((STRETCH_S * 1e9) as i64);
+    format!("{}.{}", e.motion, at)
+}
+
+/// Clocks of different recordings err independently: their effects on the common mean add in square.
+fn together(errors: &[&PathError], clocks: &[Option<ClockError>]) -> Option<ClockError> {
+    let mut sizes: BTreeMap<usize, f64> = BTreeMap::new();
+    errors.iter().for_each(|e| *sizes.entry(e.motion.recording).or_default() += 1.0);
+    let n = errors.len() as f64;
+    let known: Vec<(f64, ClockError)> = sizes
+        .into_iter()
+        .filter_map(|(r, size)| clocks.get(r).copied().flatten().map(|c| (size / n, c)))
+        .collect();
+    let sum = |of: fn(&ClockError) -> f64| known.iter().map(|(w, c)| (w * of(c)).powi(2)).sum::<f64>().sqrt();
+    let largest = known.iter().map(|(_, c)| c.sigma_s).fold(0.0, f64::max);
+    (!known.is_empty()).then(|| ClockError {
+        sigma_s: largest,
+        before_m: sum(|c| c.before_m),
+        after_m: sum(|c| c.after_m),
+    })
+}
+
+fn widen(estimate: &mut Estimate, clock_m: f64) {
+    estimate.ci95_m = estimate.ci95_m.map(|interval| wider(interval, clock_m));
+}
+
+/// An interval with an independent normal error of standard deviation `sigma_m` added.
+fn wider([low, high]: [f64; 2], sigma_m: f64) -> [f64; 2] {
+    let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let half = half.hypot(NORMAL_95 * sigma_m);
+    [centre - half, centre + half]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A straight path along x, seen 3 mm to the left and 4 mm above where the nominal model has it.
+    fn straight() -> Vec<PathError> {
+        (0..1000)
+            .map(|i| {
+                let on = Vector3::new(1e-3 * f64::from(i), 0.0, 0.0);
+                PathError {
+                    motion: DwellId { recording: 0, dwell: 0 },
+                    time_ns: i64::from(i) * 10_000_000,
+                    measured_m: on + Vector3::new(0.0, 3e-3, 4e-3),
+                    before_m: on,
+                    after_m: on + Vector3::new(0.0, 3e-3, 3e-3),
+                }
+            })
+            .collect()
+    }
+
+    fn find(rows: &[PathRow], plane: Plane, against: Against) -> Compared {
+        rows.iter().find(|r| r.plane == plane && r.against == against).expect("a row").errors
+    }
+
+    #[test]
+    fn planes_see_their_part_of_an_offset() {
+        let rows = paths(&straight(), &["one".into()], &[None], &BTreeMap::new());
+        let mean = |plane| find(&rows, plane, Against::Encoders).before.mean_m;
+        assert!((mean(Plane::Space) - 5e-3).abs() < 1e-12);
+        assert!((mean(Plane::Xy) - 3e-3).abs() < 1e-12);
+        assert!((mean(Plane::Yz) - 5e-3).abs() < 1e-12);
+        assert!((mean(Plane::Xz) - 4e-3).abs() < 1e-12);
+        let space = find(&rows, Plane::Space, Against::Encoders);
+        assert!((space.improvement - 0.8).abs() < 1e-12);
+        // 10 s are five stretches, not a thousand samples.
+        assert_eq!((space.n, space.groups), (1000, 5));
+        assert!(rows.iter().all(|r| r.against == Against::Encoders));
+    }
+
+    #[test]
+    fn a_lag_is_an_error_at_the_moment_but_not_of_the_path() {
+        let mut errors = straight();
+        let planned_m: Vec<Vector3<f64>> = errors.iter().map(|e| e.before_m).collect();
+        errors.iter_mut().for_each(|e| e.measured_m = e.before_m - Vector3::new(2e-3, 0.0, 0.0));
+        let path = Polyline::through(planned_m).expect("points");
+        let planned = BTreeMap::from([(errors[0].motion, Planned { before: path.clone(), after: path })]);
+        let rows = paths(&errors, &["one".into()], &[None], &planned);
+        assert!((find(&rows, Plane::Space, Against::Encoders).before.mean_m - 2e-3).abs() < 1e-12);
+        // Only the first two samples lie before the beginning of the path.
+        assert!(find(&rows, Plane::Space, Against::Planned).before.mean_m < 5e-6);
+    }
+
+    #[test]
+    fn an_uncertain_clock_widens_the_interval() {
+        let clock = ClockError { sigma_s: 1e-3, before_m: 0.0, after_m: 2e-4 };
+        let rows = paths(&straight(), &["one".into()], &[Some(clock)], &BTreeMap::new());
+        let [low, high] = find(&rows, Plane::Space, Against::Encoders).after.ci95_m.expect("five stretches");
+        assert!((0.5 * (high - low) - NORMAL_95 * 2e-4).abs() < 1e-9, "{low} {high}");
+    }
+}
