@@ -74,7 +74,8 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
 
     let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
-    let mut places = observe::associate_all(pipeline, board.as_ref(), &geometry, &geometry.nominal(), false, &seen)?;
+    let mut places =
+        observe::associate_all(pipeline, board.as_ref(), &geometry, &geometry.nominal(), false, &seen)?;
     let mut rounds = 0;
     loop {
         rounds += 1;

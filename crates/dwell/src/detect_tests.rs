@@ -1,6 +1,6 @@
 use super::*;
 use crate::testkit::{Random, Session, ns, tip_m};
-use armcal_core::{JointSamples, PoseSamples, ScalarSamples};
+use armcal_core::{Arrival, JointSamples, PoseSamples, ScalarSamples};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -39,7 +39,11 @@ fn joints_are_those_of_the_moment_the_sensor_saw() {
             let (before, after) = (session.joints_rad(s - 1e-4), session.joints_rad(s + 1e-4));
             for j in 0..3 {
                 let truth = (after[j] - before[j]) / 2e-4;
-                assert!((m.joint_velocity_radps[j] - truth).abs() < 0.03, "{} {truth}", m.joint_velocity_radps[j]);
+                assert!(
+                    (m.joint_velocity_radps[j] - truth).abs() < 0.03,
+                    "{} {truth}",
+                    m.joint_velocity_radps[j]
+                );
                 if truth.abs() > 0.3 {
                     let towards = if truth > 0.0 { Arrival::Positive } else { Arrival::Negative };
                     assert_eq!(m.arrival[j], towards);

@@ -4,7 +4,9 @@ use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
 use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
-use crate::{Clock, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams};
+use crate::{
+    Clock, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams,
+};
 use crate::{joints, poses};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
 
@@ -50,10 +52,15 @@ impl Recording {
 }
 
 fn requests(streams: &Streams) -> Vec<Request<'_>> {
-    let of_joints =
-        |role, s: &'_ JointStream| Request { role, topic: &s.topic, kind: Kind::Joints { wanted: &s.names } };
-    let mut requests = vec![of_joints("joints", &streams.joints)];
-    requests.extend(streams.set_points.as_ref().map(|s| of_joints("set_points", s)));
+    let joints = [("joints", Some(&streams.joints)), ("set_points", streams.set_points.as_ref())];
+    let mut requests = Vec::new();
+    for (role, stream) in joints {
+        requests.extend(stream.map(|s| Request {
+            role,
+            topic: &s.topic,
+            kind: Kind::Joints { wanted: &s.names },
+        }));
+    }
     for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
         requests.extend(stream.iter().map(|s| Request {
             role,

@@ -111,8 +111,11 @@ mod tests {
         // scipy.stats.ttest_1samp([2, 2.5, 1.5, 2.2, 1.9], 0).confidence_interval(): 1.561..2.479
         let before = [2.0, 2.5, 1.5, 2.2, 1.9];
         let names: Vec<String> = (0..5).map(|i| i.to_string()).collect();
-        let errors: Vec<Error> =
-            before.iter().zip(&names).map(|(b, g)| Error { group: g, before_m: *b, after_m: 0.5 * b }).collect();
+        let errors: Vec<Error> = before
+            .iter()
+            .zip(&names)
+            .map(|(b, g)| Error { group: g, before_m: *b, after_m: 0.5 * b })
+            .collect();
         let c = Compared::of(&errors).expect("errors");
         let [low, high] = c.before.ci95_m.expect("five groups");
         assert!((low - 1.5612).abs() < 1e-3 && (high - 2.4788).abs() < 1e-3, "{low} {high}");

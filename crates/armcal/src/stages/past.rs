@@ -40,7 +40,8 @@ pub fn place(past: &PastModel, pipeline: &Pipeline, surroundings: &Model) -> Res
     let nominal = model.nominal();
     let mut calibrated = nominal.clone();
     for (at, parameter) in model.parameters().iter().enumerate() {
-        let carried = matches!(parameter.role, Role::Robot | Role::Effect) || parameter.name.starts_with("tip.");
+        let carried =
+            matches!(parameter.role, Role::Robot | Role::Effect) || parameter.name.starts_with("tip.");
         if !carried {
             continue;
         }
@@ -79,7 +80,10 @@ fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
     }
     let family = catalogue().iter().find(|kind| kind.name == spec.kind).map(|kind| kind.family);
     if family == Some(Family::Drift) {
-        say("drift-extrapolated", "was fitted over the time of the calibration and is extrapolated to this one");
+        say(
+            "drift-extrapolated",
+            "was fitted over the time of the calibration and is extrapolated to this one",
+        );
     }
     true
 }

@@ -14,7 +14,7 @@ use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::fit_frames_from;
 use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::{Chain, Model};
-use armcal_report::{PastModel, VerifiedRecording, Verification};
+use armcal_report::{PastModel, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use std::path::Path;
 
@@ -30,7 +30,8 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
         Ok(())
     })?;
     progress.step("comparing");
-    let surroundings = Surroundings { past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
+    let surroundings =
+        Surroundings { past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
     let (placed, observations, mut warnings) = surroundings.settle()?;
     let names: Vec<String> = seen.iter().map(|s| s.name.clone()).collect();
     let joints = placed.model.chain().joint_names().to_vec();
@@ -110,10 +111,8 @@ impl Surroundings<'_> {
         if !model.parameters().iter().any(estimated) {
             return Ok(Vec::new());
         }
-        placed.nominal =
-            fit_frames_from(model, observations, placed.nominal.clone(), fit, &estimated)?;
-        placed.calibrated =
-            fit_frames_from(model, observations, placed.calibrated.clone(), fit, &of_board)?;
+        placed.nominal = fit_frames_from(model, observations, placed.nominal.clone(), fit, &estimated)?;
+        placed.calibrated = fit_frames_from(model, observations, placed.calibrated.clone(), fit, &of_board)?;
         Ok(vec![frames_fitted(model)])
     }
 }
@@ -128,14 +127,21 @@ fn frames_fitted(model: &Model) -> Warning {
     let message = "nobody knows this frame beforehand: it is fitted to the dwells that are judged, with the arm left alone \
                    (for the nominal arm likewise)"
         .to_owned();
-    Warning::new(Severity::Notice, Stage::Calibrate, "frame-fitted-on-verification", frames.join(", "), message)
+    Warning::new(
+        Severity::Notice,
+        Stage::Calibrate,
+        "frame-fitted-on-verification",
+        frames.join(", "),
+        message,
+    )
 }
 
 /// A recording that the calibration saw proves nothing.
 fn same_files(past: &PastModel, seen: &[Seen]) -> Vec<Warning> {
     let seen_before = |s: &&Seen| s.report.files.iter().any(|f| past.inputs_sha256.contains(&f.sha256));
     let warn = |s: &Seen| {
-        let message = "the calibration was made from this recording: its error here says nothing about new ones";
+        let message =
+            "the calibration was made from this recording: its error here says nothing about new ones";
         Warning::new(
             Severity::Inadequate,
             Stage::Recording,

@@ -49,7 +49,8 @@ pub(super) fn conclusion(v: &Verification) -> String {
     let path = v.paths.iter().find(along).map(|r| ("frames of moving paths", &r.errors));
     let parts: Vec<String> = [points, path].into_iter().flatten().map(|(what, c)| part(what, c)).collect();
     if parts.is_empty() {
-        return "These recordings hold neither a dwell nor a motion of a tracked tip: nothing is verified.".into();
+        return "These recordings hold neither a dwell nor a motion of a tracked tip: nothing is verified."
+            .into();
     }
     format!("Calibration was not told of these recordings: {}.", parts.join("; "))
 }
@@ -81,7 +82,9 @@ fn points(pen: &Pen, rows: &[PointsRow]) -> String {
     for row in rows {
         let subject = match row.by {
             By::All | By::Recording | By::Reference => printable(&row.subject),
-            By::Arrival => format!("{} arriving {}", row.subject.trim_end_matches([' ', '+', '-']), side(row)),
+            By::Arrival => {
+                format!("{} arriving {}", row.subject.trim_end_matches([' ', '+', '-']), side(row))
+            }
             By::Axis => format!("along {} (signed)", row.subject),
         };
         table.add_row(cells(subject, &row.errors, row.by != By::Axis));
@@ -108,9 +111,8 @@ fn paths<'a>(pen: &Pen, rows: impl Iterator<Item = &'a PathRow>) -> String {
 fn cells(subject: String, c: &Compared, sizes: bool) -> Vec<Cell> {
     let half = |e: &Estimate| e.ci95_m.map_or("-".into(), |[low, high]| millimetres(0.5 * (high - low)));
     let interval = c.difference_ci95_m;
-    let difference = interval.map_or("-".into(), |[low, high]| {
-        format!("{} .. {}", millimetres(low), millimetres(high))
-    });
+    let difference =
+        interval.map_or("-".into(), |[low, high]| format!("{} .. {}", millimetres(low), millimetres(high)));
     // A signed mean that falls in size may do so by turning its sign: a share says nothing there.
     let better = if sizes { format!("{:.1} %", 100.0 * c.improvement) } else { String::new() };
     vec![
