@@ -16,6 +16,7 @@ mod real_robots;
 
 /// Does `summary.json` keep its contract?
 mod summary_contract;
+mod verify;
 
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
@@ -49,3 +50,6 @@ mod plan;
 
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;
+
+/// What is a calibrated model worth on recordings it never saw?
+mod verify;

@@ -10,7 +10,7 @@ use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
 use armcal_model::{Deviation, EffectTable};
 use armcal_recording::Streams;
-use armcal_report::OutputConfig;
+use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -56,6 +56,9 @@ pub struct Pipeline {
     /// How the missing effect is looked for.
     #[serde(default)]
     pub diagnosis: DiagnosisConfig,
+    /// What stands beside a verification on these recordings.
+    #[serde(default)]
+    pub verify: VerifyConfig,
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,

@@ -70,7 +70,7 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     let (model_text, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
-    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |_, _| Ok(()))?;
+    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
 
     let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;

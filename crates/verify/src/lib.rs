@@ -9,18 +9,21 @@
 //! pair. Errors are vectors in the axes of the robot's base [m], so that the planes xy, yz and xz are the robot's own.
 //!
 //! * [`compared`]: mean errors with intervals, and the interval on their difference;
+//! * [`clock`]: how late the sensor's stamps are, by the motion itself;
 //! * [`points`]: grouped by recording, by axis, by direction of arrival;
 //! * [`paths`]: grouped by recording, in space and in the planes; what the clock's uncertainty adds; how far a path
 //!   lies from the planned one.
 
+pub mod clock;
 pub mod compared;
 pub mod paths;
 pub mod plane;
 pub mod points;
 pub mod polyline;
 
+pub use clock::{Lateness, Passing, lateness};
 pub use compared::{Compared, Error, Estimate};
-pub use paths::{Against, ClockError, PathError, PathRow, Planned, paths};
+pub use paths::{Against, ClockError, PathError, PathRow, Planned, paths, stretch};
 pub use plane::Plane;
 pub use points::{By, PointError, PointsRow, points};
 pub use polyline::Polyline;

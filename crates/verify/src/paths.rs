@@ -111,7 +111,7 @@ fn row(
     clock: Option<ClockError>,
     planned: Option<&BTreeMap<DwellId, Planned>>,
 ) -> Option<PathRow> {
-    let stretches: Vec<String> = errors.iter().map(|e| stretch(e)).collect();
+    let stretches: Vec<String> = errors.iter().map(|e| stretch(e.motion, e.time_ns)).collect();
     let pairs: Vec<Error<'_>> = errors
         .iter()
         .zip(&stretches)
@@ -141,10 +141,10 @@ fn row(
     Some(PathRow { subject: subject.to_owned(), plane, against, errors: compared, clock })
 }
 
-/// Recording, motion, and which stretch of time.
-fn stretch(e: &PathError) -> String {
-    let at = e.time_ns.div_euclid((STRETCH_S * 1e9) as i64);
-    format!("{}.{}", e.motion, at)
+/// Name of the stretch of a motion that a moment belongs to: what is independent of other stretches.
+pub fn stretch(motion: DwellId, time_ns: i64) -> String {
+    let at = time_ns.div_euclid((STRETCH_S * 1e9) as i64);
+    format!("{motion}.{at}")
 }
 
 /// Clocks of different recordings err independently: their effects on the common mean add in square.

@@ -44,13 +44,13 @@ pub fn open_all(pipeline: &Pipeline, progress: &Progress) -> Result<Vec<Recordin
         .collect()
 }
 
-/// Reads every recording and finds its dwells. `look` sees the samples of each before they are dropped.
+/// Reads every recording and finds its dwells. `keep` gets the samples of each.
 pub fn dwells_of_all(
     pipeline: &Pipeline,
     chain: &Chain,
     recordings: &[Recording],
     progress: &Progress,
-    look: &mut dyn FnMut(&Samples, &Seen) -> Result<(), Error>,
+    keep: &mut dyn FnMut(Samples),
 ) -> Result<Vec<Seen>, Error> {
     let speed_model = Model::new(chain.clone(), Frames::of_bare_arm())?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
@@ -59,7 +59,7 @@ pub fn dwells_of_all(
             progress.step(&format!("reading {}", entry.name()));
             let (samples, seen) =
                 dwells_of_one(pipeline, &speed_model, index, entry.load_kg, &entry.name(), recording)?;
-            look(&samples, &seen)?;
+            keep(samples);
             Ok(seen)
         })
         .collect()

@@ -14,8 +14,11 @@ use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::fit_frames_from;
 use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::{Chain, Model};
-use armcal_report::{PastModel, Verification, VerifiedRecording};
+use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
+use armcal_verify::{ClockError, PathRow};
+use motion::{Judge, Motion};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
@@ -24,11 +27,8 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let (_, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
-    let mut motions = Vec::new();
-    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |samples, seen| {
-        motions.push(motion::follow(pipeline, samples, seen)?);
-        Ok(())
-    })?;
+    let mut samples = Vec::new();
+    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
     progress.step("comparing");
     let surroundings =
         Surroundings { past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
@@ -36,31 +36,53 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let names: Vec<String> = seen.iter().map(|s| s.name.clone()).collect();
     let joints = placed.model.chain().joint_names().to_vec();
     let points = point::errors(&placed, &observations);
-    let paths = motion::compare(pipeline, &placed, &seen, &motions, &names);
+    let judge = Judge::new(pipeline, &placed);
+    let motions = seen.iter().zip(&samples).enumerate();
+    let motions = motions.map(|(r, (seen, samples))| judge.follow(r, seen, samples));
+    let motions = motions.collect::<Result<Vec<Motion>, Error>>()?;
+    let recordings = seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect();
     warnings.extend(same_files(&past, &seen));
-    warnings.extend(seen.iter().flat_map(|s| s.warnings.iter().chain(&s.report.warnings).cloned()));
+    warnings.extend(seen.iter().flat_map(of_recording));
     warnings.extend(placed.warnings.iter().cloned());
     Ok(Verification {
         pipeline: pipeline.name.clone(),
         result: past.path.clone(),
         effects: placed.model.effects().iter().map(|e| e.spec.to_string()).collect(),
-        recordings: seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect(),
+        recordings,
         points: armcal_verify::points(&points, &names, &joints),
-        paths: paths.rows,
-        samples: paths.samples,
+        samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
+        paths: rows(motions, &names),
         parameters: past.parameters.into_iter().collect(),
+        published: pipeline.verify.published.clone(),
         warnings,
     })
 }
 
-fn recording(seen: &Seen, motion: &motion::Motion) -> VerifiedRecording {
+fn recording(seen: &Seen, motion: &Motion) -> VerifiedRecording {
     VerifiedRecording {
         name: seen.name.clone(),
         dwells: seen.dwells.len(),
-        moving_samples: motion.moments.len(),
-        clock_offset_s: seen.clock.as_ref().map(|c| c.offset_s),
-        clock_sigma_s: motion.clock_sigma_s,
+        moving_samples: motion.errors.len(),
+        clock_offset_s: seen.clock.as_ref().map(|c| c.offset_s + motion.late_s),
+        clock_sigma_s: motion.clock.map(|c| c.sigma_s),
     }
+}
+
+/// Rows of the path table.
+fn rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
+    let clocks: Vec<Option<ClockError>> = motions.iter().map(|m| m.clock).collect();
+    let (mut errors, mut planned) = (Vec::new(), BTreeMap::new());
+    for motion in motions {
+        errors.extend(motion.errors);
+        planned.extend(motion.planned);
+    }
+    armcal_verify::paths(&errors, names, &clocks, &planned)
+}
+
+/// Warnings of a recording, with its name.
+fn of_recording(seen: &Seen) -> Vec<Warning> {
+    let named = |w: &Warning| Warning { subject: format!("{}: {}", seen.name, w.subject), ..w.clone() };
+    seen.warnings.iter().chain(&seen.report.warnings).map(named).collect()
 }
 
 /// The new recordings, and what is put among them.

@@ -7,97 +7,106 @@ use crate::stages::past::Placed;
 use crate::stages::perceive::Seen;
 use armcal_core::{DwellId, JointSamples, Observation, Pose, Samples};
 use armcal_dwell::{Moment, track};
-use armcal_report::PathSample;
-use armcal_verify::{ClockError, PathError, PathRow, Planned, Polyline, paths};
-use nalgebra::Vector3;
+use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A set-point older than this does not say where the arm should be [s].
 const SET_POINT_MAX_AGE_S: f64 = 0.1;
+/// Rounds in which the clock is found, and the change below which they end [s].
+const CLOCK_ROUNDS: usize = 10;
+const CLOCK_SETTLED_S: f64 = 1e-5;
 
 /// The motion of one recording.
 pub struct Motion {
-    /// Frames of the moving tip.
-    pub moments: Vec<Moment>,
-    /// The same with the sensor's clock off by one standard error, where there are two clocks.
-    shifted: Option<Vec<Moment>>,
-    /// Standard error of the offset between the clocks in the middle of the recording [s].
-    pub clock_sigma_s: Option<f64>,
-    /// Set-points at the time of each moment [rad], where they are recorded.
-    set_points: Vec<Option<Vec<f64>>>,
+    /// Where the tip was and should have been.
+    pub errors: Vec<PathError>,
+    /// Paths that the set-points command, motion by motion, where they are recorded.
+    pub planned: BTreeMap<DwellId, Planned>,
+    /// How much later the sensor's clock is than dwell detection took it to be [s].
+    pub late_s: f64,
+    /// What its uncertainty changes, where there are two clocks.
+    pub clock: Option<ClockError>,
 }
 
-/// What comes of the comparison.
-pub struct Paths {
-    /// Rows of the table.
-    pub rows: Vec<PathRow>,
-    /// Every moment.
-    pub samples: Vec<PathSample>,
-}
-
-/// Collects the motion of a recording while its samples are at hand.
-pub fn follow(pipeline: &Pipeline, samples: &Samples, seen: &Seen) -> Result<Motion, Error> {
-    let in_recording = |source| Error::Dwell { recording: seen.name.clone(), source };
-    let at = |shift_s: f64| {
-        track(samples, seen.clock.as_ref(), shift_s, &seen.dwells, &pipeline.dwell).map_err(in_recording)
-    };
-    let moments = at(0.0)?;
-    let middle_ns = samples.tip.as_ref().and_then(|t| t.time_ns.get(t.time_ns.len() / 2)).copied();
-    let clock_sigma_s = seen.clock.as_ref().zip(middle_ns).map(|(clock, ns)| clock.sigma_s(ns));
-    let shifted = clock_sigma_s.map(at).transpose()?;
-    let asked = samples.set_points.as_ref();
-    let set_points = moments.iter().map(|m| asked.and_then(|s| set_point(s, m.time_ns))).collect();
-    Ok(Motion { moments, shifted, clock_sigma_s, set_points })
-}
-
-/// The set-point in force at a time: the last one before it.
-fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>> {
-    let row = stream.time_ns.partition_point(|t| *t <= time_ns).checked_sub(1)?;
-    let age_s = time_ns.saturating_sub(stream.time_ns[row]) as f64 * 1e-9;
-    (age_s <= SET_POINT_MAX_AGE_S).then(|| stream.row_rad(row))
-}
-
-/// Compares what the sensor saw with both models.
-pub fn compare(
-    pipeline: &Pipeline,
-    placed: &Placed,
-    seen: &[Seen],
-    motions: &[Motion],
-    names: &[String],
-) -> Paths {
-    let judge = Judge { pipeline, placed, world_from_base: placed.model.base_in_world(&placed.calibrated) };
-    let recordings = || seen.iter().zip(motions).enumerate();
-    let errors: Vec<Vec<PathError>> =
-        recordings().map(|(r, (s, m))| judge.errors(r, s.load_kg, &m.moments)).collect();
-    let clocks: Vec<Option<ClockError>> = recordings()
-        .zip(&errors)
-        .map(|((r, (s, m)), now)| {
-            let shifted = judge.errors(r, s.load_kg, m.shifted.as_ref()?);
-            Some(clock_error(m.clock_sigma_s?, now, &shifted))
-        })
-        .collect();
-    let mut planned = BTreeMap::new();
-    for (r, (s, m)) in recordings() {
-        planned.extend(judge.planned(r, s.load_kg, m));
-    }
-    let errors: Vec<PathError> = errors.into_iter().flatten().collect();
-    let rows = paths(&errors, names, &clocks, &planned);
-    Paths { rows, samples: errors.into_iter().map(|e| PathSample::of(&e, names)).collect() }
-}
-
-struct Judge<'a> {
+/// Both models among the new recordings.
+pub struct Judge<'a> {
     pipeline: &'a Pipeline,
     placed: &'a Placed,
     world_from_base: Pose,
 }
 
-impl Judge<'_> {
-    fn errors(&self, recording: usize, load_kg: f64, moments: &[Moment]) -> Vec<PathError> {
+impl<'a> Judge<'a> {
+    pub fn new(pipeline: &'a Pipeline, placed: &'a Placed) -> Judge<'a> {
+        Judge { pipeline, placed, world_from_base: placed.model.base_in_world(&placed.calibrated) }
+    }
+
+    /// Compares what the sensor saw of one recording's motion with both models.
+    ///
+    /// Dwells need the sensor's clock to a tenth of a second, paths to a millisecond: an arm with play lags behind its
+    /// encoders, and the alignment of the nominal arm takes that for a late clock. So the clock is found again, by the
+    /// calibrated model.
+    pub fn follow(&self, recording: usize, seen: &Seen, samples: &Samples) -> Result<Motion, Error> {
+        let one = Recorded { recording, seen, samples, dwell: &self.pipeline.dwell };
+        let (mut moments, mut late_s) = (one.moments(0.0)?, 0.0);
+        let mut clock = None;
+        if seen.clock.is_some() {
+            for _ in 0..CLOCK_ROUNDS {
+                let Some(found) = self.lateness(&one, &moments) else { break };
+                late_s += found.late_s;
+                clock = Some(found);
+                moments = one.moments(late_s)?;
+                if found.late_s.abs() < CLOCK_SETTLED_S {
+                    break;
+                }
+            }
+        }
+        let errors = self.errors(&one, &moments);
+        let clock = match clock.filter(|c| c.sigma_s.is_finite()) {
+            None => None,
+            Some(Lateness { sigma_s, .. }) => {
+                let shifted = self.errors(&one, &one.moments(late_s + sigma_s)?);
+                Some(clock_error(sigma_s, &errors, &shifted))
+            }
+        };
+        let planned = self.planned(&one, &moments);
+        Ok(Motion { errors, planned, late_s, clock })
+    }
+
+    fn lateness(&self, one: &Recorded<'_>, moments: &[Moment]) -> Option<Lateness> {
+        let (model, p) = (&self.placed.model, &self.placed.calibrated);
+        let seen: Vec<(String, Vector3<f64>, Vector3<f64>)> = moments
+            .par_iter()
+            .enumerate()
+            .map(|(index, m)| {
+                let o = one.observation(self.pipeline, index, m);
+                let joints = DVector::from_column_slice(&m.joint_velocity_radps);
+                let velocity_mps = model.joint_jacobian(p, &o) * joints;
+                let error_m = model.residual(p, &o).position_m;
+                (
+                    stretch(one.motion(m), m.time_ns),
+                    Vector3::from_column_slice(velocity_mps.as_slice()),
+                    error_m,
+                )
+            })
+            .collect();
+        let passings: Vec<Passing<'_>> = seen
+            .iter()
+            .map(|(group, velocity_mps, error_m)| Passing {
+                group,
+                velocity_mps: *velocity_mps,
+                error_m: *error_m,
+            })
+            .collect();
+        lateness(&passings)
+    }
+
+    fn errors(&self, one: &Recorded<'_>, moments: &[Moment]) -> Vec<PathError> {
         let error = |(index, m): (usize, &Moment)| {
-            let o = observe::moving(self.pipeline, recording, index, load_kg, m);
+            let o = one.observation(self.pipeline, index, m);
             PathError {
-                motion: DwellId { recording, dwell: m.motion },
+                motion: one.motion(m),
                 time_ns: m.time_ns,
                 measured_m: self.in_base(&m.position_m),
                 before_m: self.predicted_m(&self.placed.nominal, &o),
@@ -108,22 +117,20 @@ impl Judge<'_> {
     }
 
     /// The path of each motion as its set-points command it; the joints arrive as they do in fact.
-    fn planned(&self, recording: usize, load_kg: f64, motion: &Motion) -> BTreeMap<DwellId, Planned> {
+    fn planned(&self, one: &Recorded<'_>, moments: &[Moment]) -> BTreeMap<DwellId, Planned> {
+        let Some(asked) = &one.samples.set_points else { return BTreeMap::new() };
         let mut ways: BTreeMap<DwellId, [Vec<Vector3<f64>>; 2]> = BTreeMap::new();
-        for (index, (m, set_point)) in motion.moments.iter().zip(&motion.set_points).enumerate() {
-            let Some(set_point) = set_point else { continue };
-            let mut o = observe::moving(self.pipeline, recording, index, load_kg, m);
-            o.joint_rad.clone_from(set_point);
-            let [before, after] = ways.entry(DwellId { recording, dwell: m.motion }).or_default();
+        for (index, m) in moments.iter().enumerate() {
+            let Some(joint_rad) = set_point(asked, m.time_ns) else { continue };
+            let o = Observation { joint_rad, ..one.observation(self.pipeline, index, m) };
+            let [before, after] = ways.entry(one.motion(m)).or_default();
             before.push(self.predicted_m(&self.placed.nominal, &o));
             after.push(self.predicted_m(&self.placed.calibrated, &o));
         }
-        ways.into_iter()
-            .filter_map(|(motion, [before, after])| {
-                let (before, after) = (Polyline::through(before)?, Polyline::through(after)?);
-                Some((motion, Planned { before, after }))
-            })
-            .collect()
+        let planned = |(motion, [before, after]): (DwellId, [Vec<Vector3<f64>>; 2])| {
+            Some((motion, Planned { before: Polyline::through(before)?, after: Polyline::through(after)? }))
+        };
+        ways.into_iter().filter_map(planned).collect()
     }
 
     fn predicted_m(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
@@ -133,6 +140,38 @@ impl Judge<'_> {
     fn in_base(&self, in_world_m: &Vector3<f64>) -> Vector3<f64> {
         self.world_from_base.inverse_transform_point(&(*in_world_m).into()).coords
     }
+}
+
+/// One recording with its samples.
+struct Recorded<'a> {
+    recording: usize,
+    seen: &'a Seen,
+    samples: &'a Samples,
+    dwell: &'a armcal_dwell::DwellConfig,
+}
+
+impl Recorded<'_> {
+    /// Frames of the moving tip, its stamps `late_s` later than dwell detection took them to be.
+    fn moments(&self, late_s: f64) -> Result<Vec<Moment>, Error> {
+        let Seen { name, clock, dwells, .. } = self.seen;
+        track(self.samples, clock.as_ref(), late_s, dwells, self.dwell)
+            .map_err(|source| Error::Dwell { recording: name.clone(), source })
+    }
+
+    fn observation(&self, pipeline: &Pipeline, index: usize, m: &Moment) -> Observation {
+        observe::moving(pipeline, self.recording, index, self.seen.load_kg, m)
+    }
+
+    fn motion(&self, m: &Moment) -> DwellId {
+        DwellId { recording: self.recording, dwell: m.motion }
+    }
+}
+
+/// The set-point in force at a time: the last one before it.
+fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>> {
+    let row = stream.time_ns.partition_point(|t| *t <= time_ns).checked_sub(1)?;
+    let age_s = time_ns.saturating_sub(stream.time_ns[row]) as f64 * 1e-9;
+    (age_s <= SET_POINT_MAX_AGE_S).then(|| stream.row_rad(row))
 }
 
 /// What one standard error of the clock changes in the mean errors.

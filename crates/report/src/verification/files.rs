@@ -1,6 +1,6 @@
 //! A verification for programs.
 
-use super::{PathSample, Verification, VerifiedRecording};
+use super::{PathSample, Published, Verification, VerifiedRecording};
 use crate::ReportError;
 use crate::run::{Status, VERSION};
 use crate::tables::Columns;
@@ -24,6 +24,7 @@ struct File<'a> {
     points: &'a [PointsRow],
     paths: &'a [PathRow],
     parameters: Vec<Parameter<'a>>,
+    published: &'a [Published],
     warnings: &'a [Warning],
 }
 
@@ -54,6 +55,7 @@ pub fn verification_json(v: &Verification) -> String {
             .iter()
             .map(|(name, p)| Parameter { name, nominal: p.nominal, value: p.value, sigma: p.sigma })
             .collect(),
+        published: &v.published,
         warnings: &v.warnings,
     };
     let json = serde_json::to_string_pretty(&file);

@@ -11,7 +11,7 @@ use crate::run::Status;
 use armcal_core::{Severity, Warning};
 use armcal_verify::{PathError, PathRow, PointsRow};
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A calibrated model against recordings it never saw.
@@ -33,8 +33,44 @@ pub struct Verification {
     pub samples: Vec<PathSample>,
     /// Old and new parameters (Table 5), by name.
     pub parameters: Vec<(String, PastValue)>,
+    /// Numbers of somebody else, to stand beside these.
+    pub published: Vec<Published>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
+}
+
+/// The `[verify]` section of a pipeline.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct VerifyConfig {
+    /// Published numbers to print beside the own ones.
+    pub published: Vec<Published>,
+}
+
+/// One published row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// What it is: source and subject.
+    pub label: String,
+    /// Which table it belongs to.
+    pub on: On,
+    /// Mean error before calibration [mm].
+    pub before_mm: Option<f64>,
+    /// Mean error after it [mm].
+    pub after_mm: Option<f64>,
+    /// By how much the error fell, where only that is published [%].
+    pub improvement_percent: Option<f64>,
+}
+
+/// Which table a published row belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum On {
+    /// Errors at points.
+    Points,
+    /// Errors along paths.
+    Paths,
 }
 
 /// One new recording.

@@ -1,11 +1,10 @@
 //! A verification for people, at most 100 columns wide.
 
-use super::{Verification, VerifiedRecording};
+use super::{On, Published, Verification, VerifiedRecording};
 use crate::run::VERSION;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
-use armcal_verify::{Against, Compared, Estimate, PathRow, Plane};
-use armcal_verify::{By, PointsRow};
+use armcal_verify::{Against, By, Compared, Estimate, PathRow, Plane, PointsRow};
 use comfy_table::Cell;
 
 const HEADER: [&str; 7] = ["n", "before", "± 95 %", "after", "± 95 %", "difference 95 %", "better by"];
@@ -22,7 +21,8 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
     )];
     sections.push(pen.section("Recordings", recordings(&pen, &v.recordings)));
     if !v.points.is_empty() {
-        sections.push(pen.section("Error at points [mm]", points(&pen, &v.points)));
+        let published = v.published.iter().filter(|p| p.on == On::Points);
+        sections.push(pen.section("Error at points [mm]", points(&pen, &v.points, published)));
     }
     let of = |against| v.paths.iter().filter(move |r: &&PathRow| r.against == against);
     for (against, title) in [
@@ -30,7 +30,8 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
         (Against::Planned, "Distance from the planned path [mm]"),
     ] {
         if of(against).next().is_some() {
-            sections.push(pen.section(title, paths(&pen, of(against))));
+            let published = v.published.iter().filter(|p| p.on == On::Paths && against == Against::Encoders);
+            sections.push(pen.section(title, paths(&pen, of(against), published)));
         }
     }
     if !v.warnings.is_empty() {
@@ -77,7 +78,7 @@ fn recordings(pen: &Pen, all: &[VerifiedRecording]) -> String {
     pen.render(&table)
 }
 
-fn points(pen: &Pen, rows: &[PointsRow]) -> String {
+fn points<'a>(pen: &Pen, rows: &[PointsRow], published: impl Iterator<Item = &'a Published>) -> String {
     let mut table = pen.table(&[&["points"][..], &HEADER].concat());
     for row in rows {
         let subject = match row.by {
@@ -89,14 +90,21 @@ fn points(pen: &Pen, rows: &[PointsRow]) -> String {
         };
         table.add_row(cells(subject, &row.errors, row.by != By::Axis));
     }
+    for p in published {
+        table.add_row(published_cells(p));
+    }
     pen.render(&table)
 }
 
 fn side(row: &PointsRow) -> &'static str {
-    if row.subject.ends_with('+') { "upwards" } else { "downwards" }
+    if row.subject.ends_with('+') { "from below" } else { "from above" }
 }
 
-fn paths<'a>(pen: &Pen, rows: impl Iterator<Item = &'a PathRow>) -> String {
+fn paths<'a>(
+    pen: &Pen,
+    rows: impl Iterator<Item = &'a PathRow>,
+    published: impl Iterator<Item = &'a Published>,
+) -> String {
     let mut table = pen.table(&[&["path"][..], &HEADER].concat());
     for row in rows {
         let subject = match row.plane {
@@ -105,7 +113,23 @@ fn paths<'a>(pen: &Pen, rows: impl Iterator<Item = &'a PathRow>) -> String {
         };
         table.add_row(cells(subject, &row.errors, true));
     }
+    for p in published {
+        table.add_row(published_cells(p));
+    }
     pen.render(&table)
+}
+
+/// Somebody else's numbers, for comparison.
+fn published_cells(p: &Published) -> Vec<Cell> {
+    let mm = |value: Option<f64>| number(value.map_or(String::new(), |mm| millimetres(mm * 1e-3)));
+    let better = match (p.improvement_percent, p.before_mm.zip(p.after_mm)) {
+        (Some(percent), _) => format!("{percent:.1} %"),
+        (None, Some((before, after))) => format!("{:.1} %", 100.0 * (1.0 - after / before)),
+        (None, None) => String::new(),
+    };
+    let empty = || Cell::new("");
+    let label = Cell::new(printable(&p.label));
+    vec![label, empty(), mm(p.before_mm), empty(), mm(p.after_mm), empty(), empty(), number(better)]
 }
 
 fn cells(subject: String, c: &Compared, sizes: bool) -> Vec<Cell> {
