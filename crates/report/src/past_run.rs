@@ -79,6 +79,26 @@ pub enum PastRunError {
         /// The topic that is missing.
         topic: &'static str,
     },
+    /// There is no model in the result.
+    #[error(
+        "{} holds no calibrated model ({why}); name the results of `armcal run` (their folder, run.mcap or model.json), \
+         and run an older result again",
+        path.display()
+    )]
+    NoModel {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
+    /// The model of the result is not what it should be.
+    #[error("the calibrated model in {}: {why}; run the pipeline again", path.display())]
+    BadModel {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
 }
 
 impl PastRun {
