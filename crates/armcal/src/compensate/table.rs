@@ -29,7 +29,7 @@ pub struct Sheet<'a> {
 pub fn errors(points: &[SetPoint]) -> [ErrorStats; 2] {
     let of = |pick: fn(&armcal_compensate::Reached) -> f64| {
         let all: Vec<f64> = points.iter().filter_map(|p| p.reached.as_ref().map(pick)).collect();
-        ErrorStats::of(&all)
+        ErrorStats::of_norms(&all)
     };
     [of(|r| r.before_m), of(|r| r.after_m)]
 }
