@@ -51,5 +51,7 @@ mod plan;
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;
 
+/// Do set-points computed through the calibrated model bring the rig to where it is sent?
+mod compensation;
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;

@@ -1,6 +1,7 @@
 //! Everything a user can type.
 
-use clap::{Parser, Subcommand};
+use crate::commands::CompensateRequest;
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Calibrates a robot arm from MCAP recordings.
@@ -121,6 +122,8 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Set-points that bring the calibrated arm to Cartesian targets: its model with all effects, inverted.
+    Compensate(Compensate),
     /// The report of a run, served to this machine's browser only: any combination of effects and any hold-out is
     /// refitted as you choose it.
     View {
@@ -184,4 +187,69 @@ pub enum Command {
         #[arg(long, default_value = "problem.json")]
         out: PathBuf,
     },
+}
+
+/// What `armcal compensate` takes.
+#[derive(Debug, Args)]
+pub struct Compensate {
+    /// Results of `armcal run` or `armcal add`: their folder, run.mcap or model.json.
+    result: PathBuf,
+    /// CSV with a header (x_m, y_m, z_m; name, qx, qy, qz, qw, t_s where wanted) or TOML with [[targets]]. With t_s in
+    /// every row it is a path, otherwise the arm stops at each.
+    targets: PathBuf,
+    /// CSV for the set-points.
+    #[arg(long, default_value = "set-points.csv")]
+    out: PathBuf,
+    /// MCAP for the set-points as sensor_msgs/JointState.
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+    /// Frame of the targets: world, base, or board.RECORDING.
+    #[arg(long, default_value = "world")]
+    frame: String,
+    /// Joints where the arm waits before the first target [deg], such as 0,-30,10: decides from where each arrives.
+    #[arg(long, value_name = "DEG,..", allow_hyphen_values = true)]
+    from: Option<String>,
+    /// The recording as in which the arm is: its load, temperature, board, what has happened until then. The last when
+    /// absent.
+    #[arg(long, value_name = "RECORDING")]
+    as_in: Option<String>,
+    /// Load at the tip [kg], instead of that recording's.
+    #[arg(long, value_name = "KG")]
+    load: Option<f64>,
+    /// Temperature [degC], instead of that recording's.
+    #[arg(long, value_name = "DEGC", allow_hyphen_values = true)]
+    temperature: Option<f64>,
+    /// Come to every stop from a point this far before it, all joints in their direction of travel [deg].
+    #[arg(long, default_value_t = 0.0, value_name = "DEG")]
+    approach: f64,
+    /// Points a second of a path, by cubic splines through the targets; the targets themselves when absent.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// What a joint can do, such as 2=-75..20 [deg]; may be given again.
+    #[arg(long = "range", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+    ranges: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Compensate {
+    /// What the command is asked to do.
+    pub(crate) fn request(&self) -> CompensateRequest<'_> {
+        CompensateRequest {
+            result: &self.result,
+            targets: &self.targets,
+            out: &self.out,
+            mcap: self.mcap.as_deref(),
+            frame: &self.frame,
+            start: self.from.as_deref(),
+            recording: self.as_in.as_deref(),
+            load_kg: self.load,
+            temperature_c: self.temperature,
+            approach_deg: self.approach,
+            rate_hz: self.rate,
+            ranges: &self.ranges,
+            json: self.json,
+        }
+    }
 }

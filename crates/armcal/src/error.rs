@@ -105,9 +105,6 @@ pub enum Error {
     /// Reading back the result of an earlier run.
     #[error(transparent)]
     PastRun(#[from] armcal_report::PastRunError),
-    /// Reading back the calibrated model of an earlier run.
-    #[error(transparent)]
-    PastModel(#[from] armcal_report::PastModelError),
     /// The result lacks a parameter of the arm.
     #[error(
         "{} has no parameter {parameter}: its arm is not the one of this pipeline; name the [model] it was calibrated with",
@@ -138,9 +135,9 @@ pub enum Error {
     /// Looking for the missing effect.
     #[error(transparent)]
     Diagnose(#[from] armcal_diagnose::DiagnoseError),
-    /// A number that a plan cannot use.
+    /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
-    BadPlan {
+    BadOption {
         /// The option.
         option: &'static str,
         /// What was given.
@@ -148,6 +145,20 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// A file of targets is not what it should be.
+    #[error("targets {}: {problem}", path.display())]
+    BadTargets {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        problem: String,
+    },
+    /// No set-point.
+    #[error(transparent)]
+    Compensate(#[from] armcal_compensate::CompensateError),
+    /// Writing set-points as CSV.
+    #[error("writing the set-points as CSV: {0}")]
+    Csv(csv::Error),
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,

@@ -5,6 +5,7 @@
 
 pub mod cli;
 pub mod commands;
+pub mod compensate;
 pub mod error;
 pub mod pipeline;
 pub mod plan;

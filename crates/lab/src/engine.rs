@@ -1,6 +1,7 @@
 //! The rig in motion: motors drive planned paths, a hand seats the tip, every step is recorded.
 
 mod by_hand;
+mod commanded;
 mod quickly;
 
 use crate::LabError;
@@ -126,7 +127,7 @@ impl<'a> Engine<'a> {
             return self.follow(&path, what);
         }
         let steps = (path.duration_s() / STEP_S).ceil() as usize;
-        let steps_a_set_point = (1.0 / (self.config.task.set_point_hz * STEP_S)).round().max(1.0) as usize;
+        let steps_a_set_point = self.steps_a_set_point();
         let mut planned_rad = self.set_point_rad.clone();
         for step in 0..=steps {
             if step % steps_a_set_point == 0 || step == steps {
@@ -295,6 +296,15 @@ impl<'a> Engine<'a> {
         trace.seen_tip.push(seen_tip);
         trace.seen_table.push(seen_table);
         trace.seen_base.push(seen_base);
+    }
+
+    fn steps_a_set_point(&self) -> usize {
+        (1.0 / (self.config.task.set_point_hz * STEP_S)).round().max(1.0) as usize
+    }
+
+    /// The last step so far.
+    pub fn last_step(&self) -> usize {
+        self.trace.len() - 1
     }
 
     fn counted(&self, angle_rad: f64) -> f64 {

@@ -25,6 +25,14 @@ pub enum LabError {
         /// Position and reason.
         source: Box<toml::de::Error>,
     },
+    /// A file of set-points does not say what it should.
+    #[error("the set-points {path}: {why}", path = path.display())]
+    SetPoints {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        why: String,
+    },
     /// A value that the lab cannot work with.
     #[error("lab key `{key}`: {why}")]
     Value {

@@ -5,7 +5,7 @@
 //! | step | module | physics |
 //! |---|---|---|
 //! | build the rig | [`rig`], [`arm`], [`board`] | joint axes as lines in space, cavities off by their tolerance |
-//! | carry out the task | [`plan`], [`session`] | cavities forward, backward, at random; pauses; free poses |
+//! | carry out the task | [`plan`], [`session`], [`commands`] | cavities forward, backward, at random; pauses; free poses; set-points from a file |
 //! | move | [`engine`], [`spline`], [`servo`], [`hand`] | cubic splines, inverse kinematics, PID against inertia and gravity; a guiding hand |
 //! | hide something | [`mechanism`], [`mechanisms`] | gaps, springs, growing links, slipping pulleys: `[[mechanisms]]` |
 //! | watch | [`sensors`] | counts, camera noise, occlusion, clocks, transport |
@@ -21,6 +21,7 @@
 
 pub mod arm;
 pub mod board;
+pub mod commands;
 pub mod config;
 pub mod engine;
 mod error;
@@ -46,7 +47,7 @@ pub use error::LabError;
 pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, nothing_hidden};
 pub use quick::{Nominal, NominalBoard, Observed, observe, observe_from};
 pub use trace::RestKind;
-pub use truth::{DwellTruth, RecordingTruth, Truth};
+pub use truth::{DwellTruth, RecordingTruth, SetPointTruth, Truth};
 
 use engine::Pace;
 use rig::Rig;

@@ -3,6 +3,7 @@
 use crate::LabError;
 use crate::arm::AxisArm;
 use crate::board::Board;
+use crate::commands::Commands;
 use crate::config::{ArmConfig, DhRow, LabConfig};
 use crate::random::{Purpose, Stream};
 use armcal_core::Pose;
@@ -34,6 +35,8 @@ pub struct Rig {
     pub masses_kg: Vec<f64>,
     /// True mass of the tool at the tip [kg].
     pub tip_kg: f64,
+    /// Set-points from files.
+    pub commands: Vec<Commands>,
 }
 
 /// The board in one recording.
@@ -74,6 +77,7 @@ impl Rig {
             gravity_m_s2: world_from_base.rotation.inverse() * Vector3::new(0.0, 0.0, -9.81),
             masses_kg,
             tip_kg,
+            commands: Commands::load_all(config, base_dir)?,
         })
     }
 

@@ -1,6 +1,7 @@
 //! One recording from start to end, told in order: home, a fast sweep, the cavities, free poses, home.
 
 use crate::LabError;
+use crate::commands::Commands;
 use crate::config::{LabConfig, StopConfig, value};
 use crate::engine::{Engine, Pace};
 use crate::mechanism::Mechanism;
@@ -19,8 +20,21 @@ pub struct Session {
     pub trace: Trace,
     /// Every rest.
     pub rests: Vec<Rest>,
+    /// When each set-point from a file was due.
+    pub due: Vec<Due>,
     /// What was hidden in the rig, in its final state.
     pub mechanisms: Vec<Box<dyn Mechanism>>,
+}
+
+/// When a set-point from a file was due.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Due {
+    /// The set-point [rad].
+    pub joint_rad: Vec<f64>,
+    /// First step: halfway through a stop, or the moment on a path.
+    pub first: usize,
+    /// Last step.
+    pub last: usize,
 }
 
 impl Session {
@@ -43,9 +57,12 @@ impl Session {
             engine.drive_through(&plan.sweep_m, config.task.sweep.speed_m_s, "the sweep")?;
         }
         let name = &config.recordings[recording].name;
+        let mut due = Vec::new();
         let mut visits = Visits::new(config, rig, &place, recording);
         let mut pauses = Stream::new(config.seed, Purpose::Pauses, 2 * recording + 1);
-        if let Some(tour) = config.task.tours.iter().find(|tour| tour.recording == *name) {
+        if let Some(commands) = rig.commands.iter().find(|commands| commands.recording == *name) {
+            due = obey(&mut engine, commands, &home);
+        } else if let Some(tour) = config.task.tours.iter().find(|tour| tour.recording == *name) {
             visits.tour(&mut engine, &tour.stops, &mut pauses)?;
         } else {
             visits.perform(&mut engine, &plan.visits)?;
@@ -58,8 +75,30 @@ impl Session {
         engine.hold(config.task.home_s, at_home());
 
         let (trace, rests, mechanisms) = engine.finish();
-        Ok(Session { place, trace, rests, mechanisms })
+        Ok(Session { place, trace, rests, due, mechanisms })
     }
+}
+
+/// Drives the arm along set-points from a file, from home.
+fn obey(engine: &mut Engine<'_>, commands: &Commands, home: &[f64]) -> Vec<Due> {
+    engine.drive_joints(home, commands.speed_rad_s);
+    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    let Some(time_s) = &commands.time_s else {
+        let mut stop = |joint_rad: &Vec<f64>| {
+            engine.drive_joints(joint_rad, commands.speed_rad_s);
+            let first = engine.last_step();
+            engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+            let last = engine.last_step();
+            Due { joint_rad: joint_rad.clone(), first: first + (last - first) / 2, last }
+        };
+        return commands.joint_rad.iter().map(&mut stop).collect();
+    };
+    engine.drive_joints(&commands.joint_rad[0], commands.speed_rad_s);
+    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    let steps = engine.follow_joints(time_s, &commands.joint_rad);
+    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    let due = |(q, step): (&Vec<f64>, usize)| Due { joint_rad: q.clone(), first: step, last: step };
+    commands.joint_rad.iter().zip(steps).map(due).collect()
 }
 
 /// The part with the board: hands, cavities, pauses.

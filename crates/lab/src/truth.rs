@@ -4,7 +4,7 @@ use crate::config::{DhRow, LabConfig};
 use crate::rig::Rig;
 use crate::scenario::{Hidden, Scenario};
 use crate::sensors::{Occlusion, SensorClock};
-use crate::session::Session;
+use crate::session::{Due, Session};
 use crate::trace::{Rest, RestKind, Trace};
 use crate::{LabError, Mechanism};
 use armcal_core::Pose;
@@ -107,6 +107,22 @@ pub struct RecordingTruth {
     pub dwells: Vec<DwellTruth>,
     /// When which subject was occluded.
     pub occlusions: Vec<Occlusion>,
+    /// Every set-point from a file, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set_points: Vec<SetPointTruth>,
+}
+
+/// What came of a set-point from a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SetPointTruth {
+    /// When it was due [ns], robot clock; of a stop, the middle.
+    pub time_ns: i64,
+    /// The set-point [rad].
+    pub set_point_rad: Vec<f64>,
+    /// What the encoders read then, before noise and counting [rad].
+    pub reading_rad: Vec<f64>,
+    /// The true tip in the world [m].
+    pub tip_world_m: [f64; 3],
 }
 
 /// One mechanism.
@@ -201,6 +217,7 @@ impl RecordingTruth {
     ) -> RecordingTruth {
         let name = config.recordings[recording].name.clone();
         let start_ns = config.start_ns(recording);
+        let set_point = |due: &Due| SetPointTruth::of_due(&session.trace, due, start_ns);
         let dwell = |rest: &Rest| DwellTruth::of_rest(rig, &session.trace, rest, start_ns);
         let mechanism = |m: &dyn Mechanism| MechanismTruth { name: m.name().into(), truth: m.truth() };
         RecordingTruth {
@@ -215,6 +232,7 @@ impl RecordingTruth {
             mechanisms: session.mechanisms.iter().map(|m| mechanism(m.as_ref())).collect(),
             dwells: session.rests.iter().map(dwell).collect(),
             occlusions,
+            set_points: session.due.iter().map(set_point).collect(),
         }
     }
 }
@@ -246,6 +264,18 @@ impl DwellTruth {
             nominal_error_m: (nominal - mean_vector(rows.map(in_base))).norm(),
             arrival: arrival(trace, first),
             temperature_c: trace.temperature_c[first],
+        }
+    }
+}
+
+impl SetPointTruth {
+    fn of_due(trace: &Trace, due: &Due, recording_start_ns: i64) -> SetPointTruth {
+        let tip_at = |i: usize| trace.world_from_tip[i].translation.vector;
+        SetPointTruth {
+            time_ns: recording_start_ns + (trace.time_s[due.first] * 1e9).round() as i64,
+            set_point_rad: due.joint_rad.clone(),
+            reading_rad: mean_row(&trace.reading_rad[due.first..=due.last]),
+            tip_world_m: mean_vector((due.first..=due.last).map(tip_at)).into(),
         }
     }
 }

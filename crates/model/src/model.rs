@@ -219,15 +219,33 @@ impl Model {
     /// d predicted tip / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
     /// encoders' noise to the tip.
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
-        let joints: Vec<(usize, Twist)> = match &self.effects {
-            None => linearise(&self.path, p, &o.joint_rad).joints,
-            Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
-        };
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
-        for (column, twist) in joints {
+        for (column, twist) in self.joint_twists(p, o) {
             jacobian.set_column(column, &twist.translation_m);
         }
         jacobian
+    }
+
+    /// The residual and d residual / d joint reading: 3 or 6 rows, one column a joint. Inverse kinematics iterates on
+    /// it. What drives the effects is held, so that their own slope over the joint angle, a few per cent, is left out.
+    pub fn residual_with_joint_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        let residual = self.residual(p, o);
+        let mut jacobian = DMatrix::zeros(residual.len(), self.joint_count());
+        let rate = residual.rotation_rad.as_ref().map(rotation_error_rate);
+        for (column, twist) in self.joint_twists(p, o) {
+            add_to_column(&mut jacobian, 0, column, &-twist.translation_m);
+            if let Some(rate) = &rate {
+                add_to_column(&mut jacobian, 3, column, &(rate * twist.rotation_rad));
+            }
+        }
+        (residual, jacobian)
+    }
+
+    fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
+        match &self.effects {
+            None => linearise(&self.path, p, &o.joint_rad).joints,
+            Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
+        }
     }
 
     /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].

@@ -1,145 +1,354 @@
-//! The calibrated model of an earlier run, read back from what is attached to its `run.mcap`.
+//! `model.json`: the calibrated model with all it needs to predict again, without the recordings it came from.
+//!
+//! [`PastModel::of`] a run, [`PastModel::open`] from its results, [`PastModel::arms`] to compute with. The nominal arm
+//! is kept as the text of its file, frames and effects as what was built on it, what drives the effects as the facts
+//! of the session; so the model is made again by the code that made it first.
 
-use crate::past_run::result_file;
-use crate::session_summary::SessionSummary;
-use armcal_core::{Pose, RollPitchYaw};
-use armcal_model::Session;
+use crate::run::{RecordingRun, Run, VERSION};
+use crate::{PastRunError, ReportError};
+use armcal_calibrate::Estimate;
+use armcal_core::{Observation, Pose};
+use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
 use armcal_recording::{Recording, RecordingError};
-use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
-use std::collections::{BTreeMap, BTreeSet};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a calibration said about an arm, wherever the arm is used next.
-#[derive(Debug, Clone, PartialEq)]
+/// Format of the file.
+const SCHEMA: &str = "armcal.model/1";
+/// Its name in the folder of results, and behind `armcal/` in `run.mcap`.
+pub(crate) const FILE: &str = "model.json";
+/// Postures that are kept at most; a longer session is thinned out evenly.
+const MOST_POSTURES: usize = 400;
+
+/// A calibrated model of an earlier run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PastModel {
-    /// The `run.mcap`.
-    pub path: PathBuf,
-    /// Text of its pipeline, which names the effects.
-    pub pipeline_text: String,
-    /// Hashes of the files it was calibrated on.
-    pub inputs_sha256: BTreeSet<String>,
-    /// What the effects refer to.
-    pub session: Session,
-    /// Every parameter by name, SI.
-    pub parameters: BTreeMap<String, PastValue>,
-    /// Pose of the base in the world before the fit.
-    pub nominal_base: Pose,
-    /// The same after it.
-    pub fitted_base: Pose,
+    schema: String,
+    version: String,
+    /// Name of the pipeline.
+    pub pipeline: String,
+    chain: ChainText,
+    base: FrameFacts,
+    tip: FrameFacts,
+    boards: Vec<FrameFacts>,
+    effects: Vec<EffectTable>,
+    session: SessionFacts,
+    /// Every parameter, in the order of the model.
+    pub parameters: Vec<Value>,
+    /// The recordings, in the order of the pipeline.
+    pub recordings: Vec<RecordingFacts>,
+    /// Readings at rest, for a posture to start from [rad] (sliding: [m]).
+    pub postures_rad: Vec<Vec<f64>>,
+    /// Smallest and largest reading of each joint [rad] (sliding: [m]).
+    pub range_rad: Vec<[f64; 2]>,
+    /// Mean error expected from the declared noise alone [m].
+    pub noise_floor_m: f64,
+    /// Mean error on points the fit did not see, else on those it saw [m].
+    pub mean_error_m: f64,
+    /// What the diagnosis would add to the model, as `armcal add` takes it.
+    pub missing: Vec<String>,
 }
 
-/// A parameter before and after the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct PastValue {
-    /// Before [SI].
+/// One parameter, SI.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// Its name.
+    pub name: String,
+    /// With nominal robot parameters, estimated frames fitted.
     pub nominal: f64,
-    /// After [SI].
-    pub value: f64,
-    /// Posterior standard deviation [SI]; 0 for a fixed one.
+    /// As calibrated.
+    pub calibrated: f64,
+    /// Posterior standard deviation; 0 where it was fixed.
     pub sigma: f64,
 }
 
-/// Why a calibrated model cannot be read back.
-#[derive(Debug, thiserror::Error)]
-pub enum PastModelError {
-    /// The file is not there or not an MCAP.
-    #[error("reading the result {}: {source}", path.display())]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: Box<RecordingError>,
-    },
-    /// An attachment is missing or not what it should be.
-    #[error(
-        "the result {} has no usable attachment {name}: {why}; run `armcal run` again with this version",
-        path.display()
-    )]
-    Attachment {
-        /// The file.
-        path: PathBuf,
-        /// Name of the attachment.
-        name: &'static str,
-        /// What is wrong with it.
-        why: String,
-    },
+/// One recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordingFacts {
+    /// Its name.
+    pub name: String,
+    /// Hashes of its files.
+    pub sha256: Vec<String>,
+    /// Its last observed dwell.
+    pub last_dwell: usize,
+    /// When that was [ns], robot clock.
+    pub last_ns: i64,
+    /// Load at the tip [kg].
+    pub load_kg: f64,
+    /// Mean temperature [degC].
+    pub temperature_c: Option<f64>,
 }
 
-#[derive(Deserialize)]
-struct ParameterFile {
-    parameters: Vec<Entry>,
-    frames: Vec<FrameEntry>,
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "form", rename_all = "lowercase")]
+enum ChainText {
+    Dh { text: String },
+    Urdf { text: String, base_link: String, tip_link: String },
 }
 
-#[derive(Deserialize)]
-struct Entry {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct FrameFacts {
     name: String,
-    #[serde(flatten)]
-    value: PastValue,
-}
-
-#[derive(Deserialize)]
-struct FrameEntry {
-    frame: String,
     xyz_m: [f64; 3],
-    rpy_deg: [f64; 3],
+    quaternion_xyzw: [f64; 4],
+    free_rotation: bool,
 }
 
-#[derive(Deserialize)]
-struct SummaryFile {
-    session: SessionSummary,
-    recordings: Vec<RecordingEntry>,
+/// [`Session`], field by field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct SessionFacts {
+    start_ns: i64,
+    end_ns: i64,
+    recordings: usize,
+    reference_temperature_c: Option<f64>,
+    gravity_in_world_mps2: [f64; 3],
+    gravity_in_base_mps2: Option<[f64; 3]>,
+    volume_centre_m: Option<[f64; 3]>,
+    volume_half_extent_m: f64,
+    board_centres_m: BTreeMap<usize, [f64; 3]>,
+    largest_effort_nm: Option<Vec<f64>>,
+    temperature: bool,
+    load: bool,
+    moving: bool,
+    cavities: Vec<String>,
 }
 
-#[derive(Deserialize)]
-struct RecordingEntry {
-    files: Vec<FileEntry>,
-}
-
-#[derive(Deserialize)]
-struct FileEntry {
-    sha256: String,
+/// The model without effects and with them, and their parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastArms {
+    /// The nominal arm in its frames: no effects.
+    pub geometry: Model,
+    /// Its parameters: robot nominal, estimated frames fitted.
+    pub nominal_values: Vec<f64>,
+    /// The model with its effects.
+    pub model: Model,
+    /// Its parameters as calibrated.
+    pub values: Vec<f64>,
 }
 
 impl PastModel {
-    /// Reads `run.mcap`, given itself or the folder it is in.
-    pub fn open(path: &Path) -> Result<PastModel, PastModelError> {
-        let path = result_file(path);
-        let recording = Recording::open(std::slice::from_ref(&path))
-            .map_err(|source| PastModelError::Open { path: path.clone(), source: Box::new(source) })?;
-        let fail = |name, why| PastModelError::Attachment { path: path.clone(), name, why };
-        let attachments = recording.attachments();
-        let text = |name: &'static str| {
-            let found = attachments.iter().find(|a| a.name == name);
-            let bytes = found.ok_or_else(|| fail(name, "it is not there".into()))?.data;
-            std::str::from_utf8(bytes).map(str::to_owned).map_err(|e| fail(name, e.to_string()))
+    /// What a run leaves for later.
+    pub(crate) fn of(run: &Run) -> Result<PastModel, ReportError> {
+        let model = &run.model;
+        let start = model.nominal();
+        let calibration = &run.calibration;
+        let values = calibration.fit.estimates.iter().zip(&calibration.nominal_values);
+        let value = |(e, nominal): (&Estimate, &f64)| Value {
+            name: e.parameter.name.clone(),
+            nominal: *nominal,
+            calibrated: e.value,
+            sigma: e.sigma,
         };
-        let pipeline_text = text("armcal/pipeline.toml")?;
-        let name = "armcal/parameters.toml";
-        let file: ParameterFile = toml::from_str(&text(name)?).map_err(|e| fail(name, e.to_string()))?;
-        let parameters: BTreeMap<String, PastValue> =
-            file.parameters.into_iter().map(|e| (e.name, e.value)).collect();
-        let base = file.frames.iter().find(|f| f.frame == "base");
-        let base = base.ok_or_else(|| fail(name, "it has no frame `base`".into()))?;
-        let fitted_base = Pose::from(RollPitchYaw { xyz_m: base.xyz_m, rpy_deg: base.rpy_deg });
-        let nominal_base = before_the_fit(&fitted_base, &parameters);
-        let name = "armcal/summary.json";
-        let summary: SummaryFile =
-            serde_json::from_str(&text(name)?).map_err(|e| fail(name, e.to_string()))?;
-        let session = summary.session.into();
-        let inputs_sha256 = summary.recordings.into_iter().flat_map(|r| r.files).map(|f| f.sha256).collect();
-        Ok(PastModel { pipeline_text, inputs_sha256, session, parameters, nominal_base, fitted_base, path })
+        let facts = |name: &str, pose: &Pose| FrameFacts::of(model, name, pose);
+        let boards = run.recordings.iter().enumerate().filter_map(|(index, recording)| {
+            let pose = model.board_in_world(&start, index)?;
+            Some(facts(&format!("board.{}", recording.name), &pose))
+        });
+        let judged = if calibration.holdout.fitted.n > 0 { &calibration.holdout } else { &calibration.train };
+        let missing = match &run.diagnosis {
+            Some(diagnosis) => diagnosis.suggested(model.chain().joint_names())?,
+            None => Vec::new(),
+        };
+        Ok(PastModel {
+            schema: SCHEMA.into(),
+            version: VERSION.into(),
+            pipeline: run.pipeline_name.clone(),
+            chain: chain_text(run),
+            base: facts("base", &model.base_in_world(&start)),
+            tip: facts("tip", &model.tip_in_last_link(&start)),
+            boards: boards.collect(),
+            effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
+            session: SessionFacts::from(&run.session),
+            parameters: values.map(value).collect(),
+            recordings: run.recordings.iter().enumerate().map(|(i, r)| recording(r, i, run)).collect(),
+            postures_rad: thinned(&run.observations),
+            range_rad: (0..model.joint_count()).map(|j| range(&run.observations, j)).collect(),
+            noise_floor_m: calibration.noise_floor_m,
+            mean_error_m: judged.fitted.mean_m,
+            missing: missing.iter().map(EffectSpec::to_string).collect(),
+        })
+    }
+
+    /// Its JSON.
+    pub(crate) fn json(&self) -> Result<String, ReportError> {
+        serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(ReportError::Page)
+    }
+
+    /// Reads the model of a run: its folder, its `run.mcap`, or the `model.json` itself.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or holds no model in this format.
+    pub fn open(path: &Path) -> Result<PastModel, PastRunError> {
+        let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
+        let text =
+            if path.extension().is_some_and(|e| e == "mcap") { attached(&path)? } else { file(&path)? };
+        let bad = |why: String| PastRunError::BadModel { path: path.clone(), why };
+        let model: PastModel = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
+        if model.schema != SCHEMA {
+            return Err(bad(format!("its schema is `{}`, not `{SCHEMA}`", model.schema)));
+        }
+        Ok(model)
+    }
+
+    /// What the effects refer to.
+    pub fn session(&self) -> Session {
+        Session::from(&self.session)
+    }
+
+    /// The models, made again.
+    ///
+    /// # Errors
+    /// Contents that contradict each other, as only a file changed by hand has them.
+    pub fn arms(&self) -> Result<PastArms, ModelError> {
+        let path = Path::new(FILE);
+        let chain = match &self.chain {
+            ChainText::Dh { text } => Chain::from_dh_toml(text, path)?,
+            ChainText::Urdf { text, base_link, tip_link } => {
+                Chain::from_urdf(text, base_link, tip_link, path)?
+            }
+        };
+        let frames = Frames {
+            base: self.base.frame(),
+            tip: self.tip.frame(),
+            boards: self.boards.iter().map(FrameFacts::frame).collect(),
+        };
+        let geometry = Model::new(chain, frames)?;
+        let joints = geometry.chain().joint_names();
+        let specs = self.effects.iter().map(|e| e.spec(joints)).collect::<Result<Vec<_>, _>>()?;
+        let model = geometry.with_effects(&specs, &self.session())?;
+        let expected: Vec<&str> = model.parameters().iter().map(|p| p.name.as_str()).collect();
+        let wrong = (0..expected.len().max(self.parameters.len()))
+            .find(|i| self.parameters.get(*i).map(|v| v.name.as_str()) != expected.get(*i).copied());
+        if let Some(index) = wrong {
+            return Err(ModelError::UnknownParameter {
+                name: self.parameters.get(index).map_or("(missing)".to_owned(), |v| v.name.clone()),
+                nearest: expected.get(index).map(|name| (*name).to_owned()),
+            });
+        }
+        let nominal = self.parameters.iter().take(geometry.parameters().len()).map(|v| v.nominal);
+        Ok(PastArms {
+            nominal_values: nominal.collect(),
+            geometry,
+            values: self.parameters.iter().map(|v| v.calibrated).collect(),
+            model,
+        })
     }
 }
 
-/// The base as it was known before: positions are written down, the rotation is `R_fitted Exp(-r)`, r the parameters.
-fn before_the_fit(fitted: &Pose, parameters: &BTreeMap<String, PastValue>) -> Pose {
-    let of = |quantity: &str| parameters.get(&format!("base.{quantity}"));
-    let fitted_m = fitted.translation.vector;
-    let position_m = ["x", "y", "z"].map(|q| of(q).map(|v| v.nominal));
-    let turned_rad = ["rx", "ry", "rz"].map(|q| of(q).map_or(0.0, |v| v.value - v.nominal));
-    let position_m = Vector3::from_fn(|k, _| position_m[k].unwrap_or(fitted_m[k]));
-    let back = UnitQuaternion::new(-Vector3::from(turned_rad));
-    Pose::from_parts(position_m.into(), fitted.rotation * back)
+fn file(path: &Path) -> Result<String, PastRunError> {
+    std::fs::read_to_string(path)
+        .map_err(|e| PastRunError::NoModel { path: path.to_owned(), why: e.to_string() })
+}
+
+fn attached(path: &Path) -> Result<String, PastRunError> {
+    let at = |source: RecordingError| PastRunError::Open { path: path.to_owned(), source: Box::new(source) };
+    let recording = Recording::open(&[PathBuf::from(path)]).map_err(at)?;
+    let name = format!("armcal/{FILE}");
+    let found = recording.attachments().into_iter().find(|a| a.name == name);
+    let missing =
+        || PastRunError::NoModel { path: path.to_owned(), why: format!("it has no attachment {name}") };
+    let found = found.ok_or_else(missing)?;
+    Ok(String::from_utf8_lossy(found.data).into_owned())
+}
+
+/// The nominal arm's file; the ends of a URDF chain are what the pipeline says.
+fn chain_text(run: &Run) -> ChainText {
+    let text = run.model_text.clone();
+    if !run.model.chain().is_urdf() {
+        return ChainText::Dh { text };
+    }
+    let pipeline = run.pipeline_text.parse::<toml::Table>().unwrap_or_default();
+    let link = |key| {
+        let found = pipeline.get("model").and_then(|model| model.get(key)).and_then(toml::Value::as_str);
+        found.unwrap_or_default().to_owned()
+    };
+    ChainText::Urdf { text, base_link: link("base_link"), tip_link: link("tip_link") }
+}
+
+fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFacts {
+    let own: Vec<&Observation> = run.observations.iter().filter(|o| o.dwell.recording == index).collect();
+    let temperatures: Vec<f64> = own.iter().filter_map(|o| o.temperature_c).collect();
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    RecordingFacts {
+        name: recording.name.clone(),
+        sha256: recording.report.files.iter().map(|f| f.sha256.clone()).collect(),
+        last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
+        last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),
+        load_kg: own.last().map_or(0.0, |o| o.load_kg),
+        temperature_c: (!temperatures.is_empty()).then(|| mean(&temperatures)),
+    }
+}
+
+fn thinned(observations: &[Observation]) -> Vec<Vec<f64>> {
+    let stride = observations.len().div_ceil(MOST_POSTURES).max(1);
+    observations.iter().step_by(stride).map(|o| o.joint_rad.clone()).collect()
+}
+
+fn range(observations: &[Observation], joint: usize) -> [f64; 2] {
+    let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    readings.fold(start, |[low, high], q| [q.min(low), q.max(high)])
+}
+
+impl FrameFacts {
+    fn of(model: &Model, name: &str, pose: &Pose) -> FrameFacts {
+        let q = pose.rotation.coords;
+        FrameFacts {
+            name: name.to_owned(),
+            xyz_m: pose.translation.vector.into(),
+            quaternion_xyzw: [q.x, q.y, q.z, q.w],
+            free_rotation: model.index(&format!("{name}.rx")).is_some(),
+        }
+    }
+
+    fn frame(&self) -> Frame {
+        let [x, y, z, w] = self.quaternion_xyzw;
+        let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let pose = Pose::from_parts(Vector3::from(self.xyz_m).into(), rotation);
+        Frame { free_rotation: self.free_rotation, ..Frame::given(self.name.clone(), pose) }
+    }
+}
+
+impl From<&Session> for SessionFacts {
+    fn from(s: &Session) -> SessionFacts {
+        SessionFacts {
+            start_ns: s.start_ns,
+            end_ns: s.end_ns,
+            recordings: s.recordings,
+            reference_temperature_c: s.reference_temperature_c,
+            gravity_in_world_mps2: s.gravity_in_world_mps2.into(),
+            gravity_in_base_mps2: s.gravity_in_base_mps2.map(Into::into),
+            volume_centre_m: s.volume_centre_m.map(Into::into),
+            volume_half_extent_m: s.volume_half_extent_m,
+            board_centres_m: s.board_centres_m.iter().map(|(k, v)| (*k, (*v).into())).collect(),
+            largest_effort_nm: s.largest_effort_nm.clone(),
+            temperature: s.temperature,
+            load: s.load,
+            moving: s.moving,
+            cavities: s.cavities.clone(),
+        }
+    }
+}
+
+impl From<&SessionFacts> for Session {
+    fn from(s: &SessionFacts) -> Session {
+        Session {
+            start_ns: s.start_ns,
+            end_ns: s.end_ns,
+            recordings: s.recordings,
+            reference_temperature_c: s.reference_temperature_c,
+            gravity_in_world_mps2: s.gravity_in_world_mps2.into(),
+            gravity_in_base_mps2: s.gravity_in_base_mps2.map(Into::into),
+            volume_centre_m: s.volume_centre_m.map(Into::into),
+            volume_half_extent_m: s.volume_half_extent_m,
+            board_centres_m: s.board_centres_m.iter().map(|(k, v)| (*k, (*v).into())).collect(),
+            largest_effort_nm: s.largest_effort_nm.clone(),
+            temperature: s.temperature,
+            load: s.load,
+            moving: s.moving,
+            cavities: s.cavities.clone(),
+        }
+    }
 }

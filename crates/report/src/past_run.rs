@@ -79,6 +79,26 @@ pub enum PastRunError {
         /// The topic that is missing.
         topic: &'static str,
     },
+    /// There is no model in the result.
+    #[error(
+        "{} holds no calibrated model ({why}); name the results of `armcal run` (their folder, run.mcap or model.json), \
+         and run an older result again",
+        path.display()
+    )]
+    NoModel {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
+    /// The model of the result is not what it should be.
+    #[error("the calibrated model in {}: {why}; run the pipeline again", path.display())]
+    BadModel {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
 }
 
 impl PastRun {
@@ -114,7 +134,7 @@ impl PastRun {
 
     /// Reads `run.mcap`, given itself or the folder it is in.
     pub fn open(path: &Path) -> Result<PastRun, PastRunError> {
-        let path = result_file(path);
+        let path = if path.is_dir() { path.join("run.mcap") } else { path.to_owned() };
         let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
         let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
         let mut residuals = Vec::new();
@@ -147,11 +167,6 @@ impl PastRun {
             path,
         })
     }
-}
-
-/// The `run.mcap` of a result, given itself or the folder it is in.
-pub(crate) fn result_file(path: &Path) -> PathBuf {
-    if path.is_dir() { path.join("run.mcap") } else { path.to_owned() }
 }
 
 impl From<proto::Residual> for PastResidual {

@@ -9,7 +9,6 @@
 
 use crate::diagnosis_summary::DiagnosisSummary;
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
-use crate::session_summary::SessionSummary;
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{Dwell, ErrorStats, Unit, Warning};
@@ -33,8 +32,6 @@ struct Summary<'a> {
     pipeline: &'a str,
     status: Status,
     recordings: Vec<RecordingSummary<'a>>,
-    /// What the effects of the model refer to: times, temperature, gravity, the board's centre.
-    session: SessionSummary,
     fit: FitSummary<'a>,
     /// The same observations and hold-out with more effects in the model: what was found, step by step, then the best
     /// candidates, each alone.
@@ -160,7 +157,6 @@ impl<'a> Summary<'a> {
             pipeline: &run.pipeline_name,
             status: run.status(),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
-            session: SessionSummary::from(&run.session),
             fit: fit(&run.calibration),
             refits: run.refits().map(refit).collect(),
             diagnosis: run.diagnosis.as_ref().map(DiagnosisSummary::of),

@@ -6,6 +6,7 @@ use crate::mcap_file::{Attachment, write_mcap};
 use crate::model_file::model_file;
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
+use crate::past_model::{self, PastModel};
 use crate::points::points;
 use crate::tables::parquet_files;
 use crate::{ReportError, Run, summary_json};
@@ -39,7 +40,8 @@ pub enum InputMessages {
     Reference,
 }
 
-/// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model, Foxglove layouts and the
+/// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model (for its own
+/// tools, and as `model.json` with its effects), Foxglove layouts and the
 /// Parquet tables into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
@@ -61,6 +63,7 @@ pub fn write_all(
     let points = points(run)?;
     let model = model_file(run)?;
     let parameters = parameters_toml(run)?;
+    let past_model = PastModel::of(run)?.json()?;
     let summary = summary_json(run);
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
@@ -75,6 +78,7 @@ pub fn write_all(
         ("summary.json", &summary),
         ("parameters.toml", &parameters),
         (model.name, &model.text),
+        (past_model::FILE, &past_model),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
     ];
@@ -91,6 +95,7 @@ pub fn write_all(
         Attachment { name: "summary.json", media_type: "application/json", text: &summary },
         Attachment { name: "parameters.toml", media_type: "application/toml", text: &parameters },
         Attachment { name: model.name, media_type: model.media_type, text: &model.text },
+        Attachment { name: past_model::FILE, media_type: "application/json", text: &past_model },
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];

@@ -2,6 +2,7 @@
 
 pub mod add;
 mod compare;
+mod compensate;
 mod diagnose;
 mod effects;
 mod export;
@@ -12,6 +13,8 @@ mod score;
 mod simulate;
 mod verify;
 mod view;
+
+pub(crate) use compensate::Request as CompensateRequest;
 
 use crate::cli::{Cli, Command};
 use crate::error::Error;
@@ -31,6 +34,7 @@ pub enum Outcome {
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
+        Command::Compensate(asked) => compensate::run(&asked.request()),
         Command::Diagnose { input, json } => diagnose::run(input, *json),
         Command::Add { effects, pipeline, write, out, json } => {
             add::run(&add::Request { effects, pipeline, write: write.as_deref(), out, json: *json })
@@ -56,6 +60,17 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
     }
+}
+
+/// `JOINT=LOW..HIGH`: the joint by number from 1 or by name, and its range as written; `None` where it is not that.
+fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
+    let (joint, range) = words.split_once('=')?;
+    let by_name = joints.iter().position(|name| name == joint.trim());
+    let joint = by_name.or_else(|| joint.trim().parse::<usize>().ok()?.checked_sub(1))?;
+    let (low, high) = range.split_once("..")?;
+    let (low, high) = (low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?);
+    let usable = joint < joints.len() && low.is_finite() && low < high && high.is_finite();
+    usable.then_some((joint, [low, high]))
 }
 
 /// Prints a result; a reader that closed the pipe is not an error.

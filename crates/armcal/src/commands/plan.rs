@@ -1,6 +1,6 @@
 //! `armcal plan`: what to record next.
 
-use super::{Outcome, print};
+use super::{Outcome, joint_range, print};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
@@ -83,7 +83,7 @@ fn split(words: &str) -> Vec<String> {
 
 fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
     let bad = |option, value: String, problem: &str| {
-        Err(Error::BadPlan { option, value, problem: problem.to_owned() })
+        Err(Error::BadOption { option, value, problem: problem.to_owned() })
     };
     if let Some(load) = request.loads_kg.iter().find(|l| !l.is_finite() || **l < 0.0) {
         return bad("--load", load.to_string(), "give a mass in kg, zero or more");
@@ -93,19 +93,9 @@ fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
     }
     let mut ranges_deg = Vec::new();
     for words in request.ranges {
-        let parsed = words.split_once('=').and_then(|(joint, range)| {
-            let by_name = joints.iter().position(|name| name == joint.trim());
-            let joint = by_name.or_else(|| joint.trim().parse::<usize>().ok()?.checked_sub(1))?;
-            let (low, high) = range.split_once("..")?;
-            Some((joint, [low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?]))
-        });
-        match parsed {
-            Some((joint, [low, high]))
-                if joint < joints.len() && low.is_finite() && low < high && high.is_finite() =>
-            {
-                ranges_deg.push((joint, [low, high]));
-            }
-            _ => {
+        match joint_range(words, joints) {
+            Some(range) => ranges_deg.push(range),
+            None => {
                 let problem = "write a joint's number or name and its range in degrees, such as 2=-75..20";
                 return bad("--range", words.clone(), problem);
             }

@@ -2,10 +2,10 @@
 
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
-use crate::stages::frames;
 use armcal_core::{Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, catalogue};
-use armcal_report::PastModel;
+use armcal_report::{PastArms, PastModel};
+use std::path::Path;
 
 /// The model of the past in new surroundings.
 pub struct Placed {
@@ -27,15 +27,20 @@ pub struct Placed {
 ///
 /// # Errors
 /// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.
-pub fn place(past: &PastModel, pipeline: &Pipeline, surroundings: &Model) -> Result<Placed, Error> {
-    let then = Pipeline::parse(&past.path, past.pipeline_text.clone(), &pipeline.folder)?;
+pub fn place(
+    past: &PastModel,
+    result: &Path,
+    pipeline: &Pipeline,
+    surroundings: &Model,
+) -> Result<Placed, Error> {
+    let then = past.arms()?;
     let mut warnings = Vec::new();
-    let specs = frames::effect_specs(&then, surroundings)?;
-    let lasting: Vec<EffectSpec> = specs.into_iter().filter(|s| lasts(s, &mut warnings)).collect();
+    let specs = then.model.effects().iter().map(|e| e.spec.clone());
+    let lasting: Vec<EffectSpec> = specs.filter(|s| lasts(s, &mut warnings)).collect();
     let model = if lasting.is_empty() {
         surroundings.clone()
     } else {
-        surroundings.with_effects(&lasting, &past.session)?
+        surroundings.with_effects(&lasting, &past.session())?
     };
     let nominal = model.nominal();
     let mut calibrated = nominal.clone();
@@ -45,21 +50,22 @@ pub fn place(past: &PastModel, pipeline: &Pipeline, surroundings: &Model) -> Res
         if !carried {
             continue;
         }
-        let known = past.parameters.get(&parameter.name).ok_or_else(|| Error::NotInResult {
-            result: past.path.clone(),
+        let known = then.model.index(&parameter.name).ok_or_else(|| Error::NotInResult {
+            result: result.to_owned(),
             parameter: parameter.name.clone(),
         })?;
-        if parameter.role == Role::Robot && (known.nominal - parameter.nominal).abs() > 1e-9 {
+        let nominal_then = then.model.parameters()[known].nominal;
+        if parameter.role == Role::Robot && (nominal_then - parameter.nominal).abs() > 1e-9 {
             return Err(Error::OtherArm {
-                result: past.path.clone(),
+                result: result.to_owned(),
                 parameter: parameter.name.clone(),
-                then: known.nominal,
+                then: nominal_then,
                 now: parameter.nominal,
             });
         }
-        calibrated[at] = known.value;
+        calibrated[at] = then.values[known];
     }
-    put_base(&model, &base(past, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
+    put_base(&model, &base(&then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
     Ok(Placed { model, nominal, calibrated, warnings })
 }
 
@@ -89,11 +95,13 @@ fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
 }
 
 /// The base as far as calibration and the new recordings know it together.
-fn base(past: &PastModel, pipeline: &Pipeline, now: &Pose) -> Pose {
+fn base(then: &PastArms, pipeline: &Pipeline, now: &Pose) -> Pose {
+    let measured = then.model.base_in_world(&then.model.nominal());
+    let calibrated = then.model.base_in_world(&then.values);
     match pipeline.frames.base.pose {
         FramePose::Given => *now,
-        FramePose::Measured => now * past.nominal_base.inverse() * past.fitted_base,
-        FramePose::Estimated => past.fitted_base,
+        FramePose::Measured => now * measured.inverse() * calibrated,
+        FramePose::Estimated => calibrated,
     }
 }
 

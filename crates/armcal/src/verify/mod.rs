@@ -18,7 +18,7 @@ use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
@@ -31,7 +31,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
     progress.step("comparing");
     let surroundings =
-        Surroundings { past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
+        Surroundings { result, past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
     let (placed, observations, mut warnings) = surroundings.settle()?;
     let names: Vec<String> = seen.iter().map(|s| s.name.clone()).collect();
     let joints = placed.model.chain().joint_names().to_vec();
@@ -46,13 +46,13 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     warnings.extend(placed.warnings.iter().cloned());
     Ok(Verification {
         pipeline: pipeline.name.clone(),
-        result: past.path.clone(),
+        result: result.to_owned(),
         effects: placed.model.effects().iter().map(|e| e.spec.to_string()).collect(),
         recordings,
         points: armcal_verify::points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
         paths: rows(motions, &names),
-        parameters: past.parameters.into_iter().collect(),
+        parameters: past.parameters,
         published: pipeline.verify.published.clone(),
         warnings,
     })
@@ -87,6 +87,7 @@ fn of_recording(seen: &Seen) -> Vec<Warning> {
 
 /// The new recordings, and what is put among them.
 struct Surroundings<'a> {
+    result: &'a Path,
     past: &'a PastModel,
     pipeline: &'a Pipeline,
     chain: &'a Chain,
@@ -101,11 +102,11 @@ impl Surroundings<'_> {
     /// estimated base and tip) are fitted to them, the arm left alone.
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
-        let mut placed = place(self.past, self.pipeline, &model)?;
+        let mut placed = place(self.past, self.result, self.pipeline, &model)?;
         let mut places = self.associate(&placed, false)?;
         if self.pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated) {
             frames::start_frames(self.pipeline, &mut model, &places);
-            placed = place(self.past, self.pipeline, &model)?;
+            placed = place(self.past, self.result, self.pipeline, &model)?;
         }
         let mut observations = self.observations(&places)?;
         let fitted = self.fit_frames(&mut placed, &observations)?;
@@ -160,7 +161,8 @@ fn frames_fitted(model: &Model) -> Warning {
 
 /// A recording that the calibration saw proves nothing.
 fn same_files(past: &PastModel, seen: &[Seen]) -> Vec<Warning> {
-    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| past.inputs_sha256.contains(&f.sha256));
+    let known: BTreeSet<&String> = past.recordings.iter().flat_map(|r| &r.sha256).collect();
+    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| known.contains(&f.sha256));
     let warn = |s: &Seen| {
         let message =
             "the calibration was made from this recording: its error here says nothing about new ones";

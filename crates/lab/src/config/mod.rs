@@ -9,7 +9,10 @@ pub use sensors::{
     BodyConfig, ClockConfig, EncoderConfig, JointFormat, PoseMessage, TableMarkers, TemperatureConfig,
     TransportConfig, ViconConfig,
 };
-pub use task::{FreeConfig, HandConfig, Order, PassConfig, StopConfig, SweepConfig, TaskConfig, TourConfig};
+pub use task::{
+    FreeConfig, HandConfig, Order, PassConfig, SetPointsConfig, StopConfig, SweepConfig, TaskConfig,
+    TourConfig,
+};
 
 use crate::LabError;
 use crate::mechanisms::{Keys, MechanismConfig};

@@ -3,6 +3,7 @@
 use super::{not_negative, positive, range, share, value};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// The task of every recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,6 +31,28 @@ pub struct TaskConfig {
     /// Recordings that visit given places instead.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tours: Vec<TourConfig>,
+    /// Recordings that are driven along set-points from a file instead.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub set_points: Vec<SetPointsConfig>,
+}
+
+/// A recording whose motors are given set-points from a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SetPointsConfig {
+    /// Name of the recording.
+    pub recording: String,
+    /// CSV file, relative to the lab file: columns `<columns>.<joint>_rad` and, for a path, `t_s` [s].
+    pub file: PathBuf,
+    /// Beginning of the names of the joints' columns. Default `set_point`.
+    #[serde(default = "set_point")]
+    pub columns: String,
+    /// Pause at each stop, or at both ends of a path [s]. Default 1.5.
+    #[serde(default = "pause_s")]
+    pub hold_s: f64,
+    /// Speed of the joint that goes furthest between two stops [deg/s]. Default 30.
+    #[serde(default = "speed_deg_s")]
+    pub speed_deg_s: f64,
 }
 
 /// A recording that visits given places, in their order, instead of passes and free poses.
@@ -173,6 +196,7 @@ impl Default for TaskConfig {
             sweep: SweepConfig::default(),
             set_point_hz: 100.0,
             tours: Vec::new(),
+            set_points: Vec::new(),
         }
     }
 }
@@ -230,6 +254,10 @@ impl TaskConfig {
         pause("task.free.hold_s", self.free.hold_s)?;
         self.free.range_deg.iter().try_for_each(|r| range("task.free.range_deg", *r))?;
         positive("task.sweep.speed_m_s", self.sweep.speed_m_s)?;
+        for told in &self.set_points {
+            pause("task.set_points.hold_s", [0.0, told.hold_s])?;
+            positive("task.set_points.speed_deg_s", told.speed_deg_s)?;
+        }
         if !(1.0..=500.0).contains(&self.set_point_hz) {
             return Err(value("task.set_point_hz", format!("must lie in 1..500, is {}", self.set_point_hz)));
         }
@@ -266,6 +294,18 @@ fn pause(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
     range(key, [low, high])?;
     not_negative(key, low)?;
     if high > 3600.0 { Err(value(key, format!("{high} s is more than an hour"))) } else { Ok(()) }
+}
+
+fn set_point() -> String {
+    "set_point".into()
+}
+
+fn pause_s() -> f64 {
+    1.5
+}
+
+fn speed_deg_s() -> f64 {
+    30.0
 }
 
 fn all() -> f64 {

@@ -6,7 +6,7 @@ use crate::spline::Path;
 use crate::trace::STEP_S;
 
 /// Steps of the motors for each row that is recorded while they swing.
-const STEPS_A_ROW: usize = 10;
+pub(super) const STEPS_A_ROW: usize = 10;
 
 /// After this a swing has died away [s].
 const SETTLED_S: f64 = 0.5;
@@ -71,7 +71,7 @@ impl Engine<'_> {
     }
 
     /// Lets the motors follow set-points that go from one position to another, and records where that leads.
-    fn swing(&mut self, [from, to]: &[Vec<f64>; 2], steps: usize) {
+    pub(super) fn swing(&mut self, [from, to]: &[Vec<f64>; 2], steps: usize) {
         let off: Vec<f64> = self.reading_rad.iter().zip(&self.servo.angle_rad).map(|(r, m)| r - m).collect();
         for step in 1..=steps {
             let share = step as f64 / steps as f64;

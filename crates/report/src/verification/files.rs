@@ -2,6 +2,7 @@
 
 use super::{PathSample, Published, Verification, VerifiedRecording};
 use crate::ReportError;
+use crate::past_model::Value;
 use crate::run::{Status, VERSION};
 use crate::tables::Columns;
 use armcal_core::Warning;
@@ -23,17 +24,9 @@ struct File<'a> {
     recordings: &'a [VerifiedRecording],
     points: &'a [PointsRow],
     paths: &'a [PathRow],
-    parameters: Vec<Parameter<'a>>,
+    parameters: &'a [Value],
     published: &'a [Published],
     warnings: &'a [Warning],
-}
-
-#[derive(Serialize)]
-struct Parameter<'a> {
-    name: &'a str,
-    nominal: f64,
-    value: f64,
-    sigma: f64,
 }
 
 /// `verification.json`: every row of every table in SI, indented, with a final newline. `before` is the nominal arm,
@@ -50,11 +43,7 @@ pub fn verification_json(v: &Verification) -> String {
         recordings: &v.recordings,
         points: &v.points,
         paths: &v.paths,
-        parameters: v
-            .parameters
-            .iter()
-            .map(|(name, p)| Parameter { name, nominal: p.nominal, value: p.value, sigma: p.sigma })
-            .collect(),
+        parameters: &v.parameters,
         published: &v.published,
         warnings: &v.warnings,
     };

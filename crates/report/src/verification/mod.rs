@@ -6,7 +6,7 @@ mod terminal;
 pub use files::{verification_files, verification_json};
 pub use terminal::verification_text;
 
-use crate::past_model::PastValue;
+use crate::past_model::Value;
 use crate::run::Status;
 use armcal_core::{Severity, Warning};
 use armcal_verify::{PathError, PathRow, PointsRow};
@@ -31,8 +31,8 @@ pub struct Verification {
     pub paths: Vec<PathRow>,
     /// The moving tip, frame by frame.
     pub samples: Vec<PathSample>,
-    /// Old and new parameters (Table 5), by name.
-    pub parameters: Vec<(String, PastValue)>,
+    /// Old and new parameters (Table 5), SI.
+    pub parameters: Vec<Value>,
     /// Numbers of somebody else, to stand beside these.
     pub published: Vec<Published>,
     /// What the user should know.

@@ -23,6 +23,9 @@ mod page;
 /// Parquet tables, parameters, the calibrated model.
 mod tables;
 
+/// `model.json`: the calibrated model comes back as it was.
+mod past_model;
+
 /// What a person reads.
 mod terminal;
 

@@ -165,6 +165,7 @@ fn attachments_and_metadata_are_the_inputs_and_ours() {
         ("armcal/summary.json", file("summary.json")),
         ("armcal/parameters.toml", file("parameters.toml")),
         ("armcal/calibrated.toml", file("calibrated.toml")),
+        ("armcal/model.json", file("model.json")),
         ("armcal/foxglove-layout.json", file("foxglove-layout.json")),
         ("armcal/foxglove-layout-legacy.json", file("foxglove-layout-legacy.json")),
     ];

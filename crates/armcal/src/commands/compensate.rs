@@ -1,0 +1,161 @@
+//! `armcal compensate`: set-points that bring the calibrated arm to Cartesian targets.
+
+use super::{Outcome, joint_range, print};
+use crate::compensate::table::Sheet;
+use crate::compensate::{
+    Drive, TargetFrame, in_world_m, placed, prepare, recording, recording_index, target_frame, targets,
+};
+use crate::error::Error;
+use armcal_compensate::{SetPoint, resample};
+use armcal_recording::atomic;
+use armcal_report::{PastArms, PastModel};
+use std::path::Path;
+
+/// What `armcal compensate` is asked to do.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    /// Results of a run.
+    pub result: &'a Path,
+    /// CSV or TOML.
+    pub targets: &'a Path,
+    /// CSV to write.
+    pub out: &'a Path,
+    /// MCAP to write.
+    pub mcap: Option<&'a Path>,
+    /// `world`, `base`, `board.NAME`.
+    pub frame: &'a str,
+    /// Joints before the first target, joined by commas [deg].
+    pub start: Option<&'a str>,
+    /// Recording as in which the arm is.
+    pub recording: Option<&'a str>,
+    /// Load [kg].
+    pub load_kg: Option<f64>,
+    /// Temperature [degC].
+    pub temperature_c: Option<f64>,
+    /// Approach [deg].
+    pub approach_deg: f64,
+    /// Points a second of a path.
+    pub rate_hz: Option<f64>,
+    /// `JOINT=LOW..HIGH`.
+    pub ranges: &'a [String],
+    /// JSON instead of a table.
+    pub json: bool,
+}
+
+/// Reads model and targets, computes, writes, prints.
+pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+    let past = PastModel::open(request.result)?;
+    let arms = past.arms()?;
+    let frame = target_frame(&past, request.frame)?;
+    let compensator = prepare(&past, &arms, frame, &drive(request, &past, &arms)?)?;
+    let mut targets = placed(&arms, frame, &targets::read(request.targets)?)?;
+    if let Some(rate_hz) = request.rate_hz {
+        if !(rate_hz > 0.0 && rate_hz <= 1e4) {
+            return Err(bad("--rate", rate_hz.to_string(), "give points a second, up to 10000"));
+        }
+        targets = resample(&targets, rate_hz)?;
+    }
+    let start = request.start.map(|words| joints(words, &arms)).transpose()?;
+    let points = compensator.set_points(&targets, start.as_deref())?;
+
+    let chain = arms.geometry.chain();
+    let in_world_m = points.iter().map(|p| in_world_m(&arms, frame, &p.target)).collect();
+    let sheet = Sheet {
+        chain,
+        points: &points,
+        in_world_m,
+        notes: notes(&past, &arms, frame, &compensator.conditions),
+    };
+    atomic::write(request.out, &sheet.csv().map_err(Error::Csv)?).map_err(Error::Output)?;
+    if let Some(path) = request.mcap {
+        recording::write(path, chain.joint_names(), &points).map_err(Error::Output)?;
+    }
+    if request.json {
+        print(&super::json_text(&sheet.json())?);
+    } else {
+        print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()));
+    }
+    Ok(if past.missing.is_empty() && points.iter().all(settled) { Outcome::Done } else { Outcome::Doubtful })
+}
+
+/// Whether the model predicts the tip at the target.
+fn settled(point: &SetPoint) -> bool {
+    point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
+}
+
+fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Drive, Error> {
+    if request.load_kg.is_some_and(|l| !(l.is_finite() && l >= 0.0)) {
+        return Err(bad("--load", format!("{:?}", request.load_kg), "give a mass in kg, zero or more"));
+    }
+    if !(0.0..=45.0).contains(&request.approach_deg) {
+        return Err(bad("--approach", request.approach_deg.to_string(), "give an angle from 0 to 45 deg"));
+    }
+    let names = arms.geometry.chain().joint_names();
+    let range = |words: &String| {
+        let problem = "write a joint's number or name and its range, such as 2=-75..20";
+        joint_range(words, names).ok_or_else(|| bad("--range", words.clone(), problem))
+    };
+    let recording = request
+        .recording
+        .map(|name| recording_index(past, name).map_err(|problem| bad("--as-in", name.to_owned(), &problem)));
+    Ok(Drive {
+        recording: recording.transpose()?,
+        load_kg: request.load_kg,
+        temperature_c: request.temperature_c.filter(|t| t.is_finite()),
+        ranges: request.ranges.iter().map(range).collect::<Result<_, Error>>()?,
+        approach_deg: request.approach_deg,
+    })
+}
+
+/// `0, -30, 10` in display units as a joint vector, SI.
+fn joints(words: &str, arms: &PastArms) -> Result<Vec<f64>, Error> {
+    let chain = arms.geometry.chain();
+    let parsed: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();
+    let expected = chain.joint_names().len();
+    let parsed = parsed.filter(|all| all.len() == expected && all.iter().all(|q| q.is_finite()));
+    let shown = parsed.ok_or_else(|| {
+        bad("--from", words.to_owned(), &format!("give {expected} joints in degrees, joined by commas"))
+    })?;
+    Ok(shown.iter().enumerate().map(|(j, q)| q / chain.joint_unit(j).to_display(1.0)).collect())
+}
+
+/// What holds for every set-point.
+fn notes(
+    past: &PastModel,
+    arms: &PastArms,
+    frame: TargetFrame,
+    conditions: &armcal_compensate::Conditions,
+) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !past.missing.is_empty() {
+        notes.push(format!(
+            "the diagnosis of `{}` would add {}: what the model lacks stays in the error; `armcal add suggested` first",
+            past.pipeline,
+            past.missing.join(", ")
+        ));
+    }
+    let recording = past.recordings.get(conditions.recording).map_or("none", |r| r.name.as_str());
+    let temperature = conditions.temperature_c.map_or(String::new(), |t| format!(", {t:.1} degC"));
+    notes.push(format!(
+        "as in recording `{recording}`, load {} kg{temperature}; the model's mean error where it was tested is {:.2} mm",
+        conditions.load_kg,
+        past.mean_error_m * 1e3
+    ));
+    if arms.model.effects().iter().any(|e| e.spec.kind == "effort_compliance") {
+        notes.push("the effort of a motor is not known beforehand: effort_compliance is left at zero".into());
+    }
+    if let TargetFrame::Board(index) = frame
+        && let Some(facts) = past.recordings.get(index)
+    {
+        notes.push(format!("targets lie on the board where it stood in `{}`", facts.name));
+    }
+    notes.push(
+        "servo errors at rest are taken to be zero, moves between set-points as joint-interpolated without overshoot"
+            .into(),
+    );
+    notes
+}
+
+fn bad(option: &'static str, value: String, problem: &str) -> Error {
+    Error::BadOption { option, value, problem: problem.to_owned() }
+}

@@ -1,0 +1,127 @@
+//! The inverse of a model whose tip depends on the direction of arrival.
+//!
+//! A gap makes the tip a path-dependent function of the readings, flat where the gap is being crossed: Newton steps on
+//! it stall. So a direction is assumed for every joint (and every sum and difference of neighbours, for belts), the
+//! smooth problem solved in which all gaps are closed on that side, and the answer put to the model with the path that
+//! really leads there. If a joint would travel the other way than assumed, its direction is turned and the problem
+//! solved again. Only the last step decides: what is returned is what the model predicts for the commanded path.
+
+use crate::inverse::{Limits, Miss, solve};
+use crate::past::Past;
+use crate::set_points::Arm;
+use armcal_core::Observation;
+use std::collections::VecDeque;
+
+/// A prediction this close to the target is at it [m].
+pub(crate) const ACCEPTED_M: f64 = 1e-6;
+/// The same of its orientation [rad].
+const ACCEPTED_RAD: f64 = 1e-6;
+
+/// A set-point and what the model predicts for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The readings [rad].
+    pub joint_rad: Vec<f64>,
+    /// The commanded path up to and including them.
+    pub past: Past,
+    /// Distance from the target to the prediction [m].
+    pub left_m: f64,
+    /// Rotation between them [rad]; zero where no orientation was asked for.
+    pub left_rad: f64,
+}
+
+impl Found {
+    /// Whether the prediction is at the target. If not, no direction of travel agrees with itself: the arm must come
+    /// from further away.
+    pub fn settled(&self) -> bool {
+        self.left_m <= ACCEPTED_M && self.left_rad <= ACCEPTED_RAD
+    }
+
+    fn better_than(&self, other: &Option<Found>) -> bool {
+        other.as_ref().is_none_or(|other| self.left_m + self.left_rad < other.left_m + other.left_rad)
+    }
+}
+
+/// How the arm goes from the last set-point to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Way<'a> {
+    /// Straight.
+    Direct,
+    /// By a point this far before the target, joint by joint [rad].
+    By(&'a [f64]),
+}
+
+impl Way<'_> {
+    pub fn past(&self, before: &Past, joint_rad: &[f64]) -> Past {
+        match self {
+            Way::Direct => before.then(joint_rad),
+            Way::By(_) => before.then(&self.via(joint_rad)).then(joint_rad),
+        }
+    }
+
+    /// The point on the way; the target itself where there is none.
+    pub fn via(&self, joint_rad: &[f64]) -> Vec<f64> {
+        match self {
+            Way::Direct => joint_rad.to_vec(),
+            Way::By(off_rad) => joint_rad.iter().zip(*off_rad).map(|(q, off)| q - off).collect(),
+        }
+    }
+}
+
+/// The set-point that brings the tip to `target`, after the path `before`, near `start_rad`.
+pub(crate) fn invert(
+    arm: &Arm<'_>,
+    target: &Observation,
+    before: &Past,
+    way: Way<'_>,
+    start_rad: &[f64],
+    limits: &Limits,
+) -> Result<Found, Miss> {
+    let found = |joint_rad: Vec<f64>| {
+        let past = way.past(before, &joint_rad);
+        let (left_m, left_rad) = arm.left(target, &past, &joint_rad);
+        Found { joint_rad, past, left_m, left_rad }
+    };
+    let travelled =
+        |start: &[f64]| solve(|q| arm.linearised(target, &way.past(before, q), q), start, limits).map(found);
+    if let (Way::Direct, Some(stood)) = (way, before.joint_rad()) {
+        let there = found(stood);
+        if there.settled() {
+            return Ok(there);
+        }
+    }
+    let turned = |q: &[f64]| before.then(&way.via(q)).signs(q);
+    let (mut best, mut missed): (Option<Found>, Option<Miss>) = (None, None);
+    let mut tried: Vec<Vec<f64>> = Vec::new();
+    let mut open = VecDeque::from([turned(start_rad)]);
+    while let Some(signs) = open.pop_front() {
+        if tried.contains(&signs) || tried.len() > 4 * signs.len() {
+            continue;
+        }
+        let assumed = |q: &[f64]| arm.linearised(target, &before.arriving(q, &signs), q);
+        match solve(assumed, start_rad, limits) {
+            Err(miss) => missed = missed.or(Some(miss)),
+            Ok(joint_rad) => {
+                let there = found(joint_rad);
+                if there.settled() {
+                    return Ok(there);
+                }
+                open.push_back(turned(&there.joint_rad));
+                if there.better_than(&best) {
+                    best = Some(there);
+                }
+            }
+        }
+        open.extend((0..signs.len()).map(|lane| {
+            let mut other = signs.clone();
+            other[lane] = -other[lane];
+            other
+        }));
+        tried.push(signs);
+    }
+    let Some(best) = best else {
+        return missed.map_or_else(|| travelled(start_rad), Err);
+    };
+    // A move shorter than a gap, with an effect that resolves it only in part, is smooth again.
+    Ok(travelled(&best.joint_rad).ok().filter(Found::settled).unwrap_or(best))
+}

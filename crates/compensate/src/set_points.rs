@@ -1,0 +1,241 @@
+//! One target after the other: the set-point of the nominal arm, the corrected one, and what each would reach.
+
+use crate::direction::{Way, invert};
+use crate::inverse::{Limits, Miss};
+use crate::{CompensateError, Conditions, Past, Target};
+use armcal_core::{Arrival, Observation};
+use armcal_model::{Model, ModelResidual};
+use nalgebra::DMatrix;
+
+/// Postures from which a solution is tried, at most.
+const MOST_STARTS: usize = 6;
+/// A model and its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// A value for each of its parameters.
+    pub values: Vec<f64>,
+}
+
+impl Arm<'_> {
+    pub(crate) fn linearised(
+        &self,
+        target: &Observation,
+        past: &Past,
+        q: &[f64],
+    ) -> (ModelResidual, DMatrix<f64>) {
+        self.model.residual_with_joint_jacobian(&self.values, &at(target, past, q))
+    }
+
+    /// What is left to the target after this past: distance [m] and rotation [rad].
+    pub(crate) fn left(&self, target: &Observation, past: &Past, q: &[f64]) -> (f64, f64) {
+        let residual = self.model.residual(&self.values, &at(target, past, q));
+        (residual.position_m.norm(), residual.rotation_rad.map_or(0.0, |r| r.norm()))
+    }
+}
+
+/// The target with readings and their past.
+pub(crate) fn at(target: &Observation, past: &Past, q: &[f64]) -> Observation {
+    let mut o = target.clone();
+    past.clone().into_observation(q, &mut o);
+    o
+}
+
+/// Everything but the targets.
+#[derive(Debug, Clone)]
+pub struct Compensator<'a> {
+    /// The arm as the controller knows it: no effects, nominal geometry.
+    pub nominal: Arm<'a>,
+    /// The arm as calibrated, with its effects.
+    pub calibrated: Arm<'a>,
+    /// Under which conditions it is driven.
+    pub conditions: Conditions,
+    /// What each joint can do.
+    pub limits: Limits,
+    /// Postures the arm is known to take [rad]: a solution is looked for near the one that is nearest.
+    pub postures_rad: Vec<Vec<f64>>,
+    /// Range of each joint in the calibration [rad].
+    pub recorded_rad: Vec<[f64; 2]>,
+    /// Size of an approach before every target, all joints in their direction of travel [rad]; 0 for none.
+    pub approach_rad: f64,
+}
+
+/// What a row of the output is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A target.
+    Target,
+    /// A point on the way to the target that follows, from which every joint moves in a known direction.
+    Approach,
+}
+
+/// What the calibrated model predicts for a target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reached {
+    /// Error of the tip at the nominal set-point [m].
+    pub before_m: f64,
+    /// The same at the corrected one [m].
+    pub after_m: f64,
+    /// Error of the orientation at both [rad], where one was asked for.
+    pub turn_rad: Option<[f64; 2]>,
+}
+
+/// A set-point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetPoint {
+    /// The target.
+    pub target: Target,
+    /// Whether this is the target or the way to it.
+    pub kind: Kind,
+    /// What a controller with the nominal model commands [rad] (sliding: [m]).
+    pub nominal_rad: Vec<f64>,
+    /// What brings the tip there [rad] (sliding: [m]).
+    pub joint_rad: Vec<f64>,
+    /// Direction in which each joint arrives at the corrected set-point.
+    pub arrival: Vec<Arrival>,
+    /// What both reach; `None` for an approach.
+    pub reached: Option<Reached>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Compensator<'_> {
+    /// A set-point for every target, in their order; each begins where the one before it ends.
+    ///
+    /// `start_rad` is where the arm waits before the first; without it the first directions of arrival are not known.
+    ///
+    /// # Errors
+    /// The first target that cannot be reached or makes no sense, by name.
+    pub fn set_points(
+        &self,
+        targets: &[Target],
+        start_rad: Option<&[f64]>,
+    ) -> Result<Vec<SetPoint>, CompensateError> {
+        self.check(targets, start_rad)?;
+        let joints = self.nominal.model.joint_count();
+        let start = start_rad.map_or_else(|| Past::unknown(joints), Past::at);
+        let mut pasts = [start.clone(), start];
+        let mut out: Vec<SetPoint> = Vec::with_capacity(targets.len());
+        for (i, target) in targets.iter().enumerate() {
+            let follows = i > 0 && target.time_s.is_some();
+            let [nominal_past, past] = &pasts;
+            let o = self.conditions.observation(target, joints);
+            let nominal =
+                self.nominal_set_point(target, &o, if follows { nominal_past.joint_rad() } else { None })?;
+            let offs = self.approach(target, [nominal_past, past], &nominal);
+            let [nominal_way, way] =
+                [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
+            let found = invert(&self.calibrated, &o, past, way, &nominal, &self.limits)
+                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 1))?;
+            let nominal_after = nominal_way.past(nominal_past, &nominal);
+            if offs.is_some() {
+                out.push(approach_point(target, nominal_way.via(&nominal), way.via(&found.joint_rad), past));
+            }
+            let before = self.calibrated.left(&o, &nominal_after, &nominal);
+            let leap = out.last().filter(|_| follows).and_then(|last| self.leap(last, &found, &nominal));
+            let mut warnings = self.warnings(target, &o, past, &found, offs.is_some());
+            warnings.extend(leap);
+            out.push(SetPoint {
+                target: target.clone(),
+                kind: Kind::Target,
+                nominal_rad: nominal,
+                joint_rad: found.joint_rad,
+                arrival: found.past.arrival(),
+                reached: Some(Reached {
+                    before_m: before.0,
+                    after_m: found.left_m,
+                    turn_rad: target.has_orientation().then_some([before.1, found.left_rad]),
+                }),
+                warnings,
+            });
+            pasts = [nominal_after, found.past];
+        }
+        Ok(out)
+    }
+
+    fn check(&self, targets: &[Target], start_rad: Option<&[f64]>) -> Result<(), CompensateError> {
+        let joints = self.nominal.model.joint_count();
+        if targets.is_empty() {
+            return Err(CompensateError::NoTargets);
+        }
+        targets.iter().try_for_each(|target| target.check(joints))?;
+        let wrong = |what, problem: String| Err(CompensateError::BadJoints { what, problem });
+        if let Some(start) = start_rad
+            && (start.len() != joints || !start.iter().all(|q| q.is_finite()))
+        {
+            return wrong("start", format!("needs {joints} finite joint readings, one a joint"));
+        }
+        let Limits(limits) = &self.limits;
+        if limits.len() != joints || !limits.iter().all(|[low, high]| low <= high) {
+            return wrong("limits", format!("need {joints} ranges, each from low to high"));
+        }
+        Ok(())
+    }
+
+    /// Inverse kinematics of the nominal arm: from where it stands on a path, else from the nearest known posture.
+    fn nominal_set_point(
+        &self,
+        target: &Target,
+        o: &Observation,
+        stands_rad: Option<Vec<f64>>,
+    ) -> Result<Vec<f64>, CompensateError> {
+        let unknown = Past::unknown(self.nominal.model.joint_count());
+        let mut nearest: Option<Miss> = None;
+        let mut count = 0;
+        for start in stands_rad.into_iter().chain(self.starts(o, &unknown)) {
+            count += 1;
+            match invert(&self.nominal, o, &unknown, Way::Direct, &start, &self.limits) {
+                Ok(found) => return Ok(found.joint_rad),
+                Err(miss) if nearest.as_ref().is_none_or(|n| miss.left_m < n.left_m) => nearest = Some(miss),
+                Err(_) => {}
+            }
+        }
+        let Some(nearest) = nearest else {
+            let problem = "no posture to start from: give ranges of the joints".to_owned();
+            return Err(CompensateError::BadJoints { what: "postures", problem });
+        };
+        Err(self.unreachable(target, "nominal", &nearest, count))
+    }
+
+    /// Where to start looking: known postures, nearest first, then the middle of what was recorded. Sorted only when
+    /// somebody asks.
+    fn starts<'s>(&'s self, o: &'s Observation, unknown: &'s Past) -> impl Iterator<Item = Vec<f64>> + 's {
+        std::iter::once_with(move || {
+            let off_m = |q: &Vec<f64>| self.nominal.left(o, &unknown.then(q), q).0;
+            let mut starts: Vec<(f64, &Vec<f64>)> = self.postures_rad.iter().map(|q| (off_m(q), q)).collect();
+            starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let middle = self.recorded_rad.iter().map(|[low, high]| (low + high) / 2.0).collect();
+            let known = starts.into_iter().map(|(_, q)| q.clone()).take(MOST_STARTS);
+            known.chain([middle]).collect::<Vec<Vec<f64>>>()
+        })
+        .flatten()
+    }
+
+    /// How far before the target each joint passes on its way, for the nominal and the corrected set-point; `None`
+    /// where the way is direct: on a path, or where nobody asks.
+    fn approach(&self, target: &Target, pasts: [&Past; 2], nominal: &[f64]) -> Option<[Vec<f64>; 2]> {
+        if self.approach_rad <= 0.0 || target.time_s.is_some() {
+            return None;
+        }
+        let off = |past: &Past| {
+            let signs = past.signs(nominal).into_iter().take(nominal.len());
+            signs.map(|sign| if sign < 0.0 { -self.approach_rad } else { self.approach_rad }).collect()
+        };
+        Some(pasts.map(off))
+    }
+}
+
+fn approach_point(target: &Target, nominal_rad: Vec<f64>, joint_rad: Vec<f64>, before: &Past) -> SetPoint {
+    let arrival = before.then(&joint_rad).arrival();
+    let kind = Kind::Approach;
+    SetPoint {
+        target: target.clone(),
+        kind,
+        nominal_rad,
+        joint_rad,
+        arrival,
+        reached: None,
+        warnings: Vec::new(),
+    }
+}

@@ -1,0 +1,78 @@
+//! Is the direction that the model is told the direction of the move?
+
+use super::*;
+use crate::{Kind, Target};
+
+const WIDTH_RAD: f64 = 0.02;
+
+/// Points on a circle about the base: only joint 1 moves, so its set-points have a closed form.
+fn around(angles_rad: &[f64]) -> (Vec<Target>, Vec<f64>) {
+    let nominal = bare(RIGHT_ARM);
+    let posture = |a: f64| vec![a, -0.6, 0.2];
+    let tip = |a: &f64| tip_after(&nominal, &nominal.nominal(), &[posture(*a)]);
+    let target = |(i, a): (usize, &f64)| Target::in_world(format!("t{i}"), tip(a), None);
+    (angles_rad.iter().enumerate().map(target).collect(), posture(angles_rad[0] - 0.3))
+}
+
+fn first_joint(points: &[crate::SetPoint]) -> Vec<f64> {
+    points.iter().map(|point| point.joint_rad[0]).collect()
+}
+
+#[test]
+fn a_joint_that_turns_back_is_sent_further_by_its_gap() {
+    let (model, values) = deviating(RIGHT_ARM, &[], &[("backlash:1", &[WIDTH_RAD])]);
+    let nominal = bare(RIGHT_ARM);
+    // The third step back is shorter than the gap, and the fourth target is the third again.
+    let angles = [0.1, 0.3, 0.299, 0.299, 0.1];
+    let (targets, start) = around(&angles);
+    let points = compensator(&nominal, (&model, &values)).set_points(&targets, Some(&start)).unwrap();
+    let half = WIDTH_RAD / 2.0;
+    let expected = [0.1 + half, 0.3 + half, 0.299 - half, 0.299 - half, 0.1 - half];
+    for (found, expected) in first_joint(&points).into_iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    assert!(points.iter().all(|p| p.reached.as_ref().unwrap().after_m < 1e-6));
+    // Half the gap at the distance of the tip from the axis.
+    let lever_m = targets[0].position_m().xy().norm();
+    let before_m = points[0].reached.as_ref().unwrap().before_m;
+    assert!((before_m - 2.0 * lever_m * (half / 2.0).sin()).abs() < 1e-6);
+    // The nominal set-point of the third does not move the link at all.
+    let stuck_m = points[2].reached.as_ref().unwrap().before_m;
+    assert!((stuck_m - 2.0 * lever_m * ((half - 0.001) / 2.0).sin()).abs() < 1e-6, "{stuck_m}");
+}
+
+#[test]
+fn where_no_direction_agrees_with_itself_it_is_said_and_an_approach_helps() {
+    // A link that leads its encoder: to go a little up, the encoder would have to come from above.
+    let (model, values) = deviating(RIGHT_ARM, &[], &[("backlash:1", &[-WIDTH_RAD])]);
+    let nominal = bare(RIGHT_ARM);
+    let (targets, start) = around(&[0.1, 0.102]);
+    let mut all = compensator(&nominal, (&model, &values));
+    let points = all.set_points(&targets, Some(&start)).unwrap();
+    let [.., last] = &points[..] else { panic!("no points") };
+    if last.reached.as_ref().unwrap().after_m > 1e-6 {
+        assert!(last.warnings.iter().any(|w| w.contains("agrees with itself")), "{:?}", last.warnings);
+    }
+    all.approach_rad = 0.05;
+    let points = all.set_points(&targets, Some(&start)).unwrap();
+    assert_eq!(points.len(), 4);
+    assert!(points.iter().step_by(2).all(|p| p.kind == Kind::Approach));
+    for point in points.iter().skip(1).step_by(2) {
+        assert!(point.reached.as_ref().unwrap().after_m < 1e-6, "{point:?}");
+    }
+}
+
+#[test]
+fn an_unknown_past_is_said() {
+    let (model, values) = deviating(RIGHT_ARM, &[], &[("backlash:1", &[WIDTH_RAD])]);
+    let nominal = bare(RIGHT_ARM);
+    let (targets, start) = around(&[0.1, 0.3]);
+    let all = compensator(&nominal, (&model, &values));
+    let blind = all.set_points(&targets, None).unwrap();
+    assert!(blind[0].warnings.iter().any(|w| w.contains("joint1") && w.contains("not known")), "{blind:?}");
+    assert!(blind[1].warnings.is_empty(), "{:?}", blind[1].warnings);
+    assert_eq!(blind[0].arrival[0], Arrival::Unknown);
+    assert!(all.set_points(&targets, Some(&start)).unwrap()[0].warnings.is_empty());
+    // Only joints on which something depends are worth a word.
+    assert!(!blind[0].warnings.iter().any(|w| w.contains("joint2")));
+}
