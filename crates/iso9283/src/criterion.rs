@@ -78,6 +78,8 @@ pub struct Assessment {
     pub criteria: Vec<Criterion>,
     /// All others, in the order of the standard.
     pub not_measured: Vec<NotMeasured>,
+    /// Where the whole test falls short of the standard's, or is not known to follow it.
+    pub notes: Vec<String>,
 }
 
 impl Assessment {
@@ -167,8 +169,8 @@ impl Findings {
         self.lacks.push((what, None, at.to_owned(), why.to_string()));
     }
 
-    pub fn finish(self) -> Assessment {
-        let mut assessment = Assessment::default();
+    pub fn finish(self, notes: Vec<String>) -> Assessment {
+        let mut assessment = Assessment { notes, ..Assessment::default() };
         let parts =
             CHARACTERISTICS.iter().flat_map(|&what| what.components.iter().map(move |part| (what, *part)));
         for (what, component) in parts {

@@ -19,6 +19,7 @@ pub struct Crossing {
 
 /// One possible crossing, and the best chain of crossings that ends with it.
 struct Candidate {
+    plane: usize,
     /// Index of the sample before, and the fraction of the way to the next: orders crossings in time.
     at: (usize, f64),
     crossing: Crossing,
@@ -30,33 +31,42 @@ struct Candidate {
 /// belong to the path.
 pub fn cross(planes: &[Plane], run: &[TimedPose], reach_m: f64) -> Vec<Option<Crossing>> {
     let mut candidates: Vec<Candidate> = Vec::new();
-    let mut plane_of: Vec<usize> = Vec::new();
+    // Chains so far that no earlier one undercuts, in order of time: costs fall from each to the next.
+    let mut cheapest: Vec<usize> = Vec::new();
     for (index, plane) in planes.iter().enumerate() {
         let earlier = candidates.len();
         for (at, crossing) in crossings(plane, run) {
             let distance_m = (crossing.pose.position_m - plane.pose.position_m).norm();
             if distance_m <= reach_m {
+                let ended = cheapest.partition_point(|&chain| candidates[chain].at < at);
+                let before = ended.checked_sub(1).map(|last| cheapest[last]);
                 // Every plane crossed saves `reach_m`, so that a chain leaves out no crossing that it could have.
-                let before = cheapest(&candidates[..earlier], at);
-                let cost_m = distance_m - reach_m + before.map_or(0.0, |b| candidates[b].cost_m);
-                candidates.push(Candidate { at, crossing, cost_m, before });
-                plane_of.push(index);
+                let cost_m = distance_m - reach_m + before.map_or(0.0, |chain| candidates[chain].cost_m);
+                candidates.push(Candidate { plane: index, at, crossing, cost_m, before });
             }
         }
+        cheapest.extend(earlier..candidates.len());
+        keep_cheapest(&candidates, &mut cheapest);
     }
     let mut found = vec![None; planes.len()];
-    let mut next = cheapest(&candidates, (usize::MAX, 0.0));
-    while let Some(index) = next {
-        found[plane_of[index]] = Some(candidates[index].crossing);
-        next = candidates[index].before;
+    let mut next = cheapest.last().copied();
+    while let Some(chain) = next {
+        found[candidates[chain].plane] = Some(candidates[chain].crossing);
+        next = candidates[chain].before;
     }
     found
 }
 
-/// The cheapest chain among those that end before `at`; the first of equals.
-fn cheapest(candidates: &[Candidate], at: (usize, f64)) -> Option<usize> {
-    let earlier = candidates.iter().enumerate().filter(|(_, candidate)| candidate.at < at);
-    earlier.min_by(|a, b| a.1.cost_m.total_cmp(&b.1.cost_m)).map(|(index, _)| index)
+/// Leaves the chains that cost less than every earlier one, in order of time.
+fn keep_cheapest(candidates: &[Candidate], chains: &mut Vec<usize>) {
+    let when = |chain: usize| candidates[chain].at;
+    chains.sort_by(|&a, &b| when(a).0.cmp(&when(b).0).then(when(a).1.total_cmp(&when(b).1)));
+    let mut least_m = f64::INFINITY;
+    chains.retain(|&chain| {
+        let cheaper = candidates[chain].cost_m < least_m;
+        least_m = least_m.min(candidates[chain].cost_m);
+        cheaper
+    });
 }
 
 /// All crossings of a plane from behind to before it.

@@ -19,7 +19,7 @@ pub struct Settling {
 impl Settling {
     /// Time from the first crossing until the tip stays within the band [s].
     pub fn time_s(&self) -> f64 {
-        (self.settled_ns - self.crossed_ns) as f64 * 1e-9
+        elapsed_s(self.crossed_ns, self.settled_ns)
     }
 }
 
@@ -63,9 +63,14 @@ fn entry_ns(pair: &[TimedPose], centre_m: &Vector3<f64>, band_m: f64) -> Option<
     (0.0..=1.0).contains(&s).then(|| between_ns(pair[0].time_ns, pair[1].time_ns, s))
 }
 
+/// Seconds from one time to another [ns]; wild times of a damaged file saturate.
+pub(crate) fn elapsed_s(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
+
 /// The time a fraction `s` of the way between two times [ns].
 pub(crate) fn between_ns(from_ns: i64, to_ns: i64, s: f64) -> i64 {
-    from_ns + ((to_ns - from_ns) as f64 * s).round() as i64
+    from_ns.saturating_add((to_ns.saturating_sub(from_ns) as f64 * s).round() as i64)
 }
 
 /// Position stabilization time t [s]: the mean over the cycles (ISO 9283:1998, 7.4; it asks for three).
@@ -87,7 +92,7 @@ pub fn posing_time_s(cycles: &[[i64; 2]]) -> Result<f64, IsoError> {
     Ok(mean(
         &cycles
             .iter()
-            .map(|[departed_ns, settled_ns]| (settled_ns - departed_ns) as f64 * 1e-9)
+            .map(|[departed_ns, settled_ns]| elapsed_s(*departed_ns, *settled_ns))
             .collect::<Vec<_>>(),
     ))
 }

@@ -3,7 +3,7 @@
 
 use crate::IsoError;
 use crate::command::CommandPath;
-use crate::settling::{between_ns, check_run};
+use crate::settling::{between_ns, check_run, elapsed_s};
 use crate::stats::mean;
 use crate::tip_pose::TimedPose;
 use nalgebra::{Matrix3, Vector3};
@@ -62,12 +62,12 @@ pub fn weave_of(centre: &CommandPath, run: &[TimedPose], stroke_m: f64) -> Resul
     let (Some(first), Some(last), false) = (swings.get(1), swings.last(), whole_m.is_empty()) else {
         return Err(IsoError::NoWeave { stroke_mm: stroke_m * 1e3 });
     };
-    let crossing_s = |piece: usize| {
+    let crossing_ns = |piece: usize| {
         let s = aside_m[piece] / (aside_m[piece] - aside_m[piece + 1]);
-        (between_ns(run[piece].time_ns, run[piece + 1].time_ns, s) - run[0].time_ns) as f64 * 1e-9
+        between_ns(run[piece].time_ns, run[piece + 1].time_ns, s)
     };
     let half_swings = (swings.len() - 2) as f64;
-    let duration_s = crossing_s(last.1) - crossing_s(first.1);
+    let duration_s = elapsed_s(crossing_ns(first.1), crossing_ns(last.1));
     Ok(Weave { stroke_m: mean(whole_m), frequency_hz: half_swings / 2.0 / duration_s })
 }
 

@@ -9,6 +9,7 @@ use crate::criterion::{Findings, Place};
 use crate::evidence::{PathTest, Settings};
 use crate::path::{OverPath, path_accuracy, path_repeatability};
 use crate::planes::{Crossing, cross};
+use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
 use crate::velocity::{velocity_accuracy, velocity_fluctuation_m_s, velocity_repeatability};
 use crate::weaving::{frequency_error, stroke_error, weave_of};
@@ -134,7 +135,7 @@ fn speeds_m_s(crossings: &[Option<Crossing>]) -> Vec<f64> {
     let moving = pieces.filter(|(from, to)| to.time_ns > from.time_ns);
     moving
         .map(|(from, to)| {
-            (to.pose.position_m - from.pose.position_m).norm() / ((to.time_ns - from.time_ns) as f64 * 1e-9)
+            (to.pose.position_m - from.pose.position_m).norm() / elapsed_s(from.time_ns, to.time_ns)
         })
         .collect()
 }

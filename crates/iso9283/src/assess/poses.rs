@@ -9,6 +9,7 @@ use crate::catalogue::{
 use crate::criterion::{Findings, Place};
 use crate::drift::{Drift, accuracy_drift, repeatability_drift};
 use crate::pose::{accuracy_variation, pose_accuracy, pose_repeatability};
+use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
 
 /// How long the standard watches for drift [h].
@@ -57,8 +58,8 @@ fn assess_drift(known: &Cycles<'_>, place: &Place<'_>, findings: &mut Findings) 
         return;
     }
     let blocks: Vec<Vec<TipPose>> = attained.chunks_exact(size).map(<[TipPose]>::to_vec).collect();
-    let watched_ns = known.visits[known.visits.len() - 1].time_ns - known.visits[0].time_ns;
-    let hours = watched_ns as f64 * 1e-9 / 3600.0;
+    let ends = [&known.visits[0], &known.visits[known.visits.len() - 1]];
+    let hours = elapsed_s(ends[0].time_ns, ends[1].time_ns) / 3600.0;
     let short = (hours < DRIFT_H).then(|| format!("over {hours:.2} h instead of {DRIFT_H} h"));
     let notes: Vec<String> = place.notes.iter().cloned().chain(short).collect();
     let place = Place { at: place.at, n: size, notes: &notes };
