@@ -1,8 +1,8 @@
-//! The one list of all criteria: clause, symbol, name, what the standard asks for, what each needs. Tables and the list of what a
-//! recording cannot show iterate it.
+//! The one list of all criteria: clause, symbol, name, what the standard asks for, what each needs. Tables and the
+//! list of what a recording cannot show iterate it.
 //!
-//! Clauses are cited as deep as they could be confirmed from published tables of contents of the standard (and of its identical
-//! adoption GB/T 12642-2013): three levels in 7.2 and 7.3, two in 7.4 to 8.6, one in 9 to 11.
+//! Clauses are cited as deep as they could be confirmed from published tables of contents of the standard (and of
+//! its identical adoption GB/T 12642-2013): three levels in 7.2 and 7.3, two in 7.4 to 8.6, one in 9 to 11.
 
 use armcal_core::Unit;
 
@@ -174,7 +174,8 @@ characteristics! {
         "needs visits to commanded poses";
     POSE_REPEATABILITY: "7.2.2" "RP" "pose repeatability", [Radius, A, B, C], [A, B, C], Length, 30 cycles,
         "needs repeated visits to a commanded pose from one direction";
-    ACCURACY_VARIATION: "7.2.3" "vAP" "multi-directional pose accuracy variation", [Position, A, B, C], [], Length, 30 cycles, "needs repeated approaches to a commanded pose from 3 directions";
+    ACCURACY_VARIATION: "7.2.3" "vAP" "multi-directional pose accuracy variation", [Position, A, B, C],
+        [], Length, 30 cycles, "needs repeated approaches to a commanded pose from 3 directions";
     DISTANCE_ACCURACY: "7.3.2" "AD" "distance accuracy", [Position, X, Y, Z, A, B, C], [], Length, 30 cycles,
         "needs moves from one commanded pose to another";
     DISTANCE_REPEATABILITY: "7.3.3" "RD" "distance repeatability", [Position, X, Y, Z, A, B, C],

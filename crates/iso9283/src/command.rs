@@ -62,8 +62,8 @@ impl CommandPath {
         self.along_m.last().copied().unwrap_or(0.0)
     }
 
-    /// `count` planes at equal distances along the path, half a distance from its ends: at the very ends the arm is at rest
-    /// and crosses nothing.
+    /// `count` planes at equal distances along the path, half a distance from its ends: at the very ends the arm is
+    /// at rest and crosses nothing.
     pub fn planes(&self, count: usize) -> Vec<Plane> {
         (0..count).map(|i| self.plane(self.length_m() * (i as f64 + 0.5) / count as f64)).collect()
     }

@@ -14,8 +14,9 @@ pub struct LoadStep {
     pub displacement_m: Vector3<f64>,
 }
 
-/// Static compliance [m/N]: the displacement per unit of load, the mean over repetitions of one load, the largest over the loads
-/// (ISO 9283:1998, 10; it asks for forces along and against each axis of the base, in steps of a tenth of the rated load).
+/// Static compliance [m/N]: the displacement per unit of load, the mean over repetitions of one load, the largest
+/// over the loads (ISO 9283:1998, 10; it asks for forces along and against each axis of the base, in steps of a
+/// tenth of the rated load).
 ///
 /// Fails without a load, where a number is not finite, or where a force is zero.
 pub fn static_compliance_m_n(steps: &[LoadStep]) -> Result<f64, IsoError> {

@@ -1,13 +1,13 @@
-//! Clause 8.5: cornering deviations. The round-off error CR says by how much the attained path cuts a corner, the overshoot CO
-//! by how much it runs beyond the second leg.
+//! Clause 8.5: cornering deviations. The round-off error CR says by how much the attained path cuts a corner, the
+//! overshoot CO by how much it runs beyond the second leg.
 
 use crate::IsoError;
 use crate::command::Corner;
 use crate::stats::{largest, mean};
 use nalgebra::Vector3;
 
-/// Cornering round-off error CR [m]: the smallest distance between the corner and the attained path, the mean over the cycles
-/// (ISO 9283:1998, 8.5). `runs[j]` are the positions [m] of cycle j, straight between samples.
+/// Cornering round-off error CR [m]: the smallest distance between the corner and the attained path, the mean over
+/// the cycles (ISO 9283:1998, 8.5). `runs[j]` are the positions [m] of cycle j, straight between samples.
 ///
 /// Fails without a cycle, or where one has fewer than two samples.
 pub fn round_off_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, IsoError> {
@@ -15,8 +15,9 @@ pub fn round_off_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, I
     Ok(mean(&runs.iter().map(|run| closest(&corner.position_m, run).1).collect::<Vec<_>>()))
 }
 
-/// Cornering overshoot CO [m]: the largest distance from the second leg after the corner, on the side towards which the first
-/// leg points, and 0 where the path stays on the other side; the mean over the cycles (ISO 9283:1998, 8.5).
+/// Cornering overshoot CO [m]: the largest distance from the second leg after the corner, on the side towards which
+/// the first leg points, and 0 where the path stays on the other side; the mean over the cycles (ISO 9283:1998,
+/// 8.5).
 ///
 /// Fails without a cycle, or where one has fewer than two samples.
 pub fn overshoot_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, IsoError> {
@@ -34,7 +35,8 @@ fn run_overshoot_m(corner: &Corner, run: &[Vector3<f64>]) -> f64 {
     largest(outside.map(|p| (p - leaving * p.dot(&leaving)).norm()))
 }
 
-/// Index of the sample that ends the piece of a polyline closest to a point, and its distance [m]; the first of equals.
+/// Index of the sample that ends the piece of a polyline closest to a point, and its distance [m]; the first of
+/// equals.
 fn closest(point_m: &Vector3<f64>, run: &[Vector3<f64>]) -> (usize, f64) {
     let pieces = run.windows(2).enumerate().map(|(k, ends)| (k + 1, distance_m(point_m, &ends[0], &ends[1])));
     pieces.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))

@@ -24,6 +24,8 @@ pub struct Criterion {
     pub quantity: Quantity,
     /// Cycles it was computed from.
     pub n: usize,
+    /// Cycles that the standard asks for.
+    pub asked: usize,
     /// Where the test falls short of the standard's.
     pub notes: Vec<String>,
 }
@@ -47,7 +49,11 @@ impl std::fmt::Display for Criterion {
         if !self.symbol.is_empty() {
             write!(f, " {}", self.symbol)?;
         }
-        write!(f, " at {}: {sign}{value:.4} {unit}, n = {}", self.at, self.n)?;
+        write!(f, " at {}: {sign}{value:.4} {unit}", self.at)?;
+        // Fewer cycles than asked for are the first note.
+        if self.n >= self.asked {
+            write!(f, "; n = {}", self.n)?;
+        }
         self.notes.iter().try_for_each(|note| write!(f, "; {note}"))
     }
 }
@@ -129,6 +135,7 @@ impl Findings {
             plus_minus: what.is_band(component),
             quantity: what.quantity_of(component),
             n: place.n,
+            asked: what.cycles,
             notes: few.into_iter().chain(place.notes.iter().cloned()).collect(),
         };
         self.found.push((what, component, criterion));

@@ -30,8 +30,8 @@ fn check_pairs(what: &'static str, pairs: &[[TipPose; 2]], least: usize) -> Resu
     (0..2).try_for_each(|end| check(what, &pairs.iter().map(|pair| pair[end]).collect::<Vec<_>>(), least))
 }
 
-/// Distance accuracy: mean attained minus commanded distance, `AD_P = D_mean - D_c`, signed; likewise along and about x, y, z
-/// (ISO 9283:1998, 7.3.2). `attained[j]` are the two poses of cycle j.
+/// Distance accuracy: mean attained minus commanded distance, `AD_P = D_mean - D_c`, signed; likewise along and
+/// about x, y, z (ISO 9283:1998, 7.3.2). `attained[j]` are the two poses of cycle j.
 ///
 /// Fails without a cycle, or where a pose is not finite.
 pub fn distance_accuracy(commanded: &[TipPose; 2], attained: &[[TipPose; 2]]) -> Result<Distance, IsoError> {
@@ -50,8 +50,8 @@ pub fn distance_accuracy(commanded: &[TipPose; 2], attained: &[[TipPose; 2]]) ->
     })
 }
 
-/// Distance repeatability `RD = +-3 sqrt(sum_j (D_j - D_mean)^2 / (n - 1))`, the positive side; likewise along and about
-/// x, y, z (ISO 9283:1998, 7.3.3).
+/// Distance repeatability `RD = +-3 sqrt(sum_j (D_j - D_mean)^2 / (n - 1))`, the positive side; likewise along and
+/// about x, y, z (ISO 9283:1998, 7.3.3).
 ///
 /// Fails with fewer than two cycles, or where a pose is not finite.
 pub fn distance_repeatability(attained: &[[TipPose; 2]]) -> Result<Distance, IsoError> {

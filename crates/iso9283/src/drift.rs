@@ -15,8 +15,8 @@ pub struct Drift {
     pub angles_rad: Option<Vector3<f64>>,
 }
 
-/// Drift of pose accuracy `dAP = max_T |AP(t = 0) - AP(t = T)|`, for the position and each angle (ISO 9283:1998, 7.6).
-/// `blocks[k]` are the poses attained about time k, ten cycles each in the standard.
+/// Drift of pose accuracy `dAP = max_T |AP(t = 0) - AP(t = T)|`, for the position and each angle (ISO 9283:1998,
+/// 7.6). `blocks[k]` are the poses attained about time k, ten cycles each in the standard.
 ///
 /// Fails with fewer than two blocks, with an empty block, or where a pose is not finite.
 pub fn accuracy_drift(commanded: &TipPose, blocks: &[Vec<TipPose>]) -> Result<Drift, IsoError> {
@@ -25,7 +25,8 @@ pub fn accuracy_drift(commanded: &TipPose, blocks: &[Vec<TipPose>]) -> Result<Dr
     largest_change("drift of pose accuracy", &values)
 }
 
-/// Drift of pose repeatability `dRP = max_T |RP(t = 0) - RP(t = T)|`, for the position and each angle (ISO 9283:1998, 7.6).
+/// Drift of pose repeatability `dRP = max_T |RP(t = 0) - RP(t = T)|`, for the position and each angle (ISO
+/// 9283:1998, 7.6).
 ///
 /// Fails with fewer than two blocks, with a block of fewer than two poses, or where a pose is not finite.
 pub fn repeatability_drift(blocks: &[Vec<TipPose>]) -> Result<Drift, IsoError> {
@@ -50,8 +51,9 @@ fn largest_change(what: &'static str, values: &[(f64, Option<Vector3<f64>>)]) ->
     })
 }
 
-/// Exchangeability E [m]: the largest distance between the barycentres that two robots of one kind attain for the same command
-/// in the same programme (ISO 9283:1998, 7.7; it asks for five robots). `robots[h]` are the poses that robot h attained.
+/// Exchangeability E [m]: the largest distance between the barycentres that two robots of one kind attain for the
+/// same command in the same programme (ISO 9283:1998, 7.7; it asks for five robots). `robots[h]` are the poses that
+/// robot h attained.
 ///
 /// Fails with fewer than two robots, with a robot without poses, or where a pose is not finite.
 pub fn exchangeability_m(robots: &[Vec<TipPose>]) -> Result<f64, IsoError> {

@@ -55,8 +55,8 @@ pub enum IsoError {
     },
     /// Visits of the same name were commanded to different places.
     #[error(
-        "visit {visit} to '{pose}' was commanded {distance_mm:.3} mm or {angle_deg:.3} deg away from the first visit of that \
-         name: give poses that differ different names (a tilted board's cavities, for one)"
+        "visit {visit} to '{pose}' was commanded {distance_mm:.3} mm or {angle_deg:.3} deg away from the first visit of \
+         that name: give poses that differ different names (a tilted board's cavities, for one)"
     )]
     CommandMoved {
         /// Name of the pose.

@@ -9,8 +9,8 @@ use crate::weaving::Weave;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// One stop of the arm at a commanded pose. All poses of an [`Evidence`] are in one frame, that of the standard's x, y, z: the robot's
-/// base frame.
+/// One stop of the arm at a commanded pose. All poses of an [`Evidence`] are in one frame, that of the standard's
+/// x, y, z: the robot's base frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Visit {
     /// Name of the commanded pose. Visits of one name are cycles of one command.
@@ -62,7 +62,8 @@ pub struct Evidence {
 pub struct Settings {
     /// Approaches within this angle of the first of them count as one direction [rad].
     pub same_direction_rad: f64,
-    /// Radius of the limit band of clauses 7.4, 7.5 and 9 [m], as the maker states it; without it, the pose repeatability.
+    /// Radius of the limit band of clauses 7.4, 7.5 and 9 [m], as the maker states it; without it, the pose
+    /// repeatability.
     pub limit_band_m: Option<f64>,
     /// The command path has a corner where it turns by more than this [rad].
     pub corner_rad: f64,

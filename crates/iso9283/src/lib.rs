@@ -1,16 +1,17 @@
-//! ISO 9283:1998, *Manipulating industrial robots: performance criteria and related test methods*: every criterion by the standard's name,
-//! symbol, clause and formula.
+//! ISO 9283:1998, *Manipulating industrial robots: performance criteria and related test methods*: every criterion
+//! by the standard's name, symbol, clause and formula.
 //!
-//! Two rooms. The formulas are pure functions, one file a family: [`pose`] (7.2), [`distance`] (7.3), [`settling`] (7.4, 7.5, 9),
-//! [`drift`] (7.6, 7.7), [`path`] (8.2 to 8.4) on the planes of [`command`] and [`planes`], [`cornering`] (8.5), [`velocity`] (8.6),
-//! [`compliance`] (10), [`weaving`] (11). [`assess`] takes the [`Evidence`] that a recording gives and returns an [`Assessment`]: what it
-//! supports is computed, with a note where there are fewer cycles than the standard asks for; everything else in the
-//! [`catalogue`] is listed with the reason.
+//! Two rooms. The formulas are pure functions, one file a family: [`pose`] (7.2), [`distance`] (7.3), [`settling`]
+//! (7.4, 7.5, 9), [`drift`] (7.6, 7.7), [`path`] (8.2 to 8.4) on the planes of [`command`] and [`planes`],
+//! [`cornering`] (8.5), [`velocity`] (8.6), [`compliance`] (10), [`weaving`] (11). [`assess`] takes the
+//! [`Evidence`] that a recording gives and returns an [`Assessment`]: what it supports is computed, with a note
+//! where there are fewer cycles than the standard asks for; everything else in the [`catalogue`] is listed with the
+//! reason.
 //!
 //! `Evidence -> Assessment { criteria, not_measured }`
 //!
-//! Nothing here reads files or knows a robot's model. Lengths are metres, angles radians, times nanoseconds; all poses share one frame, in
-//! which x, y and z of the standard are the robot's base axes.
+//! Nothing here reads files or knows a robot's model. Lengths are metres, angles radians, times nanoseconds; all
+//! poses share one frame, in which x, y and z of the standard are the robot's base axes.
 //!
 //! ```
 //! use armcal_iso9283::{TipPose, pose::pose_accuracy};

@@ -1,7 +1,7 @@
 //! Clauses 8.2 to 8.4: path accuracy AT and path repeatability RT.
 //!
-//! Both are taken on planes normal to the command path: `attained[i][j]` is the pose of cycle j on plane i, `commanded[i]` the
-//! command there.
+//! Both are taken on planes normal to the command path: `attained[i][j]` is the pose of cycle j on plane i,
+//! `commanded[i]` the command there.
 
 use crate::IsoError;
 use crate::pose::{pose_accuracy, pose_repeatability};
@@ -18,8 +18,8 @@ pub struct OverPath {
     pub angles_rad: Option<Vector3<f64>>,
 }
 
-/// Path accuracy: `AT_P = max_i |mean_j x_ij - x_ci|` and `AT_a = max_i |mean_j a_ij - a_ci|` (ISO 9283:1998, 8.2; its position
-/// part, on a path along which the orientation changes, is 8.4).
+/// Path accuracy: `AT_P = max_i |mean_j x_ij - x_ci|` and `AT_a = max_i |mean_j a_ij - a_ci|` (ISO 9283:1998, 8.2;
+/// its position part, on a path along which the orientation changes, is 8.4).
 ///
 /// Fails without a plane, with a plane without cycles, or where a pose is not finite.
 pub fn path_accuracy(commanded: &[TipPose], attained: &[Vec<TipPose>]) -> Result<OverPath, IsoError> {

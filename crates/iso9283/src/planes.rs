@@ -1,8 +1,8 @@
 //! Where an attained path crosses the measuring planes of the command path.
 //!
-//! A plane is crossed again on the way back, on the far side of a circle, and many times by a tip that trembles at rest. Of
-//! all crossings in the command's direction those are taken that follow one another in time and lie closest to the
-//! commanded poses, all together. A plane that has none nearby stays without a crossing.
+//! A plane is crossed again on the way back, on the far side of a circle, and many times by a tip that trembles at
+//! rest. Of all crossings in the command's direction those are taken that follow one another in time and lie
+//! closest to the commanded poses, all together. A plane that has none nearby stays without a crossing.
 
 use crate::command::Plane;
 use crate::settling::between_ns;
@@ -27,8 +27,8 @@ struct Candidate {
     before: Option<usize>,
 }
 
-/// The crossing of every plane by `run`, or none. A crossing further than `reach_m` [m] from the commanded pose does not
-/// belong to the path.
+/// The crossing of every plane by `run`, or none. A crossing further than `reach_m` [m] from the commanded pose
+/// does not belong to the path.
 pub fn cross(planes: &[Plane], run: &[TimedPose], reach_m: f64) -> Vec<Option<Crossing>> {
     let mut candidates: Vec<Candidate> = Vec::new();
     // Chains so far that no earlier one undercuts, in order of time: costs fall from each to the next.

@@ -71,8 +71,8 @@ pub struct AccuracyVariation {
     pub angles_rad: Option<Vector3<f64>>,
 }
 
-/// Multi-directional pose accuracy variation: `directions[h]` are the poses attained from direction h, three perpendicular
-/// ones in the standard (ISO 9283:1998, 7.2.3).
+/// Multi-directional pose accuracy variation: `directions[h]` are the poses attained from direction h, three
+/// perpendicular ones in the standard (ISO 9283:1998, 7.2.3).
 ///
 /// Fails with fewer than two directions, with a direction without poses, or where a pose is not finite.
 pub fn accuracy_variation(directions: &[Vec<TipPose>]) -> Result<AccuracyVariation, IsoError> {

@@ -23,8 +23,9 @@ impl Settling {
     }
 }
 
-/// Follows one approach until rest. The limit band is a sphere of radius `limit_band_m` [m] about the position that is
-/// finally attained: the pose repeatability, or what the maker states. Between samples the tip moves on a straight line.
+/// Follows one approach until rest. The limit band is a sphere of radius `limit_band_m` [m] about the position that
+/// is finally attained: the pose repeatability, or what the maker states. Between samples the tip moves on a
+/// straight line.
 ///
 /// Fails when the samples begin inside the band, end outside it, are not in order of time, or are not finite.
 pub fn settle(run: &[TimedPose], attained_m: &Vector3<f64>, limit_band_m: f64) -> Result<Settling, IsoError> {
@@ -85,8 +86,9 @@ pub fn overshoot_m(cycles: &[Settling]) -> Result<f64, IsoError> {
     Ok(largest(cycles.iter().map(|cycle| cycle.overshoot_m)))
 }
 
-/// Minimum posing time [s]: from the departure from rest until the tip is settled at the next pose, the stabilization time
-/// included; the mean over the cycles (ISO 9283:1998, 9; it asks for three). Each cycle is departure and arrival [ns].
+/// Minimum posing time [s]: from the departure from rest until the tip is settled at the next pose, the
+/// stabilization time included; the mean over the cycles (ISO 9283:1998, 9; it asks for three). Each cycle is
+/// departure and arrival [ns].
 pub fn posing_time_s(cycles: &[[i64; 2]]) -> Result<f64, IsoError> {
     some("minimum posing time", cycles.len())?;
     Ok(mean(

@@ -1,9 +1,9 @@
 //! A pose as the standard sees it: a position, and an orientation where it was tracked.
 //!
-//! The standard writes orientations as angles a, b, c about x, y, z. Differences of such angles depend on the order of the
-//! turns and jump at +-180 deg, so armcal takes for (a, b, c) the rotation vector of the turn between two orientations,
-//! expressed in the frame of the positions. For the small turns between commanded and attained orientations the two agree
-//! to first order.
+//! The standard writes orientations as angles a, b, c about x, y, z. Differences of such angles depend on the order
+//! of the turns and jump at +-180 deg, so armcal takes for (a, b, c) the rotation vector of the turn between two
+//! orientations, expressed in the frame of the positions. For the small turns between commanded and attained
+//! orientations the two agree to first order.
 
 use crate::IsoError;
 use armcal_core::Pose;
@@ -64,15 +64,15 @@ impl TipPose {
     }
 }
 
-/// Barycentre of a cluster of poses: mean position, and the orientation from which the turns to all of them add up to zero
-/// where every pose has one. The cluster must not be empty.
+/// Barycentre of a cluster of poses: mean position, and the orientation from which the turns to all of them add up
+/// to zero where every pose has one. The cluster must not be empty.
 pub fn barycentre(poses: &[TipPose]) -> TipPose {
     let sum_m: Vector3<f64> = poses.iter().map(|p| p.position_m).sum();
     TipPose { position_m: sum_m / poses.len() as f64, orientation: mean_orientation(poses) }
 }
 
-/// Iterated mean of turns (Manton, *A globally convergent numerical algorithm for computing the centre of mass on compact
-/// Lie groups*, 2004). Converges quadratically for the clusters an arm makes; ten steps leave nothing.
+/// Iterated mean of turns (Manton, *A globally convergent numerical algorithm for computing the centre of mass on
+/// compact Lie groups*, 2004). Converges quadratically for the clusters an arm makes; ten steps leave nothing.
 fn mean_orientation(poses: &[TipPose]) -> Option<UnitQuaternion<f64>> {
     let mut centre = poses.first().copied()?;
     centre.orientation?;

@@ -1,7 +1,7 @@
 //! Clause 8.6: path velocity accuracy AV, repeatability RV and fluctuation FV.
 //!
-//! `runs[j][i]` is the speed [m/s] of cycle j at measuring point i, in the part of the path in which the arm runs at constant
-//! speed.
+//! `runs[j][i]` is the speed [m/s] of cycle j at measuring point i, in the part of the path in which the arm runs
+//! at constant speed.
 
 use crate::IsoError;
 use crate::stats::{deviation, largest, mean};
@@ -9,14 +9,15 @@ use crate::stats::{deviation, largest, mean};
 /// Path velocity accuracy `AV = (v_mean - v_c) / v_c` as a ratio, `v_mean` the mean over cycles of their mean speeds
 /// (ISO 9283:1998, 8.6).
 ///
-/// Fails without a cycle, with a cycle without a speed, where one is not finite, or unless `commanded_m_s` is positive.
+/// Fails without a cycle, with a cycle without a speed, where one is not finite, or unless `commanded_m_s` is
+/// positive.
 pub fn velocity_accuracy(commanded_m_s: f64, runs: &[Vec<f64>]) -> Result<f64, IsoError> {
     check("path velocity accuracy", commanded_m_s, runs, 1)?;
     Ok((mean(&means_m_s(runs)) - commanded_m_s) / commanded_m_s)
 }
 
-/// Path velocity repeatability `RV = +-3 S_v / v_c` as a ratio, the positive side, `S_v` the standard deviation of the cycles'
-/// mean speeds (ISO 9283:1998, 8.6).
+/// Path velocity repeatability `RV = +-3 S_v / v_c` as a ratio, the positive side, `S_v` the standard deviation of
+/// the cycles' mean speeds (ISO 9283:1998, 8.6).
 ///
 /// Fails like [`velocity_accuracy`], and with fewer than two cycles.
 pub fn velocity_repeatability(commanded_m_s: f64, runs: &[Vec<f64>]) -> Result<f64, IsoError> {

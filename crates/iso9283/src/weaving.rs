@@ -1,5 +1,5 @@
-//! Clause 11: weaving deviations. The tip swings from side to side of a centre line, as a welding torch does; WS is the error of the
-//! stroke, WF that of the frequency.
+//! Clause 11: weaving deviations. The tip swings from side to side of a centre line, as a welding torch does; WS is
+//! the error of the stroke, WF that of the frequency.
 
 use crate::IsoError;
 use crate::command::CommandPath;
@@ -48,8 +48,8 @@ fn relative(
 }
 
 /// The weave in a motion along a straight centre line. Sides are told apart along the direction in which the tip
-/// strays most from the line; a side counts once the tip is an eighth of `stroke_m` [m], the commanded stroke, beyond the middle, so
-/// that noise makes no swings.
+/// strays most from the line; a side counts once the tip is an eighth of `stroke_m` [m], the commanded stroke,
+/// beyond the middle, so that noise makes no swings.
 ///
 /// Fails where samples are not finite or not in order, or where the tip does not reach a side four times.
 pub fn weave_of(centre: &CommandPath, run: &[TimedPose], stroke_m: f64) -> Result<Weave, IsoError> {
@@ -86,7 +86,8 @@ fn aside_m(centre: &CommandPath, run: &[TimedPose]) -> Vec<f64> {
     strays_m.iter().map(|p| side.dot(&(p - middle_m))).collect()
 }
 
-/// Turning point [m] of every swing to a side beyond `least_m`, and the piece of the path in which the swing crossed the middle.
+/// Turning point [m] of every swing to a side beyond `least_m`, and the piece of the path in which the swing
+/// crossed the middle.
 fn swings(aside_m: &[f64], least_m: f64) -> Vec<(f64, usize)> {
     let (mut swings, mut crossed): (Vec<(f64, usize)>, usize) = (Vec::new(), 0);
     for (index, &at_m) in aside_m.iter().enumerate() {

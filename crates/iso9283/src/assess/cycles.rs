@@ -40,8 +40,8 @@ impl Cycles<'_> {
     }
 }
 
-/// Sorts visits by pose, in order of first appearance, and by direction. A visit belongs to the first direction within
-/// `same_rad` [rad], else it opens one.
+/// Sorts visits by pose, in order of first appearance, and by direction. A visit belongs to the first direction
+/// within `same_rad` [rad], else it opens one.
 pub(super) fn by_direction(visits: &[Visit], same_rad: f64) -> Vec<Cycles<'_>> {
     let mut cycles: Vec<Cycles<'_>> = Vec::new();
     for visit in in_time(visits) {

@@ -1,5 +1,5 @@
-//! From evidence to criteria: what a recording supports is computed with as many cycles as there are, what it does not support is
-//! listed with the reason.
+//! From evidence to criteria: what a recording supports is computed with as many cycles as there are, what it does
+//! not support is listed with the reason.
 
 mod cycles;
 mod moves;
@@ -14,7 +14,8 @@ use crate::{Component, IsoError};
 
 /// Computes every criterion of ISO 9283:1998 that `evidence` supports.
 ///
-/// Fails where the evidence is wrong in itself ([`Evidence::check`]); what is merely missing is a reason in the result.
+/// Fails where the evidence is wrong in itself ([`Evidence::check`]); what is merely missing is a reason in the
+/// result.
 pub fn assess(evidence: &Evidence, settings: &Settings) -> Result<Assessment, IsoError> {
     evidence.check()?;
     let mut findings = Findings::default();
@@ -36,8 +37,8 @@ const POSES: usize = 5;
 /// What the evidence cannot prove about the test as a whole.
 fn notes(poses: usize) -> Vec<String> {
     let few = (1..POSES).contains(&poses).then(|| format!("{poses} commanded poses instead of {POSES}"));
-    let unknown = "the standard asks for poses and paths in the largest cube within the most used part of the working space, at rated load and \
-                   velocity: not checked here";
+    let unknown = "the standard asks for poses and paths in the largest cube within the most used part of the \
+                   working space, at rated load and velocity: not checked here";
     few.into_iter().chain([unknown.to_owned()]).collect()
 }
 

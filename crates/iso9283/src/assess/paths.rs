@@ -16,8 +16,8 @@ use crate::weaving::{frequency_error, stroke_error, weave_of};
 use crate::{IsoError, cornering};
 use nalgebra::Vector3;
 
-/// A crossing further from the command than this part of the path's length is another motion: the far side of a circle is 1/pi of
-/// its length away.
+/// A crossing further from the command than this part of the path's length is another motion: the far side of a
+/// circle is 1/pi of its length away.
 const REACH: f64 = 0.3;
 
 pub(super) fn assess(path: &PathTest, settings: &Settings, findings: &mut Findings) -> Result<(), IsoError> {

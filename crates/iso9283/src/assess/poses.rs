@@ -47,7 +47,8 @@ pub(super) fn assess(cycles: &[Cycles<'_>], findings: &mut Findings) {
     }
 }
 
-/// Drift from the first block of cycles to later ones: ten cycles a block as in the standard, or half of what there are.
+/// Drift from the first block of cycles to later ones: ten cycles a block as in the standard, or half of what there
+/// are.
 fn assess_drift(known: &Cycles<'_>, place: &Place<'_>, findings: &mut Findings) {
     let attained = known.attained();
     let size = (attained.len() / 2).min(ACCURACY_DRIFT.cycles);
@@ -110,8 +111,9 @@ pub(super) fn assess_directions(cycles: &[Cycles<'_>], findings: &mut Findings) 
     }
 }
 
-/// The three directions nearest to perpendicular, and the smallest and largest angle between any two of them [deg]. Directions that
-/// were repeated come before those that were not, and the thirty-two most visited are enough to choose from.
+/// The three directions nearest to perpendicular, and the smallest and largest angle between any two of them [deg].
+/// Directions that were repeated come before those that were not, and the thirty-two most visited are enough to
+/// choose from.
 fn most_perpendicular<'c, 'a>(directed: &[&'c Cycles<'a>]) -> Option<([&'c Cycles<'a>; 3], [f64; 2])> {
     let mut known = directed.to_vec();
     known.sort_by_key(|c| std::cmp::Reverse(c.visits.len()));

@@ -26,8 +26,8 @@ fn stop(
     }
 }
 
-/// Thirty cycles through two poses, each from the three axes in turn, an hour apart each time: a gap lets the tip lag behind its
-/// motion by 0.2 mm, and the arm warms up and grows by 0.01 mm an hour along x.
+/// Thirty cycles through two poses, each from the three axes in turn, an hour apart each time: a gap lets the tip
+/// lag behind its motion by 0.2 mm, and the arm warms up and grows by 0.01 mm an hour along x.
 fn three_directions() -> Evidence {
     let mut visits = Vec::new();
     for hour in 0..30 {
@@ -102,8 +102,9 @@ fn every_criterion_is_computed_or_has_a_reason() {
 
 #[test]
 fn the_catalogue_has_the_fourteen_characteristics_of_the_standard() {
-    // Scope of ISO 9283:1998 (also in GB/T 12642-2013 and JIS B 8432): accuracy and repeatability of a pose, a distance and a path go by
-    // pairs, as do stroke and frequency of a weave; drift, cornering and velocity are one characteristic each.
+    // Scope of ISO 9283:1998 (also in GB/T 12642-2013 and JIS B 8432): accuracy and repeatability of a pose, a
+    // distance and a path go by pairs, as do stroke and frequency of a weave; drift, cornering and velocity are one
+    // characteristic each.
     let mut scope: Vec<&str> = CHARACTERISTICS
         .iter()
         .map(|what| match what.clause {
@@ -134,8 +135,8 @@ fn what_is_missing_is_said_in_words() {
     let variation = reason(&assessment, "7.2.3", "multi-directional pose accuracy variation, position");
     assert_eq!(
         variation,
-        "needs repeated approaches to a commanded pose from 3 directions; this recording has 2 (cavity 1), needs repeated approaches \
-         to a commanded pose from 3 directions; this recording has 0 (cavity 2)"
+        "needs repeated approaches to a commanded pose from 3 directions; this recording has 2 (cavity 1), needs \
+         repeated approaches to a commanded pose from 3 directions; this recording has 0 (cavity 2)"
     );
     assert!(reason(&assessment, "7.2.2", "pose repeatability, position").contains("it was visited once"));
     assert!(
@@ -152,7 +153,8 @@ fn what_is_missing_is_said_in_words() {
     let unknown = assessment.criteria.iter().find(|c| c.at == "cavity 2").unwrap();
     assert_eq!(
         unknown.to_string(),
-        "7.2.1 pose accuracy, position AP_P at cavity 2: 0.2000 mm, n = 1; n = 1 instead of 30; direction of approach unknown"
+        "7.2.1 pose accuracy, position AP_P at cavity 2: 0.2000 mm; n = 1 instead of 30; \
+         direction of approach unknown"
     );
     // Of two places with one error the first; of several the worst.
     let worst = assessment.worst();
@@ -173,6 +175,61 @@ fn oblique_directions_and_few_cycles_are_noted() {
     let variation = assessment.criteria.iter().find(|c| c.symbol == "vAP_P").unwrap();
     close(variation.value, 2e-3, 1e-15);
     assert_eq!(variation.notes, ["n = 2 instead of 30", "directions are 45 to 60 deg apart instead of 90"]);
+}
+
+#[test]
+fn of_many_directions_the_perpendicular_ones_are_compared() {
+    // Errors of 1 mm along each of x, y, z; one oblique direction is 50 mm off, and so is one that was taken only once.
+    let directions = [
+        (Vector3::new(1.0, 1.0, 0.5), mm(50.0, 0.0, 0.0)),
+        (Vector3::x(), mm(1.0, 0.0, 0.0)),
+        (Vector3::y(), mm(0.0, 1.0, 0.0)),
+        (Vector3::z(), mm(0.0, 0.0, 1.0)),
+        (-Vector3::z(), mm(0.0, 0.0, -50.0)),
+    ];
+    let visits = (0..9).map(|i| {
+        let (approach, attained) = directions[if i < 8 { i % 4 } else { 4 }];
+        stop("P1", i as f64, mm(0.0, 0.0, 0.0), attained, Some(approach))
+    });
+    let evidence = Evidence { visits: visits.collect(), ..Evidence::default() };
+    let assessment = assess(&evidence, &Settings::default()).unwrap();
+    close(value(&assessment, "vAP_P", "P1"), 2.0_f64.sqrt() * 1e-3, 1e-15);
+}
+
+#[test]
+fn there_is_no_move_between_two_recordings() {
+    let mut visits = vec![
+        stop("P1", 0.0, mm(0.0, 0.0, 0.0), mm(0.0, 0.0, 0.0), None),
+        stop("P2", 1.0, mm(50.0, 0.0, 0.0), mm(50.0, 0.0, 0.0), None),
+        stop("P3", 2.0, mm(90.0, 0.0, 0.0), mm(90.0, 0.0, 0.0), None),
+    ];
+    visits[2].recording = 1;
+    let assessment = assess(&Evidence { visits, ..Evidence::default() }, &Settings::default()).unwrap();
+    let moves: Vec<&str> =
+        assessment.criteria.iter().filter(|c| c.symbol == "AD_P").map(|c| c.at.as_str()).collect();
+    assert_eq!(moves, ["P1 to P2"]);
+}
+
+#[test]
+fn speed_is_that_of_the_middle_half() {
+    // 400 mm: the first and last 80 mm at 0.1 m/s, the rest at 0.3 m/s, asked for 0.3 m/s.
+    let x_mm = |t: f64| match t {
+        t if t < 0.8 => 100.0 * t,
+        t if t < 1.6 => 80.0 + 300.0 * (t - 0.8),
+        _ => 320.0 + 100.0 * (t - 1.6),
+    };
+    let path = PathTest {
+        name: "line".into(),
+        commanded: vec![mm(0.0, 0.0, 0.0), mm(400.0, 0.0, 0.0)],
+        runs: vec![sampled(0.01, 2.4, |t| mm(x_mm(t), 0.0, 0.0))],
+        speed_m_s: Some(0.3),
+        weave: None,
+    };
+    let assessment =
+        assess(&Evidence { paths: vec![path], ..Evidence::default() }, &Settings::default()).unwrap();
+    close(value(&assessment, "AV", "line"), 0.0, 1e-6);
+    close(value(&assessment, "FV", "line"), 0.0, 1e-6);
+    assert!(reason(&assessment, "8.6", "path velocity repeatability").contains("at least 2 cycles"));
 }
 
 #[test]

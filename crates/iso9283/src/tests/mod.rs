@@ -1,5 +1,5 @@
-//! Tests by question: are the formulas the standard's, do they hold under rigid motions, is an assessment complete and honest, and
-//! does an independent implementation agree?
+//! Tests by question: are the formulas the standard's, do they hold under rigid motions, is an assessment complete
+//! and honest, and does an independent implementation agree?
 
 mod assessment;
 mod motion;

@@ -14,7 +14,8 @@ fn at(time_s: f64, x_mm: f64) -> TimedPose {
 
 #[test]
 fn stabilization_runs_from_the_first_crossing_to_the_last() {
-    // Band 2 mm about 0. From 10 to 0 mm in 1 s: in at 0.8 s. To -4 mm at 2 s, back to 0 at 3 s: in for good at 2.5 s.
+    // Band 2 mm about 0. From 10 to 0 mm in 1 s: in at 0.8 s. To -4 mm at 2 s, back to 0 at 3 s: in for good at 2.5
+    // s.
     let run = [at(0.0, 10.0), at(1.0, 0.0), at(2.0, -4.0), at(3.0, 0.0), at(4.0, 1.0)];
     let settling = settle(&run, &Vector3::zeros(), 2e-3).unwrap();
     close(settling.time_s(), 1.7, 1e-8);
@@ -28,9 +29,10 @@ fn stabilization_runs_from_the_first_crossing_to_the_last() {
 
 #[test]
 fn a_damped_joint_overshoots_by_its_closed_form() {
-    // x'' + 2 z w x' + w^2 x = 0 from rest at 100 mm: first overshoot 100 exp(-pi z / sqrt(1 - z^2)) mm (Ogata, Modern
-    // Control Engineering, 5-3), here 37.23 mm. It leaves the band of 1 mm for the last time at its eighth half period or so: the
-    // envelope 100 exp(-z w t) / sqrt(1 - z^2) falls to 1 mm at t = 1.54 s, and a peak comes every 0.33 s.
+    // x'' + 2 z w x' + w^2 x = 0 from rest at 100 mm: first overshoot 100 exp(-pi z / sqrt(1 - z^2)) mm (Ogata,
+    // Modern Control Engineering, 5-3), here 37.23 mm. It leaves the band of 1 mm for the last time at its eighth
+    // half period or so: the envelope 100 exp(-z w t) / sqrt(1 - z^2) falls to 1 mm at t = 1.54 s, and a peak comes
+    // every 0.33 s.
     let (z, w): (f64, f64) = (0.3, 10.0);
     let damped = w * (1.0 - z * z).sqrt();
     let x_mm =

@@ -111,7 +111,8 @@ fn angles_along_a_path_are_compared_on_the_planes() {
 
 #[test]
 fn a_rounded_corner_is_cut_by_its_closed_form() {
-    // A fillet of radius r misses a right corner by r (sqrt(2) - 1): 4.142136 mm for 10 mm. Another run cuts by twice that.
+    // A fillet of radius r misses a right corner by r (sqrt(2) - 1): 4.142136 mm for 10 mm. Another run cuts by
+    // twice that.
     let command = CommandPath::new(&[mm(0.0, 0.0, 0.0), mm(100.0, 0.0, 0.0), mm(100.0, 50.0, 0.0)]).unwrap();
     let corners = command.corners(0.5);
     assert_eq!(corners.len(), 1);
@@ -142,7 +143,7 @@ fn an_overshoot_counts_beyond_the_second_leg_only() {
             mm(100.0 + beyond, 2.0, 4.0),
             mm(99.0, 10.0, 0.0),
             // Beyond the end of the second leg: the second corner's business.
-            mm(100.0, 56.0, 0.0),
+            mm(103.0, 56.0, 0.0),
             mm(0.0, 50.0, 0.0),
         ];
         points.iter().map(|p| p.position_m).collect()

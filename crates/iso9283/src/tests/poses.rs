@@ -5,7 +5,7 @@ use crate::distance::{distance_accuracy, distance_repeatability};
 use crate::drift::{accuracy_drift, exchangeability_m, repeatability_drift};
 use crate::pose::{accuracy_variation, pose_accuracy, pose_repeatability};
 use crate::{IsoError, TipPose, barycentre};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 #[test]
 fn pose_accuracy_is_the_barycentre_seen_from_the_command() {
@@ -28,6 +28,15 @@ fn angles_of_accuracy_and_repeatability_are_turns_about_the_axes() {
     assert!((ap - Vector3::new(0.0, 0.0, 0.01)).norm() < 1e-12, "{ap}");
     let rp = pose_repeatability(&attained).unwrap().angles_rad.unwrap();
     assert!((rp - Vector3::new(0.0, 0.0, 3.0 * (10.0_f64 / 3.0).sqrt() * 1e-3)).norm() < 1e-12, "{rp}");
+}
+
+#[test]
+fn angles_are_about_the_axes_of_the_world_not_of_the_tip() {
+    let commanded = turned(mm(0.0, 0.0, 0.0), [std::f64::consts::FRAC_PI_2, 0.0, 0.0]);
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 0.01));
+    let attained = TipPose { orientation: commanded.orientation.map(|q| turn * q), ..commanded };
+    let ap = pose_accuracy(&commanded, &[attained]).unwrap().angles_rad.unwrap();
+    assert!((ap - Vector3::new(0.0, 0.0, 0.01)).norm() < 1e-12, "{ap}");
 }
 
 #[test]
@@ -105,7 +114,8 @@ fn distances_of_orientation_are_turns_between_the_poses() {
 
 #[test]
 fn drift_is_the_largest_change_from_the_first_block() {
-    // AP of the blocks: 1, 4, 2 mm, so dAP = 3 mm. RP_l: half the distance within a block, 0.5, 0.5, 2 mm, so dRP = 1.5 mm.
+    // AP of the blocks: 1, 4, 2 mm, so dAP = 3 mm. RP_l: half the distance within a block, 0.5, 0.5, 2 mm, so dRP =
+    // 1.5 mm.
     let block = |centre: f64, half: f64| vec![mm(centre, half, 0.0), mm(centre, -half, 0.0)];
     let blocks = [block(1.0, 0.5), block(4.0, 0.5), block(-2.0, 2.0)];
     let commanded = mm(0.0, 0.0, 0.0);

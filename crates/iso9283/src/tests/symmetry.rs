@@ -1,5 +1,5 @@
-//! Laws that hold for any evidence: a rigid motion of the world, the order of the list and the origin of time change nothing;
-//! lengths scale; rubbish is refused and never panics.
+//! Laws that hold for any evidence: a rigid motion of the world, the order of the list and the origin of time
+//! change nothing; lengths scale; rubbish is refused and never panics.
 
 use super::{mm, sampled, turned};
 use crate::compliance::LoadStep;
@@ -126,7 +126,9 @@ proptest! {
     }
 
     #[test]
-    fn the_vector_of_accuracy_turns_with_the_world(errors in prop::collection::vec(vector(3e-3), 1..9), turn in vector(3.0)) {
+    fn the_vector_of_accuracy_turns_with_the_world(
+        errors in prop::collection::vec(vector(3e-3), 1..9), turn in vector(3.0),
+    ) {
         let commanded = mm(300.0, -20.0, 80.0);
         let attained: Vec<TipPose> = errors.iter().map(|e| TipPose::at(commanded.position_m + e)).collect();
         let by = Pose::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(turn));
@@ -177,8 +179,8 @@ proptest! {
         sorted.sort_by_key(|s| s.time_ns);
         sorted.dedup_by_key(|s| s.time_ns);
         let test = |weave| PathTest {
-            name: "path".into(), commanded: (0..8).map(at).collect(), runs: vec![sorted.clone(), run.clone(), Vec::new()],
-            speed_m_s: Some(numbers[0]), weave,
+            name: "path".into(), commanded: (0..8).map(at).collect(),
+            runs: vec![sorted.clone(), run.clone(), Vec::new()], speed_m_s: Some(numbers[0]), weave,
         };
         let weave = Some(Weave { stroke_m: numbers[1], frequency_hz: numbers[2] });
         let evidence = Evidence {
@@ -187,7 +189,8 @@ proptest! {
         };
         let settings = Settings { planes, limit_band_m: Some(numbers[3]), ..Settings::default() };
         let _ = assess(&evidence, &settings);
-        let only_paths = Evidence { paths: vec![PathTest { runs: vec![sorted.clone()], ..test(None) }], ..Evidence::default() };
+        let path = PathTest { runs: vec![sorted.clone()], ..test(None) };
+        let only_paths = Evidence { paths: vec![path], ..Evidence::default() };
         let _ = assess(&only_paths, &settings);
     }
 }
