@@ -1,0 +1,58 @@
+//! From evidence to criteria: what a recording supports is computed with as many cycles as there are, what it does
+//! not support is listed with the reason.
+
+mod cycles;
+mod moves;
+mod paths;
+mod poses;
+
+use crate::catalogue::{EXCHANGEABILITY, STATIC_COMPLIANCE};
+use crate::compliance::static_compliance_m_n;
+use crate::criterion::{Assessment, Findings, Place};
+use crate::evidence::{Evidence, Settings};
+use crate::{Component, IsoError};
+
+/// Computes every criterion of ISO 9283:1998 that `evidence` supports.
+///
+/// Fails where the evidence is wrong in itself ([`Evidence::check`]); what is merely missing is a reason in the
+/// result.
+pub fn assess(evidence: &Evidence, settings: &Settings) -> Result<Assessment, IsoError> {
+    evidence.check()?;
+    let mut findings = Findings::default();
+    let cycles = cycles::by_direction(&evidence.visits, settings.same_direction_rad);
+    poses::assess(&cycles, &mut findings);
+    poses::assess_directions(&cycles, &mut findings);
+    moves::assess(&evidence.visits, &cycles, settings, &mut findings);
+    for path in &evidence.paths {
+        paths::assess(path, settings, &mut findings)?;
+    }
+    assess_loads(evidence, &mut findings);
+    findings.lack(&EXCHANGEABILITY, "one recorded robot", EXCHANGEABILITY.needs);
+    Ok(findings.finish(notes(cycles::by_pose(&cycles).len())))
+}
+
+/// Poses that the standard asks for, P1 to P5.
+const POSES: usize = 5;
+
+/// What the evidence cannot prove about the test as a whole.
+fn notes(poses: usize) -> Vec<String> {
+    let few = (1..POSES).contains(&poses).then(|| format!("{poses} commanded poses instead of {POSES}"));
+    let unknown = "the standard asks for poses and paths in the largest cube within the most used part of the \
+                   working space, at rated load and velocity: not checked here";
+    few.into_iter().chain([unknown.to_owned()]).collect()
+}
+
+fn assess_loads(evidence: &Evidence, findings: &mut Findings) {
+    if evidence.loads.is_empty() {
+        return;
+    }
+    let same = |force| evidence.loads.iter().filter(|load| load.force_n == force).count();
+    let n = evidence.loads.iter().map(|load| same(load.force_n)).min().unwrap_or(0);
+    match static_compliance_m_n(&evidence.loads) {
+        Ok(value) => {
+            let place = Place { at: "the loaded pose", n, notes: &[] };
+            findings.give(&STATIC_COMPLIANCE, Component::Only, value, &place);
+        }
+        Err(why) => findings.lack(&STATIC_COMPLIANCE, "the loaded pose", why),
+    }
+}
