@@ -30,7 +30,7 @@ mod text;
 mod write;
 
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis};
+pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
