@@ -3,6 +3,8 @@
 //! Paths inside the file are relative to the file. Every section belongs to the crate that acts on it;
 //! this module only puts them side by side, so a key is documented where it is used.
 
+use crate::check::CheckSection;
+use crate::check::section::Surroundings;
 use crate::error::Error;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
@@ -56,6 +58,9 @@ pub struct Pipeline {
     /// How the missing effect is looked for.
     #[serde(default)]
     pub diagnosis: DiagnosisConfig,
+    /// Limits that `armcal check` holds the result to.
+    #[serde(default)]
+    pub check: CheckSection,
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,
@@ -304,6 +309,13 @@ impl Pipeline {
         }
         if self.table.is_none() && self.streams.tip.is_none() {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
+        }
+        let recordings: Vec<String> = self.recordings.iter().map(RecordingEntry::name).collect();
+        let holdout = self.holdout != HoldoutConfig::None;
+        let diagnosis = self.diagnosis.enabled;
+        let around = Surroundings { recordings: &recordings, holdout, diagnosis };
+        if let Some((key, problem)) = self.check.contradiction(&around) {
+            return fail(&key, problem);
         }
         match (&self.model.dh, &self.model.urdf) {
             (Some(_), None) | (None, Some(_)) => Ok(()),

@@ -1,0 +1,157 @@
+//! Checks of base, tip and boards against an accepted result: a table that was bumped between two jobs.
+//!
+//! Poses are in the sensor's frame. Where base and boards all moved by one rigid motion, the sensor's frame did (cameras
+//! calibrated anew) and the rig stands as it stood: that breaks no limit.
+
+use super::limits::Limits;
+use super::measured::Check;
+use super::reasons;
+use super::reference::{Calibrated, FittedFrame};
+use armcal_core::Pose;
+use armcal_report::{Run, printable};
+
+/// A frame in both results.
+#[derive(Debug, Clone, PartialEq)]
+struct Shift {
+    name: String,
+    /// Distance between the origins [m].
+    by_m: f64,
+    /// Angle between the axes [rad].
+    by_rad: f64,
+    /// Joint standard deviations [m], [rad].
+    sigma: [f64; 2],
+}
+
+impl Shift {
+    fn of(name: &str, then: FittedFrame, now: FittedFrame) -> Shift {
+        let sigma = [now.sigma_m.hypot(then.sigma_m), now.sigma_rad.hypot(then.sigma_rad)];
+        let between = then.pose.inverse() * now.pose;
+        Shift {
+            name: name.to_owned(),
+            by_m: between.translation.vector.norm(),
+            by_rad: between.rotation.angle(),
+            sigma,
+        }
+    }
+
+    /// The change that the uncertainties do not explain [m], [rad]; 0 otherwise.
+    fn real(&self, sigmas: f64) -> [f64; 2] {
+        let beyond = |by: f64, sigma: f64| if by > sigmas * sigma { by } else { 0.0 };
+        [beyond(self.by_m, self.sigma[0]), beyond(self.by_rad, self.sigma[1])]
+    }
+}
+
+/// How every frame of both results moved.
+struct Shifts {
+    /// In the order of the result: base, tip, boards.
+    frames: Vec<Shift>,
+    /// The common motion of base and boards, where the rig moved as one.
+    common: Option<Shift>,
+}
+
+/// Positions and rotations of base, tip and boards.
+pub fn frame_shifts(run: &Run, now: &Calibrated, limits: &Limits) -> Vec<Check> {
+    let Some(reference) = &limits.reference else { return Vec::new() };
+    let section = &limits.section;
+    let shifts = Shifts::of(reference, now, limits);
+    let rows = [
+        ("max_frame_shift_mm", 0, 1e3, "mm", section.max_frame_shift_mm),
+        ("max_frame_shift_deg", 1, 1f64.to_degrees(), "deg", section.max_frame_shift_deg),
+    ];
+    rows.into_iter()
+        .filter_map(|(name, which, to_display, unit, limit)| {
+            let limit = limit?;
+            let real = |s: &Shift| s.real(limits.shift_sigmas)[which] * to_display;
+            let largest = shifts.judged().map(real).fold(0.0, f64::max);
+            let measured = (!shifts.frames.is_empty()).then_some(largest);
+            let moved: Vec<&Shift> = shifts.judged().filter(|s| real(s) > limit).collect();
+            let check = Check::at_most(name, measured, limit, unit);
+            Some(check.saying(shifts.said(&moved), || shifts.causes(&moved, reasons::healthy(run))))
+        })
+        .collect()
+}
+
+impl Shifts {
+    fn of(reference: &Calibrated, now: &Calibrated, limits: &Limits) -> Shifts {
+        let both = |name: &str| Some((reference.frame(name)?, now.frame(name)?));
+        let shift = |name: &str| both(name).map(|(then, now)| Shift::of(name, then, now));
+        let frames: Vec<Shift> = now.frame_names().filter_map(shift).collect();
+        let common = both("base").zip(shift("base")).filter(|((then, now_base), base)| {
+            // Where the boards are, seen from the base.
+            let seen = |f: FittedFrame, base: Pose| FittedFrame { pose: base.inverse() * f.pose, ..f };
+            let mut boards = now.frame_names().filter(|n| is_board(n)).filter_map(both).peekable();
+            moved(base, limits)
+                && boards.peek().is_some()
+                && boards
+                    .all(|(a, b)| !moved(&Shift::of("", seen(a, then.pose), seen(b, now_base.pose)), limits))
+        });
+        Shifts { frames, common: common.map(|(_, base)| base) }
+    }
+
+    /// The frames that can break a limit.
+    fn judged(&self) -> impl Iterator<Item = &Shift> {
+        self.frames.iter().filter(|s| self.common.is_none() || s.name == "tip")
+    }
+
+    fn said(&self, moved: &[&Shift]) -> String {
+        let n = self.frames.len();
+        match (moved, &self.common) {
+            ([], _) if n == 0 => {
+                "the reference has none of this result's frames, so nothing was compared; are the recordings named alike?"
+                    .to_owned()
+            }
+            ([], Some(common)) => format!(
+                "base and boards moved as one by {}: the sensor's frame is another (cameras calibrated anew), the rig stands \
+                 as it stood",
+                amount(common)
+            ),
+            ([], None) => format!("none of {n} frames (base, tip, boards) moved by more than is allowed or explained"),
+            (moved, _) => {
+                let names: Vec<String> = moved.iter().map(|s| printable(&s.name)).collect();
+                format!("{} of {n} frames moved: {}", moved.len(), names.join(", "))
+            }
+        }
+    }
+
+    fn causes(&self, moved: &[&Shift], healthy: bool) -> Vec<String> {
+        let is_moved = |test: &dyn Fn(&str) -> bool| moved.iter().any(|s| test(&s.name));
+        let (base, boards) = (is_moved(&|n| n == "base"), is_moved(&is_board));
+        let cause = |s: &Shift| match (s.name.as_str(), base, boards) {
+            _ if !healthy && s.sigma != [0.0; 2] => {
+                "It is fitted with the arm, and this fit does not explain its data: what is missing there may have dragged \
+                 it along."
+            }
+            ("tip", ..) => "The tool was exchanged, remounted or bent.",
+            ("base", _, false) => {
+                "The boards did not: the robot's foot slid, or the markers on its base were bumped."
+            }
+            ("base", _, true) => {
+                "So did boards, otherwise: look at the robot's foot, its markers and the cameras."
+            }
+            (_, false, _) => "The base did not: the table was bumped or pushed, or its markers were.",
+            (_, true, _) => "So did the base, otherwise: look at the table, its markers and the cameras.",
+        };
+        moved
+            .iter()
+            .map(|s| {
+                printable(&format!("`{}` moved by {} since the reference. {}", s.name, amount(s), cause(s)))
+            })
+            .collect()
+    }
+}
+
+fn is_board(name: &str) -> bool {
+    name.starts_with("board.")
+}
+
+fn amount(shift: &Shift) -> String {
+    format!("{:.2} mm and {:.3} deg", shift.by_m * 1e3, shift.by_rad.to_degrees())
+}
+
+/// Whether a frame moved by more than a limit that is given.
+fn moved(shift: &Shift, limits: &Limits) -> bool {
+    let [by_m, by_rad] = shift.real(limits.shift_sigmas);
+    let beyond = |by: f64, limit: Option<f64>| limit.is_some_and(|limit| by > limit);
+    beyond(by_m * 1e3, limits.section.max_frame_shift_mm)
+        || beyond(by_rad.to_degrees(), limits.section.max_frame_shift_deg)
+}
