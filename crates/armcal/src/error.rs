@@ -180,7 +180,7 @@ pub enum Error {
     },
     /// What `[check]` compares with is not a result.
     #[error(
-        "reference {} {problem}; name the summary.json, run.mcap or folder of an accepted `armcal run`",
+        "check.reference: {} {problem}; name the summary.json, run.mcap or folder of an accepted `armcal run`",
         path.display()
     )]
     BadReference {

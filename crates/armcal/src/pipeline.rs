@@ -4,7 +4,6 @@
 //! this module only puts them side by side, so a key is documented where it is used.
 
 use crate::check::CheckSection;
-use crate::check::section::Surroundings;
 use crate::error::Error;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
@@ -309,13 +308,6 @@ impl Pipeline {
         }
         if self.table.is_none() && self.streams.tip.is_none() {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
-        }
-        let recordings: Vec<String> = self.recordings.iter().map(RecordingEntry::name).collect();
-        let holdout = self.holdout != HoldoutConfig::None;
-        let diagnosis = self.diagnosis.enabled;
-        let around = Surroundings { recordings: &recordings, holdout, diagnosis };
-        if let Some((key, problem)) = self.check.contradiction(&around) {
-            return fail(&key, problem);
         }
         match (&self.model.dh, &self.model.urdf) {
             (Some(_), None) | (None, Some(_)) => Ok(()),

@@ -155,3 +155,84 @@ fn moved(shift: &Shift, limits: &Limits) -> bool {
     beyond(by_m * 1e3, limits.section.max_frame_shift_mm)
         || beyond(by_rad.to_degrees(), limits.section.max_frame_shift_deg)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::CheckSection;
+    use armcal_core::RollPitchYaw;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use serde_json::{Value, json};
+
+    fn pose(xyz_m: [f64; 3], turn_deg: f64) -> Pose {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * turn_deg.to_radians());
+        Pose::from_parts(Translation3::from(Vector3::from(xyz_m)), turn)
+    }
+
+    /// A base whose height is known to 3 mm, and two boards.
+    fn rig(base: Pose, boards: [Pose; 2]) -> Calibrated {
+        let frame = |name: &str, pose: &Pose| {
+            let RollPitchYaw { xyz_m, rpy_deg } = pose.into();
+            json!({ "frame": name, "parent": "world", "xyz_m": xyz_m, "rpy_deg": rpy_deg })
+        };
+        let height = json!({ "name": "base.z", "unit": "m", "value": 0.7, "sigma": 0.003, "at_bound": false,
+                             "role": "known_frame" });
+        let frames: Value =
+            [frame("base", &base), frame("board.a", &boards[0]), frame("board.b", &boards[1])].into();
+        let summary = json!({ "schema": armcal_report::SCHEMA, "pipeline": "rig",
+                              "fit": { "parameters": [height] }, "frames": frames });
+        serde_json::from_value(summary).expect("a summary")
+    }
+
+    fn limits() -> Limits {
+        let section = CheckSection {
+            max_frame_shift_mm: Some(1.0),
+            max_frame_shift_deg: Some(0.1),
+            ..CheckSection::default()
+        };
+        Limits { section, allowed: Vec::new(), reference: None, shift_sigmas: 4.0 }
+    }
+
+    const BASE: [f64; 3] = [1.2, -0.4, 0.7];
+    const BOARDS: [[f64; 3]; 2] = [[1.6, -0.2, 0.8], [1.5, -0.3, 0.9]];
+
+    fn shifts(base: Pose, boards: [Pose; 2]) -> Shifts {
+        let reference = rig(pose(BASE, 30.0), BOARDS.map(|at| pose(at, 30.0)));
+        Shifts::of(&reference, &rig(base, boards), &limits())
+    }
+
+    fn names(shifts: &Shifts) -> Vec<&str> {
+        let moved = shifts.judged().filter(|s| s.real(4.0) != [0.0, 0.0]);
+        moved.map(|s| s.name.as_str()).collect()
+    }
+
+    #[test]
+    fn a_bumped_board_moved_by_its_distance_and_turn() {
+        let bumped = pose([1.6 + 0.003, -0.2 - 0.004, 0.8], 30.0 + 2.0);
+        let shifts = shifts(pose(BASE, 30.0), [bumped, pose(BOARDS[1], 30.0)]);
+        assert_eq!(names(&shifts), ["board.a"]);
+        let board = shifts.judged().find(|s| s.name == "board.a").expect("the board");
+        assert!((board.by_m - 0.005).abs() < 1e-12 && (board.by_rad.to_degrees() - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_sensor_frame_that_moved_moves_everything_and_breaks_nothing() {
+        let motion = pose([0.05, 0.02, -0.01], 3.0);
+        let boards = BOARDS.map(|at| motion * pose(at, 30.0));
+        let shifts = shifts(motion * pose(BASE, 30.0), boards);
+        assert!(shifts.common.is_some() && names(&shifts).is_empty());
+        // With one board bumped besides, it is no common motion.
+        let mut boards = boards;
+        boards[1].translation.vector.x += 0.004;
+        assert!(self::shifts(motion * pose(BASE, 30.0), boards).common.is_none());
+    }
+
+    #[test]
+    fn a_shift_within_its_uncertainty_is_none() {
+        let boards = BOARDS.map(|at| pose(at, 30.0));
+        let lifted = |by_m: f64| pose([BASE[0], BASE[1], BASE[2] + by_m], 30.0);
+        // 4 times sqrt(3^2 + 3^2) mm is 16.97 mm.
+        assert!(names(&shifts(lifted(0.0169), boards)).is_empty());
+        assert_eq!(names(&shifts(lifted(0.0171), boards)), ["base"]);
+    }
+}

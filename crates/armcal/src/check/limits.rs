@@ -1,10 +1,11 @@
 //! The limits of a pipeline, ready to judge.
 
 use super::reference::Calibrated;
-use super::section::CheckSection;
+use super::section::{CheckSection, Surroundings};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, RecordingEntry};
 use crate::stages::frames;
+use armcal_calibrate::HoldoutConfig;
 use armcal_model::EffectSpec;
 use std::path::Path;
 
@@ -28,27 +29,33 @@ impl Limits {
     /// Reads what the section refers to, before a long run.
     ///
     /// # Errors
-    /// No limit at all, an effect or joint that does not exist, a reference that cannot be read.
+    /// No limit at all, one that cannot be meant, an effect or joint that does not exist, a reference that cannot be read.
     pub fn of(pipeline: &Pipeline, path: &Path) -> Result<Limits, Error> {
         let section = pipeline.check.clone();
         if !section.has_limits() {
             return Err(Error::NoLimits { path: path.to_owned() });
         }
+        let refused = |key: String, problem: String| Error::PipelineContradiction {
+            path: path.to_owned(),
+            key,
+            problem,
+        };
+        let recordings: Vec<String> = pipeline.recordings.iter().map(RecordingEntry::name).collect();
+        let holdout = pipeline.holdout != HoldoutConfig::None;
+        let around = Surroundings { recordings: &recordings, holdout, diagnosis: pipeline.diagnosis.enabled };
+        if let Some((key, problem)) = section.contradiction(&around) {
+            return Err(refused(key, problem));
+        }
         let (_, chain) = frames::nominal_chain(pipeline)?;
         let joints = chain.joint_names();
         if let Some((joint, _)) = section.teeth.iter().flatten().find(|(joint, _)| !joints.contains(joint)) {
-            return Err(Error::PipelineContradiction {
-                path: path.to_owned(),
-                key: format!("check.teeth.{joint}"),
-                problem: format!("names no joint; they are {}", joints.join(", ")),
-            });
+            let problem = format!("names no joint; they are {}", joints.join(", "));
+            return Err(refused(format!("check.teeth.{joint}"), problem));
         }
         let allowed = section.allowed_effects.iter().flatten().map(|text| EffectSpec::parse(text, joints));
-        let allowed = allowed.collect::<Result<_, _>>().map_err(|e| Error::PipelineContradiction {
-            path: path.to_owned(),
-            key: "check.allowed_effects".into(),
-            problem: format!("is not understood: {e}"),
-        })?;
+        let allowed = allowed
+            .collect::<Result<_, _>>()
+            .map_err(|e| refused("check.allowed_effects".into(), format!("is not understood: {e}")))?;
         let reference = section.reference.as_ref().map(|r| Calibrated::open(&pipeline.resolve(r)));
         Ok(Limits {
             allowed,

@@ -64,8 +64,7 @@ impl Calibrated {
             serde_json::from_value(PastRun::open(path)?.summary)
         } else {
             let file = if path.is_dir() { path.join("summary.json") } else { path.to_owned() };
-            let text = std::fs::read_to_string(&file);
-            let text = text.map_err(|source| Error::ReadFile { what: "reference", path: file, source })?;
+            let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
             serde_json::from_str(&text)
         };
         let calibrated =

@@ -126,3 +126,56 @@ fn differences(reference: &Calibrated, now: &Calibrated) -> Option<String> {
         format!("The two models differ: {}. The others may have moved because of it.", parts.join("; "))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn calibrated(parameters: &[Value]) -> Calibrated {
+        let summary = json!({ "schema": armcal_report::SCHEMA, "pipeline": "rig",
+                              "fit": { "parameters": parameters }, "frames": [] });
+        serde_json::from_value(summary).expect("a summary")
+    }
+
+    fn parameter(name: &str, unit: &str, role: &str, value: f64, sigma: f64) -> Value {
+        json!({ "name": name, "unit": unit, "value": value, "sigma": sigma, "at_bound": false, "role": role })
+    }
+
+    #[test]
+    fn a_change_is_measured_in_the_uncertainty_of_both_values() {
+        let then = calibrated(&[parameter("joint1.a", "m", "robot", 0.1, 0.003)]);
+        let now = calibrated(&[parameter("joint1.a", "m", "robot", 0.12, 0.004)]);
+        let shifts = shifts_of(&then, &now, "m");
+        // 20 mm over sqrt(3^2 + 4^2) mm.
+        assert!((shifts[0].by - 0.02).abs() < 1e-15 && (shifts[0].sigmas() - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn parameters_that_are_exact_in_both_differ_or_do_not() {
+        let fixed = |value| calibrated(&[parameter("joint1.a", "m", "robot", value, 0.0)]);
+        assert_eq!(shifts_of(&fixed(0.1), &fixed(0.1), "m")[0].sigmas(), 0.0);
+        assert_eq!(shifts_of(&fixed(0.1), &fixed(0.2), "m")[0].sigmas(), f64::INFINITY);
+    }
+
+    #[test]
+    fn only_what_both_arms_have_in_one_unit_is_compared() {
+        let then = calibrated(&[
+            parameter("joint1.theta", "rad", "robot", 0.0, 0.1),
+            parameter("joint2.zero", "m", "robot", 0.0, 0.1),
+            parameter("base.x", "m", "known_frame", 0.0, 0.1),
+        ]);
+        let now = calibrated(&[
+            parameter("joint1.theta", "rad", "robot", 0.5, 0.1),
+            parameter("joint2.zero", "rad", "robot", 0.5, 0.1),
+            parameter("base.x", "m", "known_frame", 0.5, 0.1),
+            parameter("backlash:1.width", "rad", "effect", 0.5, 0.1),
+        ]);
+        let shifts = shifts_of(&then, &now, "rad");
+        let names: Vec<&str> = shifts.iter().map(|s| s.parameter.name.as_str()).collect();
+        assert_eq!(names, ["joint1.theta"]);
+        assert!(shifts_of(&then, &now, "m").is_empty());
+        let said = differences(&then, &now).expect("another model");
+        assert!(said.contains("`backlash:1.width` is only in this result"), "{said}");
+    }
+}
