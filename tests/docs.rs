@@ -17,6 +17,8 @@ fn the_reference_lists_every_key_with_a_default() {
         keys(&armcal_calibrate::FitConfig::default()),
         keys(&armcal_model::Deviation::default()),
         keys(&armcal_diagnose::DiagnosisConfig::default()),
+        keys(&armcal::check::CheckSection::default()),
+        keys(&armcal::check::MaxWarnings::default()),
     ];
     for key in sections.concat() {
         assert!(reference.contains(&format!("`{key}`")), "docs/pipeline-reference.md does not list `{key}`");
@@ -44,4 +46,20 @@ fn effects_named_in_the_guide_to_the_diagnosis_exist() {
         let name = row.trim_start_matches("| `").split(['`', ':', '@', ',']).next().unwrap_or_default();
         assert!(known.contains(&name), "docs/diagnosis.md: `{name}` is not in the catalogue");
     }
+}
+
+/// Somebody will paste it.
+#[test]
+fn the_limits_shown_in_the_guide_to_checks_are_understood() {
+    #[derive(serde::Deserialize)]
+    struct Shown {
+        check: armcal::check::CheckSection,
+    }
+    let guide = std::fs::read_to_string(root().join("docs/check.md")).expect("guide");
+    let block = guide.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a section");
+    let shown: Shown = toml::from_str(block).unwrap_or_else(|e| panic!("{e}"));
+    let all = serde_json::to_value(&shown.check).expect("JSON");
+    let unset: Vec<&String> =
+        all.as_object().expect("a table").iter().filter(|(_, v)| v.is_null()).map(|(k, _)| k).collect();
+    assert!(unset.is_empty(), "docs/check.md does not show {unset:?}");
 }

@@ -42,6 +42,9 @@ mod sealed_scenarios;
 /// Does comparing two results say what changed, on the same dwells?
 mod compare;
 
+/// Does a CI job learn which limit is broken, by what, and in the form it reads?
+mod check;
+
 /// Is what the documentation lists what the program knows?
 mod docs;
 

@@ -23,16 +23,19 @@ pub fn real_recordings() -> Option<PathBuf> {
     None
 }
 
-/// A Python with the packages of `tests/requirements.txt`: `$ARMCAL_PYTHON`, else `python3`; says so loudly if
-/// there is none.
+/// A Python with the packages that read results back: `$ARMCAL_PYTHON`, else `python3`; says so loudly if there is none.
 pub fn python() -> Option<PathBuf> {
+    python_with("scipy, numpy, mcap, mcap_ros2, mcap_protobuf")
+}
+
+/// A Python that can import these packages of `tests/requirements.txt`; says so loudly if there is none.
+pub fn python_with(packages: &str) -> Option<PathBuf> {
     let python = PathBuf::from(std::env::var_os("ARMCAL_PYTHON").unwrap_or_else(|| "python3".into()));
-    let imports = "import scipy, numpy, mcap, mcap_ros2, mcap_protobuf";
-    let ok = Command::new(&python).args(["-c", imports]).output().is_ok_and(|o| o.status.success());
-    if ok {
+    let import = format!("import {packages}");
+    if Command::new(&python).args(["-c", &import]).output().is_ok_and(|o| o.status.success()) {
         return Some(python);
     }
-    eprintln!("SKIPPED: {} lacks tests/requirements.txt; set ARMCAL_PYTHON", python.display());
+    eprintln!("SKIPPED: {} lacks {packages} of tests/requirements.txt; set ARMCAL_PYTHON", python.display());
     None
 }
 

@@ -96,6 +96,26 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// For CI: whether the result keeps the limits in the pipeline's [check]; what broke one, and why.
+    ///
+    /// Exit codes: 0 every limit holds, 1 one is broken or the run failed, 2 usage (or no limit is given), 3 every
+    /// limit holds, but data were lost or the model is inadequate, and max_warnings does not say how much of it is accepted.
+    Check {
+        /// Pipeline file with a [check] section.
+        pipeline: PathBuf,
+        /// Write JUnit XML: a suite with a case for each limit, or an error where the run failed.
+        #[arg(long, value_name = "FILE")]
+        junit: Option<PathBuf>,
+        /// Write Markdown, for the summary page of a job.
+        #[arg(long, value_name = "FILE")]
+        markdown: Option<PathBuf>,
+        /// Write all results of the run to this folder too, as `armcal run` does.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Two results on the same dwells, paired: what got better, what got worse, what moved.
     Compare {
         /// Result before: a run.mcap or the folder it is in.

@@ -217,6 +217,38 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// `armcal check` of a pipeline that limits nothing.
+    #[error(
+        "pipeline {}: there is no limit to check; add a [check] section, for instance `max_over_floor = 1.5`, \
+         `max_holdout_mean_mm = 0.5` and `verdicts = [\"nothing_missing\"]` (docs/check.md lists them)",
+        path.display()
+    )]
+    NoLimits {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What `[check]` compares with is not a result.
+    #[error(
+        "check.reference: {} {problem}; name the summary.json, run.mcap or folder of an accepted `armcal run`",
+        path.display()
+    )]
+    BadReference {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Writing JUnit XML.
+    #[error("writing the checks as JUnit XML: {0}")]
+    Junit(Box<dyn std::error::Error + Send + Sync>),
+    /// Reporting a failure failed too.
+    #[error("{first}; and {second}")]
+    Also {
+        /// What failed.
+        first: Box<Error>,
+        /// What failed while saying so.
+        second: Box<Error>,
+    },
     /// Writing an effect as TOML.
     #[error("writing the effect as TOML: {0}")]
     Toml(toml::ser::Error),
@@ -226,4 +258,15 @@ pub enum Error {
     /// Writing a result of a small command.
     #[error(transparent)]
     Output(armcal_recording::RecordingError),
+}
+
+impl Error {
+    /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::NoLimits { .. } => 2,
+            Error::Also { first, .. } => first.exit_code(),
+            _ => 1,
+        }
+    }
 }

@@ -3,6 +3,7 @@
 //! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
 //! are what a user types.
 
+pub mod check;
 pub mod cli;
 pub mod commands;
 pub mod compensate;

@@ -1,4 +1,4 @@
-//! Outcome to exit code: 0 done, 1 failed, 2 usage, 3 finished but data were lost or the model is inadequate.
+//! Outcome to exit code: 0 done, 1 failed or a limit is broken, 2 usage, 3 finished but data were lost or the model is inadequate.
 
 use armcal::cli::Cli;
 use armcal::commands::{self, Outcome};
@@ -12,10 +12,11 @@ fn main() -> ExitCode {
     match commands::dispatch(&cli) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Doubtful) => ExitCode::from(3),
+        Ok(Outcome::Broken) => ExitCode::FAILURE,
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
             let _ = writeln!(std::io::stderr(), "error: {error}");
-            ExitCode::FAILURE
+            ExitCode::from(error.exit_code())
         }
     }
 }

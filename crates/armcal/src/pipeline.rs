@@ -3,6 +3,7 @@
 //! Paths inside the file are relative to the file. Every section belongs to the crate that acts on it;
 //! this module only puts them side by side, so a key is documented where it is used.
 
+use crate::check::CheckSection;
 use crate::error::Error;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
@@ -59,6 +60,9 @@ pub struct Pipeline {
     /// What stands beside a verification on these recordings.
     #[serde(default)]
     pub verify: VerifyConfig,
+    /// Limits that `armcal check` holds the result to.
+    #[serde(default)]
+    pub check: CheckSection,
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,

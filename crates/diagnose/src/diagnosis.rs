@@ -4,13 +4,13 @@ use crate::contrasts::Contrast;
 use crate::crossval::HeldOut;
 use crate::structure::Structure;
 use armcal_core::{DwellId, Unit, Warning};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Stands in a set where an explanation outside the catalogue cannot be excluded.
 pub const NOT_LISTED: &str = "something not listed";
 
 /// The answer in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing is missing that these data can show.

@@ -155,7 +155,7 @@ pub(crate) fn sizes(c: &CandidateReport) -> String {
 }
 
 /// `width 0.052 ± 0.004 deg`.
-pub(crate) fn size(p: &ParameterReport) -> String {
+pub fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
     let shown = |si| in_display_unit(p.unit, si);
     format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol())

@@ -32,7 +32,7 @@ mod verification;
 mod write;
 
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis};
+pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use past_model::{PastArms, PastModel, RecordingFacts, Value};

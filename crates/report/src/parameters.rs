@@ -39,8 +39,9 @@ struct Entry<'a> {
     meaning: &'a str,
 }
 
-#[derive(Serialize)]
-struct FrameEntry {
+/// Where a frame lies in its parent.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct FrameEntry {
     frame: String,
     parent: String,
     xyz_m: [f64; 3],
@@ -78,7 +79,7 @@ fn entry(e: &Estimate) -> Entry<'_> {
 }
 
 /// Base, tip, and the board of every recording that has one, as calibrated.
-fn frames(run: &Run) -> Vec<FrameEntry> {
+pub(crate) fn frames(run: &Run) -> Vec<FrameEntry> {
     let p = run.calibration.fit.values();
     let entry = |frame: String, parent: &str, pose: &Pose| {
         let RollPitchYaw { xyz_m, rpy_deg } = pose.into();

@@ -8,6 +8,7 @@
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
 use crate::diagnosis_summary::DiagnosisSummary;
+use crate::parameters::{FrameEntry, frames};
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
@@ -33,6 +34,8 @@ struct Summary<'a> {
     status: Status,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
+    /// Base, tip and boards as calibrated.
+    frames: Vec<FrameEntry>,
     /// The same observations and hold-out with more effects in the model: what was found, step by step, then the best
     /// candidates, each alone.
     refits: Vec<RefitSummary<'a>>,
@@ -158,6 +161,7 @@ impl<'a> Summary<'a> {
             status: run.status(),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
+            frames: frames(run),
             refits: run.refits().map(refit).collect(),
             diagnosis: run.diagnosis.as_ref().map(DiagnosisSummary::of),
             conclusion: conclusion(&run.calibration),

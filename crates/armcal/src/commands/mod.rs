@@ -1,6 +1,7 @@
 //! One command, one file.
 
 pub mod add;
+mod check;
 mod compare;
 mod compensate;
 mod diagnose;
@@ -28,11 +29,17 @@ pub enum Outcome {
     Done,
     /// Done, but data were lost or the model is inadequate.
     Doubtful,
+    /// Done, and the result breaks a limit.
+    Broken,
 }
 
 /// Runs the command a user typed.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
+        Command::Check { pipeline, junit, markdown, out, json } => {
+            let (junit, markdown, out) = (junit.as_deref(), markdown.as_deref(), out.as_deref());
+            check::run(&check::Request { pipeline, junit, markdown, out, json: *json })
+        }
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Compensate(asked) => compensate::run(&asked.request()),
         Command::Diagnose { input, json } => diagnose::run(input, *json),

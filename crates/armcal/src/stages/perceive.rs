@@ -137,7 +137,10 @@ fn static_bodies(
         if !pose.has_orientation {
             return Err(Error::NoOrientation { recording: name.to_owned(), role });
         }
-        warnings.extend(said);
+        // A stream that names no body would leave open which of the two moved.
+        let subject =
+            if samples.body.is_empty() { role.to_owned() } else { format!("{role} ({})", samples.body) };
+        warnings.extend(said.into_iter().map(|w| Warning { subject: subject.clone(), ..w }));
         Ok::<MeanPose, Error>(pose)
     };
     let base = match pipeline.frames.base.pose {

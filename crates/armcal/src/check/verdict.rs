@@ -1,0 +1,101 @@
+//! The check of the diagnosis.
+
+use super::limits::Limits;
+use super::measured::{Check, Measured};
+use super::reasons;
+use armcal_diagnose::{Diagnosis, Verdict};
+use armcal_model::EffectSpec;
+use armcal_report::{Run, headline};
+
+/// Whether the verdict is one of the right ones, or all that is missing may be.
+///
+/// An effect that the data cannot tell from others may be missing only if every one of its names may: the limit must
+/// not hold by the choice of a name.
+pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
+    let section = &limits.section;
+    if !section.limits_verdict() {
+        return None;
+    }
+    let nothing = vec![Verdict::NothingMissing];
+    let right = section.verdicts.as_ref().unwrap_or(&nothing);
+    let joints = run.model.chain().joint_names();
+    let may_miss = |name: &String| {
+        EffectSpec::parse(name, joints).is_ok_and(|found| limits.allowed.iter().any(|a| covers(a, &found)))
+    };
+    let diagnosis = run.diagnosis.as_ref();
+    let allowed = |d: &Diagnosis| {
+        let names = d.effects.iter().flat_map(|e| &e.set);
+        d.unlisted.is_empty() && !d.effects.is_empty() && names.into_iter().all(may_miss)
+    };
+    let holds = diagnosis.is_some_and(|d| right.contains(&d.verdict) || allowed(d));
+    let words = right.iter().map(|v| word(*v).to_owned());
+    let effects = limits.allowed.iter().map(EffectSpec::to_string);
+    let check = Check {
+        name: if section.verdicts.is_some() { "verdicts" } else { "allowed_effects" }.to_owned(),
+        measured: diagnosis.map_or(Measured::Nothing, |d| Measured::Words(answer(d))),
+        limit: Measured::Words(words.chain(effects).collect::<Vec<_>>().join(", ")),
+        unit: "",
+        holds,
+        said: String::new(),
+        why: Vec::new(),
+    };
+    let said = diagnosis.map_or("the run was not diagnosed".to_owned(), |d| uncapitalised(&headline(d)));
+    Some(check.saying(said, || reasons::of_run(run, limits)))
+}
+
+/// Whether an allowance speaks of an effect: where it names no joint or no time, of every one.
+fn covers(allowed: &EffectSpec, found: &EffectSpec) -> bool {
+    allowed.kind == found.kind
+        && (allowed.target.is_none() || allowed.target == found.target)
+        && (allowed.since.is_none() || allowed.since == found.since)
+}
+
+/// As `[check]` spells it.
+pub fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => "nothing_missing",
+        Verdict::Identified => "identified",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unknown => "unknown",
+    }
+}
+
+/// The verdict with its names: `identified: zero_slip:2@1`.
+fn answer(d: &Diagnosis) -> String {
+    let names = d.names.join(", ");
+    if names.is_empty() { word(d.verdict).to_owned() } else { format!("{}: {names}", word(d.verdict)) }
+}
+
+/// A sentence as the end of another one: without its capital and full stop.
+fn uncapitalised(sentence: &str) -> String {
+    let mut rest = sentence.trim_end_matches('.').chars();
+    rest.next().map_or(String::new(), |first| first.to_lowercase().chain(rest).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_allowance_covers_what_it_does_not_say() {
+        let joints = ["a".to_owned(), "b".to_owned()];
+        let spec = |text: &str| EffectSpec::parse(text, &joints).expect("a spec");
+        for (allowed, found, covered) in [
+            ("backlash", "backlash:2", true),
+            ("backlash:b", "backlash:2", true),
+            ("backlash:1", "backlash:2", false),
+            ("zero_slip:2", "zero_slip:2@1.17", true),
+            ("zero_slip:2@1", "zero_slip:2@1.17", false),
+            ("frame_shift", "zero_slip:2@1", false),
+        ] {
+            assert_eq!(covers(&spec(allowed), &spec(found)), covered, "{allowed} and {found}");
+        }
+    }
+
+    #[test]
+    fn verdicts_are_spelt_as_the_pipeline_spells_them() {
+        for verdict in [Verdict::NothingMissing, Verdict::Identified, Verdict::Ambiguous, Verdict::Unknown] {
+            assert_eq!(serde_json::to_value(verdict).expect("JSON"), word(verdict));
+        }
+    }
+}

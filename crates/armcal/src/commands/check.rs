@@ -1,0 +1,85 @@
+//! `armcal check`: whether a result keeps the limits in its pipeline's `[check]`.
+
+use super::{Outcome, print};
+use crate::check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::{story, view};
+use armcal_recording::atomic;
+use armcal_report::{printable, write_all};
+use serde_json::json;
+use std::path::Path;
+
+/// What `armcal check` is asked to do.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    /// The pipeline.
+    pub pipeline: &'a Path,
+    /// Where the JUnit XML goes.
+    pub junit: Option<&'a Path>,
+    /// Where the Markdown goes.
+    pub markdown: Option<&'a Path>,
+    /// Folder for the results of the run, if they are wanted.
+    pub out: Option<&'a Path>,
+    /// JSON instead of the table.
+    pub json: bool,
+}
+
+/// Runs the pipeline and judges it. A run that fails leaves its error in the files too, so that CI shows it where it
+/// shows the checks.
+pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+    match judged(request) {
+        Ok(judged) => {
+            write(request.junit, || junit::junit(&judged))?;
+            write(request.markdown, || Ok(markdown::markdown(&judged)))?;
+            print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) });
+            Ok(match judged.judgement {
+                Judgement::Holds => Outcome::Done,
+                Judgement::Doubtful => Outcome::Doubtful,
+                Judgement::Broken => Outcome::Broken,
+            })
+        }
+        Err(error) => Err(match report_failure(request, &error) {
+            Ok(()) => error,
+            Err(unwritten) => Error::Also { first: Box::new(error), second: Box::new(unwritten) },
+        }),
+    }
+}
+
+fn judged(request: &Request<'_>) -> Result<Judged, Error> {
+    let pipeline = Pipeline::load(request.pipeline)?;
+    let limits = Limits::of(&pipeline, request.pipeline)?;
+    let progress = Progress::new();
+    let (mut run, recordings) = story::diagnosed(story::settle(&pipeline, &progress)?, &pipeline, &progress)?;
+    let judged = judge(&run, &limits)?;
+    if let Some(out) = request.out {
+        story::add_refits(&mut run, &pipeline, &progress)?;
+        progress.step("writing results");
+        write_all(&run, &recordings, out, &pipeline.output)?;
+        view::remember(out, request.pipeline)?;
+    }
+    progress.finish();
+    Ok(judged)
+}
+
+/// Says wherever a result was wanted that there is none; the error itself goes to stderr as every command's does.
+fn report_failure(request: &Request<'_>, error: &Error) -> Result<(), Error> {
+    let name = request.pipeline.file_stem().unwrap_or_default().to_string_lossy();
+    let error = error.to_string();
+    write(request.junit, || junit::junit_failed(&name, &error))?;
+    write(request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
+    let line = format!("{}: no check was made, the run failed", printable(&name));
+    if request.json {
+        let value = json!({ "schema": SCHEMA, "judgement": "failed", "line": line, "error": error });
+        print(&super::json_text(&value)?);
+    } else {
+        print(&format!("{line}\n"));
+    }
+    Ok(())
+}
+
+fn write(path: Option<&Path>, content: impl FnOnce() -> Result<String, Error>) -> Result<(), Error> {
+    let Some(path) = path else { return Ok(()) };
+    atomic::write(path, content()?.as_bytes()).map_err(Error::Output)
+}
