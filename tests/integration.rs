@@ -14,10 +14,6 @@ mod paper_rig;
 /// Does geometry alone bring real robots as far as independent solvers bring them?
 mod real_robots;
 
-/// Does `summary.json` keep its contract?
-mod summary_contract;
-mod verify;
-
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
 
