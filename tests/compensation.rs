@@ -52,9 +52,9 @@ fn driven(folder: &Path, recordings: &[(&str, &str, &str)]) -> Value {
     };
     let names: Vec<toml::Value> = recordings.iter().map(|(name, ..)| table(&[("name", name)])).collect();
     lab["recordings"] = names.into();
-    let told = recordings.iter().map(|(name, file, columns)| {
-        table(&[("recording", name), ("file", file), ("columns", columns)])
-    });
+    let told = recordings
+        .iter()
+        .map(|(name, file, columns)| table(&[("recording", name), ("file", file), ("columns", columns)]));
     let task = lab["task"].as_table_mut().expect("task");
     task.insert("set_points".into(), told.collect::<Vec<toml::Value>>().into());
     std::fs::write(folder.join("drive.toml"), toml::to_string(&lab).expect("lab as text")).expect("lab file");
@@ -148,9 +148,10 @@ fn compensated_set_points_reach_their_targets_in_the_rig_that_was_calibrated() {
         let [nominal, geometry, effects] = rows.map(|[mean, most]| format!("{mean:.3} ({most:.3})"));
         println!("{what:6} nominal {nominal}, geometry {geometry}, with effects {effects}");
     }
-    for (rows, most_mean_mm) in [(stops, STOPS_MM), (path, PATH_MM)] {
-        let [nominal, geometry, effects] = rows.map(|[mean, _]| mean);
+    for [[nominal, _], [geometry, _], _] in [stops, path] {
         assert!(nominal > 10.0 && geometry > 2.0, "nominal {nominal}, geometry {geometry} mm");
-        assert!(effects < most_mean_mm && effects < 0.15 * geometry, "with effects {effects} mm");
     }
+    assert!(stops[2][0] < 1.5 * floor, "stops with effects");
+    // On a path the servo lags, and crosses a gap in its own time.
+    assert!(path[2][0] < 0.25 * path[1][0], "path with effects");
 }

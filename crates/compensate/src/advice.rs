@@ -104,7 +104,13 @@ impl Compensator<'_> {
     }
 
     /// The error for a target that the iteration missed from `starts` postures.
-    pub(crate) fn unreachable(&self, target: &Target, arm: &'static str, miss: &Miss, starts: usize) -> CompensateError {
+    pub(crate) fn unreachable(
+        &self,
+        target: &Target,
+        arm: &'static str,
+        miss: &Miss,
+        starts: usize,
+    ) -> CompensateError {
         let chain = self.nominal.model.chain();
         let names: Vec<&str> = miss.at_limit.iter().map(|j| chain.joint_names()[*j].as_str()).collect();
         let advice = if names.is_empty() {

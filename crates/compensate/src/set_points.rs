@@ -1,6 +1,6 @@
 //! One target after the other: the set-point of the nominal arm, the corrected one, and what each would reach.
 
-use crate::direction::{Found, Way, invert};
+use crate::direction::{Way, invert};
 use crate::inverse::{Limits, Miss};
 use crate::{CompensateError, Conditions, Past, Target};
 use armcal_core::{Arrival, Observation};
@@ -126,8 +126,14 @@ impl Compensator<'_> {
             let offs = self.approach(target, [nominal_past, past], &nominal);
             let [nominal_way, way] =
                 [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
-            let found = invert(&self.calibrated, &o, past, way, &nominal, &self.limits)
-                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 1))?;
+            // Travel is that of the nominal arm; from where the corrected one stands.
+            let likely = match (past.joint_rad(), nominal_past.joint_rad()) {
+                (Some(stands), Some(stood)) => moved(&stands, &stood, &nominal),
+                _ => nominal.clone(),
+            };
+            let found = invert(&self.calibrated, &o, past, way, &likely, &self.limits)
+                .or_else(|_| invert(&self.calibrated, &o, past, way, &nominal, &self.limits))
+                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 2))?;
             let nominal_after = nominal_way.past(nominal_past, &nominal);
             if offs.is_some() {
                 out.push(approach_point(target, nominal_way.via(&nominal), way.via(&found.joint_rad), past));
@@ -224,6 +230,11 @@ impl Compensator<'_> {
         };
         Some(pasts.map(off))
     }
+}
+
+/// `stands` moved by the way from `stood` to `to`.
+fn moved(stands: &[f64], stood: &[f64], to: &[f64]) -> Vec<f64> {
+    stands.iter().zip(stood.iter().zip(to)).map(|(q, (from, to))| q + (to - from)).collect()
 }
 
 fn approach_point(target: &Target, nominal_rad: Vec<f64>, joint_rad: Vec<f64>, before: &Past) -> SetPoint {
