@@ -242,6 +242,9 @@ pub struct Compensate {
     /// Come to every stop from a point this far before it, all joints in their direction of travel [deg].
     #[arg(long, default_value_t = 0.0, value_name = "DEG")]
     approach: f64,
+    /// Time in which a joint that turns back on a path crosses its gap [s]; 0 for a leap.
+    #[arg(long, default_value_t = 0.4, value_name = "S")]
+    crossing: f64,
     /// Points a second of a path, by cubic splines through the targets; the targets themselves when absent.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -267,6 +270,7 @@ impl Compensate {
             load_kg: self.load,
             temperature_c: self.temperature,
             approach_deg: self.approach,
+            crossing_s: self.crossing,
             rate_hz: self.rate,
             ranges: &self.ranges,
             json: self.json,

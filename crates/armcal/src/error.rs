@@ -132,6 +132,9 @@ pub enum Error {
         /// Nominal value in the pipeline.
         now: f64,
     },
+    /// Judging by ISO 9283.
+    #[error("judging by ISO 9283: {0}")]
+    Iso(#[from] armcal_iso9283::IsoError),
     /// Looking for the missing effect.
     #[error(transparent)]
     Diagnose(#[from] armcal_diagnose::DiagnoseError),

@@ -1,5 +1,6 @@
 //! What the user should know of a set-point, and why there is none.
 
+use crate::crossing::leap_rad;
 use crate::direction::Found;
 use crate::inverse::Miss;
 use crate::set_points::{Compensator, SetPoint, at};
@@ -12,9 +13,6 @@ const SHORT_MOVE_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
 const TELLING_M: f64 = 0.05e-3;
 /// A joint this far beyond what was recorded is extrapolated [rad].
 const BEYOND_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
-/// A set-point that leaps by this much more than the nominal one crosses a gap [rad].
-const LEAP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
-
 impl Compensator<'_> {
     /// About one target.
     pub(crate) fn warnings(
@@ -83,18 +81,20 @@ impl Compensator<'_> {
         (tip_m(1.0) - tip_m(-1.0)).norm()
     }
 
-    /// On a path: the joints whose set-point leaps over a gap.
-    pub(crate) fn leap(&self, last: &SetPoint, found: &Found, nominal: &[f64]) -> Option<String> {
+    /// On a path: the joints that go further than the nominal ones, over a gap.
+    pub(crate) fn crossings(&self, last: &SetPoint, found: &Found, nominal: &[f64]) -> Option<String> {
         let names = self.nominal.model.chain().joint_names();
-        let more = |j: &usize| {
-            let step = found.joint_rad[*j] - last.joint_rad[*j];
-            (step - (nominal[*j] - last.nominal_rad[*j])).abs()
+        let crossing = |j: usize| {
+            let before = [last.nominal_rad[j], last.joint_rad[j]];
+            let size = leap_rad(before, [nominal[j], found.joint_rad[j]])?;
+            Some(format!(
+                "{} turns back and goes {} further to cross its gap",
+                names[j],
+                self.amount(j, size.abs())
+            ))
         };
-        let leaps: Vec<String> = (0..names.len())
-            .filter(|j| more(j) > LEAP_RAD)
-            .map(|j| format!("{} leaps by {} to cross its gap", names[j], self.amount(j, more(&j))))
-            .collect();
-        (!leaps.is_empty()).then(|| leaps.join(", "))
+        let all: Vec<String> = (0..names.len()).filter_map(crossing).collect();
+        (!all.is_empty()).then(|| all.join(", "))
     }
 
     /// A joint's travel for people.

@@ -17,6 +17,11 @@ pub(crate) const ACCEPTED_M: f64 = 1e-6;
 /// The same of its orientation [rad].
 const ACCEPTED_RAD: f64 = 1e-6;
 
+/// Combinations of directions that are tried, at most: all of eight joints.
+const MOST_TRIES: usize = 256;
+/// A direction that moves the tip by less does not count [m].
+const TELLING_M: f64 = 1e-8;
+
 /// A set-point and what the model predicts for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -68,7 +73,8 @@ impl Way<'_> {
     }
 }
 
-/// The set-point that brings the tip to `target`, after the path `before`, near `start_rad`.
+/// The set-point that brings the tip to `target`, after the path `before`, near `start_rad`, which also says in which
+/// direction each joint is likely to travel.
 pub(crate) fn invert(
     arm: &Arm<'_>,
     target: &Observation,
@@ -93,9 +99,10 @@ pub(crate) fn invert(
     let turned = |q: &[f64]| before.then(&way.via(q)).signs(q);
     let (mut best, mut missed): (Option<Found>, Option<Miss>) = (None, None);
     let mut tried: Vec<Vec<f64>> = Vec::new();
+    let mut telling: Option<Vec<usize>> = None;
     let mut open = VecDeque::from([turned(start_rad)]);
     while let Some(signs) = open.pop_front() {
-        if tried.contains(&signs) || tried.len() > 4 * signs.len() {
+        if tried.contains(&signs) || tried.len() == MOST_TRIES {
             continue;
         }
         let assumed = |q: &[f64]| arm.linearised(target, &before.arriving(q, &signs), q);
@@ -112,11 +119,9 @@ pub(crate) fn invert(
                 }
             }
         }
-        open.extend((0..signs.len()).map(|lane| {
-            let mut other = signs.clone();
-            other[lane] = -other[lane];
-            other
-        }));
+        // Few flips first; what nothing depends on is not flipped.
+        let telling = telling.get_or_insert_with(|| telling_lanes(arm, target, before, start_rad, &signs));
+        open.extend(telling.iter().map(|lane| flipped(&signs, *lane)));
         tried.push(signs);
     }
     let Some(best) = best else {
@@ -124,4 +129,25 @@ pub(crate) fn invert(
     };
     // A move shorter than a gap, with an effect that resolves it only in part, is smooth again.
     Ok(travelled(&best.joint_rad).ok().filter(Found::settled).unwrap_or(best))
+}
+
+/// Joints, sums and differences whose direction moves the tip.
+fn telling_lanes(arm: &Arm<'_>, target: &Observation, before: &Past, q: &[f64], signs: &[f64]) -> Vec<usize> {
+    let residual = |signs: &[f64]| arm.linearised(target, &before.arriving(q, signs), q).0;
+    let here = residual(signs);
+    let moves = |lane: &usize| {
+        let there = residual(&flipped(signs, *lane));
+        let turned_rad = match (there.rotation_rad, here.rotation_rad) {
+            (Some(a), Some(b)) => (a - b).norm(),
+            _ => 0.0,
+        };
+        (there.position_m - here.position_m).norm() + turned_rad > TELLING_M
+    };
+    (0..signs.len()).filter(moves).collect()
+}
+
+fn flipped(signs: &[f64], lane: usize) -> Vec<f64> {
+    let mut other = signs.to_vec();
+    other[lane] = -other[lane];
+    other
 }

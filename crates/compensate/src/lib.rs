@@ -11,6 +11,7 @@
 //! | [`inverse`] | damped Newton steps on the model's own joint Jacobian |
 //! | [`direction`] | the inverse where `f` depends on the direction of arrival: that of the model is that of the move |
 //! | [`set_points`] | the story: one target after the other, nominal and corrected |
+//! | `crossing` | on a path, a joint that turns back is given time to cross its gap |
 //! | `advice` | what to look at, and what to do where there is no set-point |
 //!
 //! A set-point is an encoder reading that the controller reaches: the steady error of the servo is taken to be zero.
@@ -19,6 +20,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout))]
 
 mod advice;
+mod crossing;
 pub mod direction;
 mod error;
 pub mod inverse;

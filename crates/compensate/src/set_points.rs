@@ -1,5 +1,6 @@
 //! One target after the other: the set-point of the nominal arm, the corrected one, and what each would reach.
 
+use crate::crossing;
 use crate::direction::{Way, invert};
 use crate::inverse::{Limits, Miss};
 use crate::{CompensateError, Conditions, Past, Target};
@@ -59,6 +60,8 @@ pub struct Compensator<'a> {
     pub recorded_rad: Vec<[f64; 2]>,
     /// Size of an approach before every target, all joints in their direction of travel [rad]; 0 for none.
     pub approach_rad: f64,
+    /// Time in which a joint that turns back on a path crosses its gap [s]; 0 for one leap.
+    pub crossing_s: f64,
 }
 
 /// What a row of the output is.
@@ -115,7 +118,7 @@ impl Compensator<'_> {
         self.check(targets, start_rad)?;
         let joints = self.nominal.model.joint_count();
         let start = start_rad.map_or_else(|| Past::unknown(joints), Past::at);
-        let mut pasts = [start.clone(), start];
+        let mut pasts = [start.clone(), start.clone()];
         let mut out: Vec<SetPoint> = Vec::with_capacity(targets.len());
         for (i, target) in targets.iter().enumerate() {
             let follows = i > 0 && target.time_s.is_some();
@@ -126,16 +129,23 @@ impl Compensator<'_> {
             let offs = self.approach(target, [nominal_past, past], &nominal);
             let [nominal_way, way] =
                 [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
-            let found = invert(&self.calibrated, &o, past, way, &nominal, &self.limits)
-                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 1))?;
+            // Travel is that of the nominal arm; from where the corrected one stands.
+            let likely = match (past.joint_rad(), nominal_past.joint_rad()) {
+                (Some(stands), Some(stood)) => moved(&stands, &stood, &nominal),
+                _ => nominal.clone(),
+            };
+            let found = invert(&self.calibrated, &o, past, way, &likely, &self.limits)
+                .or_else(|_| invert(&self.calibrated, &o, past, way, &nominal, &self.limits))
+                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 2))?;
             let nominal_after = nominal_way.past(nominal_past, &nominal);
             if offs.is_some() {
                 out.push(approach_point(target, nominal_way.via(&nominal), way.via(&found.joint_rad), past));
             }
             let before = self.calibrated.left(&o, &nominal_after, &nominal);
-            let leap = out.last().filter(|_| follows).and_then(|last| self.leap(last, &found, &nominal));
+            let crossings = out.last().filter(|_| follows);
+            let crossings = crossings.and_then(|last| self.crossings(last, &found, &nominal));
             let mut warnings = self.warnings(target, &o, past, &found, offs.is_some());
-            warnings.extend(leap);
+            warnings.extend(crossings);
             out.push(SetPoint {
                 target: target.clone(),
                 kind: Kind::Target,
@@ -151,7 +161,25 @@ impl Compensator<'_> {
             });
             pasts = [nominal_after, found.past];
         }
+        if self.crossing_s > 0.0 && crossing::spread(&mut out, self.crossing_s) {
+            self.predict_again(&mut out, start);
+        }
         Ok(out)
+    }
+
+    /// What the calibrated model predicts for set-points that were changed.
+    fn predict_again(&self, points: &mut [SetPoint], start: Past) {
+        let mut past = start;
+        for point in points {
+            past = past.then(&point.joint_rad);
+            point.arrival = past.arrival();
+            let o = self.conditions.observation(&point.target, point.joint_rad.len());
+            let (left_m, left_rad) = self.calibrated.left(&o, &past, &point.joint_rad);
+            if let Some(reached) = &mut point.reached {
+                reached.after_m = left_m;
+                reached.turn_rad = reached.turn_rad.map(|[before, _]| [before, left_rad]);
+            }
+        }
     }
 
     fn check(&self, targets: &[Target], start_rad: Option<&[f64]>) -> Result<(), CompensateError> {
@@ -224,6 +252,11 @@ impl Compensator<'_> {
         };
         Some(pasts.map(off))
     }
+}
+
+/// `stands` moved by the way from `stood` to `to`.
+fn moved(stands: &[f64], stood: &[f64], to: &[f64]) -> Vec<f64> {
+    stands.iter().zip(stood.iter().zip(to)).map(|(q, (from, to))| q + (to - from)).collect()
 }
 
 fn approach_point(target: &Target, nominal_rad: Vec<f64>, joint_rad: Vec<f64>, before: &Past) -> SetPoint {

@@ -76,5 +76,6 @@ fn compensator<'a>(nominal: &'a Model, (model, values): (&'a Model, &[f64])) -> 
         postures_rad: vec![Past::at(&vec![0.0; joints]).joint_rad().unwrap()],
         recorded_rad: vec![[-1.0, 1.0]; joints],
         approach_rad: 0.0,
+        crossing_s: 0.0,
     }
 }

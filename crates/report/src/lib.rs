@@ -42,7 +42,7 @@ pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};
 pub use verification::{
-    On, PathSample, Published, Verification, VerifiedRecording, VerifyConfig, verification_files,
+    IsoReport, On, PathSample, Published, Verification, VerifiedRecording, VerifyConfig, verification_files,
     verification_json, verification_text,
 };
 pub use write::{InputMessages, OutputConfig, write_all};

@@ -15,6 +15,38 @@ impl Polyline {
         (!points_m.is_empty()).then_some(Polyline { points_m })
     }
 
+    /// Its corners [m].
+    pub fn points_m(&self) -> &[Vector3<f64>] {
+        &self.points_m
+    }
+
+    /// Length [m].
+    pub fn length_m(&self) -> f64 {
+        self.points_m.windows(2).map(|piece| (piece[1] - piece[0]).norm()).sum()
+    }
+
+    /// Whether another path is nowhere further away than this, place by place: at every tenth of the length.
+    pub fn is_like(&self, other: &Polyline, within_m: f64) -> bool {
+        (self.length_m() - other.length_m()).abs() < within_m
+            && (0..=10).all(|tenth| {
+                let share = f64::from(tenth) / 10.0;
+                (self.at(share) - other.at(share)).norm() < within_m
+            })
+    }
+
+    /// The place at a share of the length, 0 to 1.
+    fn at(&self, share: f64) -> Vector3<f64> {
+        let mut left_m = share * self.length_m();
+        for piece in self.points_m.windows(2) {
+            let piece_m = (piece[1] - piece[0]).norm();
+            if piece_m > 0.0 && left_m <= piece_m {
+                return piece[0].lerp(&piece[1], left_m / piece_m);
+            }
+            left_m -= piece_m;
+        }
+        self.points_m[self.points_m.len() - 1]
+    }
+
     /// Distance of a point from the nearest place of the path, as seen in a plane [m].
     pub fn distance_m(&self, point_m: &Vector3<f64>, plane: Plane) -> f64 {
         let at = plane.seen(point_m);
@@ -52,6 +84,19 @@ mod tests {
         assert!(path.distance_m(&above, Plane::Xy) < 1e-9);
         // Seen along x the circle is the piece -1..1 of the y axis.
         assert!((path.distance_m(&above, Plane::Yz) - 0.4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_same_way_sampled_otherwise_is_like_and_another_is_not() {
+        let line = |n: usize, end: f64| {
+            let points = (0..=n).map(|i| Vector3::new(end * i as f64 / n as f64, 0.0, 0.0)).collect();
+            Polyline::through(points).expect("points")
+        };
+        assert!(line(7, 1.0).is_like(&line(40, 1.0), 1e-6));
+        assert!(!line(7, 1.0).is_like(&line(7, 1.01), 1e-3));
+        let back = Polyline::through(vec![Vector3::x(), Vector3::zeros()]).expect("points");
+        assert!(!line(7, 1.0).is_like(&back, 1e-3));
+        assert!((line(7, 1.5).length_m() - 1.5).abs() < 1e-12);
     }
 
     proptest! {

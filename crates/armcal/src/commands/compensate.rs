@@ -34,6 +34,8 @@ pub struct Request<'a> {
     pub temperature_c: Option<f64>,
     /// Approach [deg].
     pub approach_deg: f64,
+    /// Time to cross a gap [s].
+    pub crossing_s: f64,
     /// Points a second of a path.
     pub rate_hz: Option<f64>,
     /// `JOINT=LOW..HIGH`.
@@ -78,9 +80,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     Ok(if past.missing.is_empty() && points.iter().all(settled) { Outcome::Done } else { Outcome::Doubtful })
 }
 
-/// Whether the model predicts the tip at the target.
+/// Whether the model predicts the tip at a stop. On a path links wait while a gap is crossed.
 fn settled(point: &SetPoint) -> bool {
-    point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
+    point.target.time_s.is_some() || point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
 }
 
 fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Drive, Error> {
@@ -89,6 +91,9 @@ fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Dri
     }
     if !(0.0..=45.0).contains(&request.approach_deg) {
         return Err(bad("--approach", request.approach_deg.to_string(), "give an angle from 0 to 45 deg"));
+    }
+    if !(0.0..=10.0).contains(&request.crossing_s) {
+        return Err(bad("--crossing", request.crossing_s.to_string(), "give a time from 0 to 10 s"));
     }
     let names = arms.geometry.chain().joint_names();
     let range = |words: &String| {
@@ -104,6 +109,7 @@ fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Dri
         temperature_c: request.temperature_c.filter(|t| t.is_finite()),
         ranges: request.ranges.iter().map(range).collect::<Result<_, Error>>()?,
         approach_deg: request.approach_deg,
+        crossing_s: request.crossing_s,
     })
 }
 

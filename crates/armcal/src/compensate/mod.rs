@@ -38,6 +38,8 @@ pub struct Drive {
     pub ranges: Vec<(usize, [f64; 2])>,
     /// Size of an approach before every target [deg]; 0 for none.
     pub approach_deg: f64,
+    /// Time in which a joint crosses its gap on a path [s].
+    pub crossing_s: f64,
 }
 
 /// The frame of that name: `world`, `base`, or `board.<recording>`.
@@ -103,6 +105,7 @@ pub fn prepare<'a>(
         postures_rad: past.postures_rad.clone(),
         recorded_rad: past.range_rad.clone(),
         approach_rad: drive.approach_deg.to_radians(),
+        crossing_s: drive.crossing_s,
     })
 }
 

@@ -176,7 +176,8 @@ fn why_not(place: Option<&Place>, untracked: String) -> String {
     }
 }
 
-fn observation(
+/// A dwell as an observation of this reference.
+pub fn observation(
     dwell: &Dwell,
     load_kg: f64,
     reference: Reference,

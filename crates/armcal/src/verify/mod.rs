@@ -2,6 +2,7 @@
 //!
 //! `PastModel -> placed among the new recordings' frames -> points (dwells) + motion (everything between) -> Verification`
 
+mod iso;
 mod motion;
 mod point;
 
@@ -40,6 +41,8 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let motions = seen.iter().zip(&samples).enumerate();
     let motions = motions.map(|(r, (seen, samples))| judge.follow(r, seen, samples));
     let motions = motions.collect::<Result<Vec<Motion>, Error>>()?;
+    let shown = iso::Shown { placed: &placed, seen: &seen, samples: &samples, motions: &motions };
+    let iso9283 = shown.assess()?;
     let recordings = seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect();
     warnings.extend(same_files(&past, &seen));
     warnings.extend(seen.iter().flat_map(of_recording));
@@ -52,6 +55,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
         points: armcal_verify::points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
         paths: rows(motions, &names),
+        iso9283,
         parameters: past.parameters,
         published: pipeline.verify.published.clone(),
         warnings,
@@ -64,6 +68,7 @@ fn recording(seen: &Seen, motion: &Motion) -> VerifiedRecording {
         dwells: seen.dwells.len(),
         moving_samples: motion.errors.len(),
         clock_offset_s: seen.clock.as_ref().map(|c| c.offset_s + motion.late_s),
+        clock_reference_ns: seen.clock.as_ref().map(|c| c.reference_ns),
         clock_sigma_s: motion.clock.map(|c| c.sigma_s),
     }
 }

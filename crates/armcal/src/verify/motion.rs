@@ -168,7 +168,7 @@ impl Recorded<'_> {
 }
 
 /// The set-point in force at a time: the last one before it.
-fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>> {
+pub(super) fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>> {
     let row = stream.time_ns.partition_point(|t| *t <= time_ns).checked_sub(1)?;
     let age_s = time_ns.saturating_sub(stream.time_ns[row]) as f64 * 1e-9;
     (age_s <= SET_POINT_MAX_AGE_S).then(|| stream.row_rad(row))

@@ -1,6 +1,6 @@
 //! A verification for programs.
 
-use super::{PathSample, Published, Verification, VerifiedRecording};
+use super::{IsoReport, PathSample, Published, Verification, VerifiedRecording};
 use crate::ReportError;
 use crate::past_model::Value;
 use crate::run::{Status, VERSION};
@@ -24,6 +24,7 @@ struct File<'a> {
     recordings: &'a [VerifiedRecording],
     points: &'a [PointsRow],
     paths: &'a [PathRow],
+    iso9283: &'a IsoReport,
     parameters: &'a [Value],
     published: &'a [Published],
     warnings: &'a [Warning],
@@ -43,6 +44,7 @@ pub fn verification_json(v: &Verification) -> String {
         recordings: &v.recordings,
         points: &v.points,
         paths: &v.paths,
+        iso9283: &v.iso9283,
         parameters: &v.parameters,
         published: &v.published,
         warnings: &v.warnings,

@@ -1,6 +1,7 @@
 //! What `armcal verify` found: one value, shown as terminal text, JSON and Parquet.
 
 mod files;
+mod iso;
 mod terminal;
 
 pub use files::{verification_files, verification_json};
@@ -9,6 +10,7 @@ pub use terminal::verification_text;
 use crate::past_model::Value;
 use crate::run::Status;
 use armcal_core::{Severity, Warning};
+use armcal_iso9283::Assessment;
 use armcal_verify::{PathError, PathRow, PointsRow};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -31,6 +33,8 @@ pub struct Verification {
     pub paths: Vec<PathRow>,
     /// The moving tip, frame by frame.
     pub samples: Vec<PathSample>,
+    /// Criteria of ISO 9283.
+    pub iso9283: IsoReport,
     /// Old and new parameters (Table 5), SI.
     pub parameters: Vec<Value>,
     /// Numbers of somebody else, to stand beside these.
@@ -73,6 +77,17 @@ pub enum On {
     Paths,
 }
 
+/// Criteria of ISO 9283, against what each model says was commanded.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IsoReport {
+    /// Whether commands are recorded set-points; else the encoder readings stand for them.
+    pub commands_recorded: bool,
+    /// Commands as the nominal model sees them: a controller without calibration.
+    pub nominal: Assessment,
+    /// Commands as the calibrated model sees them: a controller that compensates.
+    pub calibrated: Assessment,
+}
+
 /// One new recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerifiedRecording {
@@ -84,7 +99,9 @@ pub struct VerifiedRecording {
     pub moving_samples: usize,
     /// Offset of the sensor's clock [s], where there are two clocks.
     pub clock_offset_s: Option<f64>,
-    /// Its standard error in the middle of the recording [s].
+    /// Sensor time at which it holds [ns].
+    pub clock_reference_ns: Option<i64>,
+    /// Its standard error [s], as the motion tells it.
     pub clock_sigma_s: Option<f64>,
 }
 

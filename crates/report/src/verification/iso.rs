@@ -1,0 +1,45 @@
+//! Criteria of ISO 9283 in the terminal: the worst place of each, and what the recordings cannot show.
+
+use super::IsoReport;
+use crate::terminal::{Pen, number};
+use crate::text::printable;
+use armcal_iso9283::Criterion;
+use comfy_table::Cell;
+
+/// The section; nothing where no criterion could be computed.
+pub(super) fn section(pen: &Pen, report: &IsoReport) -> Option<String> {
+    if report.calibrated.criteria.is_empty() {
+        return None;
+    }
+    let mut table =
+        pen.table(&["clause", "criterion", "", "unit", "nominal", "calibrated", "worst at", "n", "asked"]);
+    let nominal = report.nominal.worst();
+    for calibrated in report.calibrated.worst() {
+        let before = nominal.iter().find(|c| c.clause == calibrated.clause && c.name == calibrated.name);
+        table.add_row(vec![
+            Cell::new(calibrated.clause),
+            Cell::new(&calibrated.name),
+            Cell::new(&calibrated.symbol),
+            Cell::new(calibrated.quantity.display_symbol()),
+            number(before.map_or("-".into(), |c| shown(c))),
+            number(shown(calibrated)),
+            Cell::new(printable(&calibrated.at)),
+            number(calibrated.n),
+            number(calibrated.asked),
+        ]);
+    }
+    let mut text = pen.render(&table);
+    if !report.commands_recorded {
+        text.push_str(" Set-points are not recorded: encoder readings stand for commands.\n");
+    }
+    let notes = report.calibrated.notes.iter().map(|note| ("note", printable(note)));
+    text.push_str(&pen.list(notes));
+    let missing = &report.calibrated.not_measured;
+    text.push_str(&pen.list(missing.iter().map(|m| ("no", printable(&m.to_string())))));
+    Some(pen.section("ISO 9283, the worst place of each criterion (verification.json has all)", text))
+}
+
+fn shown(c: &Criterion) -> String {
+    let sign = if c.plus_minus { "±" } else { "" };
+    format!("{sign}{:.3}", c.display_value())
+}
