@@ -40,16 +40,14 @@ pub struct Moment {
 
 /// Every frame of the tip outside the dwells, in order of time; none without a tip stream.
 ///
-/// The tip's stamps are brought to the robot's clock by `clock`, shifted by `shift_s` more (how much the result depends on
-/// the clock is found so), and the joint readings interpolated linearly. Frames beyond the joint stream, or in a break of
-/// it, are left out.
+/// The tip's stamps are brought to the robot's clock by `clock`, and the joint readings interpolated linearly. Frames beyond
+/// the joint stream, or in a break of it, are left out.
 ///
 /// # Errors
 /// No joint rows, columns of different length, stamps that do not increase.
 pub fn track(
     samples: &Samples,
     clock: Option<&ClockAlignment>,
-    shift_s: f64,
     dwells: &[Dwell],
     config: &DwellConfig,
 ) -> Result<Vec<Moment>, DwellError> {
@@ -62,8 +60,7 @@ pub fn track(
     let history = History::of(&encoders, config);
     let mut motions = Motions::new(dwells);
     let mut moments = Vec::new();
-    for (row, sensor_ns) in tip.robot_ns.iter().enumerate() {
-        let time_ns = sensor_ns.saturating_sub((shift_s * 1e9).round() as i64);
+    for (row, time_ns) in tip.robot_ns.iter().copied().enumerate() {
         let position_m = tip.samples.position_m[row];
         let reading = Reading::at(&encoders, time_ns).filter(|_| position_m.iter().all(|v| v.is_finite()));
         let Some(motion) = motions.of(time_ns, reading.as_ref().map(|r| r.stretch)) else { continue };

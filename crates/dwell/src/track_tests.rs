@@ -29,7 +29,7 @@ fn joints_are_those_of_the_moment_the_sensor_saw() {
         let (session, samples, clock) = recorded(seed, 0.043);
         let config = DwellConfig::default();
         let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
-        let moments = track(&samples, Some(&clock), 0.0, &dwells, &config).unwrap();
+        let moments = track(&samples, Some(&clock), &dwells, &config).unwrap();
         assert!(moments.len() > 300, "{}", moments.len());
         for m in &moments {
             // Linear interpolation between rows 10 ms apart errs by up to a h^2 / 8, a a few rad/s^2.
@@ -61,7 +61,10 @@ fn a_shifted_clock_moves_the_joints_by_their_velocity() {
     let (_, samples, clock) = recorded(3, 0.043);
     let config = DwellConfig::default();
     let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
-    let at = |shift_s| track(&samples, Some(&clock), shift_s, &dwells, &config).unwrap();
+    let at = |shift_s: f64| {
+        let clock = ClockAlignment { offset_s: clock.offset_s + shift_s, ..clock.clone() };
+        track(&samples, Some(&clock), &dwells, &config).unwrap()
+    };
     let (now, later) = (at(0.0), at(0.005));
     let mut compared = 0;
     for m in &now {
@@ -81,7 +84,7 @@ fn a_break_of_the_stream_ends_a_motion() {
     let (_, mut samples, clock) = recorded(5, 0.0);
     let config = DwellConfig::default();
     let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
-    let whole = track(&samples, Some(&clock), 0.0, &dwells, &config).unwrap();
+    let whole = track(&samples, Some(&clock), &dwells, &config).unwrap();
     // Cut 0.4 s out of the middle of the longest motion.
     let longest = (0..=whole.last().unwrap().motion)
         .max_by_key(|k| whole.iter().filter(|m| m.motion == *k).count())
@@ -95,7 +98,7 @@ fn a_break_of_the_stream_ends_a_motion() {
     for column in &mut samples.joints.joint_rad {
         *column = kept.iter().map(|i| column[*i]).collect();
     }
-    let cut = track(&samples, Some(&clock), 0.0, &dwells, &config).unwrap();
+    let cut = track(&samples, Some(&clock), &dwells, &config).unwrap();
     assert_eq!(cut.last().unwrap().motion, whole.last().unwrap().motion + 1);
     assert!(cut.iter().all(|m| (m.time_ns - middle).abs() > 190_000_000));
 }
@@ -104,5 +107,5 @@ fn a_break_of_the_stream_ends_a_motion() {
 fn without_a_sensor_there_is_nothing_to_follow() {
     let (_, mut samples, _) = recorded(1, 0.0);
     samples.tip = None;
-    assert!(track(&samples, None, 0.0, &[], &DwellConfig::default()).unwrap().is_empty());
+    assert!(track(&samples, None, &[], &DwellConfig::default()).unwrap().is_empty());
 }

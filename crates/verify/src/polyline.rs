@@ -25,6 +25,28 @@ impl Polyline {
         self.points_m.windows(2).map(|piece| (piece[1] - piece[0]).norm()).sum()
     }
 
+    /// The path with no more corners than it takes to stay within a distance of every point (Douglas and Peucker,
+    /// Cartographica 10, 1973): the jitter of sampling is no corner.
+    pub fn simplified(&self, within_m: f64) -> Polyline {
+        let n = self.points_m.len();
+        let mut kept = vec![false; n];
+        (kept[0], kept[n - 1]) = (true, true);
+        let mut open = vec![(0, n - 1)];
+        while let Some((from, to)) = open.pop() {
+            let away = |i: &usize| {
+                let at = &self.points_m[*i];
+                (at - nearest(at, &self.points_m[from], &self.points_m[to])).norm()
+            };
+            let farthest = (from + 1..to).max_by(|a, b| away(a).total_cmp(&away(b)));
+            if let Some(corner) = farthest.filter(|i| away(i) > within_m) {
+                kept[corner] = true;
+                open.extend([(from, corner), (corner, to)]);
+            }
+        }
+        let points = self.points_m.iter().zip(kept).filter(|(_, kept)| *kept);
+        Polyline { points_m: points.map(|(m, _)| *m).collect() }
+    }
+
     /// Whether another path is nowhere further away than this, place by place: at every tenth of the length.
     pub fn is_like(&self, other: &Polyline, within_m: f64) -> bool {
         (self.length_m() - other.length_m()).abs() < within_m
@@ -97,6 +119,17 @@ mod tests {
         let back = Polyline::through(vec![Vector3::x(), Vector3::zeros()]).expect("points");
         assert!(!line(7, 1.0).is_like(&back, 1e-3));
         assert!((line(7, 1.5).length_m() - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn jitter_is_no_corner_and_a_corner_is() {
+        let jitter = |i: usize| if i % 2 == 0 { 5e-5 } else { -5e-5 };
+        let mut points: Vec<Vector3<f64>> =
+            (0..=100).map(|i| Vector3::new(i as f64 * 1e-3, jitter(i), 0.0)).collect();
+        points.extend((1..=100).map(|i| Vector3::new(0.1 + jitter(i), i as f64 * 1e-3, 0.0)));
+        let path = Polyline::through(points).expect("points").simplified(2e-4);
+        assert_eq!(path.points_m().len(), 3);
+        assert!((path.points_m()[1] - Vector3::new(0.1, 0.0, 0.0)).norm() < 2e-4);
     }
 
     proptest! {

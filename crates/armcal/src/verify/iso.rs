@@ -19,6 +19,8 @@ use nalgebra::{Matrix3, Vector3};
 const SAME_COMMAND_RAD: f64 = 1e-3;
 /// Commanded paths that differ by less than this at every tenth of their length are one command [m].
 const SAME_PATH_M: f64 = 1e-3;
+/// Corners of a commanded path that are smaller than this are the jitter of its samples [m].
+const JITTER_M: f64 = 2e-4;
 /// Shorter motions are no path to judge [m].
 const SHORTEST_PATH_M: f64 = 0.1;
 /// How much of the motion before a stop is looked at [s].
@@ -147,7 +149,8 @@ impl Shown<'_> {
                     Some((_, test)) => test.runs.push(run),
                     None => {
                         let name = format!("path {}", tests.len() + 1);
-                        let commanded = path.points_m().iter().map(|m| TipPose::at(*m)).collect();
+                        let corners = path.simplified(JITTER_M);
+                        let commanded = corners.points_m().iter().map(|m| TipPose::at(*m)).collect();
                         let test =
                             PathTest { name, commanded, runs: vec![run], speed_m_s: None, weave: None };
                         tests.push((path.clone(), test));

@@ -67,15 +67,15 @@ fn recording(seen: &Seen, motion: &Motion) -> VerifiedRecording {
         name: seen.name.clone(),
         dwells: seen.dwells.len(),
         moving_samples: motion.errors.len(),
-        clock_offset_s: seen.clock.as_ref().map(|c| c.offset_s + motion.late_s),
-        clock_reference_ns: seen.clock.as_ref().map(|c| c.reference_ns),
-        clock_sigma_s: motion.clock.map(|c| c.sigma_s),
+        clock_offset_s: motion.clock.as_ref().map(|c| c.offset_s),
+        clock_reference_ns: motion.clock.as_ref().map(|c| c.reference_ns),
+        clock_sigma_s: motion.clock.as_ref().map(|c| c.offset_sigma_s),
     }
 }
 
 /// Rows of the path table.
 fn rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
-    let clocks: Vec<Option<ClockError>> = motions.iter().map(|m| m.clock).collect();
+    let clocks: Vec<Option<ClockError>> = motions.iter().map(|m| m.clock_error).collect();
     let (mut errors, mut planned) = (Vec::new(), BTreeMap::new());
     for motion in motions {
         errors.extend(motion.errors);

@@ -6,7 +6,7 @@ use crate::stages::observe;
 use crate::stages::past::Placed;
 use crate::stages::perceive::Seen;
 use armcal_core::{DwellId, JointSamples, Observation, Pose, Samples};
-use armcal_dwell::{Moment, track};
+use armcal_dwell::{ClockAlignment, Moment, track};
 use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
@@ -24,10 +24,10 @@ pub struct Motion {
     pub errors: Vec<PathError>,
     /// Paths that the set-points command, motion by motion, where they are recorded.
     pub planned: BTreeMap<DwellId, Planned>,
-    /// How much later the sensor's clock is than dwell detection took it to be [s].
-    pub late_s: f64,
-    /// What its uncertainty changes, where there are two clocks.
-    pub clock: Option<ClockError>,
+    /// The sensor's clock as the motion tells it, where there are two clocks.
+    pub clock: Option<ClockAlignment>,
+    /// What its uncertainty changes.
+    pub clock_error: Option<ClockError>,
 }
 
 /// Both models among the new recordings.
@@ -49,34 +49,33 @@ impl<'a> Judge<'a> {
     /// calibrated model.
     pub fn follow(&self, recording: usize, seen: &Seen, samples: &Samples) -> Result<Motion, Error> {
         let one = Recorded { recording, seen, samples, dwell: &self.pipeline.dwell };
-        let (mut moments, mut late_s) = (one.moments(0.0)?, 0.0);
-        let mut clock = None;
-        if seen.clock.is_some() {
-            for _ in 0..CLOCK_ROUNDS {
-                let Some(found) = self.lateness(&one, &moments) else { break };
-                late_s += found.late_s;
-                clock = Some(found);
-                moments = one.moments(late_s)?;
-                if found.late_s.abs() < CLOCK_SETTLED_S {
-                    break;
-                }
+        let (mut clock, mut moments) = (seen.clock.clone(), one.moments(seen.clock.as_ref())?);
+        for _ in 0..CLOCK_ROUNDS {
+            let Some(thought) = &clock else { break };
+            let Some(found) = self.lateness(&one, thought, &moments) else { break };
+            let corrected = corrected(thought, &found);
+            moments = one.moments(Some(&corrected))?;
+            clock = Some(corrected);
+            if found.late_s.abs() < CLOCK_SETTLED_S {
+                break;
             }
         }
         let errors = self.errors(&one, &moments);
-        let clock = match clock.filter(|c| c.sigma_s.is_finite()) {
-            None => None,
-            Some(Lateness { sigma_s, .. }) => {
-                let shifted = self.errors(&one, &one.moments(late_s + sigma_s)?);
+        let clock_error = match clock.as_ref().map(|c| (c, over_recording_s(c, samples))) {
+            Some((clock, sigma_s)) if sigma_s.is_finite() => {
+                let later = ClockAlignment { offset_s: clock.offset_s + sigma_s, ..clock.clone() };
+                let shifted = self.errors(&one, &one.moments(Some(&later))?);
                 Some(clock_error(sigma_s, &errors, &shifted))
             }
+            _ => None,
         };
         let planned = self.planned(&one, &moments);
-        Ok(Motion { errors, planned, late_s, clock })
+        Ok(Motion { errors, planned, clock, clock_error })
     }
 
-    fn lateness(&self, one: &Recorded<'_>, moments: &[Moment]) -> Option<Lateness> {
+    fn lateness(&self, one: &Recorded<'_>, clock: &ClockAlignment, moments: &[Moment]) -> Option<Lateness> {
         let (model, p) = (&self.placed.model, &self.placed.calibrated);
-        let seen: Vec<(String, Vector3<f64>, Vector3<f64>)> = moments
+        let seen: Vec<(String, f64, Vector3<f64>, Vector3<f64>)> = moments
             .par_iter()
             .enumerate()
             .map(|(index, m)| {
@@ -86,6 +85,7 @@ impl<'a> Judge<'a> {
                 let error_m = model.residual(p, &o).position_m;
                 (
                     stretch(one.motion(m), m.time_ns),
+                    m.time_ns.saturating_sub(clock.reference_ns) as f64 * 1e-9,
                     Vector3::from_column_slice(velocity_mps.as_slice()),
                     error_m,
                 )
@@ -93,8 +93,9 @@ impl<'a> Judge<'a> {
             .collect();
         let passings: Vec<Passing<'_>> = seen
             .iter()
-            .map(|(group, velocity_mps, error_m)| Passing {
+            .map(|(group, since_s, velocity_mps, error_m)| Passing {
                 group,
+                since_s: *since_s,
                 velocity_mps: *velocity_mps,
                 error_m: *error_m,
             })
@@ -151,10 +152,10 @@ struct Recorded<'a> {
 }
 
 impl Recorded<'_> {
-    /// Frames of the moving tip, its stamps `late_s` later than dwell detection took them to be.
-    fn moments(&self, late_s: f64) -> Result<Vec<Moment>, Error> {
-        let Seen { name, clock, dwells, .. } = self.seen;
-        track(self.samples, clock.as_ref(), late_s, dwells, self.dwell)
+    /// Frames of the moving tip by this clock.
+    fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<Moment>, Error> {
+        let Seen { name, dwells, .. } = self.seen;
+        track(self.samples, clock, dwells, self.dwell)
             .map_err(|source| Error::Dwell { recording: name.clone(), source })
     }
 
@@ -172,6 +173,26 @@ pub(super) fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>>
     let row = stream.time_ns.partition_point(|t| *t <= time_ns).checked_sub(1)?;
     let age_s = time_ns.saturating_sub(stream.time_ns[row]) as f64 * 1e-9;
     (age_s <= SET_POINT_MAX_AGE_S).then(|| stream.row_rad(row))
+}
+
+/// A clock whose stamps turned out to be late.
+fn corrected(thought: &ClockAlignment, found: &Lateness) -> ClockAlignment {
+    let reference_ns = thought.reference_ns.saturating_add((found.since_s * 1e9) as i64);
+    ClockAlignment {
+        offset_s: thought.offset_s + thought.drift * found.since_s + found.late_s,
+        offset_sigma_s: found.sigma_s,
+        drift: thought.drift + found.drift,
+        drift_sigma: found.drift_sigma,
+        reference_ns,
+        ..thought.clone()
+    }
+}
+
+/// Standard error of a clock over a recording: root mean square over its frames [s].
+fn over_recording_s(clock: &ClockAlignment, samples: &Samples) -> f64 {
+    let Some(tip) = &samples.tip else { return f64::NAN };
+    let square: f64 = tip.time_ns.iter().map(|t| clock.sigma_s(*t).powi(2)).sum();
+    (square / tip.len() as f64).sqrt()
 }
 
 /// What one standard error of the clock changes in the mean errors.

@@ -3,7 +3,7 @@
 use super::IsoReport;
 use crate::terminal::{Pen, number};
 use crate::text::printable;
-use armcal_iso9283::Criterion;
+use armcal_iso9283::{Criterion, NotMeasured};
 use comfy_table::Cell;
 
 /// The section; nothing where no criterion could be computed.
@@ -34,9 +34,22 @@ pub(super) fn section(pen: &Pen, report: &IsoReport) -> Option<String> {
     }
     let notes = report.calibrated.notes.iter().map(|note| ("note", printable(note)));
     text.push_str(&pen.list(notes));
-    let missing = &report.calibrated.not_measured;
-    text.push_str(&pen.list(missing.iter().map(|m| ("no", printable(&m.to_string())))));
+    text.push_str(&pen.list(missing(&report.calibrated.not_measured).into_iter().map(|m| ("no", m))));
     Some(pen.section("ISO 9283, the worst place of each criterion (verification.json has all)", text))
+}
+
+/// What cannot be computed, criteria with one reason together.
+fn missing(all: &[NotMeasured]) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for m in all {
+        let symbol = if m.symbol.is_empty() { m.name.clone() } else { m.symbol.clone() };
+        let named = format!("{} {symbol}", m.clause);
+        match reasons.iter_mut().find(|(reason, _)| *reason == m.reason) {
+            Some((_, names)) => names.push(named),
+            None => reasons.push((&m.reason, vec![named])),
+        }
+    }
+    reasons.iter().map(|(reason, names)| printable(&format!("{}: {reason}", names.join(", ")))).collect()
 }
 
 fn shown(c: &Criterion) -> String {

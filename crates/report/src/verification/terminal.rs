@@ -85,7 +85,7 @@ fn points<'a>(pen: &Pen, rows: &[PointsRow], published: impl Iterator<Item = &'a
         let subject = match row.by {
             By::All | By::Recording | By::Reference => printable(&row.subject),
             By::Arrival => {
-                format!("{} arriving {}", row.subject.trim_end_matches([' ', '+', '-']), side(row))
+                format!("{} {}", row.subject.trim_end_matches([' ', '+', '-']), side(row))
             }
             By::Axis => format!("along {} (signed)", row.subject),
         };
