@@ -103,7 +103,8 @@ pub fn solve(
 
 /// The posture, every joint bent a little, neighbours to opposite sides.
 fn kicked(q: &DVector<f64>, kick: usize) -> DVector<f64> {
-    let bend = |j: usize, q: f64| q + KICK_RAD * kick as f64 * if (j + kick) % 2 == 0 { 1.0 } else { -1.0 };
+    let bend =
+        |j: usize, q: f64| q + KICK_RAD * kick as f64 * if (j + kick).is_multiple_of(2) { 1.0 } else { -1.0 };
     DVector::from_iterator(q.len(), q.iter().enumerate().map(|(j, q)| bend(j, *q)))
 }
 
