@@ -43,10 +43,8 @@ pub struct PastModel {
     pub postures_rad: Vec<Vec<f64>>,
     /// Smallest and largest reading of each joint [rad] (sliding: [m]).
     pub range_rad: Vec<[f64; 2]>,
-    /// Mean error expected from the declared noise alone [m].
-    pub noise_floor_m: f64,
-    /// Mean error on points the fit did not see, else on those it saw [m].
-    pub mean_error_m: f64,
+    /// Mean error on points the fit did not see, else on those it saw [m]; `None` where it is not a number.
+    pub mean_error_m: Option<f64>,
     /// What the diagnosis would add to the model, as `armcal add` takes it.
     pub missing: Vec<String>,
 }
@@ -165,8 +163,7 @@ impl PastModel {
             recordings: run.recordings.iter().enumerate().map(|(i, r)| recording(r, i, run)).collect(),
             postures_rad: thinned(&run.observations),
             range_rad: (0..model.joint_count()).map(|j| range(&run.observations, j)).collect(),
-            noise_floor_m: calibration.noise_floor_m,
-            mean_error_m: judged.fitted.mean_m,
+            mean_error_m: Some(judged.fitted.mean_m).filter(|mean| mean.is_finite()),
             missing: missing.iter().map(EffectSpec::to_string).collect(),
         })
     }

@@ -141,12 +141,11 @@ fn notes(
         ));
     }
     let recording = past.recordings.get(conditions.recording).map_or("none", |r| r.name.as_str());
+    let tested = past.mean_error_m.map_or(String::new(), |mean_m| {
+        format!("; the model's mean error where it was tested is {:.2} mm", mean_m * 1e3)
+    });
     let temperature = conditions.temperature_c.map_or(String::new(), |t| format!(", {t:.1} degC"));
-    notes.push(format!(
-        "as in recording `{recording}`, load {} kg{temperature}; the model's mean error where it was tested is {:.2} mm",
-        conditions.load_kg,
-        past.mean_error_m * 1e3
-    ));
+    notes.push(format!("as in recording `{recording}`, load {} kg{temperature}{tested}", conditions.load_kg));
     if arms.model.effects().iter().any(|e| e.spec.kind == "effort_compliance") {
         notes.push("the effort of a motor is not known beforehand: effort_compliance is left at zero".into());
     }

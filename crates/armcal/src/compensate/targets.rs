@@ -154,7 +154,7 @@ mod tests {
             ("x_m,y_m,z_m,qx,qy,qz,qw\n1,2,3,0,0,0,0\n", "no direction"),
             ("x_m,y_m,z_m,qx,qy,qz,qw\n1,2,3,0,0,,1\n", "all of qx"),
         ] {
-            let words = read_as("t.csv", text).unwrap_err();
+            let words = read_as("t.csv", text).expect_err("a fault");
             assert!(words.contains(says) && words.contains("t.csv"), "{words}");
         }
     }

@@ -108,8 +108,8 @@ fn on_a_path_joints_leap_where_links_turn_back_and_nowhere_else() {
         let leaps = steps.filter(|step| *step > half).count();
         assert!(turns >= 2 && leaps <= turns + 1, "joint {joint}: {leaps} leaps at {turns} turns");
     }
-    // With time to cross, no step of a joint is a leap, and links are off by no more than a T^2 / 8, a at most
-    // (2 pi / 12 s)^2 times the radius, over a quarter of which the second harmonic in z swings too.
+    // With time to cross, no step of a joint is a leap, and links are off by no more than a T^2 / 8; a is bounded by the
+    // amplitudes of the curve times the squares of their frequencies.
     all.crossing_s = 0.4;
     let calm = all.set_points(&path, Some(&start)).unwrap();
     let steps = calm.windows(2).flat_map(|p| {
