@@ -111,7 +111,8 @@ fn the_papers_experiment_and_what_it_becomes_with_the_effect() {
         let planted_s = clock("offset_s") + clock("drift") * since_start_s;
         let (found_s, sigma_s) = (number(recording, "/clock_offset_s"), number(recording, "/clock_sigma_s"));
         println!("  clock: {:.3} ± {:.3} ms, planted {:.3}", found_s * 1e3, sigma_s * 1e3, planted_s * 1e3);
-        assert!((found_s - planted_s).abs() < 4.0 * sigma_s.max(1e-4), "{recording}");
+        // Play is never modelled quite as it is crossed, and what is left along the velocity is taken for time.
+        assert!((found_s - planted_s).abs() < 1.5e-3, "{recording}");
     }
 }
 
@@ -127,6 +128,16 @@ fn the_shipped_recordings_verify_each_other() {
     // A difference of that size is beyond doubt, and its interval says so.
     let row = &seen["points"].as_array().expect("rows")[0];
     assert!(number(row, "/difference_ci95_m/1") < 0.0);
+    // Without play the clock of the motion is the true one.
+    let truth = read_json(&root().join("fixtures/paper/truth.json"));
+    for (index, recording) in (1..3).zip(seen["recordings"].as_array().expect("recordings")) {
+        let clock = |name: &str| number(&truth, &format!("/recordings/{index}/clock/{name}"));
+        let since_start_s = (number(recording, "/clock_reference_ns") - clock("reference_ns")) * 1e-9;
+        let planted_s = clock("offset_s") + clock("drift") * since_start_s;
+        let (found_s, sigma_s) = (number(recording, "/clock_offset_s"), number(recording, "/clock_sigma_s"));
+        println!("clock: {:.3} ± {:.3} ms, planted {:.3}", found_s * 1e3, sigma_s * 1e3, planted_s * 1e3);
+        assert!((found_s - planted_s).abs() < 4.0 * sigma_s.max(5e-5), "{recording}");
+    }
 }
 
 #[test]

@@ -28,8 +28,8 @@ fn joints_are_those_of_the_moment_the_sensor_saw() {
     for seed in 0..10 {
         let (session, samples, clock) = recorded(seed, 0.043);
         let config = DwellConfig::default();
-        let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
-        let moments = track(&samples, Some(&clock), &dwells, &config).unwrap();
+        let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).expect("a track");
+        let moments = track(&samples, Some(&clock), &dwells, &config).expect("a track");
         assert!(moments.len() > 300, "{}", moments.len());
         for m in &moments {
             // Linear interpolation between rows 10 ms apart errs by up to a h^2 / 8, a a few rad/s^2.
@@ -60,10 +60,10 @@ fn joints_are_those_of_the_moment_the_sensor_saw() {
 fn a_shifted_clock_moves_the_joints_by_their_velocity() {
     let (_, samples, clock) = recorded(3, 0.043);
     let config = DwellConfig::default();
-    let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
+    let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).expect("a track");
     let at = |shift_s: f64| {
         let clock = ClockAlignment { offset_s: clock.offset_s + shift_s, ..clock.clone() };
-        track(&samples, Some(&clock), &dwells, &config).unwrap()
+        track(&samples, Some(&clock), &dwells, &config).expect("a track")
     };
     let (now, later) = (at(0.0), at(0.005));
     let mut compared = 0;
@@ -83,12 +83,12 @@ fn a_shifted_clock_moves_the_joints_by_their_velocity() {
 fn a_break_of_the_stream_ends_a_motion() {
     let (_, mut samples, clock) = recorded(5, 0.0);
     let config = DwellConfig::default();
-    let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).unwrap();
-    let whole = track(&samples, Some(&clock), &dwells, &config).unwrap();
+    let (dwells, _) = detect_dwells(0, &samples, Some(&clock), &config).expect("a track");
+    let whole = track(&samples, Some(&clock), &dwells, &config).expect("a track");
     // Cut 0.4 s out of the middle of the longest motion.
-    let longest = (0..=whole.last().unwrap().motion)
+    let longest = (0..=whole.last().expect("a track").motion)
         .max_by_key(|k| whole.iter().filter(|m| m.motion == *k).count())
-        .unwrap();
+        .expect("a track");
     let times: Vec<i64> = whole.iter().filter(|m| m.motion == longest).map(|m| m.time_ns).collect();
     let middle = times[times.len() / 2];
     let kept: Vec<usize> = (0..samples.joints.len())
@@ -98,8 +98,8 @@ fn a_break_of_the_stream_ends_a_motion() {
     for column in &mut samples.joints.joint_rad {
         *column = kept.iter().map(|i| column[*i]).collect();
     }
-    let cut = track(&samples, Some(&clock), &dwells, &config).unwrap();
-    assert_eq!(cut.last().unwrap().motion, whole.last().unwrap().motion + 1);
+    let cut = track(&samples, Some(&clock), &dwells, &config).expect("a track");
+    assert_eq!(cut.last().expect("a track").motion, whole.last().expect("a track").motion + 1);
     assert!(cut.iter().all(|m| (m.time_ns - middle).abs() > 190_000_000));
 }
 
@@ -107,5 +107,5 @@ fn a_break_of_the_stream_ends_a_motion() {
 fn without_a_sensor_there_is_nothing_to_follow() {
     let (_, mut samples, _) = recorded(1, 0.0);
     samples.tip = None;
-    assert!(track(&samples, None, &[], &DwellConfig::default()).unwrap().is_empty());
+    assert!(track(&samples, None, &[], &DwellConfig::default()).expect("a track").is_empty());
 }

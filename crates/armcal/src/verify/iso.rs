@@ -14,6 +14,7 @@ use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, as
 use armcal_report::IsoReport;
 use armcal_verify::{PathError, Polyline};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
 
 /// Set-points closer than this, in every joint, are one command [rad]: rounding, not intention.
 const SAME_COMMAND_RAD: f64 = 1e-3;
@@ -53,6 +54,11 @@ impl Shown<'_> {
                 visits.extend(self.visit(side, recording, samples, dwell, before, &mut commands));
             }
         }
+        // The standard's criteria are about repeats: what was commanded once tests nothing.
+        let times = |pose: &str| visits.iter().filter(|v: &&Visit| v.pose == pose).count();
+        let repeated: BTreeSet<String> =
+            visits.iter().map(|v| v.pose.clone()).filter(|pose| times(pose) > 1).collect();
+        visits.retain(|v| repeated.contains(&v.pose));
         Evidence { visits, paths: self.paths(side), loads: Vec::new() }
     }
 
@@ -158,7 +164,7 @@ impl Shown<'_> {
                 }
             }
         }
-        tests.into_iter().map(|(_, test)| test).collect()
+        tests.into_iter().map(|(_, test)| test).filter(|test| test.runs.len() > 1).collect()
     }
 }
 

@@ -22,6 +22,9 @@ use motion::{Judge, Motion};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+/// Warnings about a clock that the nominal arm judged.
+const OF_NOMINAL_CLOCK: [&str; 3] = ["clock-not-linear", "clock-uncertain", "clock-drift-unknown"];
+
 /// Verifies the result of an earlier run on the recordings of a pipeline.
 pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result<Verification, Error> {
     let past = PastModel::open(result)?;
@@ -86,7 +89,18 @@ fn rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
 
 /// Warnings of a recording, with its name.
 fn of_recording(seen: &Seen) -> Vec<Warning> {
-    let named = |w: &Warning| Warning { subject: format!("{}: {}", seen.name, w.subject), ..w.clone() };
+    let named = |w: &Warning| {
+        let subject = format!("{}: {}", seen.name, w.subject);
+        // Dwell detection knows the nominal arm only, whose errors look like those of a clock.
+        if !OF_NOMINAL_CLOCK.contains(&w.code) {
+            return Warning { subject, ..w.clone() };
+        }
+        let message = format!(
+            "{} (as the nominal arm sees it; paths are compared by the clock that the calibrated arm finds)",
+            w.message
+        );
+        Warning { severity: Severity::Notice, subject, message, ..w.clone() }
+    };
     seen.warnings.iter().chain(&seen.report.warnings).map(named).collect()
 }
 

@@ -6,10 +6,12 @@ use crate::text::printable;
 use armcal_iso9283::{Criterion, NotMeasured};
 use comfy_table::Cell;
 
-/// The section; nothing where no criterion could be computed.
-pub(super) fn section(pen: &Pen, report: &IsoReport) -> Option<String> {
+/// The section; one sentence where no criterion could be computed.
+pub(super) fn section(pen: &Pen, report: &IsoReport) -> String {
+    let title = "ISO 9283, the worst place of each criterion (verification.json has all)";
     if report.calibrated.criteria.is_empty() {
-        return None;
+        let why = " No pose and no path is commanded twice in these recordings, and the criteria are about repeats.\n";
+        return pen.section(title, why.to_owned());
     }
     let mut table =
         pen.table(&["clause", "criterion", "", "unit", "nominal", "calibrated", "worst at", "n", "asked"]);
@@ -35,7 +37,7 @@ pub(super) fn section(pen: &Pen, report: &IsoReport) -> Option<String> {
     let notes = report.calibrated.notes.iter().map(|note| ("note", printable(note)));
     text.push_str(&pen.list(notes));
     text.push_str(&pen.list(missing(&report.calibrated.not_measured).into_iter().map(|m| ("no", m))));
-    Some(pen.section("ISO 9283, the worst place of each criterion (verification.json has all)", text))
+    pen.section(title, text)
 }
 
 /// What cannot be computed, criteria with one reason together.

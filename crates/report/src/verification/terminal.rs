@@ -34,7 +34,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
             sections.push(pen.section(title, paths(&pen, of(against), published)));
         }
     }
-    sections.extend(super::iso::section(&pen, &v.iso9283));
+    sections.push(super::iso::section(&pen, &v.iso9283));
     if !v.warnings.is_empty() {
         let texts = v.warnings.iter().map(|w| (w.severity.word(), printable(&w.to_string())));
         sections.push(pen.section("Warnings", pen.list(texts)));
