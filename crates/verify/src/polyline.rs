@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn jitter_is_no_corner_and_a_corner_is() {
-        let jitter = |i: usize| if i % 2 == 0 { 5e-5 } else { -5e-5 };
+        let jitter = |i: usize| if i.is_multiple_of(2) { 5e-5 } else { -5e-5 };
         let mut points: Vec<Vector3<f64>> =
             (0..=100).map(|i| Vector3::new(i as f64 * 1e-3, jitter(i), 0.0)).collect();
         points.extend((1..=100).map(|i| Vector3::new(0.1 + jitter(i), i as f64 * 1e-3, 0.0)));
