@@ -54,3 +54,6 @@ mod report_page;
 mod compensation;
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;
+
+/// Does the calibration table do without a camera?
+mod camera_free;

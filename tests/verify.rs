@@ -1,3 +1,4 @@
+use crate::support::browser::{browser, scripted};
 use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -138,6 +139,22 @@ fn the_shipped_recordings_verify_each_other() {
         println!("clock: {:.3} ± {:.3} ms, planted {:.3}", found_s * 1e3, sigma_s * 1e3, planted_s * 1e3);
         assert!((found_s - planted_s).abs() < 4.0 * sigma_s.max(5e-5), "{recording}");
     }
+}
+
+/// Figures 6, 7 and 10 of the paper, in a real browser.
+#[test]
+fn the_page_of_a_verification_draws_its_paths() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (out, verified) = (folder.path().join("out"), folder.path().join("verified"));
+    run_pipeline(&root().join("pipelines/paper-normal.toml"), &out, &[0]);
+    let pipeline = root().join("pipelines/paper-verify.toml");
+    let output = armcal([Path::new("verify"), &out, &pipeline, Path::new("--out"), &verified]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let screenshots = root().join("target/screenshots/verify");
+    std::fs::create_dir_all(&screenshots).expect("folder for screenshots");
+    let (page, json) = (verified.join("verification.html"), verified.join("verification.json"));
+    println!("{}", scripted(&browser, "verified.mjs", &[&page, &json, &screenshots]));
 }
 
 #[test]

@@ -135,7 +135,7 @@ pub enum Command {
         result: PathBuf,
         /// Pipeline file of the new recordings, with the same nominal arm.
         pipeline: PathBuf,
-        /// Folder for verification.json and paths.parquet.
+        /// Folder for verification.html, verification.json and paths.parquet.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Print JSON.

@@ -158,7 +158,8 @@ pub(crate) fn sizes(c: &CandidateReport) -> String {
 pub fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
     let shown = |si| in_display_unit(p.unit, si);
-    format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol())
+    let text = format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol());
+    text.trim_end().to_owned()
 }
 
 pub(crate) fn found(e: &FoundEffect) -> String {

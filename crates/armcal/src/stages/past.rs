@@ -23,7 +23,7 @@ pub struct Placed {
 /// the pipeline of the new recordings knows them.
 ///
 /// What calibration learned about the base is kept: where the base is measured again, its correction relative to the
-/// measured pose; where it is to be estimated, its calibrated pose; a given pose stays as given.
+/// measured pose; where it is to be estimated, its calibrated pose, to start from; a given pose stays as given.
 ///
 /// # Errors
 /// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.

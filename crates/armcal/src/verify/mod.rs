@@ -117,8 +117,8 @@ struct Surroundings<'a> {
 impl Surroundings<'_> {
     /// The calibrated model in its place, and the dwells in theirs.
     ///
-    /// Frames that nobody could know without these dwells (a board whose pose is estimated; for the nominal arm also an
-    /// estimated base and tip) are fitted to them, the arm left alone.
+    /// Frames that nobody could know without these dwells (a board or a base whose pose is estimated; for the nominal arm
+    /// also an estimated tip) are fitted to them, the arm left alone.
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
@@ -149,12 +149,12 @@ impl Surroundings<'_> {
     fn fit_frames(&self, placed: &mut Placed, observations: &[Observation]) -> Result<Vec<Warning>, Error> {
         let (model, fit) = (&placed.model, &self.pipeline.fit);
         let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        let of_board = |p: &Parameter| estimated(p) && p.name.starts_with("board.");
+        let around = |p: &Parameter| estimated(p) && !p.name.starts_with("tip.");
         if !model.parameters().iter().any(estimated) {
             return Ok(Vec::new());
         }
         placed.nominal = fit_frames_from(model, observations, placed.nominal.clone(), fit, &estimated)?;
-        placed.calibrated = fit_frames_from(model, observations, placed.calibrated.clone(), fit, &of_board)?;
+        placed.calibrated = fit_frames_from(model, observations, placed.calibrated.clone(), fit, &around)?;
         Ok(vec![frames_fitted(model)])
     }
 }

@@ -12,7 +12,7 @@ mod bands;
 mod basis;
 mod compared;
 mod document;
-mod embed;
+pub(crate) mod embed;
 mod groups;
 mod levers;
 mod numbers;

@@ -1,5 +1,6 @@
 //! A verification for programs.
 
+use super::page::verification_html;
 use super::{IsoReport, PathSample, Published, Verification, VerifiedRecording};
 use crate::ReportError;
 use crate::past_model::Value;
@@ -53,9 +54,11 @@ pub fn verification_json(v: &Verification) -> String {
     json.expect("strings, numbers and lists under literal names always serialise") + "\n"
 }
 
-/// Files of a verification, by name: `verification.json`, and `paths.parquet` with the moving tip frame by frame.
+/// Files of a verification, by name: `verification.html` to look at, `verification.json`, and `paths.parquet` with the moving
+/// tip frame by frame.
 pub fn verification_files(v: &Verification) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
     Ok(vec![
+        ("verification.html", verification_html(v)?.into_bytes()),
         ("verification.json", verification_json(v).into_bytes()),
         ("paths.parquet", path_columns(&v.samples).encode("paths.parquet")?),
     ])

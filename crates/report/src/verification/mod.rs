@@ -1,7 +1,8 @@
-//! What `armcal verify` found: one value, shown as terminal text, JSON and Parquet.
+//! What `armcal verify` found: one value, shown as terminal text, page, JSON and Parquet.
 
 mod files;
 mod iso;
+mod page;
 mod terminal;
 
 pub use files::{verification_files, verification_json};
