@@ -54,3 +54,6 @@ mod report_page;
 mod compensation;
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;
+
+/// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
+mod two_arms;

@@ -48,7 +48,7 @@ mod tests;
 pub use calibration::calibrate;
 pub use closed_chain::{
     ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, LengthKnowledge,
-    calibrate_closed_chain,
+    calibrate_closed_chain, closed_chain_nominal,
 };
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use error::CalibrateError;

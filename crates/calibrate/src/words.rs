@@ -166,11 +166,13 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
         return format!("these dwells do not show {} from enough sides", spoken(tip));
     }
     if let Some(base) = base {
-        let others = list(&without(&parts, base));
-        if others.is_empty() {
-            return format!("these dwells do not tie {} down", spoken(base));
+        let base_in_words = spoken(base);
+        let mut all = without(&parts, base);
+        if all.is_empty() {
+            return format!("these dwells do not tie {base_in_words} down");
         }
-        return format!("{others} and {} move the tip alike over these dwells", spoken(base));
+        all.push(&base_in_words);
+        return format!("{} move the tip alike over these dwells", list(&all));
     }
     format!("{} move the tip alike over these dwells", list(&names(terms)))
 }

@@ -43,20 +43,29 @@ struct Judge<'a> {
     config: &'a FitConfig,
 }
 
-impl Judge<'_> {
-    /// Nominal arms, with only what nobody knew beforehand fitted.
-    fn nominal_values(&self, train: &ClosedChainProblem<'_>) -> Result<Vec<f64>, CalibrateError> {
-        let start = self.chain.nominal();
-        let unknown = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        if !self.chain.parameters().iter().any(unknown) {
-            return Ok(start);
-        }
-        // Frames are never the subject of eq. 4; they are fitted robustly under it.
-        let robust = self.config.objective == Objective::Paper;
-        let objective = if robust { Objective::Robust } else { self.config.objective };
-        let config = FitConfig { objective, ..self.config.clone() };
-        Ok(fit_problem(train, &start, &unknown, &config)?.values())
+/// Parameters of nominal arms, with only what nobody knew beforehand fitted: an estimated base, the length of a link that
+/// nobody measured.
+pub fn closed_chain_nominal(
+    chain: &ClosedChain,
+    observations: &[ClosedObservation],
+    config: &FitConfig,
+) -> Result<Vec<f64>, CalibrateError> {
+    nominal_values(&ClosedChainProblem::new(chain, observations)?, chain, config)
+}
+
+fn nominal_values(
+    problem: &ClosedChainProblem<'_>,
+    chain: &ClosedChain,
+    config: &FitConfig,
+) -> Result<Vec<f64>, CalibrateError> {
+    let start = chain.nominal();
+    let unknown = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
+    if !chain.parameters().iter().any(unknown) {
+        return Ok(start);
     }
+    // Frames are never the subject of eq. 4; they are fitted robustly under it.
+    let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
+    Ok(fit_problem(problem, &start, &unknown, &FitConfig { objective, ..config.clone() })?.values())
 }
 
 impl Judged for Judge<'_> {
@@ -67,7 +76,7 @@ impl Judged for Judge<'_> {
     fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError> {
         let kept = self.observations.iter().enumerate().filter(|(i, _)| held.binary_search(i).is_err());
         let train = ClosedChainProblem::new(self.chain, kept.map(|(_, o)| o))?;
-        let nominal_values = self.nominal_values(&train)?;
+        let nominal_values = nominal_values(&train, self.chain, self.config)?;
         let free = |p: &Parameter| p.free;
         let fit = match near {
             Some(fit) => {

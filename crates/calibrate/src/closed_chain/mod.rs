@@ -17,7 +17,7 @@ mod calibration;
 mod problem;
 mod start;
 
-pub use calibration::calibrate_closed_chain;
+pub use calibration::{calibrate_closed_chain, closed_chain_nominal};
 pub use problem::ClosedChainProblem;
 
 use crate::CalibrateError;
