@@ -57,3 +57,6 @@ mod verify;
 
 /// Does the calibration table do without a camera?
 mod camera_free;
+
+/// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
+mod two_arms;

@@ -87,6 +87,12 @@ pub enum Error {
         /// Why.
         source: armcal_table::TableError,
     },
+    /// Two arms that cannot be calibrated against each other.
+    #[error("two arms: {problem}")]
+    TwoArms {
+        /// What was seen, and what to do.
+        problem: String,
+    },
     /// The board file.
     #[error(transparent)]
     Board(#[from] armcal_table::TableError),

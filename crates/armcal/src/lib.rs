@@ -1,10 +1,11 @@
 //! armcal calibrates a robot arm from MCAP recordings.
 //!
 //! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
-//! are what a user types.
+//! are what a user types. Two arms have a pipeline and a story of their own in [`closed_chain`].
 
 pub mod check;
 pub mod cli;
+pub mod closed_chain;
 pub mod commands;
 pub mod compensate;
 pub mod error;
@@ -17,5 +18,6 @@ pub mod story;
 pub mod verify;
 pub mod view;
 
+pub use closed_chain::ClosedPipeline;
 pub use error::Error;
-pub use pipeline::Pipeline;
+pub use pipeline::{Job, Pipeline};

@@ -4,6 +4,7 @@
 //! this module only puts them side by side, so a key is documented where it is used.
 
 use crate::check::CheckSection;
+use crate::closed_chain::ClosedPipeline;
 use crate::error::Error;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
@@ -256,19 +257,54 @@ impl Default for ObservationsSection {
     }
 }
 
+/// What a pipeline file asks for.
+#[derive(Debug, Clone)]
+pub enum Job {
+    /// One arm.
+    OneArm(Box<Pipeline>),
+    /// Two arms whose tips are joined.
+    TwoArms(Box<ClosedPipeline>),
+}
+
+impl Job {
+    /// Reads and checks a pipeline file of either kind: one with a `[closed_chain]` is about two arms.
+    pub fn load(path: &Path) -> Result<Job, Error> {
+        let text = read(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if is_of_two_arms(&text) {
+            return Ok(Job::TwoArms(Box::new(ClosedPipeline::parse(path, &text, folder)?)));
+        }
+        Ok(Job::OneArm(Box::new(Pipeline::parse(path, text, folder)?)))
+    }
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
+        what: "pipeline",
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
+fn is_of_two_arms(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("closed_chain"))
+}
+
 impl Pipeline {
     /// Reads and checks a pipeline file.
     pub fn load(path: &Path) -> Result<Pipeline, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
-            what: "pipeline",
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = read(path)?;
         Pipeline::parse(path, text, path.parent().unwrap_or(Path::new("")))
     }
 
     /// Reads and checks the text of a pipeline whose relative paths start in `folder`.
     pub fn parse(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
+        if is_of_two_arms(&text) {
+            let problem = "is about two arms, which only `armcal run` reads".into();
+            let key = "closed_chain".into();
+            return Err(Error::PipelineContradiction { path: path.to_owned(), key, problem });
+        }
         let mut pipeline: Pipeline = toml::from_str(&text)
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
         pipeline.folder = folder.to_owned();

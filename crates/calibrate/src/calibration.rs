@@ -14,10 +14,9 @@
 use crate::fit::{Near, fit_near};
 use crate::frames::{self, is_of};
 use crate::holdout::{self, Holdout};
-use crate::model_problem::ModelProblem;
+use crate::model_problem::{ModelProblem, describe, position_covariance_m2};
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
-use crate::problem::Problem as _;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
@@ -37,10 +36,28 @@ pub fn calibrate(
     }
     let frame_names = frames::frame_names(model);
     let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
-    let judge = Judge { model, observations, config };
+    judged(&Judge { model, observations, config }, &holdout, config)
+}
+
+/// Observations that can be fitted without some of them, and the error of each.
+pub(crate) trait Judged: Sync {
+    /// Number of observations.
+    fn observations(&self) -> usize;
+    /// Fits without the observations `held`, from nominal or from `near`.
+    fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError>;
+    /// One observation as a turn predicts it.
+    fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError>;
+}
+
+/// Fits in the turns of the hold-out and pools their errors.
+pub(crate) fn judged(
+    judge: &dyn Judged,
+    holdout: &Holdout,
+    config: &FitConfig,
+) -> Result<Calibration, CalibrateError> {
     if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
         let turn = judge.turn(held, None)?;
-        return judge.pool(&holdout, std::slice::from_ref(&turn), turn.clone());
+        return pool(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
     let last = judge.turn(&[], None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
@@ -49,17 +66,78 @@ pub fn calibrate(
     let turns: Vec<Result<Turn, CalibrateError>> =
         holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
-    judge.pool(&holdout, &turns, last)
+    pool(judge, holdout, &turns, last)
 }
 
 /// A fit outside a held-out set, completed by the frames that only the held-out set shows.
 #[derive(Clone)]
-struct Turn {
-    fit: Fit,
-    nominal_values: Vec<f64>,
+pub(crate) struct Turn {
+    pub fit: Fit,
+    /// Parameters that give the nominal errors.
+    pub nominal_values: Vec<f64>,
     /// Index into the fit's weights of every observation it saw.
     weight_of: Vec<Option<usize>>,
-    warnings: Vec<Warning>,
+    pub warnings: Vec<Warning>,
+}
+
+impl Turn {
+    /// A turn that fitted all of `observations` but those `held` (indices in rising order).
+    pub fn new(fit: Fit, nominal_values: Vec<f64>, held: &[usize], observations: usize) -> Turn {
+        let mut seen = 0..;
+        let is_held = |i: usize| held.binary_search(&i).is_ok();
+        let weight_of = (0..observations).map(|i| if is_held(i) { None } else { seen.next() }).collect();
+        Turn { fit, nominal_values, weight_of, warnings: Vec::new() }
+    }
+
+    /// Robust weight of an observation in the fit; 1 where it did not take part.
+    pub fn weight(&self, i: usize) -> f64 {
+        self.weight_of[i].map_or(1.0, |at| self.fit.weights[at])
+    }
+}
+
+/// Residuals and errors of all turns and the last fit.
+fn pool(
+    judge: &dyn Judged,
+    holdout: &Holdout,
+    turns: &[Turn],
+    last: Turn,
+) -> Result<Calibration, CalibrateError> {
+    let mut turn_of = vec![None; judge.observations()];
+    for (t, held) in holdout.turns.iter().enumerate() {
+        held.iter().for_each(|&i| turn_of[i] = Some(t));
+    }
+    let mut residuals = Vec::with_capacity(judge.observations());
+    let mut train = Vec::new();
+    for (i, held_in) in turn_of.iter().enumerate() {
+        let judged_by = held_in.map_or(&last, |t| &turns[t]);
+        residuals.push(judge.residual(i, judged_by, held_in.is_some())?);
+        // In turns, everything is training for the last fit.
+        if holdout.in_turn {
+            train.push(judge.residual(i, &last, false)?);
+        }
+    }
+    let held: Vec<&Residual> = residuals.iter().filter(|r| r.held_out).collect();
+    let seen: Vec<&Residual> =
+        train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
+    let judged = if held.is_empty() { &seen } else { &held };
+    let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
+    let (train, holdout_errors) = (errors(&seen), errors(&held));
+    let mut warnings = last.fit.warnings.clone();
+    let of_turns: Vec<&Warning> = turns.iter().flat_map(|t| &t.warnings).collect();
+    for warning in of_turns {
+        if !warnings.contains(warning) {
+            warnings.push(warning.clone());
+        }
+    }
+    Ok(Calibration {
+        fit: last.fit,
+        nominal_values: last.nominal_values,
+        residuals,
+        train,
+        holdout: holdout_errors,
+        noise_floor_m,
+        warnings,
+    })
 }
 
 struct Judge<'a> {
@@ -68,8 +146,11 @@ struct Judge<'a> {
     config: &'a FitConfig,
 }
 
-impl Judge<'_> {
-    /// Fits without the observations `held`, from nominal or from `near`.
+impl Judged for Judge<'_> {
+    fn observations(&self) -> usize {
+        self.observations.len()
+    }
+
     fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
@@ -93,12 +174,31 @@ impl Judge<'_> {
             adopt(&mut fit, &frozen, &of_unseen);
             warnings.push(fitted_on_held_out(&unseen));
         }
-        let mut seen = 0..;
-        let weight_of =
-            (0..self.observations.len()).map(|i| if is_held(i) { None } else { seen.next() }).collect();
-        Ok(Turn { fit, nominal_values, weight_of, warnings })
+        Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations.len()) })
     }
 
+    fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
+        let o = &self.observations[i];
+        let values = turn.fit.values();
+        let covariance = position_covariance_m2(self.model, &values, o);
+        let fitted_m = self.model.residual(&values, o).position_m;
+        let whitened = covariance
+            .cholesky()
+            .and_then(|c| c.l().solve_lower_triangular(&fitted_m))
+            .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
+        Ok(Residual {
+            dwell: o.dwell,
+            held_out,
+            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
+            fitted_m,
+            whitened,
+            weight: if held_out { 1.0 } else { turn.weight(i) },
+            expected_norm_m: expected_norm_m(&covariance),
+        })
+    }
+}
+
+impl Judge<'_> {
     /// Where a fit ended, as a start; what the turn must not know of is at nominal.
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
         let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
@@ -117,73 +217,6 @@ impl Judge<'_> {
             .into_iter()
             .filter(|frame| !known.contains(frame) && estimated(frame))
             .collect()
-    }
-
-    /// Residuals and errors of all turns and the last fit.
-    fn pool(&self, holdout: &Holdout, turns: &[Turn], last: Turn) -> Result<Calibration, CalibrateError> {
-        let mut turn_of = vec![None; self.observations.len()];
-        for (t, held) in holdout.turns.iter().enumerate() {
-            held.iter().for_each(|&i| turn_of[i] = Some(t));
-        }
-        let all = ModelProblem::new(self.model, self.observations, self.config)?;
-        let mut residuals = Vec::with_capacity(self.observations.len());
-        let mut train = Vec::new();
-        for (i, held_in) in turn_of.iter().enumerate() {
-            let judged_by = held_in.map_or(&last, |t| &turns[t]);
-            residuals.push(self.residual(&all, i, judged_by, held_in.is_some())?);
-            // In turns, everything is training for the last fit.
-            if holdout.in_turn {
-                train.push(self.residual(&all, i, &last, false)?);
-            }
-        }
-        let held: Vec<&Residual> = residuals.iter().filter(|r| r.held_out).collect();
-        let seen: Vec<&Residual> =
-            train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
-        let judged = if held.is_empty() { &seen } else { &held };
-        let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
-        let (train, holdout_errors) = (errors(&seen), errors(&held));
-        let mut warnings = last.fit.warnings.clone();
-        let of_turns: Vec<&Warning> = turns.iter().flat_map(|t| &t.warnings).collect();
-        for warning in of_turns {
-            if !warnings.contains(warning) {
-                warnings.push(warning.clone());
-            }
-        }
-        Ok(Calibration {
-            fit: last.fit,
-            nominal_values: last.nominal_values,
-            residuals,
-            train,
-            holdout: holdout_errors,
-            noise_floor_m,
-            warnings,
-        })
-    }
-
-    fn residual(
-        &self,
-        all: &ModelProblem<'_>,
-        i: usize,
-        turn: &Turn,
-        held_out: bool,
-    ) -> Result<Residual, CalibrateError> {
-        let o = &self.observations[i];
-        let values = turn.fit.values();
-        let covariance = all.position_covariance_m2(i, &values);
-        let fitted_m = self.model.residual(&values, o).position_m;
-        let whitened = covariance
-            .cholesky()
-            .and_then(|c| c.l().solve_lower_triangular(&fitted_m))
-            .ok_or_else(|| CalibrateError::BadCovariance { observation: all.name(i) })?;
-        Ok(Residual {
-            dwell: o.dwell,
-            held_out,
-            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
-            fitted_m,
-            whitened,
-            weight: turn.weight_of[i].filter(|_| !held_out).map_or(1.0, |at| turn.fit.weights[at]),
-            expected_norm_m: expected_norm_m(&covariance),
-        })
     }
 }
 

@@ -91,7 +91,12 @@ fn fit_from(
         weights,
         sigma_scale: proposal2_scale(&cost, &residual, fitted),
         rank: uncertainty.rank,
-        undetermined: undetermined::directions(&uncertainty, &white.axes, problem.parameters()),
+        undetermined: undetermined::directions(
+            &uncertainty,
+            &white.axes,
+            problem.parameters(),
+            &problem.symmetries(&white.parameters_at(&solved.x)),
+        ),
         paper: solved.paper,
         status: solved.status,
         iterations: solved.iterations,

@@ -12,9 +12,11 @@
 //! * the minimum: `solver`; eq. 4 of the paper instead: `paper`;
 //! * covariance, intervals, rank, what the data cannot determine: `statistics`, `undetermined`, `words`;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
-//! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`].
+//! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
+//! * two arms whose tips are joined, each the other's reference: [`ClosedChain`], [`calibrate_closed_chain`].
 
 mod calibration;
+mod closed_chain;
 mod config;
 mod error;
 mod export;
@@ -44,6 +46,10 @@ mod words;
 mod tests;
 
 pub use calibration::calibrate;
+pub use closed_chain::{
+    ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, LengthKnowledge,
+    calibrate_closed_chain, closed_chain_nominal,
+};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};

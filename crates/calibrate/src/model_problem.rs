@@ -145,15 +145,8 @@ pub(crate) fn describe(o: &Observation) -> String {
 
 fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
     let observation = describe(o);
-    if o.joint_sigma_rad.len() != o.joint_rad.len() {
-        let why = format!(
-            "{} joint readings but {} standard errors of them: give one for each joint (0 when negligible)",
-            o.joint_rad.len(),
-            o.joint_sigma_rad.len()
-        );
-        return Err(CalibrateError::Mismatch { observation, why });
-    }
-    let (what, values): (&str, Vec<f64>) = match &o.reference {
+    check_joints(o, &observation)?;
+    let (what, values): (&'static str, Vec<f64>) = match &o.reference {
         Reference::Seated { in_board_m, .. } => {
             ("the position of the cavity", in_board_m.iter().copied().collect())
         }
@@ -161,17 +154,40 @@ fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
             ("the measured position", position_m.iter().copied().collect())
         }
     };
-    let unusable = if !o.joint_rad.iter().all(|v| v.is_finite()) {
-        "a joint reading"
-    } else if !o.joint_sigma_rad.iter().all(|v| v.is_finite() && *v >= 0.0) {
-        "the standard error of a joint reading"
-    } else if !values.iter().all(|v| v.is_finite()) {
-        what
-    } else if !o.covariance_m2.iter().all(|v| v.is_finite()) {
+    if !values.iter().all(|v| v.is_finite()) {
+        return Err(not_finite(o, &observation, what));
+    }
+    if !o.covariance_m2.iter().all(|v| v.is_finite()) {
         return Err(CalibrateError::BadCovariance { observation });
-    } else {
-        return Ok(());
-    };
+    }
+    Ok(())
+}
+
+/// One finite reading with a standard error for each joint.
+pub(crate) fn check_joints(o: &Observation, observation: &str) -> Result<(), CalibrateError> {
+    if o.joint_sigma_rad.len() != o.joint_rad.len() {
+        let why = format!(
+            "{} joint readings but {} standard errors of them: give one for each joint (0 when negligible)",
+            o.joint_rad.len(),
+            o.joint_sigma_rad.len()
+        );
+        return Err(CalibrateError::Mismatch { observation: observation.to_owned(), why });
+    }
+    if !o.joint_rad.iter().all(|v| v.is_finite()) {
+        return Err(not_finite(o, observation, "a joint reading"));
+    }
+    if !o.joint_sigma_rad.iter().all(|v| v.is_finite() && *v >= 0.0) {
+        return Err(not_finite(o, observation, "the standard error of a joint reading"));
+    }
+    Ok(())
+}
+
+fn not_finite(o: &Observation, observation: &str, what: &'static str) -> CalibrateError {
     let joint_rad = o.joint_rad.clone();
-    Err(CalibrateError::NotFinite { observation, what: unusable, parameter: String::new(), joint_rad })
+    CalibrateError::NotFinite {
+        observation: observation.to_owned(),
+        what,
+        parameter: String::new(),
+        joint_rad,
+    }
 }

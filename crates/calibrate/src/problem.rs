@@ -4,6 +4,15 @@
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector};
 
+/// A motion of the parameters that no observation of a problem can ever see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Symmetry {
+    /// Change of every parameter along it, SI, in the order of the parameter vector.
+    pub direction: Vec<f64>,
+    /// What moves, and why nothing shows it.
+    pub text: String,
+}
+
 /// A weighted nonlinear least-squares problem in blocks.
 ///
 /// Row order within a block: three position rows [m], then, where used, three orientation rows [rad].
@@ -24,6 +33,11 @@ pub trait Problem {
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>);
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
+    /// What the problem is known to leave open at parameters `p`. One that the data do see after all (because a parameter
+    /// in it is fixed) is dropped when what is undetermined is put into words.
+    fn symmetries(&self, _p: &[f64]) -> Vec<Symmetry> {
+        Vec::new()
+    }
 }
 
 impl<P: Problem + ?Sized> Problem for &P {
@@ -53,5 +67,9 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         (**self).covariance(block, p)
+    }
+
+    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
+        (**self).symmetries(p)
     }
 }

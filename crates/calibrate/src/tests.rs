@@ -1,5 +1,6 @@
 //! Tests of the whole crate, one question a file.
 
+mod closed_chain; // do two arms of the lab with joined tips recover what is planted in both?
 mod coverage; // do 95 % intervals hold 95 % of planted truths, and are parallel axes reported?
 mod frames; // are frames metres and half turns off found?
 mod holdout; // does the fit never see what is held out?

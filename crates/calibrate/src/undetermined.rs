@@ -1,12 +1,13 @@
 //! The directions the data do not determine, chosen so that they are readable.
 //!
 //! An eigenvector of a zero eigenvalue is any mixture of the physical reasons, so the weak subspace gets a basis of
-//! simple directions instead: first single parameters that lie in it, then pairs (those with a known physical reason
+//! simple directions instead: first the symmetries that the problem itself names, then single parameters that lie in it, then pairs (those with a known physical reason
 //! before those of equal unit before the rest), as long as each adds something to those already chosen. What is left
 //! is turned by the varimax rotation (Kaiser 1958), which looks for few large shares. The directions are unit vectors
 //! in units of the prior; they span the weak subspace but need not be orthogonal.
 
 use crate::outcome::UndeterminedDirection;
+use crate::problem::Symmetry;
 use crate::statistics::Uncertainty;
 use crate::whitened::Axis;
 use crate::words::{self, Simplicity};
@@ -28,15 +29,21 @@ pub(crate) fn directions(
     uncertainty: &Uncertainty,
     axes: &[Axis],
     parameters: &[Parameter],
+    symmetries: &[Symmetry],
 ) -> Vec<UndeterminedDirection> {
     let simplicity =
         |i: usize, j: usize| words::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
-    let mut found: Vec<(usize, UndeterminedDirection)> = simple_basis(&uncertainty.undetermined, &simplicity)
+    let weak = &uncertainty.undetermined;
+    let (named, texts): (Vec<DVector<f64>>, Vec<&str>) = unseen(weak, axes, symmetries).into_iter().unzip();
+    let texts = texts.into_iter().map(Some).chain(std::iter::repeat(None));
+    let mut found: Vec<(usize, UndeterminedDirection)> = simple_basis(weak, named, &simplicity)
         .into_iter()
-        .map(|direction| {
+        .zip(texts)
+        .map(|(direction, text)| {
             let shares = shares_of(&direction, &uncertainty.information);
             let lead = shares.iter().map(|s| s.0).min().unwrap_or(usize::MAX);
-            let text = words::describe(&shares, axes, parameters, &uncertainty.information);
+            let in_words = || words::describe(&shares, axes, parameters, &uncertainty.information);
+            let text = text.map_or_else(in_words, str::to_owned);
             let name = |k: usize| parameters[axes[k].index].name.clone();
             let shares = shares.iter().map(|&(k, v)| (name(k), v)).collect();
             (lead, UndeterminedDirection { shares, text })
@@ -44,6 +51,35 @@ pub(crate) fn directions(
         .collect();
     found.sort_by_key(|(lead, _)| *lead);
     found.into_iter().map(|(_, direction)| direction).collect()
+}
+
+/// The symmetries that lie in the weak subspace, as unit vectors in units of the prior, independent of each other.
+fn unseen<'s>(
+    weak: &DMatrix<f64>,
+    axes: &[Axis],
+    symmetries: &'s [Symmetry],
+) -> Vec<(DVector<f64>, &'s str)> {
+    let mut found: Vec<(DVector<f64>, &str)> = Vec::new();
+    let mut spanned: Vec<DVector<f64>> = Vec::new();
+    for symmetry in symmetries {
+        let change = axes.iter().map(|a| symmetry.direction[a.index] / a.scale);
+        let whole = DVector::from_iterator(axes.len(), change);
+        let Some(direction) = whole.try_normalize(0.0) else { continue };
+        if (weak.transpose() * &direction).norm_squared() < INSIDE {
+            continue;
+        }
+        let rest = beyond(&direction, &spanned);
+        if rest.norm_squared() >= NEW {
+            spanned.push(rest.normalize());
+            found.push((direction, &symmetry.text));
+        }
+    }
+    found
+}
+
+/// What of a direction is orthogonal to those already spanned.
+fn beyond(direction: &DVector<f64>, spanned: &[DVector<f64>]) -> DVector<f64> {
+    spanned.iter().fold(direction.clone(), |rest, s| &rest - s * s.dot(&rest))
 }
 
 /// The parameters that matter in a direction, largest share first and positive.
@@ -63,8 +99,12 @@ fn shares_of(direction: &DVector<f64>, information: &DMatrix<f64>) -> Vec<(usize
     shares
 }
 
-/// Unit vectors spanning the columns of `weak` (orthonormal), simple ones first.
-fn simple_basis(weak: &DMatrix<f64>, simplicity: &dyn Fn(usize, usize) -> Simplicity) -> Vec<DVector<f64>> {
+/// Unit vectors spanning the columns of `weak` (orthonormal): the `named` ones, then simple ones.
+fn simple_basis(
+    weak: &DMatrix<f64>,
+    named: Vec<DVector<f64>>,
+    simplicity: &dyn Fn(usize, usize) -> Simplicity,
+) -> Vec<DVector<f64>> {
     let projector = weak * weak.transpose();
     let mut candidates = Vec::new();
     for i in 0..weak.nrows() {
@@ -74,10 +114,14 @@ fn simple_basis(weak: &DMatrix<f64>, simplicity: &dyn Fn(usize, usize) -> Simpli
         candidates.extend((i + 1..weak.nrows()).map(|j| (simplicity(i, j), i, j)));
     }
     candidates.sort_unstable();
-    let (mut chosen, mut spanned): (Vec<DVector<f64>>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
+    let mut spanned: Vec<DVector<f64>> = Vec::new();
+    for direction in &named {
+        spanned.push(beyond(direction, &spanned).normalize());
+    }
+    let mut chosen = named;
     for (_, i, j) in candidates {
         let Some(direction) = inside(&projector, i, j) else { continue };
-        let rest = spanned.iter().fold(direction.clone(), |rest, s| &rest - s * s.dot(&rest));
+        let rest = beyond(&direction, &spanned);
         if rest.norm_squared() >= NEW {
             spanned.push(rest.normalize());
             chosen.push(direction);

@@ -46,7 +46,7 @@ pub(crate) fn simplicity(a: &Parameter, b: &Parameter) -> Simplicity {
     let (turning, sliding) =
         (terms.iter().all(Term::turns_about_axis), terms.iter().all(Term::slides_along_axis));
     let parallel = terms.iter().all(|t| t.quantity == "d");
-    if parts.len() == 2 && (parallel || parts.contains(&"base") && (turning || sliding)) {
+    if parts.len() == 2 && (parallel || base_of(&parts).is_some() && (turning || sliding)) {
         Simplicity::Known
     } else if a.unit == b.unit {
         Simplicity::SameUnit
@@ -112,11 +112,11 @@ fn combination(terms: &[Term<'_>]) -> String {
 
 fn reason(terms: &[Term<'_>], blind: bool) -> String {
     let parts = distinct_parts(terms);
-    let base = parts.contains(&"base");
+    let (base, tip) = (base_of(&parts), tip_of(&parts));
     let robot: Vec<&Term<'_>> = terms.iter().filter(|t| !t.is_of_board()).collect();
-    let pair_with_base = base && parts.len() == 2 && terms.len() == 2;
+    let pair_with_base = parts.len() == 2 && terms.len() == 2;
     let boards = parts.iter().filter(|p| p.starts_with("board")).count();
-    let frames = parts.iter().all(|p| *p == "base" || p.starts_with("board"));
+    let frames = parts.iter().all(|p| is_frame(p, "base") || p.starts_with("board"));
     if blind {
         return "no observation depends on it".to_string();
     }
@@ -124,13 +124,15 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
         let name = &only.parameter.name;
         return format!("these dwells move the tip by less than their noise when {name} changes");
     }
-    if pair_with_base && terms.iter().all(Term::turns_about_axis) {
-        let joint = other_than(&parts, "base");
-        return format!("turning the zero of {joint} is the same as turning the base");
-    }
-    if pair_with_base && terms.iter().all(Term::slides_along_axis) {
-        let joint = other_than(&parts, "base");
-        return format!("moving {joint} along its axis is the same as raising the base");
+    if let (true, Some(base)) = (pair_with_base, base) {
+        let joint = other_than(&parts, base);
+        let base = spoken(base);
+        if terms.iter().all(Term::turns_about_axis) {
+            return format!("turning the zero of {joint} is the same as turning {base}");
+        }
+        if terms.iter().all(Term::slides_along_axis) {
+            return format!("moving {joint} along its axis is the same as raising {base}");
+        }
     }
     if frames && parts.len() > 1 {
         return format!("{} moving together leave every distance as it is", list(&parts));
@@ -156,19 +158,41 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
     if parts.len() > 1 && terms.iter().all(|t| t.quantity == "d") {
         return format!("the axes of {} are parallel, moving along them is the same", list(&parts));
     }
-    if parts.contains(&"tip") && parts.len() > 1 {
-        return format!("{} and the tip frame cannot be told apart", list(&without(&parts, "tip")));
+    if let (Some(tip), true) = (tip, parts.len() > 1) {
+        let others = list(&without(&parts, tip));
+        return format!("{others} and {} frame cannot be told apart", spoken(tip));
     }
-    if parts.contains(&"tip") {
-        return "these dwells do not show the tip from enough sides".to_string();
+    if let Some(tip) = tip {
+        return format!("these dwells do not show {} from enough sides", spoken(tip));
     }
-    if base {
-        return format!(
-            "{} and the base move the tip alike over these dwells",
-            list(&without(&parts, "base"))
-        );
+    if let Some(base) = base {
+        let base_in_words = spoken(base);
+        let mut all = without(&parts, base);
+        if all.is_empty() {
+            return format!("these dwells do not tie {base_in_words} down");
+        }
+        all.push(&base_in_words);
+        return format!("{} move the tip alike over these dwells", list(&all));
     }
     format!("{} move the tip alike over these dwells", list(&names(terms)))
+}
+
+/// Whether a part is the frame of this name, of the only arm or (`left.base`) of one of two.
+fn is_frame(part: &str, frame: &str) -> bool {
+    part.strip_suffix(frame).is_some_and(|arm| arm.is_empty() || arm.ends_with('.'))
+}
+
+fn base_of<'a>(parts: &[&'a str]) -> Option<&'a str> {
+    parts.iter().copied().find(|p| is_frame(p, "base"))
+}
+
+fn tip_of<'a>(parts: &[&'a str]) -> Option<&'a str> {
+    parts.iter().copied().find(|p| is_frame(p, "tip"))
+}
+
+/// `the base` of the only arm, `left.base` of one of two.
+fn spoken(frame: &str) -> String {
+    if frame.contains('.') { frame.to_owned() } else { format!("the {frame}") }
 }
 
 fn names<'a>(terms: &[Term<'a>]) -> Vec<&'a str> {

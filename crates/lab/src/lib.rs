@@ -12,7 +12,7 @@
 //! | write | `record`, [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
 //!
 //! [`observe`] goes the same way without streams, one reading a dwell, in milliseconds. [`scenario`] draws rigs with
-//! one thing hidden, and seals them: recordings in one folder, the truth in another.
+//! one thing hidden, and seals them: recordings in one folder, the truth in another. [`pair`] joins the tips of two arms.
 //!
 //! The lab shares no formula with the models that are fitted to its recordings: it lays joint axes out as
 //! lines and turns points about them, where the models multiply matrices.
@@ -28,6 +28,7 @@ mod error;
 pub mod hand;
 pub mod mechanism;
 pub mod mechanisms;
+pub mod pair;
 pub mod plan;
 pub mod quick;
 pub mod random;

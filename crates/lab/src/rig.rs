@@ -4,7 +4,7 @@ use crate::LabError;
 use crate::arm::AxisArm;
 use crate::board::Board;
 use crate::commands::Commands;
-use crate::config::{ArmConfig, DhRow, LabConfig};
+use crate::config::{ArmConfig, DeviationConfig, DhRow, LabConfig};
 use crate::random::{Purpose, Stream};
 use armcal_core::Pose;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -53,7 +53,8 @@ pub struct BoardPlace {
 impl Rig {
     /// Builds the rig of the configured seed.
     pub fn build(config: &LabConfig, base_dir: &Path) -> Result<Rig, LabError> {
-        let built_rows = build_rows(&config.arm, config.seed);
+        let mut geometry = Stream::new(config.seed, Purpose::Geometry, 0);
+        let built_rows = build_rows(&config.arm.rows, &config.arm.deviation, &mut geometry);
         let world_from_base = Pose::from(config.base);
         let base_from_table = Pose::from(config.board.in_base);
         let mut mounting = Stream::new(config.seed, Purpose::Mounting, 0);
@@ -101,10 +102,9 @@ impl Rig {
 }
 
 /// The table of the built arm: every entry of every row uniform within its bounds.
-fn build_rows(arm: &ArmConfig, seed: u64) -> Vec<DhRow> {
-    let mut draw = Stream::new(seed, Purpose::Geometry, 0);
+pub(crate) fn build_rows(rows: &[DhRow], deviation: &DeviationConfig, draw: &mut Stream) -> Vec<DhRow> {
     let mut within = |half_width: f64| draw.uniform([-half_width, half_width]);
-    let (length_m, angle_deg) = (arm.deviation.length_mm * 1e-3, arm.deviation.angle_deg);
+    let (length_m, angle_deg) = (deviation.length_mm * 1e-3, deviation.angle_deg);
     let deviate = |row: &DhRow| DhRow {
         theta_deg: row.theta_deg + within(angle_deg),
         d_m: row.d_m + within(length_m),
@@ -112,7 +112,7 @@ fn build_rows(arm: &ArmConfig, seed: u64) -> Vec<DhRow> {
         alpha_deg: row.alpha_deg + within(angle_deg),
         ..row.clone()
     };
-    arm.rows.iter().map(deviate).collect()
+    rows.iter().map(deviate).collect()
 }
 
 /// Masses of the built arm's links and tool, each uniform within its bound.
@@ -125,7 +125,7 @@ fn true_masses(arm: &ArmConfig, seed: u64) -> (Vec<f64>, f64) {
 }
 
 /// A small random displacement: each coordinate and each rotation about an axis normally distributed.
-fn small_motion(draw: &mut Stream, [sigma_mm, sigma_deg]: [f64; 2]) -> Pose {
+pub(crate) fn small_motion(draw: &mut Stream, [sigma_mm, sigma_deg]: [f64; 2]) -> Pose {
     let shift = draw.normal3() * (sigma_mm * 1e-3);
     let turn = draw.normal3() * sigma_deg.to_radians();
     Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn))
@@ -140,7 +140,9 @@ mod tests {
         let arm = ArmConfig::default();
         let mut largest = [0.0f64; 2];
         for seed in 0..50 {
-            for (built, nominal) in build_rows(&arm, seed).iter().zip(&arm.rows) {
+            let mut draw = Stream::new(seed, Purpose::Geometry, 0);
+            let rows = build_rows(&arm.rows, &arm.deviation, &mut draw);
+            for (built, nominal) in rows.iter().zip(&arm.rows) {
                 let mm = 1e3 * (built.d_m - nominal.d_m).abs().max((built.a_m - nominal.a_m).abs());
                 let turned = (built.theta_deg - nominal.theta_deg).abs();
                 let deg = turned.max((built.alpha_deg - nominal.alpha_deg).abs());

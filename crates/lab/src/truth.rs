@@ -198,11 +198,16 @@ impl Truth {
 
     /// Writes it as JSON, atomically.
     pub fn write(&self, path: &Path) -> Result<(), LabError> {
-        let failed = |why: String| LabError::Truth { path: path.to_owned(), why };
-        let mut text = serde_json::to_vec_pretty(self).map_err(|e| failed(e.to_string()))?;
-        text.push(b'\n');
-        armcal_recording::atomic::write(path, &text).map_err(|e| failed(e.to_string()))
+        write_json(self, path)
     }
+}
+
+/// Writes a truth as JSON, atomically.
+pub(crate) fn write_json(truth: &impl Serialize, path: &Path) -> Result<(), LabError> {
+    let failed = |why: String| LabError::Truth { path: path.to_owned(), why };
+    let mut text = serde_json::to_vec_pretty(truth).map_err(|e| failed(e.to_string()))?;
+    text.push(b'\n');
+    armcal_recording::atomic::write(path, &text).map_err(|e| failed(e.to_string()))
 }
 
 impl RecordingTruth {
@@ -321,7 +326,7 @@ fn mean_vector(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
     sum / n.max(1) as f64
 }
 
-fn deviations(nominal: &[DhRow], built: &[DhRow]) -> Vec<Deviation> {
+pub(crate) fn deviations(nominal: &[DhRow], built: &[DhRow]) -> Vec<Deviation> {
     let entries = |row: &DhRow| {
         [("theta", row.theta_rad()), ("d", row.d_m), ("a", row.a_m), ("alpha", row.alpha_rad())]
     };

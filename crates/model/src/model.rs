@@ -103,16 +103,14 @@ impl Model {
     /// world_from_board, such as the one the association found. Returns whether the recording has a board.
     pub fn set_board_start(&mut self, recording: usize, board_in_world: Pose) -> bool {
         let Some(board) = self.boards.get_mut(recording) else { return false };
-        if let Geometry::Origin { nominal, .. } = &mut board.geometry {
-            *nominal = Rigid::from(&board_in_world);
-        }
-        let at = board_in_world.translation.vector;
-        // Position, then the rotation vector, which is zero at nominal.
-        let start = [at.x, at.y, at.z, 0.0, 0.0, 0.0];
-        for (parameter, value) in self.parameters[board.parameters.clone()].iter_mut().zip(start) {
-            parameter.nominal = value;
-        }
+        restart(board, &mut self.parameters, board_in_world);
         true
+    }
+
+    /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base, such as the
+    /// one that brings the tips of two arms together. Effects that are placed already keep the old one.
+    pub fn set_base_start(&mut self, base_in_world: Pose) {
+        restart(&mut self.path[0], &mut self.parameters, base_in_world);
     }
 
     /// Checks that every observation has a reading for each joint, and a board where it needs one.
@@ -358,6 +356,19 @@ fn seated_m(o: &Observation) -> Vector3<f64> {
     match &o.reference {
         Reference::Seated { in_board_m, .. } => *in_board_m,
         Reference::Tracked { .. } => Vector3::zeros(),
+    }
+}
+
+/// Lets a frame with six parameters start at another pose.
+fn restart(frame: &mut Segment, parameters: &mut [Parameter], pose: Pose) {
+    if let Geometry::Origin { nominal, .. } = &mut frame.geometry {
+        *nominal = Rigid::from(&pose);
+    }
+    let at = pose.translation.vector;
+    // Position, then the rotation vector, which is zero at nominal.
+    let start = [at.x, at.y, at.z, 0.0, 0.0, 0.0];
+    for (parameter, value) in parameters[frame.parameters.clone()].iter_mut().zip(start) {
+        parameter.nominal = value;
     }
 }
 

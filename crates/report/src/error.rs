@@ -36,7 +36,7 @@ pub enum ReportError {
     /// The calibrated model cannot be written.
     #[error("writing the calibrated model: {0}")]
     Model(#[source] Box<armcal_model::ModelError>),
-    /// The page's document cannot be written as JSON.
+    /// The data of the page, or a summary, cannot be written as JSON.
     #[error("encoding the report's data as JSON: {0}")]
     Page(#[source] serde_json::Error),
     /// The page's template cannot be filled in.

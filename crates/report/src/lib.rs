@@ -5,10 +5,13 @@
 //! `Run -> write_all -> files`. All outputs are views of the one [`Run`]; the same run gives the same bytes,
 //! and each file appears whole or not at all.
 //!
+//! Two arms in a closed chain have a run and files of their own: [`ClosedRun`], [`write_closed`].
+//!
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
 
 mod channels;
+mod closed_chain;
 mod comparison;
 mod diagnosis_summary;
 mod diagnosis_text;
@@ -31,6 +34,9 @@ mod text;
 mod verification;
 mod write;
 
+pub use closed_chain::{
+    CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_summary_json, closed_terminal, write_closed,
+};
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;

@@ -2,6 +2,7 @@
 
 use crate::{ReportError, Run};
 use armcal_core::Warning;
+use armcal_model::Model;
 use std::path::Path;
 
 /// A model file with its name in the output folder.
@@ -15,11 +16,15 @@ pub(crate) struct ModelFile {
 
 /// The calibrated model of a run.
 pub(crate) fn model_file(run: &Run) -> Result<ModelFile, ReportError> {
-    let p = run.calibration.fit.values();
-    if run.model.chain().is_urdf() {
-        let (text, warnings) = run.model.to_urdf(&run.model_text, Path::new("model_text of the run"), &p)?;
+    calibrated(&run.model, &run.model_text, &run.calibration.fit.values())
+}
+
+/// A model with the parameters `p`, in the form of the text that its nominal one was read from.
+pub(crate) fn calibrated(model: &Model, nominal_text: &str, p: &[f64]) -> Result<ModelFile, ReportError> {
+    if model.chain().is_urdf() {
+        let (text, warnings) = model.to_urdf(nominal_text, Path::new("model_text of the run"), p)?;
         return Ok(ModelFile { name: "calibrated.urdf", media_type: "application/xml", text, warnings });
     }
-    let text = run.model.chain().to_dh_toml(&p)?;
+    let text = model.chain().to_dh_toml(p)?;
     Ok(ModelFile { name: "calibrated.toml", media_type: "application/toml", text, warnings: Vec::new() })
 }

@@ -24,8 +24,9 @@ struct File<'a> {
     frames: Vec<FrameEntry>,
 }
 
+/// One parameter in a file for programs.
 #[derive(Serialize)]
-struct Entry<'a> {
+pub(crate) struct Entry<'a> {
     name: &'a str,
     unit: &'static str,
     nominal: f64,
@@ -62,7 +63,8 @@ pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
     Ok(format!("{HEADER}{}", toml::to_string(&file)?))
 }
 
-fn entry(e: &Estimate) -> Entry<'_> {
+/// One parameter as it is written.
+pub(crate) fn entry(e: &Estimate) -> Entry<'_> {
     Entry {
         name: &e.parameter.name,
         unit: e.parameter.unit.symbol(),
@@ -81,18 +83,20 @@ fn entry(e: &Estimate) -> Entry<'_> {
 /// Base, tip, and the board of every recording that has one, as calibrated.
 pub(crate) fn frames(run: &Run) -> Vec<FrameEntry> {
     let p = run.calibration.fit.values();
-    let entry = |frame: String, parent: &str, pose: &Pose| {
-        let RollPitchYaw { xyz_m, rpy_deg } = pose.into();
-        FrameEntry { frame, parent: parent.into(), xyz_m, rpy_deg }
-    };
     let mut frames = vec![
-        entry("base".into(), "world", &run.model.base_in_world(&p)),
-        entry("tip".into(), "last link", &run.model.tip_in_last_link(&p)),
+        frame_entry("base".into(), "world", &run.model.base_in_world(&p)),
+        frame_entry("tip".into(), "last link", &run.model.tip_in_last_link(&p)),
     ];
     for (index, recording) in run.recordings.iter().enumerate() {
         if let Some(board) = run.model.board_in_world(&p, index) {
-            frames.push(entry(format!("board.{}", recording.name), "world", &board));
+            frames.push(frame_entry(format!("board.{}", recording.name), "world", &board));
         }
     }
     frames
+}
+
+/// A frame as it is written.
+pub(crate) fn frame_entry(frame: String, parent: &str, pose: &Pose) -> FrameEntry {
+    let RollPitchYaw { xyz_m, rpy_deg } = pose.into();
+    FrameEntry { frame, parent: parent.into(), xyz_m, rpy_deg }
 }

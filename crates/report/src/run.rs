@@ -104,13 +104,9 @@ pub enum Status {
 impl Run {
     /// The gravest thing any warning says.
     pub fn status(&self) -> Status {
-        let of_recordings = self.recordings.iter().flat_map(RecordingRun::all_warnings).map(|w| w.severity);
+        let of_recordings = self.recordings.iter().flat_map(RecordingRun::all_warnings);
         let overall = self.overall_warnings();
-        match of_recordings.chain(overall.iter().map(|w| w.severity)).max() {
-            None | Some(Severity::Notice) => Status::Ok,
-            Some(Severity::Inadequate) => Status::Inadequate,
-            Some(Severity::DataLost) => Status::DataLost,
-        }
+        status_of(of_recordings.chain(&overall))
     }
 
     /// Warnings that are not about one recording: pipeline, fit, hold-out, outputs; each once.
@@ -234,7 +230,17 @@ fn output_warnings(run: &Run) -> Vec<Warning> {
     warnings
 }
 
-fn without_repeats<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Vec<&'a Warning> {
+/// The gravest thing any of these says.
+pub(crate) fn status_of<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Status {
+    match warnings.map(|w| w.severity).max() {
+        None | Some(Severity::Notice) => Status::Ok,
+        Some(Severity::Inadequate) => Status::Inadequate,
+        Some(Severity::DataLost) => Status::DataLost,
+    }
+}
+
+/// Each warning once, in the order given.
+pub(crate) fn without_repeats<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Vec<&'a Warning> {
     let mut seen: Vec<&Warning> = Vec::new();
     for warning in warnings {
         if !seen.contains(&warning) {

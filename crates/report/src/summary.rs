@@ -89,8 +89,9 @@ struct DwellPlace<'a> {
     confidence: Option<f64>,
 }
 
+/// What the fit says.
 #[derive(Debug, Clone, Serialize)]
-struct FitSummary<'a> {
+pub(crate) struct FitSummary<'a> {
     objective: &'a str,
     effects: Vec<&'a str>,
     status: &'static str,
@@ -224,7 +225,8 @@ fn refit(refit: &Refit) -> RefitSummary<'_> {
     }
 }
 
-fn fit(c: &Calibration) -> FitSummary<'_> {
+/// What the fit says.
+pub(crate) fn fit(c: &Calibration) -> FitSummary<'_> {
     FitSummary {
         objective: &c.fit.objective,
         effects: crate::run::effects(c),

@@ -32,7 +32,7 @@ pub fn terminal(run: &Run, style: TerminalStyle) -> String {
     sections.extend(undetermined(&pen, &run.calibration));
     sections.extend(run.diagnosis.iter().map(|d| brief(&pen, d)));
     sections.extend(warnings(&pen, run));
-    sections.push(pen.closing(run));
+    sections.push(pen.verdict(&conclusion(&run.calibration), run.status() == Status::Ok));
     sections.join("\n")
 }
 
@@ -66,7 +66,8 @@ fn clock_drift(recording: &RecordingRun) -> String {
     }
 }
 
-fn errors(pen: &Pen, calibration: &Calibration) -> String {
+/// Nominal and calibrated errors on both sides of the hold-out.
+pub(crate) fn errors(pen: &Pen, calibration: &Calibration) -> String {
     let mut table = pen.table(&["points", "n", "parameters", "mean", "rms", "p95", "max"]);
     for (label, side) in [("fitted", &calibration.train), ("held out", &calibration.holdout)] {
         if side.fitted.n == 0 {
@@ -88,7 +89,7 @@ fn error_row(label: &str, n: String, parameters: &str, stats: &ErrorStats) -> Ve
 }
 
 /// Free parameters only; the fixed ones are counted below the table and listed in `parameters.toml`.
-fn parameters(pen: &Pen, calibration: &Calibration) -> String {
+pub(crate) fn parameters(pen: &Pen, calibration: &Calibration) -> String {
     let mut table = pen.table(&["parameter", "unit", "nominal", "value", "change", "± 95 %", ""]);
     let (free, fixed): (Vec<&Estimate>, Vec<&Estimate>) =
         calibration.fit.estimates.iter().partition(|e| e.parameter.free);
@@ -123,7 +124,8 @@ fn marks(e: &Estimate) -> &'static str {
     }
 }
 
-fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<String> {
+/// What the data leave open, if anything.
+pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<String> {
     let directions = &calibration.fit.undetermined;
     let texts = directions.iter().map(|d| ("-", printable(&d.text)));
     (!directions.is_empty())
@@ -207,14 +209,11 @@ impl Pen {
         format!("{}\n{body}", self.bold(title))
     }
 
-    fn closing(&self, run: &Run) -> String {
+    /// The result in one sentence, in the colour of whether it can be relied upon.
+    pub fn verdict(&self, conclusion: &str, reliable: bool) -> String {
         let mut table = self.bare_table();
-        let colour = match run.status() {
-            Status::Ok => Color::Green,
-            Status::Inadequate | Status::DataLost => Color::Yellow,
-        };
-        table
-            .add_row(vec![Cell::new(conclusion(&run.calibration)).fg(colour).add_attribute(Attribute::Bold)]);
+        let colour = if reliable { Color::Green } else { Color::Yellow };
+        table.add_row(vec![Cell::new(conclusion).fg(colour).add_attribute(Attribute::Bold)]);
         self.render(&table)
     }
 

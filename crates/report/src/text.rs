@@ -5,6 +5,11 @@ use armcal_core::Unit;
 
 /// The result in one sentence, about held-out points where there are any.
 pub fn conclusion(calibration: &Calibration) -> String {
+    conclusion_about(calibration, "error")
+}
+
+/// The same about errors of another name.
+pub(crate) fn conclusion_about(calibration: &Calibration, error: &str) -> String {
     let floor = match calibration.noise_floor_m {
         floor if floor.is_finite() => format!("; the noise floor is {} mm.", millimetres(floor)),
         _ => ".".into(),
@@ -16,12 +21,12 @@ pub fn conclusion(calibration: &Calibration) -> String {
     if calibration.holdout.fitted.n > 0 {
         let side = &calibration.holdout;
         let held_out = points(side).replacen(' ', " held-out ", 1);
-        return format!("On {held_out} the mean error {}{floor}", change(side));
+        return format!("On {held_out} the mean {error} {}{floor}", change(side));
     }
     if calibration.train.fitted.n > 0 {
         let side = &calibration.train;
         return format!(
-            "Nothing was held out: on the {} the fit saw, the mean error {}{floor}",
+            "Nothing was held out: on the {} the fit saw, the mean {error} {}{floor}",
             points(side),
             change(side)
         );

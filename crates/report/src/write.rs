@@ -116,14 +116,15 @@ pub fn write_all(
 }
 
 /// A complete file that has no name yet.
-fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
+pub(crate) fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
     let mut file = AtomicFile::create(path).map_err(at(path))?;
     file.write_all(bytes)
         .map_err(|e| at(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() }))?;
     Ok(file)
 }
 
-fn at(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
+/// What writing this file ran into.
+pub(crate) fn at(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
     let path = path.to_owned();
     move |source| ReportError::Write { path, source: Box::new(source) }
 }

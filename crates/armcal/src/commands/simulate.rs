@@ -3,11 +3,12 @@
 use super::score::word;
 use super::{Outcome, print};
 use crate::error::Error;
+use armcal_lab::pair::{self, PairConfig};
 use armcal_lab::scenario::{Scenario, seal};
 use armcal_lab::{LabConfig, simulate};
 use std::path::{Path, PathBuf};
 
-/// Simulates the rig that `lab` describes and writes its recordings and their truth to `out`.
+/// Simulates the rig that `lab` describes, of one arm or (with `[[arms]]`) of two, and writes its recordings and their truth to `out`.
 pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> {
     let lab = lab.unwrap_or(Path::new(""));
     let text = std::fs::read_to_string(lab).map_err(|source| Error::ReadFile {
@@ -15,6 +16,13 @@ pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome,
         path: lab.to_owned(),
         source,
     })?;
+    if text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms")) {
+        let mut config = PairConfig::from_toml(&text, lab)?;
+        config.seed = seed.unwrap_or(config.seed);
+        let simulated = pair::simulate(&config, out)?;
+        list(simulated.recordings.iter().chain([&simulated.truth]));
+        return Ok(Outcome::Done);
+    }
     let mut config = LabConfig::from_toml(&text, lab)?;
     config.seed = seed.unwrap_or(config.seed);
     let folder = lab.parent().unwrap_or(Path::new(""));

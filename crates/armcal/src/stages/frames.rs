@@ -1,7 +1,10 @@
 //! The nominal model of a pipeline: chain, base, tip and one board frame a recording.
 
 use crate::error::Error;
-use crate::pipeline::{BoardPose, FramePose, FrameSection, MarkersOn, Pipeline, TableSection, Vertical};
+use crate::pipeline::{
+    BoardPose, FramePose, FrameSection, MarkersOn, ModelSection, ParameterOverride, Pipeline, TableSection,
+    Vertical,
+};
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
@@ -11,14 +14,18 @@ use std::path::Path;
 
 /// Reads the DH or URDF file of the pipeline: its text and the chain in it.
 pub fn nominal_chain(pipeline: &Pipeline) -> Result<(String, Chain), Error> {
-    let model = &pipeline.model;
+    chain_of(&pipeline.model, &pipeline.folder)
+}
+
+/// Reads the DH or URDF file of a model section: its text and the chain in it.
+pub fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Error> {
     if let Some(dh) = &model.dh {
-        let path = pipeline.resolve(dh);
+        let path = folder.join(dh);
         let text = read("DH model", &path)?;
         let chain = Chain::from_dh_toml(&text, &path)?;
         return Ok((text, chain));
     }
-    let path = pipeline.resolve(model.urdf.as_deref().unwrap_or(Path::new("")));
+    let path = folder.join(model.urdf.as_deref().unwrap_or(Path::new("")));
     let link = |name: &Option<String>| name.clone().unwrap_or_default();
     let text = read("URDF", &path)?;
     let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?
@@ -54,7 +61,13 @@ pub fn nominal_model(
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?;
-    for change in &pipeline.parameters {
+    override_parameters(&mut model, &pipeline.parameters)?;
+    Ok(model)
+}
+
+/// Applies the changes to single parameters, in their order.
+pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> Result<(), Error> {
+    for change in changes {
         model.set_parameter(&change.name, |p| {
             let si = |display: f64| display / p.unit.to_display(1.0);
             p.free = change.free.unwrap_or(p.free);
@@ -64,7 +77,7 @@ pub fn nominal_model(
             p.prior_sigma = change.prior.map(si).or(p.prior_sigma);
         })?;
     }
-    Ok(model)
+    Ok(())
 }
 
 /// What the pipeline's effects need to know about all observations together.
@@ -98,7 +111,8 @@ fn read(what: &'static str, path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
 }
 
-fn frame(name: &str, section: &FrameSection, free_rotation: bool) -> Frame {
+/// A frame as its section has it.
+pub fn frame(name: &str, section: &FrameSection, free_rotation: bool) -> Frame {
     let knowledge = match section.pose {
         FramePose::Given => Knowledge::Given,
         FramePose::Measured => measured(section.sigma_mm, section.sigma_deg),

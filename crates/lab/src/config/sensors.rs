@@ -271,7 +271,7 @@ impl EncoderConfig {
         std::f64::consts::TAU / self.counts_per_turn
     }
 
-    pub(super) fn check(&self) -> Result<(), LabError> {
+    pub(crate) fn check(&self) -> Result<(), LabError> {
         rate("joints.rate_hz", self.rate_hz)?;
         positive("joints.counts_per_turn", self.counts_per_turn)?;
         not_negative("joints.noise_counts", self.noise_counts)?;

@@ -92,7 +92,8 @@ fn put(
     log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
 }
 
-fn payload(joints: &EncoderConfig, counts: &[f64], counts_per_s: &[f64]) -> Payload {
+/// A joint state of these counts, in the form that is published.
+pub(crate) fn payload(joints: &EncoderConfig, counts: &[f64], counts_per_s: &[f64]) -> Payload {
     let (position, velocity): (Vec<f64>, Vec<f64>) = match joints.format {
         JointFormat::Rad => {
             let rad = |counts: &[f64]| counts.iter().map(|c| c * joints.count_rad()).collect();

@@ -1,11 +1,11 @@
 //! What the recorder gets to see of a session: encoders, cameras, a thermometer, each with its clock.
 
 mod clock;
-mod encoder;
+pub(crate) mod encoder;
 mod message;
 pub(crate) mod outliers;
 mod temperature;
-mod transport;
+pub(crate) mod transport;
 mod vicon;
 
 pub use clock::SensorClock;

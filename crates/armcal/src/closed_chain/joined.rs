@@ -1,0 +1,176 @@
+//! Two joint streams as one, so that a dwell is an interval in which both arms stand still; and apart again.
+//!
+//! Both streams must be stamped by one clock. The rows are those of the slower stream, each with the latest reading of
+//! the other: nothing is interpolated, and no reading of the slower one is used twice.
+
+use crate::error::Error;
+use armcal_core::{Dwell, JointSamples, Observation, Reference};
+use nalgebra::{Matrix3, Vector3};
+
+/// A reading older than this many periods of its own stream is missing, not old.
+const OLDEST_PERIODS: f64 = 3.5;
+
+/// Joins the streams of both arms: the columns of the first, then those of the second.
+///
+/// # Errors
+/// In words: no time at which both were recorded.
+pub fn join(arms: &[JointSamples; 2], names: [&str; 2], max_gap_s: f64) -> Result<JointSamples, String> {
+    let span = |s: &JointSamples| Some([*s.time_ns.first()?, *s.time_ns.last()?]);
+    let [Some(a), Some(b)] = [span(&arms[0]), span(&arms[1])] else {
+        return Err("one of the joint streams has no rows".into());
+    };
+    let overlap = [a[0].max(b[0]), a[1].min(b[1])];
+    if overlap[0] >= overlap[1] {
+        let (first, second, gap_s) =
+            if a[1] <= b[0] { (names[0], names[1], b[0] - a[1]) } else { (names[1], names[0], a[0] - b[1]) };
+        return Err(format!(
+            "the joint streams of both arms do not overlap: {first} ends {:.1} s before {second} begins; record them \
+             together, and stamp both by one clock",
+            gap_s as f64 * 1e-9
+        ));
+    }
+    let period_s = arms.each_ref().map(|s| seconds(s.time_ns[0], s.time_ns[s.len() - 1]) / s.len() as f64);
+    let slower = usize::from(period_s[1] > period_s[0]);
+    let (rows, other) = (&arms[slower], &arms[1 - slower]);
+    let oldest_s = max_gap_s.max(OLDEST_PERIODS * period_s[1 - slower]);
+    let mut picked: Vec<[usize; 2]> = Vec::new();
+    for (row, time_ns) in rows.time_ns.iter().enumerate() {
+        let latest = other.time_ns.partition_point(|t| t <= time_ns).checked_sub(1);
+        let latest = latest.filter(|&i| seconds(other.time_ns[i], *time_ns) <= oldest_s);
+        picked.extend(latest.map(|latest| if slower == 0 { [row, latest] } else { [latest, row] }));
+    }
+    let columns = |of: &dyn Fn(&JointSamples) -> Option<Vec<Vec<f64>>>| -> Option<Vec<Vec<f64>>> {
+        let [first, second] = [of(&arms[0])?, of(&arms[1])?];
+        let taken = |columns: Vec<Vec<f64>>, arm: usize| -> Vec<Vec<f64>> {
+            columns.iter().map(|c| picked.iter().map(|at| c[at[arm]]).collect()).collect()
+        };
+        Some([taken(first, 0), taken(second, 1)].concat())
+    };
+    let prefixed = |arm: usize| arms[arm].names.iter().map(move |joint| format!("{}.{joint}", names[arm]));
+    Ok(JointSamples {
+        time_ns: picked.iter().map(|at| rows.time_ns[at[slower]]).collect(),
+        names: prefixed(0).chain(prefixed(1)).collect(),
+        joint_rad: columns(&|s| Some(s.joint_rad.clone())).unwrap_or_default(),
+        effort_nm: columns(&|s| s.effort_nm.clone()),
+    })
+}
+
+/// One arm's part of a dwell of both: `first` joints come before its own `count`. Its reference is the other arm.
+pub fn of_arm(dwell: &Dwell, first: usize, count: usize) -> Observation {
+    let own = first..first + count;
+    let pairs = first..(first + count).saturating_sub(1);
+    Observation {
+        dwell: dwell.id,
+        time_ns: dwell.mid_ns(),
+        joint_rad: dwell.joint_rad[own.clone()].to_vec(),
+        joint_sigma_rad: dwell.joint_sigma_rad[own.clone()].to_vec(),
+        arrival: dwell.arrival[own.clone()].to_vec(),
+        path_memory_rad: Some(dwell.path_memory_rad[own.clone()].to_vec()),
+        pair_memory_rad: Some(dwell.pair_memory_rad[pairs].to_vec()),
+        joint_velocity_radps: None,
+        effort_nm: dwell.effort_nm.as_ref().map(|e| e[own].to_vec()),
+        temperature_c: None,
+        load_kg: 0.0,
+        reference: Reference::Tracked {
+            position_m: Vector3::zeros(),
+            orientation: None,
+            orientation_sigma_rad: 0.0,
+        },
+        covariance_m2: Matrix3::zeros(),
+    }
+}
+
+/// Refuses an arm that is held in one pose throughout: nothing can be learnt of it.
+pub fn check_moves(name: &str, observations: &[Observation], least_rad: f64) -> Result<(), Error> {
+    let joints = observations.first().map_or(0, |o| o.joint_rad.len());
+    let range = |joint: usize| {
+        let of = observations.iter().map(|o| o.joint_rad[joint]);
+        of.clone().fold(f64::NEG_INFINITY, f64::max) - of.fold(f64::INFINITY, f64::min)
+    };
+    let widest_rad = (0..joints).map(range).fold(0.0, f64::max);
+    if observations.len() < 2 || widest_rad >= least_rad {
+        return Ok(());
+    }
+    let problem = format!(
+        "the {name} arm never moves: over {} dwells none of its joints changes by more than {:.3} deg; lead both arms \
+         through many poses, or check its topic and joint names",
+        observations.len(),
+        widest_rad.to_degrees()
+    );
+    Err(Error::TwoArms { problem })
+}
+
+fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stream(start_ms: i64, period_ms: i64, rows: i64) -> JointSamples {
+        let time_ns: Vec<i64> = (0..rows).map(|i| (start_ms + i * period_ms) * 1_000_000).collect();
+        let joint_rad = vec![time_ns.iter().map(|t| *t as f64 * 1e-9).collect()];
+        JointSamples { time_ns, names: vec!["joint1".into()], joint_rad, effort_nm: None }
+    }
+
+    #[test]
+    fn the_slower_stream_gives_the_rows_and_the_faster_its_latest_reading() {
+        for (arms, slower) in
+            [([stream(0, 20, 50), stream(3, 7, 200)], 0), ([stream(3, 7, 200), stream(0, 20, 50)], 1)]
+        {
+            let joined = join(&arms, ["right", "left"], 0.1).expect("they overlap");
+            assert_eq!(joined.names, ["right.joint1", "left.joint1"]);
+            // The first row of the slower comes before the faster begins.
+            assert_eq!(joined.len(), 49);
+            for i in 0..joined.len() {
+                let now_s = joined.time_ns[i] as f64 * 1e-9;
+                let (own, late_s) = (joined.joint_rad[slower][i], now_s - joined.joint_rad[1 - slower][i]);
+                assert_eq!(own, now_s);
+                assert!((0.0..0.007).contains(&late_s), "{late_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_of_one_arm_is_a_gap_of_both() {
+        let mut gappy = stream(0, 10, 300);
+        let keep = |t: &i64| !(1_000_000_000..2_000_000_000).contains(t);
+        gappy.joint_rad[0] = gappy.time_ns.iter().filter(|t| keep(t)).map(|t| *t as f64 * 1e-9).collect();
+        gappy.time_ns.retain(keep);
+        let joined = join(&[stream(0, 10, 300), gappy], ["right", "left"], 0.1).expect("they overlap");
+        let widest = joined.time_ns.windows(2).map(|w| w[1] - w[0]).max().expect("rows");
+        assert!((880_000_000..920_000_000).contains(&widest), "{widest}");
+    }
+
+    #[test]
+    fn streams_that_do_not_overlap_and_arms_that_do_not_move_are_told_in_words() {
+        let apart = [stream(60_000, 10, 100), stream(0, 10, 100)];
+        let said = join(&apart, ["right", "left"], 0.1).expect_err("apart");
+        assert!(said.contains("left ends 59.0 s before right begins"), "{said}");
+        let empty = join(&[stream(0, 10, 0), stream(0, 10, 9)], ["right", "left"], 0.1).expect_err("empty");
+        assert!(empty.contains("no rows"), "{empty}");
+
+        let dwell = |q: f64| Dwell {
+            id: armcal_core::DwellId { recording: 0, dwell: 0 },
+            start_ns: 0,
+            end_ns: 1_000_000_000,
+            joint_rad: vec![q, 0.5, 0.5],
+            joint_spread_rad: vec![0.0; 3],
+            joint_sigma_rad: vec![1e-5; 3],
+            effort_nm: None,
+            samples: 50,
+            effective_samples: 50.0,
+            arrival: vec![armcal_core::Arrival::Unknown; 3],
+            path_memory_rad: vec![Vec::new(); 3],
+            pair_memory_rad: vec![[Vec::new(), Vec::new()]; 2],
+            tip: None,
+            temperature_c: None,
+        };
+        let observed = |first, count| [0.0, 1.0].map(|q| of_arm(&dwell(q), first, count));
+        assert_eq!(observed(1, 2)[1].joint_rad, [0.5, 0.5]);
+        assert!(check_moves("right", &observed(0, 1), 0.02).is_ok());
+        let said = check_moves("left", &observed(1, 2), 0.02).expect_err("still").to_string();
+        assert!(said.contains("the left arm never moves: over 2 dwells"), "{said}");
+    }
+}

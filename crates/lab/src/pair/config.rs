@@ -1,0 +1,190 @@
+//! The lab file of two arms: recognised by its `[[arms]]`.
+
+use crate::LabError;
+use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, positive, range, value};
+use armcal_core::RollPitchYaw;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Two arms with their tips joined.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairConfig {
+    /// Name of the rig.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Clock at the start of the first recording [s since 1970]. Default 1760000000.
+    #[serde(default = "default_start")]
+    pub start_unix_s: u64,
+    /// The arms.
+    pub arms: [PairArmConfig; 2],
+    /// How the tips are joined.
+    #[serde(default)]
+    pub joined: JoinConfig,
+    /// What is done in each recording.
+    #[serde(default)]
+    pub task: PairTaskConfig,
+    /// Names of the recordings; the files are `<name>.mcap`. Default one, `closed`.
+    #[serde(default = "default_recordings")]
+    pub recordings: Vec<String>,
+}
+
+/// One of the arms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairArmConfig {
+    /// Its name.
+    pub name: String,
+    /// Where its base is meant to stand in the world.
+    #[serde(default)]
+    pub base: RollPitchYaw,
+    /// How far each coordinate of the base is off, 1 sigma [mm]. Default 0.
+    #[serde(default)]
+    pub placement_sigma_mm: f64,
+    /// How far it is off about each axis, 1 sigma [deg]. Default 0.
+    #[serde(default)]
+    pub placement_sigma_deg: f64,
+    /// Nominal DH rows from base to tip (standard convention).
+    pub rows: Vec<DhRow>,
+    /// How far the built arm deviates.
+    #[serde(default)]
+    pub deviation: DeviationConfig,
+    /// Where it waits before the tips are joined and after [deg].
+    pub home_deg: Vec<f64>,
+    /// Its encoders and their topic.
+    pub joints: EncoderConfig,
+}
+
+/// How the tips are joined.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JoinConfig {
+    /// Distance of the tips on a rigid link with a ball joint at either end [mm]; both in one point when absent.
+    pub length_mm: Option<f64>,
+    /// Error of that length, 1 sigma [mm]. Default 0.
+    pub length_sigma_mm: f64,
+    /// How far the joined points are apart all the same, anew in each dwell, 1 sigma per axis [mm]. Default 0.05.
+    pub slip_sigma_mm: f64,
+}
+
+/// What the hand does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PairTaskConfig {
+    /// Dwells with the tips joined. Default 80.
+    pub poses: usize,
+    /// The region of the world they are drawn from: x, y, z, each from and to [m].
+    pub region_m: [[f64; 2]; 3],
+    /// Length of a rest [s].
+    pub rest_s: [f64; 2],
+    /// Time between two rests [s].
+    pub move_s: [f64; 2],
+    /// Tremor of the hand on the way, 1 sigma per axis [mm]. Default 0.4.
+    pub tremor_mm: f64,
+}
+
+impl Default for JoinConfig {
+    fn default() -> JoinConfig {
+        JoinConfig { length_mm: None, length_sigma_mm: 0.0, slip_sigma_mm: 0.05 }
+    }
+}
+
+impl Default for PairTaskConfig {
+    fn default() -> PairTaskConfig {
+        PairTaskConfig {
+            poses: 80,
+            region_m: [[0.22, 0.56], [0.0, 0.5], [0.05, 0.6]],
+            rest_s: [0.8, 1.4],
+            move_s: [0.7, 1.1],
+            tremor_mm: 0.4,
+        }
+    }
+}
+
+impl PairConfig {
+    /// Reads and checks a lab file.
+    pub fn from_toml(text: &str, path: &Path) -> Result<PairConfig, LabError> {
+        let config: PairConfig = toml::from_str(text).map_err(|source| LabError::Parse {
+            what: "lab file",
+            path: path.to_owned(),
+            source: Box::new(source),
+        })?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Clock at the start of recording `recording` [ns]: a quarter of an hour apart.
+    pub fn start_ns(&self, recording: usize) -> i64 {
+        (self.start_unix_s as i64 + 900 * recording as i64) * 1_000_000_000
+    }
+
+    /// Checks every value the simulation divides by, indexes with or waits for.
+    pub fn check(&self) -> Result<(), LabError> {
+        self.arms.iter().try_for_each(PairArmConfig::check)?;
+        if self.arms[0].name == self.arms[1].name || self.arms[0].joints.topic == self.arms[1].joints.topic {
+            return Err(value("arms", "the two need names and topics of their own".into()));
+        }
+        if let Some(length_mm) = self.joined.length_mm {
+            positive("joined.length_mm", length_mm)?;
+        }
+        not_negative("joined.length_sigma_mm", self.joined.length_sigma_mm)?;
+        not_negative("joined.slip_sigma_mm", self.joined.slip_sigma_mm)?;
+        let task = &self.task;
+        task.region_m.iter().try_for_each(|r| range("task.region_m", *r))?;
+        for (key, seconds) in [("task.rest_s", task.rest_s), ("task.move_s", task.move_s)] {
+            range(key, seconds)?;
+            positive(key, seconds[0])?;
+        }
+        not_negative("task.tremor_mm", task.tremor_mm)?;
+        if self.recordings.is_empty() {
+            return Err(value("recordings", "there are none; name at least one".into()));
+        }
+        for (i, name) in self.recordings.iter().enumerate() {
+            let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_');
+            if name.is_empty() || !name.chars().all(plain) || self.recordings[..i].contains(name) {
+                return Err(value("recordings", format!("`{name}` cannot be the name of another file")));
+            }
+        }
+        if self.start_unix_s > 2_100_000_000 {
+            return Err(value("start_unix_s", "lies beyond 2036; give seconds, not milliseconds".into()));
+        }
+        Ok(())
+    }
+}
+
+impl PairArmConfig {
+    fn check(&self) -> Result<(), LabError> {
+        let joints = self.rows.iter().filter(|row| row.joint).count();
+        for (key, size) in
+            [("arms.home_deg", self.home_deg.len()), ("arms.joints.names", self.joints.names.len())]
+        {
+            if size != joints || joints == 0 {
+                return Err(value(key, format!("has {size} entries for an arm of {joints} joints")));
+            }
+        }
+        if !self.rows[0].joint {
+            return Err(value(
+                "arms.rows",
+                "the first row must be a joint; put a fixed base into `base`".into(),
+            ));
+        }
+        let rows = self.rows.iter().flat_map(|r| [r.theta_deg, r.d_m, r.a_m, r.alpha_deg]);
+        if !rows.chain(self.home_deg.iter().copied()).all(f64::is_finite) {
+            return Err(value("arms", format!("`{}` has a number that is not finite", self.name)));
+        }
+        not_negative("arms.deviation.length_mm", self.deviation.length_mm)?;
+        not_negative("arms.deviation.angle_deg", self.deviation.angle_deg)?;
+        not_negative("arms.placement_sigma_mm", self.placement_sigma_mm)?;
+        not_negative("arms.placement_sigma_deg", self.placement_sigma_deg)?;
+        self.joints.check()
+    }
+}
+
+fn default_start() -> u64 {
+    1_760_000_000
+}
+
+fn default_recordings() -> Vec<String> {
+    vec!["closed".into()]
+}

@@ -1,0 +1,184 @@
+//! Two arms in one recording, their tips joined by hand and led from pose to pose.
+//!
+//! `PairConfig -> Pair (both arms built, bases placed) -> Motion (where the joined tips are, when) -> Log -> recording and
+//! truth`. The geometry is the lab's own: axis lines ([`crate::arm`]), turned until both tips are where the hand is.
+//!
+//! [`observe`] goes the same way without streams: one mean reading of both arms a dwell.
+
+mod config;
+mod motion;
+mod recorded;
+mod truth;
+
+pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig};
+pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
+
+use crate::LabError;
+use crate::arm::AxisArm;
+use crate::config::DhRow;
+use crate::random::{Purpose, Stream};
+use crate::rig::{build_rows, small_motion};
+use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
+use motion::{Motion, Phase};
+use nalgebra::{Matrix3, Vector3};
+use std::path::{Path, PathBuf};
+
+/// The pair of one seed, as built.
+#[derive(Debug, Clone)]
+pub(crate) struct Pair {
+    pub arms: [BuiltArm; 2],
+    /// Distance of the joined points; 0 for tips in one point [m].
+    pub link_m: f64,
+}
+
+/// One arm as built and placed.
+#[derive(Debug, Clone)]
+pub(crate) struct BuiltArm {
+    pub arm: AxisArm,
+    pub rows: Vec<DhRow>,
+    pub world_from_base: Pose,
+}
+
+/// What a simulation of a pair left on disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedPair {
+    /// One file a recording.
+    pub recordings: Vec<PathBuf>,
+    /// The truth file.
+    pub truth: PathBuf,
+    /// What it says.
+    pub facts: PairTruth,
+}
+
+/// What the pipeline would make of the recordings of a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservedPair {
+    /// Both arms in every dwell with the tips joined. There is no reference: each arm is the other's.
+    pub dwells: Vec<[Observation; 2]>,
+    /// What was true.
+    pub truth: PairTruth,
+}
+
+/// Simulates a pair and writes `<recording>.mcap` and `truth.json` into `out_dir`, made if need be.
+pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, LabError> {
+    config.check()?;
+    let pair = Pair::build(config);
+    let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
+    std::fs::create_dir_all(out_dir).map_err(refused)?;
+    let mut truth = PairTruth::of_pair(config, &pair);
+    let mut recordings = Vec::new();
+    for (recording, name) in config.recordings.iter().enumerate() {
+        let motion = Motion::perform(config, &pair, recording)?;
+        let log = recorded::log(config, &pair, &motion, recording)?;
+        let path = out_dir.join(format!("{name}.mcap"));
+        crate::record::write(&path, &config.name, name, &log)?;
+        truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
+        recordings.push(path);
+    }
+    let path = out_dir.join("truth.json");
+    truth.write(&path)?;
+    Ok(SimulatedPair { recordings, truth: path, facts: truth })
+}
+
+/// Observes a pair without recording it.
+pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
+    config.check()?;
+    let pair = Pair::build(config);
+    let mut truth = PairTruth::of_pair(config, &pair);
+    let mut dwells = Vec::new();
+    for recording in 0..config.recordings.len() {
+        let motion = Motion::perform(config, &pair, recording)?;
+        let rests: Vec<&Phase> = motion.phases.iter().filter(|p| p.is_joined_rest()).collect();
+        let mut draw = Stream::new(config.seed, Purpose::Quick, recording);
+        for (dwell, rest) in rests.into_iter().enumerate() {
+            let id = DwellId { recording, dwell };
+            let time_ns = config.start_ns(recording) + (rest.mid_s() * 1e9) as i64;
+            let reading = |arm: usize, draw: &mut Stream| {
+                reading(config, arm, &rest.to_rad[arm], rest.end_s - rest.start_s, draw)
+            };
+            let first = observation(id, time_ns, reading(0, &mut draw));
+            dwells.push([first, observation(id, time_ns, reading(1, &mut draw))]);
+        }
+        truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
+    }
+    Ok(ObservedPair { dwells, truth })
+}
+
+impl Pair {
+    /// Builds both arms of the configured seed and places them.
+    pub fn build(config: &PairConfig) -> Pair {
+        let built = |which: usize| {
+            let arm = &config.arms[which];
+            let mut geometry = Stream::new(config.seed, Purpose::Geometry, which);
+            let rows = build_rows(&arm.rows, &arm.deviation, &mut geometry);
+            let mut placing = Stream::new(config.seed, Purpose::Mounting, which);
+            let off = small_motion(&mut placing, [arm.placement_sigma_mm, arm.placement_sigma_deg]);
+            BuiltArm { arm: AxisArm::from_rows(&rows), rows, world_from_base: Pose::from(arm.base) * off }
+        };
+        let mut making = Stream::new(config.seed, Purpose::Board, 0);
+        let joined = &config.joined;
+        let link_m = match joined.length_mm {
+            None => 0.0,
+            Some(length_mm) => (length_mm + joined.length_sigma_mm * making.normal()) * 1e-3,
+        };
+        Pair { arms: [built(0), built(1)], link_m }
+    }
+}
+
+impl BuiltArm {
+    /// The tip in the world [m].
+    pub fn tip_in_world(&self, joint_rad: &[f64]) -> Vector3<f64> {
+        (self.world_from_base * nalgebra::Point3::from(self.arm.tip(joint_rad))).coords
+    }
+
+    /// Joint angles that put the tip on a point of the world, near `start_rad`; the distance left [m] where it cannot.
+    pub fn reach(&self, target_m: &Vector3<f64>, start_rad: &[f64]) -> Result<Vec<f64>, f64> {
+        let in_base = self.world_from_base.inverse() * nalgebra::Point3::from(*target_m);
+        self.arm.solve(&in_base.coords, start_rad).map_err(|out| out.short_by_m)
+    }
+}
+
+/// Mean reading of each joint over a rest [rad], and its standard error [rad].
+fn reading(
+    config: &PairConfig,
+    arm: usize,
+    joint_rad: &[f64],
+    rest_s: f64,
+    draw: &mut Stream,
+) -> [Vec<f64>; 2] {
+    let joints = &config.arms[arm].joints;
+    let (count, readings) = (joints.count_rad(), (rest_s * joints.rate_hz).max(1.0).floor());
+    let mean = |angle: &f64| {
+        let counted =
+            (0..readings as usize).map(|_| (angle / count + draw.normal() * joints.noise_counts).round());
+        counted.sum::<f64>() / readings * count
+    };
+    // Counting adds the variance of a uniform error of one count.
+    let sigma = count * ((joints.noise_counts.powi(2) + 1.0 / 12.0) / readings).sqrt();
+    [joint_rad.iter().map(mean).collect(), vec![sigma; joint_rad.len()]]
+}
+
+fn observation(dwell: DwellId, time_ns: i64, [joint_rad, joint_sigma_rad]: [Vec<f64>; 2]) -> Observation {
+    Observation {
+        dwell,
+        time_ns,
+        arrival: vec![Arrival::Unknown; joint_rad.len()],
+        joint_rad,
+        joint_sigma_rad,
+        path_memory_rad: None,
+        pair_memory_rad: None,
+        joint_velocity_radps: None,
+        effort_nm: None,
+        temperature_c: None,
+        load_kg: 0.0,
+        reference: Reference::Tracked {
+            position_m: Vector3::zeros(),
+            orientation: None,
+            orientation_sigma_rad: 0.0,
+        },
+        covariance_m2: Matrix3::zeros(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

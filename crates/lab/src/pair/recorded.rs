@@ -1,0 +1,70 @@
+//! What the recorder sees of a pair: two joint state topics, each at its own instants.
+
+use super::motion::Motion;
+use super::{Pair, PairConfig};
+use crate::LabError;
+use crate::random::{Purpose, Stream};
+use crate::sensors::encoder::payload;
+use crate::sensors::transport::Transport;
+use crate::sensors::{Channel, Kind, Log, Message, SensorClock};
+
+/// Records a motion.
+pub(crate) fn log(
+    config: &PairConfig,
+    pair: &Pair,
+    motion: &Motion,
+    recording: usize,
+) -> Result<Log, LabError> {
+    let reference_ns = config.start_ns(recording);
+    let clock = SensorClock { offset_s: 0.0, latency_s: 0.0, drift: 0.0, reference_ns };
+    let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
+    for arm in [0, 1] {
+        joint_states(config, pair, motion, recording, arm, &mut log)?;
+    }
+    // Stable: messages logged in the same nanosecond keep the order of their channels.
+    log.messages.sort_by_key(|message| message.log_ns);
+    Ok(log)
+}
+
+fn joint_states(
+    config: &PairConfig,
+    pair: &Pair,
+    motion: &Motion,
+    recording: usize,
+    arm: usize,
+    log: &mut Log,
+) -> Result<(), LabError> {
+    let joints = &config.arms[arm].joints;
+    log.channels.push(Channel {
+        topic: joints.topic.clone(),
+        kind: Kind::JointState,
+        frame_id: String::new(),
+        names: joints.names.clone(),
+    });
+    let stream = 2 * recording + arm;
+    let mut noise = Stream::new(config.seed, Purpose::Encoder, stream);
+    let draw = Stream::new(config.seed, Purpose::JointTransport, stream);
+    let mut transport = Transport::new(&joints.transport, draw);
+    let mut near = motion.phases[0].to_rad[arm].clone();
+    let last = (motion.duration_s() * joints.rate_hz).floor() as u32;
+    for sequence in 0..=last {
+        // The two computers do not sample together: half a period apart.
+        let nominal_s = (f64::from(sequence) + 0.5 * arm as f64) / joints.rate_hz;
+        let time_s = (nominal_s + transport.period_jitter_s()).clamp(0.0, motion.duration_s());
+        near = motion.joint_rad(pair, arm, time_s, &near).map_err(|short_by_m| LabError::Unreachable {
+            recording: config.recordings[recording].clone(),
+            arm: "true",
+            what: format!("the joined tips {time_s:.2} s after the start"),
+            short_by_mm: short_by_m * 1e3,
+        })?;
+        let counts: Vec<f64> = near
+            .iter()
+            .map(|angle| (angle / joints.count_rad() + noise.normal() * joints.noise_counts).round())
+            .collect();
+        let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
+        let log_ns = transport.log_ns(stamp_ns);
+        let payload = payload(joints, &counts, &[]);
+        log.messages.push(Message { channel: arm, sequence, stamp_ns, log_ns, payload });
+    }
+    Ok(())
+}

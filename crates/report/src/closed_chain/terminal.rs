@@ -1,0 +1,56 @@
+//! The summary of two arms that a person reads in the terminal.
+
+use super::ClosedRun;
+use crate::run::{Status, VERSION};
+use crate::terminal::{Pen, TerminalStyle, errors, number, parameters, undetermined};
+use crate::text::{conclusion_about, millimetres, printable};
+use armcal_core::Warning;
+use comfy_table::Cell;
+
+/// The summary of a run, ending in a newline.
+pub fn closed_terminal(run: &ClosedRun, style: TerminalStyle) -> String {
+    let pen = Pen { style };
+    let [first, second] = run.chain.arms();
+    let joined = match run.chain.link_length_m(&run.chain.nominal()) {
+        None => "their tips in one point".to_owned(),
+        Some(length_m) => format!("their tips on a rigid link of {} mm", millimetres(length_m)),
+    };
+    let head = format!(
+        "armcal {VERSION}   pipeline {}   {} and {}, {joined}\n",
+        printable(&run.pipeline_name),
+        printable(&first.name),
+        printable(&second.name)
+    );
+    let calibration = &run.calibration;
+    let mut sections = vec![head, pen.section("Recordings", recordings(&pen, run))];
+    sections.push(pen.section("Closing errors [mm]", errors(&pen, calibration)));
+    sections.push(pen.section("Parameters", parameters(&pen, calibration)));
+    sections.extend(undetermined(&pen, calibration));
+    sections.extend(warnings(&pen, run));
+    sections.push(pen.verdict(&conclusion_about(calibration, "closing error"), run.status() == Status::Ok));
+    sections.join("\n")
+}
+
+fn recordings(pen: &Pen, run: &ClosedRun) -> String {
+    let mut table = pen.table(&["recording", "dwells of both", "joined", "open"]);
+    for recording in &run.recordings {
+        table.add_row(vec![
+            Cell::new(printable(&recording.name)),
+            number(recording.dwells),
+            number(recording.dwells - recording.open.len()),
+            number(recording.open.len()),
+        ]);
+    }
+    pen.render(&table)
+}
+
+fn warnings(pen: &Pen, run: &ClosedRun) -> Option<String> {
+    let text = |warning: &Warning| printable(&warning.to_string());
+    let of_recordings = run.recordings.iter().flat_map(|r| {
+        let named = |w: &Warning| (w.severity.word(), format!("{}: {}", printable(&r.name), text(w)));
+        r.all_warnings().into_iter().map(named).collect::<Vec<_>>()
+    });
+    let overall = run.overall_warnings().into_iter().map(|w| (w.severity.word(), text(w)));
+    let all: Vec<_> = of_recordings.chain(overall).collect();
+    (!all.is_empty()).then(|| pen.section("Warnings", pen.list(all.into_iter())))
+}

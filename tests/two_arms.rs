@@ -1,0 +1,152 @@
+use crate::support::{armcal, files_made, root};
+use armcal_lab::pair::{PairConfig, PairTruth, simulate};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+fn lab() -> PairConfig {
+    let path = root().join("pipelines/lab/two-arms.toml");
+    PairConfig::from_toml(&std::fs::read_to_string(&path).expect("lab file"), &path).expect("valid")
+}
+
+/// The shipped pipeline on another recording, with this `[closed_chain]`.
+fn pipeline(folder: &Path, closed_chain: &str) -> std::path::PathBuf {
+    let shipped = std::fs::read_to_string(root().join("pipelines/two-arms.toml")).expect("pipeline");
+    let models = root().join("pipelines/models");
+    let text = shipped
+        .replace("../fixtures/two-arms/closed.mcap", "closed.mcap")
+        .replace("models/", &format!("{}/", models.display()))
+        .replace("kind = \"same-point\"", closed_chain);
+    let path = folder.join("pipeline.toml");
+    std::fs::write(&path, text).expect("writable");
+    path
+}
+
+fn run(pipeline: &Path, out: &Path) -> (Value, BTreeMap<String, Vec<u8>>) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_armcal"));
+    let files = files_made(command.arg("run").arg(pipeline), out);
+    (serde_json::from_slice(&files["summary.json"]).expect("summary"), files)
+}
+
+/// Determined parameters of the arms within their intervals, and how many there are.
+fn inside(summary: &Value, truth: &PairTruth) -> [usize; 2] {
+    let truth: BTreeMap<&str, f64> =
+        truth.arms.iter().flat_map(|a| &a.deviations).map(|d| (d.name.as_str(), d.value)).collect();
+    let mut count = [0, 0];
+    for p in summary["fit"]["parameters"].as_array().expect("parameters") {
+        if let (Some(true), Some(truth)) =
+            (p["determined"].as_bool(), truth.get(p["name"].as_str().unwrap_or("")))
+        {
+            let [from, to] = [0, 1].map(|k| p["ci95"][k].as_f64().expect("a number"));
+            count = [count[0] + usize::from(from <= *truth && *truth <= to), count[1] + 1];
+        }
+    }
+    count
+}
+
+#[test]
+fn the_recording_of_two_arms_recovers_both_and_closes_dwells_it_never_saw() {
+    let mut count = [0, 0];
+    for (seed, length_mm) in [(21, None), (22, None), (23, None), (24, Some(180.0)), (25, Some(180.0))] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut config = lab();
+        (config.seed, config.joined.length_mm) = (seed, length_mm);
+        let truth = simulate(&config, folder.path()).expect("simulated").facts;
+        let chain = match length_mm {
+            None => "kind = \"same-point\"",
+            Some(_) => "kind = \"rigid-link\"\nlength_mm = 180.0",
+        };
+        let out = folder.path().join("out");
+        let (summary, _) = run(&pipeline(folder.path(), chain), &out);
+        let of = inside(&summary, &truth);
+        count = [count[0] + of[0], count[1] + of[1]];
+
+        // At home, before and after, the tips are apart: these two dwells are found out and told.
+        let recording = &summary["recordings"][0];
+        assert_eq!(recording["dwells"], 82, "seed {seed}");
+        let open: Vec<i64> = recording["open"]
+            .as_array()
+            .expect("open dwells")
+            .iter()
+            .filter_map(|d| d["dwell"].as_i64())
+            .collect();
+        assert_eq!(open, [0, 81], "seed {seed}");
+
+        let mm = |side: &str, which: &str| summary["fit"][side][which]["mean"].as_f64().expect("a mean");
+        let floor = summary["fit"]["noise_floor_mm"].as_f64().expect("a floor");
+        let (before, after) = (mm("holdout", "nominal_mm"), mm("holdout", "fitted_mm"));
+        println!(
+            "seed {seed}: {before:.2} -> {after:.3} mm, floor {floor:.3} mm; {} of {} inside",
+            of[0], of[1]
+        );
+        assert_eq!(summary["fit"]["holdout"]["n"], 80);
+        assert!(after < 1.3 * floor && before > 20.0 * floor, "seed {seed}: {before} {after} {floor}");
+        let scale_is_open = summary["fit"]["undetermined"].to_string().contains("scale (every length");
+        assert_eq!(scale_is_open, length_mm.is_none(), "seed {seed}");
+    }
+    assert!(
+        count[1] > 40 && count[0] as f64 >= 0.88 * count[1] as f64,
+        "{} of {} inside",
+        count[0],
+        count[1]
+    );
+}
+
+#[test]
+fn the_shipped_recording_is_what_its_seed_gives_and_each_arm_gets_its_table_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = simulate(&lab(), folder.path()).expect("simulated");
+    let shipped = root().join("fixtures/two-arms");
+    let bytes = |path: &Path| std::fs::read(path).expect("readable");
+    assert!(bytes(&made.recordings[0]) == bytes(&shipped.join("closed.mcap")), "closed.mcap has changed");
+    assert!(bytes(&made.truth) == bytes(&shipped.join("truth.json")), "truth.json has changed");
+
+    let path = root().join("pipelines/two-arms.toml");
+    let (summary, files) = run(&path, &folder.path().join("out"));
+    let names: Vec<&str> = files.keys().map(String::as_str).collect();
+    assert_eq!(names, ["left.toml", "parameters.toml", "right.toml", "summary.json"]);
+    assert_eq!(run(&path, &folder.path().join("again")).1, files, "the same input gives the same bytes");
+    for arm in ["right", "left"] {
+        let text = String::from_utf8(files[&format!("{arm}.toml")].clone()).expect("text");
+        let chain = armcal_model::Chain::from_dh_toml(&text, Path::new(arm)).expect("a DH table");
+        for p in chain.parameters() {
+            let name = format!("{arm}.{}", p.name);
+            let all = summary["fit"]["parameters"].as_array().expect("parameters");
+            let value = all.iter().find(|v| v["name"] == name.as_str()).expect("there")["value"].as_f64();
+            assert!((p.nominal - value.expect("a number")).abs() < 1e-12, "{name}");
+        }
+    }
+}
+
+#[test]
+fn what_two_arms_cannot_show_is_told_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let says = |change: &dyn Fn(&mut PairConfig), closed_chain: &str| {
+        let mut config = lab();
+        change(&mut config);
+        simulate(&config, folder.path()).expect("simulated");
+        let out = folder.path().join("out");
+        let output = armcal([
+            "run".as_ref(),
+            pipeline(folder.path(), closed_chain).as_os_str(),
+            "--out".as_ref(),
+            out.as_os_str(),
+        ]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(!out.exists(), "no half results");
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let same = "kind = \"same-point\"";
+    let few = says(&|c| c.task.poses = 2, same);
+    assert!(few.contains("4 are the least"), "{few}");
+    let still = says(&|c| c.task.region_m = [[0.4, 0.4], [0.25, 0.25], [0.3, 0.3]], same);
+    assert!(still.contains("right arm never moves"), "{still}");
+    let lengthless = says(&|c| c.task.poses = 4, "kind = \"rigid-link\"");
+    assert!(lengthless.contains("length_mm") && lengthless.contains("is missing"), "{lengthless}");
+
+    let shipped = root().join("pipelines/two-arms.toml");
+    let output = armcal(["diagnose".as_ref(), shipped.as_os_str()]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("is about two arms"), "{said}");
+}
