@@ -156,7 +156,7 @@ fn placed(
     let mut near = vec![true; all.len()];
     for _ in 0..MAX_ROUNDS {
         let joined = chosen(all, &near);
-        enough(&chain, joined.len(), all.len(), limit_m)?;
+        enough(&chain, &joined, all.len(), limit_m)?;
         chain.place_bases(&joined)?;
         // A link's length must not pull the base: the frames alone are fitted before a dwell is judged.
         let start = closed_chain_nominal(&chain, &joined, &pipeline.fit)?;
@@ -169,7 +169,7 @@ fn placed(
         near = again;
     }
     let joined = chosen(all, &near);
-    enough(&chain, joined.len(), all.len(), limit_m)?;
+    enough(&chain, &joined, all.len(), limit_m)?;
     check_both_move(pipeline, &joined)?;
     Ok((chain, near))
 }
@@ -212,7 +212,7 @@ fn settled(
     loop {
         rounds += 1;
         let joined = chosen(all, &is_joined);
-        enough(&chain, joined.len(), all.len(), limit_m)?;
+        enough(&chain, &joined, all.len(), limit_m)?;
         let last = rounds == MAX_ROUNDS;
         // Only the last fit is judged; those on the way to it need no hold-out.
         let search = calibrate_closed_chain(&chain, &joined, &pipeline.fit, &HoldoutConfig::None)?;
@@ -246,21 +246,38 @@ fn chosen(all: &[ClosedObservation], which: &[bool]) -> Vec<ClosedObservation> {
     all.iter().zip(which).filter(|(_, chosen)| **chosen).map(|(o, _)| o.clone()).collect()
 }
 
-/// Three points place a base, six distances do; twice as many also show which dwells do not belong.
-fn enough(chain: &ClosedChain, joined: usize, all: usize, limit_m: f64) -> Result<(), Error> {
+/// Three points place a base, six distances do; twice as many also show which dwells do not belong. A pose held twice
+/// counts once.
+fn enough(chain: &ClosedChain, joined: &[ClosedObservation], all: usize, limit_m: f64) -> Result<(), Error> {
     let least = match chain.closure() {
         Closure::SamePoint => 6,
         Closure::RigidLink { .. } => 12,
     };
-    if joined >= least {
+    let poses = different_poses(joined);
+    if poses >= least {
         return Ok(());
     }
     Err(two_arms(format!(
-        "{joined} of {all} dwells of both arms have their tips within {:.0} mm of closing, {least} are the least that place \
-         one arm against the other and show which dwells do not belong: record more poses with the tips joined, or check joint names, signs and units, \
-         arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+        "{} of {all} dwells of both arms have their tips within {:.0} mm of closing, in {poses} different poses; {least} are \
+         the least that place one arm against the other and show which dwells do not belong: record more poses with the \
+         tips joined, or check joint names, signs and units, arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+        joined.len(),
         limit_m * 1e3
     )))
+}
+
+/// Poses that differ from all earlier ones by [`LEAST_MOTION_RAD`] in some joint.
+fn different_poses(joined: &[ClosedObservation]) -> usize {
+    let joints =
+        |o: &ClosedObservation| o.arms.iter().flat_map(|a| a.joint_rad.clone()).collect::<Vec<f64>>();
+    let mut poses: Vec<Vec<f64>> = Vec::new();
+    for q in joined.iter().map(joints) {
+        let same = |pose: &Vec<f64>| pose.iter().zip(&q).all(|(a, b)| (a - b).abs() < LEAST_MOTION_RAD);
+        if !poses.iter().any(same) {
+            poses.push(q);
+        }
+    }
+    poses.len()
 }
 
 fn two_arms(problem: String) -> Error {
