@@ -272,7 +272,7 @@ impl Job {
         let text = read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         if is_of_two_arms(&text) {
-            return Ok(Job::TwoArms(Box::new(ClosedPipeline::parse(path, &text, folder)?)));
+            return Ok(Job::TwoArms(Box::new(ClosedPipeline::parse(path, text, folder)?)));
         }
         Ok(Job::OneArm(Box::new(Pipeline::parse(path, text, folder)?)))
     }

@@ -56,6 +56,19 @@ pub enum LabError {
         /// How far the arm falls short [mm].
         short_by_mm: f64,
     },
+    /// One of two joined arms cannot get to where the hand leads the tips.
+    #[error(
+        "recording `{recording}`: an arm stays {short_by_mm:.1} mm away from {what}; narrow `task.region_m`, move \
+         `arms.base` or choose another seed"
+    )]
+    JoinedOutOfReach {
+        /// Name of the recording.
+        recording: String,
+        /// The place.
+        what: String,
+        /// How far the arm falls short [mm].
+        short_by_mm: f64,
+    },
     /// No free pose that keeps clear of the board was found.
     #[error(
         "recording `{recording}`: found only {found} of {wanted} free poses that keep clear of the board and of \

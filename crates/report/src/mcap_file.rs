@@ -30,21 +30,35 @@ pub(crate) fn write_mcap(
     attachments: &[Attachment],
     path: &Path,
 ) -> Result<(), RecordingError> {
+    let about = [("armcal/run", about_run(run)), ("armcal/input", about_input(run))];
+    write_results(messages(run, points, findings), inputs, attachments, run_end_ns(run), &about, path)
+}
+
+/// Writes results beside the messages of their inputs, with attachments stamped `end_ns` and metadata by name.
+pub(crate) fn write_results(
+    results: Vec<ResultMessage>,
+    inputs: &[Recording],
+    attachments: &[Attachment],
+    end_ns: i64,
+    about: &[(&str, BTreeMap<String, String>)],
+    path: &Path,
+) -> Result<(), RecordingError> {
     // Neither `ros2` nor any other profile: those promise one encoding for all channels.
     let mut out = McapOutput::create(path, "")?;
     for input in inputs {
         copy_messages(input, &mut out)?;
     }
-    put_results(messages(run, points, findings), &mut out)?;
+    put_results(results, &mut out)?;
     for input in inputs {
         copy_extras(input, &mut out)?;
     }
-    let end_ns = u64::try_from(run_end_ns(run)).unwrap_or(0);
+    let end_ns = u64::try_from(end_ns).unwrap_or(0);
     for Attachment { name, media_type, text } in attachments {
         out.attach(&format!("{OWN}{name}"), media_type, end_ns, 0, text.as_bytes())?;
     }
-    out.metadata("armcal/run", &about_run(run))?;
-    out.metadata("armcal/input", &about_input(run))?;
+    for (name, entries) in about {
+        out.metadata(name, entries)?;
+    }
     out.finish()
 }
 

@@ -4,6 +4,7 @@
 //! the other: nothing is interpolated, and no reading of the slower one is used twice.
 
 use crate::error::Error;
+use armcal_core::robust::median;
 use armcal_core::{Dwell, JointSamples, Observation, Reference};
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +15,7 @@ const OLDEST_PERIODS: f64 = 3.5;
 ///
 /// # Errors
 /// In words: no time at which both were recorded.
-pub fn join(arms: &[JointSamples; 2], names: [&str; 2], max_gap_s: f64) -> Result<JointSamples, String> {
+pub fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, String> {
     let span = |s: &JointSamples| Some([*s.time_ns.first()?, *s.time_ns.last()?]);
     let [Some(a), Some(b)] = [span(&arms[0]), span(&arms[1])] else {
         return Err("one of the joint streams has no rows".into());
@@ -29,10 +30,10 @@ pub fn join(arms: &[JointSamples; 2], names: [&str; 2], max_gap_s: f64) -> Resul
             gap_s as f64 * 1e-9
         ));
     }
-    let period_s = arms.each_ref().map(|s| seconds(s.time_ns[0], s.time_ns[s.len() - 1]) / s.len() as f64);
+    let period_s = arms.each_ref().map(median_period_s);
     let slower = usize::from(period_s[1] > period_s[0]);
     let (rows, other) = (&arms[slower], &arms[1 - slower]);
-    let oldest_s = max_gap_s.max(OLDEST_PERIODS * period_s[1 - slower]);
+    let oldest_s = OLDEST_PERIODS * period_s[1 - slower];
     let mut picked: Vec<[usize; 2]> = Vec::new();
     for (row, time_ns) in rows.time_ns.iter().enumerate() {
         let latest = other.time_ns.partition_point(|t| t <= time_ns).checked_sub(1);
@@ -100,6 +101,11 @@ pub fn check_moves(name: &str, observations: &[Observation], least_rad: f64) -> 
     Err(Error::TwoArms { problem })
 }
 
+fn median_period_s(stream: &JointSamples) -> f64 {
+    let periods: Vec<f64> = stream.time_ns.windows(2).map(|w| seconds(w[0], w[1])).collect();
+    median(&periods)
+}
+
 fn seconds(from_ns: i64, to_ns: i64) -> f64 {
     (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
 }
@@ -119,7 +125,7 @@ mod tests {
         for (arms, slower) in
             [([stream(0, 20, 50), stream(3, 7, 200)], 0), ([stream(3, 7, 200), stream(0, 20, 50)], 1)]
         {
-            let joined = join(&arms, ["right", "left"], 0.1).expect("they overlap");
+            let joined = join(&arms, ["right", "left"]).expect("they overlap");
             assert_eq!(joined.names, ["right.joint1", "left.joint1"]);
             // The first row of the slower comes before the faster begins.
             assert_eq!(joined.len(), 49);
@@ -138,17 +144,17 @@ mod tests {
         let keep = |t: &i64| !(1_000_000_000..2_000_000_000).contains(t);
         gappy.joint_rad[0] = gappy.time_ns.iter().filter(|t| keep(t)).map(|t| *t as f64 * 1e-9).collect();
         gappy.time_ns.retain(keep);
-        let joined = join(&[stream(0, 10, 300), gappy], ["right", "left"], 0.1).expect("they overlap");
+        let joined = join(&[stream(0, 10, 300), gappy], ["right", "left"]).expect("they overlap");
         let widest = joined.time_ns.windows(2).map(|w| w[1] - w[0]).max().expect("rows");
-        assert!((880_000_000..920_000_000).contains(&widest), "{widest}");
+        assert!((970_000_000..990_000_000).contains(&widest), "{widest}");
     }
 
     #[test]
     fn streams_that_do_not_overlap_and_arms_that_do_not_move_are_told_in_words() {
         let apart = [stream(60_000, 10, 100), stream(0, 10, 100)];
-        let said = join(&apart, ["right", "left"], 0.1).expect_err("apart");
+        let said = join(&apart, ["right", "left"]).expect_err("apart");
         assert!(said.contains("left ends 59.0 s before right begins"), "{said}");
-        let empty = join(&[stream(0, 10, 0), stream(0, 10, 9)], ["right", "left"], 0.1).expect_err("empty");
+        let empty = join(&[stream(0, 10, 0), stream(0, 10, 9)], ["right", "left"]).expect_err("empty");
         assert!(empty.contains("no rows"), "{empty}");
 
         let dwell = |q: f64| Dwell {

@@ -33,6 +33,9 @@ pub struct ClosedPipeline {
     /// Folder of the pipeline file.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// The file's text, carried into the results.
+    #[serde(skip)]
+    pub text: String,
 }
 
 /// One recording.
@@ -137,10 +140,11 @@ impl ClosedChainSection {
 
 impl ClosedPipeline {
     /// Reads and checks the text of a pipeline whose relative paths start in `folder`.
-    pub fn parse(path: &Path, text: &str, folder: &Path) -> Result<ClosedPipeline, Error> {
-        let mut pipeline: ClosedPipeline = toml::from_str(text)
+    pub fn parse(path: &Path, text: String, folder: &Path) -> Result<ClosedPipeline, Error> {
+        let mut pipeline: ClosedPipeline = toml::from_str(&text)
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
         pipeline.folder = folder.to_owned();
+        pipeline.text = text;
         let said = pipeline.contradiction();
         said.map_or(Ok(pipeline), |(key, problem)| {
             Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem })

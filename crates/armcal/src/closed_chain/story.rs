@@ -9,7 +9,7 @@ use armcal_calibrate::{
     Calibration, ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, HoldoutConfig,
     calibrate_closed_chain, closed_chain_nominal, expected_norm_m,
 };
-use armcal_core::{Dwell, JointSamples, Rejection, Samples};
+use armcal_core::{JointSamples, Rejection, Samples};
 use armcal_dwell::detect_dwells;
 use armcal_model::{Frames, Model, Session};
 use armcal_recording::{JointStream, Recording, Streams};
@@ -23,18 +23,21 @@ const OPEN_FACTOR: f64 = 10.0;
 /// An arm none of whose joints moves by as much is not led through poses [rad]: 1 deg.
 const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 
-/// Runs a pipeline of two arms up to its results in memory; nothing is written.
-pub fn run(pipeline: &ClosedPipeline, progress: &Progress) -> Result<ClosedRun, Error> {
+/// Runs a pipeline of two arms up to its results in memory; nothing is written. Returns the run and the opened recordings,
+/// which the writers pass through to the output.
+pub fn run(pipeline: &ClosedPipeline, progress: &Progress) -> Result<(ClosedRun, Vec<Recording>), Error> {
     let mut arms = Vec::new();
     for arm in &pipeline.arms {
         arms.push(nominal_arm(pipeline, arm)?);
     }
     let [(first, first_text), (second, second_text)] = <[(ChainArm, String); 2]>::try_from(arms)
         .map_err(|_| two_arms("there must be two [[arms]]".into()))?;
-    let mut seen = Vec::new();
+    let (mut seen, mut opened) = (Vec::new(), Vec::new());
     for (index, entry) in pipeline.recordings.iter().enumerate() {
         progress.step(&format!("reading {}", entry.name()));
-        seen.push(seen_in(pipeline, index, entry)?);
+        let (recording, found) = seen_in(pipeline, index, entry)?;
+        opened.push(recording);
+        seen.push(found);
     }
     let count = [&first, &second].map(|arm| arm.model.joint_count());
     let all = observations(pipeline, &seen, count)?;
@@ -45,29 +48,23 @@ pub fn run(pipeline: &ClosedPipeline, progress: &Progress) -> Result<ClosedRun, 
     progress.step("calibrating");
     let settled = settled(pipeline, with_effects(pipeline, chain, &all)?, &all, near)?;
     let recordings =
-        seen.into_iter().enumerate().map(|(index, seen)| seen.into_recording(index, &settled.open)).collect();
-    Ok(ClosedRun {
+        seen.into_iter().enumerate().map(|(index, seen)| with_open(seen, index, &settled.open)).collect();
+    let run = ClosedRun {
         pipeline_name: pipeline.name.clone(),
+        pipeline_text: pipeline.text.clone(),
         chain: settled.chain,
         model_texts: [first_text, second_text],
         recordings,
         observations: settled.joined,
         calibration: settled.calibration,
         warnings: Vec::new(),
-    })
+    };
+    Ok((run, opened))
 }
 
-/// One recording before any arm is involved.
-struct Seen {
-    recording: ClosedRecording,
-    dwells: Vec<Dwell>,
-}
-
-impl Seen {
-    fn into_recording(self, index: usize, open: &[Rejection]) -> ClosedRecording {
-        let open = open.iter().filter(|r| r.dwell.recording == index).cloned().collect();
-        ClosedRecording { open, ..self.recording }
-    }
+fn with_open(recording: ClosedRecording, index: usize, open: &[Rejection]) -> ClosedRecording {
+    let open = open.iter().filter(|r| r.dwell.recording == index).cloned().collect();
+    ClosedRecording { open, ..recording }
 }
 
 /// The arm before calibration, without effects, and the text of its file.
@@ -80,7 +77,12 @@ fn nominal_arm(pipeline: &ClosedPipeline, arm: &ArmSection) -> Result<(ChainArm,
     Ok((ChainArm { name: arm.name.clone(), model }, text))
 }
 
-fn seen_in(pipeline: &ClosedPipeline, index: usize, entry: &RecordingPaths) -> Result<Seen, Error> {
+/// One recording before any arm is involved.
+fn seen_in(
+    pipeline: &ClosedPipeline,
+    index: usize,
+    entry: &RecordingPaths,
+) -> Result<(Recording, ClosedRecording), Error> {
     let name = entry.name();
     let in_recording = |source| Error::Recording { recording: name.clone(), source };
     let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.folder.join(p)).collect();
@@ -101,20 +103,14 @@ fn seen_in(pipeline: &ClosedPipeline, index: usize, entry: &RecordingPaths) -> R
     let unjoined = |problem: String| two_arms(format!("recording `{name}`: {problem}"));
     let joints = <[JointSamples; 2]>::try_from(joints)
         .map_err(|_| unjoined("there must be two joint streams".into()))?;
-    let joints = join(&joints, names, pipeline.dwell.max_gap_s).map_err(unjoined)?;
+    let joints = join(&joints, names).map_err(unjoined)?;
     let samples = Samples { joints, ..Samples::default() };
     let (dwells, said) = detect_dwells(index, &samples, None, &pipeline.dwell)
         .map_err(|source| Error::Dwell { recording: name.clone(), source })?;
     warnings.extend(said);
-    let recording = ClosedRecording {
-        name,
-        paths: entry.paths.clone(),
-        report,
-        dwells: dwells.len(),
-        open: Vec::new(),
-        warnings,
-    };
-    Ok(Seen { recording, dwells })
+    let found =
+        ClosedRecording { name, paths: entry.paths.clone(), report, dwells, open: Vec::new(), warnings };
+    Ok((recording, found))
 }
 
 fn joints_only(joints: &JointStream) -> Streams {
@@ -125,7 +121,7 @@ fn joints_only(joints: &JointStream) -> Streams {
 /// Both arms in every dwell.
 fn observations(
     pipeline: &ClosedPipeline,
-    seen: &[Seen],
+    seen: &[ClosedRecording],
     count: [usize; 2],
 ) -> Result<Vec<ClosedObservation>, Error> {
     let contact_sigma_m = pipeline.closed_chain.sigma_mm * 1e-3;
@@ -160,7 +156,7 @@ fn placed(
     let mut near = vec![true; all.len()];
     for _ in 0..MAX_ROUNDS {
         let joined = chosen(all, &near);
-        enough(&chain, joined.len(), all.len(), limit_m)?;
+        enough(&chain, &joined, all.len(), limit_m)?;
         chain.place_bases(&joined)?;
         // A link's length must not pull the base: the frames alone are fitted before a dwell is judged.
         let start = closed_chain_nominal(&chain, &joined, &pipeline.fit)?;
@@ -173,7 +169,7 @@ fn placed(
         near = again;
     }
     let joined = chosen(all, &near);
-    enough(&chain, joined.len(), all.len(), limit_m)?;
+    enough(&chain, &joined, all.len(), limit_m)?;
     check_both_move(pipeline, &joined)?;
     Ok((chain, near))
 }
@@ -216,7 +212,7 @@ fn settled(
     loop {
         rounds += 1;
         let joined = chosen(all, &is_joined);
-        enough(&chain, joined.len(), all.len(), limit_m)?;
+        enough(&chain, &joined, all.len(), limit_m)?;
         let last = rounds == MAX_ROUNDS;
         // Only the last fit is judged; those on the way to it need no hold-out.
         let search = calibrate_closed_chain(&chain, &joined, &pipeline.fit, &HoldoutConfig::None)?;
@@ -250,21 +246,38 @@ fn chosen(all: &[ClosedObservation], which: &[bool]) -> Vec<ClosedObservation> {
     all.iter().zip(which).filter(|(_, chosen)| **chosen).map(|(o, _)| o.clone()).collect()
 }
 
-/// Three points place a base, six distances do; one more makes it a measurement.
-fn enough(chain: &ClosedChain, joined: usize, all: usize, limit_m: f64) -> Result<(), Error> {
+/// Three points place a base, six distances do; twice as many also show which dwells do not belong. A pose held twice
+/// counts once.
+fn enough(chain: &ClosedChain, joined: &[ClosedObservation], all: usize, limit_m: f64) -> Result<(), Error> {
     let least = match chain.closure() {
-        Closure::SamePoint => 4,
-        Closure::RigidLink { .. } => 7,
+        Closure::SamePoint => 6,
+        Closure::RigidLink { .. } => 12,
     };
-    if joined >= least {
+    let poses = different_poses(joined);
+    if poses >= least {
         return Ok(());
     }
     Err(two_arms(format!(
-        "{joined} of {all} dwells of both arms have their tips within {:.0} mm of closing, {least} are the least that place \
-         one arm against the other: record more poses with the tips joined, or check joint names, signs and units, \
-         arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+        "{} of {all} dwells of both arms have their tips within {:.0} mm of closing, in {poses} different poses; {least} are \
+         the least that place one arm against the other and show which dwells do not belong: record more poses with the \
+         tips joined, or check joint names, signs and units, arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+        joined.len(),
         limit_m * 1e3
     )))
+}
+
+/// Poses that differ from all earlier ones by [`LEAST_MOTION_RAD`] in some joint.
+fn different_poses(joined: &[ClosedObservation]) -> usize {
+    let joints =
+        |o: &ClosedObservation| o.arms.iter().flat_map(|a| a.joint_rad.clone()).collect::<Vec<f64>>();
+    let mut poses: Vec<Vec<f64>> = Vec::new();
+    for q in joined.iter().map(joints) {
+        let same = |pose: &Vec<f64>| pose.iter().zip(&q).all(|(a, b)| (a - b).abs() < LEAST_MOTION_RAD);
+        if !poses.iter().any(same) {
+            poses.push(q);
+        }
+    }
+    poses.len()
 }
 
 fn two_arms(problem: String) -> Error {

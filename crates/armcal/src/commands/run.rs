@@ -36,9 +36,9 @@ pub fn run(path: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
 /// The same for two arms in a closed chain.
 fn two_arms(pipeline: &ClosedPipeline, out: &Path, json: bool) -> Result<Outcome, Error> {
     let progress = Progress::new();
-    let run = closed_chain::run(pipeline, &progress)?;
+    let (run, recordings) = closed_chain::run(pipeline, &progress)?;
     progress.step("writing results");
-    let written = write_closed(&run, out)?;
+    let written = write_closed(&run, &recordings, out)?;
     progress.finish();
     if json {
         print(&closed_summary_json(&run)?);

@@ -10,6 +10,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 const TREMOR_S: [f64; 2] = [0.03, 0.002];
 /// Poses that may be drawn for each one wanted, before the region counts as out of reach.
 const TRIES: usize = 200;
+/// Steps in which the way to a pose is tried.
+const WALK_STEPS: u32 = 16;
+/// How much further than that an arm must reach [m].
+const MARGIN_M: f64 = 0.01;
 /// Joint angles beyond this are not what a hand would lead an arm to [rad].
 const WIDEST_RAD: f64 = 2.4;
 
@@ -111,8 +115,7 @@ impl Motion {
             phases.push(Phase { start_s, end_s, held, from_rad, to_rad: to_rad.clone(), moves });
         };
         for _ in 0..task.poses {
-            let near = before.as_ref().map_or(&home, |(_, q)| q);
-            let next = draw_pose(config, pair, recording, &mut draw, near)?;
+            let next = draw_pose(config, pair, recording, &mut draw, before.as_ref(), &home)?;
             let way = before.as_ref().map(|(grip, _)| [*grip, next.0]);
             add(&mut phases, pauses.uniform(task.move_s), way, &next.1, true);
             add(&mut phases, pauses.uniform(task.rest_s), Some([next.0; 2]), &next.1, false);
@@ -159,13 +162,32 @@ impl Motion {
     }
 }
 
+/// Joint angles of an arm at the end of the way to a grip [rad], walked in steps, so that the elbow stays on its side; what
+/// is missing [m] where a step, tremor included, is out of reach.
+fn walk(pair: &Pair, arm: usize, before: Option<&Pose>, to: &Grip, home: &[f64]) -> Result<Vec<f64>, f64> {
+    let built = &pair.arms[arm];
+    let start_rad = before.map_or(home, |(_, q)| &q[arm]);
+    let start_m = built.tip_in_world(start_rad);
+    (1..=WALK_STEPS).try_fold(start_rad.to_vec(), |q, step| {
+        let share = f64::from(step) / f64::from(WALK_STEPS);
+        let target_m = match before {
+            Some((from, _)) => Grip::between(from, to, share).tips_m(pair.link_m)[arm],
+            None => start_m.lerp(&to.tips_m(pair.link_m)[arm], share),
+        };
+        let outwards = (target_m - built.world_from_base.translation.vector).normalize();
+        built.reach(&(target_m + outwards * MARGIN_M), &q)?;
+        built.reach(&target_m, &q)
+    })
+}
+
 /// Draws poses until both arms reach one, and each point of the straight way to it.
 fn draw_pose(
     config: &PairConfig,
     pair: &Pair,
     recording: usize,
     draw: &mut Stream,
-    near: &[Vec<f64>; 2],
+    before: Option<&Pose>,
+    home: &[Vec<f64>; 2],
 ) -> Result<Pose, LabError> {
     let mut shortest = f64::INFINITY;
     for _ in 0..TRIES {
@@ -173,15 +195,7 @@ fn draw_pose(
         let direction = draw.normal3().normalize();
         let slip_m = draw.normal3() * (config.joined.slip_sigma_mm * 1e-3);
         let grip = Grip { point_m, direction, slip_m };
-        let ends = grip.tips_m(pair.link_m);
-        // Walked there in steps, so that the elbow stays on its side.
-        let reached = [0, 1].map(|arm| {
-            let start = pair.arms[arm].tip_in_world(&near[arm]);
-            (1..=8).try_fold(near[arm].clone(), |q, step| {
-                pair.arms[arm].reach(&start.lerp(&ends[arm], f64::from(step) / 8.0), &q)
-            })
-        });
-        match reached {
+        match [0, 1].map(|arm| walk(pair, arm, before, &grip, &home[arm])) {
             [Ok(first), Ok(second)] => {
                 if first.iter().chain(&second).all(|q| q.abs() < WIDEST_RAD) {
                     return Ok((grip, [first, second]));
@@ -192,9 +206,8 @@ fn draw_pose(
             }
         }
     }
-    Err(LabError::Unreachable {
+    Err(LabError::JoinedOutOfReach {
         recording: config.recordings[recording].clone(),
-        arm: "true",
         what: "every meeting point drawn from `task.region_m`".into(),
         short_by_mm: shortest * 1e3,
     })

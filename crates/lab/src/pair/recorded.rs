@@ -51,12 +51,12 @@ fn joint_states(
         // The two computers do not sample together: half a period apart.
         let nominal_s = (f64::from(sequence) + 0.5 * arm as f64) / joints.rate_hz;
         let time_s = (nominal_s + transport.period_jitter_s()).clamp(0.0, motion.duration_s());
-        near = motion.joint_rad(pair, arm, time_s, &near).map_err(|short_by_m| LabError::Unreachable {
-            recording: config.recordings[recording].clone(),
-            arm: "true",
-            what: format!("the joined tips {time_s:.2} s after the start"),
-            short_by_mm: short_by_m * 1e3,
-        })?;
+        near =
+            motion.joint_rad(pair, arm, time_s, &near).map_err(|short_by_m| LabError::JoinedOutOfReach {
+                recording: config.recordings[recording].clone(),
+                what: format!("the joined tips {time_s:.2} s after the start"),
+                short_by_mm: short_by_m * 1e3,
+            })?;
         let counts: Vec<f64> = near
             .iter()
             .map(|angle| (angle / joints.count_rad() + noise.normal() * joints.noise_counts).round())

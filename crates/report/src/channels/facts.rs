@@ -5,16 +5,20 @@ use crate::points::Point;
 use crate::proto;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
 use crate::text::conclusion;
-use armcal_calibrate::{Estimate, SideErrors};
-use armcal_core::{Dwell, DwellId, ErrorStats, TipMeasurement};
+use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
+use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
 use armcal_table::Place;
 use nalgebra::Vector3;
 
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
-    out.put("/armcal/parameters", begin_ns, &parameters(run, begin_ns));
-    out.put("/armcal/report", begin_ns, &calibration(run, begin_ns));
+    out.put("/armcal/parameters", begin_ns, &parameters(&run.calibration.fit, begin_ns));
+    out.put(
+        "/armcal/report",
+        begin_ns,
+        &calibration(&run.pipeline_name, &run.calibration, conclusion(&run.calibration), begin_ns),
+    );
     for (index, recording) in run.recordings.iter().enumerate() {
         let start_ns = start_ns(recording);
         if let Some(clock) = &recording.clock {
@@ -25,7 +29,7 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
             let time_ns = dwell.mid_ns();
             let seen = recording.clock.as_ref().filter(|_| dwell.tip.is_some());
             let publish_ns = seen.map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
-            out.put_published("/armcal/dwells", time_ns, publish_ns, &dwell_message(recording, dwell));
+            out.put_published("/armcal/dwells", time_ns, publish_ns, &dwell_message(&recording.name, dwell));
             let used = points.iter().any(|p| p.observation.dwell == dwell.id);
             out.put("/armcal/assignments", time_ns, &assignment(recording, dwell, used));
         }
@@ -35,10 +39,11 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     }
 }
 
-fn dwell_message(recording: &RecordingRun, d: &Dwell) -> proto::Dwell {
+/// A dwell of the recording of this name.
+pub(super) fn dwell_message(recording: &str, d: &Dwell) -> proto::Dwell {
     proto::Dwell {
         timestamp: time(d.mid_ns()),
-        recording: recording.name.clone(),
+        recording: recording.to_owned(),
         recording_index: count(d.id.recording),
         dwell: count(d.id.dwell),
         start: time(d.start_ns),
@@ -111,14 +116,23 @@ fn assignment(recording: &RecordingRun, dwell: &Dwell, used: bool) -> proto::Ass
 }
 
 fn residual(run: &Run, point: &Point) -> proto::Residual {
-    let (o, r) = (point.observation, point.residual);
-    let DwellId { recording, dwell } = o.dwell;
+    let o = point.observation;
     proto::Residual {
-        timestamp: time(o.time_ns),
-        recording: run.recording_name(o.dwell).to_owned(),
-        recording_index: count(recording),
-        dwell: count(dwell),
         cavity: o.cavity().unwrap_or_default().to_owned(),
+        measured_m: Some(vector(&point.measured_m)),
+        predicted_m: Some(vector(&point.predicted_m)),
+        step_norm_mm: point.steps_m.iter().map(|r| r.norm() * 1e3).collect(),
+        ..error(run.recording_name(o.dwell), o.time_ns, point.residual)
+    }
+}
+
+/// The errors of one observation, without its places.
+pub(super) fn error(recording: &str, time_ns: i64, r: &Residual) -> proto::Residual {
+    proto::Residual {
+        timestamp: time(time_ns),
+        recording: recording.to_owned(),
+        recording_index: count(r.dwell.recording),
+        dwell: count(r.dwell.dwell),
         held_out: r.held_out,
         nominal_mm: Some(vector(&(r.nominal_m * 1e3))),
         nominal_norm_mm: r.nominal_m.norm() * 1e3,
@@ -127,14 +141,12 @@ fn residual(run: &Run, point: &Point) -> proto::Residual {
         whitened: Some(vector(&r.whitened)),
         weight: r.weight,
         expected_norm_mm: r.expected_norm_m * 1e3,
-        measured_m: Some(vector(&point.measured_m)),
-        predicted_m: Some(vector(&point.predicted_m)),
-        step_norm_mm: point.steps_m.iter().map(|r| r.norm() * 1e3).collect(),
+        ..Default::default()
     }
 }
 
-fn parameters(run: &Run, time_ns: i64) -> proto::Parameters {
-    let fit = &run.calibration.fit;
+/// Every parameter of a fit.
+pub(super) fn parameters(fit: &Fit, time_ns: i64) -> proto::Parameters {
     proto::Parameters {
         timestamp: time(time_ns),
         parameters: fit.estimates.iter().map(parameter).collect(),
@@ -168,11 +180,16 @@ fn parameter(e: &Estimate) -> proto::Parameter {
     }
 }
 
-fn calibration(run: &Run, time_ns: i64) -> proto::Calibration {
-    let c = &run.calibration;
+/// The calibration of the pipeline of this name, and what it comes to in a sentence.
+pub(super) fn calibration(
+    pipeline: &str,
+    c: &Calibration,
+    conclusion: String,
+    time_ns: i64,
+) -> proto::Calibration {
     proto::Calibration {
         timestamp: time(time_ns),
-        pipeline: run.pipeline_name.clone(),
+        pipeline: pipeline.to_owned(),
         version: VERSION.into(),
         objective: c.fit.objective.clone(),
         effects: effects(c).into_iter().map(str::to_owned).collect(),
@@ -189,7 +206,7 @@ fn calibration(run: &Run, time_ns: i64) -> proto::Calibration {
             limit_mm: p.limit_m * 1e3,
             feasible: p.feasible,
         }),
-        conclusion: conclusion(c),
+        conclusion,
     }
 }
 
@@ -225,7 +242,7 @@ fn clock_alignment(c: &ClockAlignment, recording: &str, index: usize, time_ns: i
     }
 }
 
-fn vector(v: &Vector3<f64>) -> proto::Vector {
+pub(super) fn vector(v: &Vector3<f64>) -> proto::Vector {
     proto::Vector { x: v.x, y: v.y, z: v.z }
 }
 

@@ -59,7 +59,8 @@ fn verdict(time_ns: i64, findings: &Findings, out: &mut Messages) {
     }
 }
 
-fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
+/// A warning as a line of the log.
+pub(super) fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
     let level = match warning.severity {
         Severity::Notice => Level::Info,
         Severity::Inadequate => Level::Warning,
@@ -77,7 +78,14 @@ fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
 }
 
 /// `subject` goes where a log has its source file: the thing the message is about.
-fn put(out: &mut Messages, time_ns: i64, level: Level, name: &str, subject: &str, message: String) {
+pub(super) fn put(
+    out: &mut Messages,
+    time_ns: i64,
+    level: Level,
+    name: &str,
+    subject: &str,
+    message: String,
+) {
     let log = fox::Log {
         timestamp: Some(timestamp(time_ns)),
         level: level as i32,

@@ -34,6 +34,7 @@
 
 mod arrows;
 pub(crate) mod board_map;
+mod closed_chain;
 mod facts;
 mod findings;
 mod frames;
@@ -42,6 +43,7 @@ mod paths;
 mod scene;
 mod shapes;
 
+pub(crate) use closed_chain::closed_messages;
 pub(crate) use findings::{curve_topic, implied_topic};
 
 use crate::findings::Findings;

@@ -6,12 +6,15 @@ use super::{Messages, start_ns};
 use crate::points::Point;
 use crate::run::Run;
 use armcal_core::{Dwell, Pose};
+use armcal_model::Model;
 use armcal_table::Cavity;
 use foxglove::messages as fox;
 use nalgebra::{Translation3, Vector3};
 
-const GREY: Rgba = [0.62, 0.62, 0.62, 0.6];
-const GREEN: Rgba = [0.15, 0.65, 0.35, 0.9];
+/// Nominal arms.
+pub(super) const GREY: Rgba = [0.62, 0.62, 0.62, 0.6];
+/// Calibrated arms.
+pub(super) const GREEN: Rgba = [0.15, 0.65, 0.35, 0.9];
 const WHITE: Rgba = [0.95, 0.95, 0.95, 1.0];
 const HELD_OUT: Rgba = [0.25, 0.50, 0.95, 1.0];
 const PLATE: Rgba = [0.45, 0.45, 0.50, 0.5];
@@ -40,8 +43,15 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], out: &mut Messages)
     let time_ns = dwell.mid_ns();
     let fitted = run.calibration.fit.values();
     let mut entities = vec![
-        arm(run, "arm/nominal", &run.calibration.nominal_values, GREY, dwell),
-        arm(run, "arm/calibrated", &fitted, GREEN, dwell),
+        arm(
+            "arm/nominal",
+            &run.model,
+            &run.calibration.nominal_values,
+            GREY,
+            dwell.mid_ns(),
+            &dwell.joint_rad,
+        ),
+        arm("arm/calibrated", &run.model, &fitted, GREEN, dwell.mid_ns(), &dwell.joint_rad),
     ];
     let observed = own.iter().find(|p| p.observation.dwell == dwell.id).map(|p| p.measured_m);
     let mut measured = entity("tip/measured", time_ns);
@@ -53,12 +63,19 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], out: &mut Messages)
 }
 
 /// Links as lines, joints as spheres, the predicted tip as a smaller one.
-fn arm(run: &Run, id: &str, p: &[f64], rgba: Rgba, dwell: &Dwell) -> fox::SceneEntity {
-    let world_from_base = run.model.base_in_world(p);
-    let frames = run.model.link_frames_in_base(p, &dwell.joint_rad);
+pub(super) fn arm(
+    id: &str,
+    model: &Model,
+    p: &[f64],
+    rgba: Rgba,
+    time_ns: i64,
+    joint_rad: &[f64],
+) -> fox::SceneEntity {
+    let world_from_base = model.base_in_world(p);
+    let frames = model.link_frames_in_base(p, joint_rad);
     let places_m: Vec<Vector3<f64>> =
         frames.iter().map(|(_, frame)| (world_from_base * frame).translation.vector).collect();
-    let mut arm = entity(id, dwell.mid_ns());
+    let mut arm = entity(id, time_ns);
     arm.lines.push(line_strip(&places_m, 0.006, rgba));
     if let Some((tip_m, joints_m)) = places_m.split_last() {
         arm.spheres.extend(joints_m.iter().map(|joint_m| sphere(joint_m, 0.025, rgba)));

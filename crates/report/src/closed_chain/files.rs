@@ -4,6 +4,8 @@
 
 use super::{ClosedRecording, ClosedRun};
 use crate::ReportError;
+use crate::channels::closed_messages;
+use crate::mcap_file::{Attachment, write_results};
 use crate::model_file::calibrated;
 use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
 use crate::run::{Status, VERSION};
@@ -12,6 +14,7 @@ use crate::text::conclusion_about;
 use crate::write::{at, stage};
 use armcal_calibrate::Residual;
 use armcal_core::Warning;
+use armcal_recording::Recording;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -89,12 +92,16 @@ struct Parameters<'a> {
     frames: Vec<FrameEntry>,
 }
 
-/// Writes `summary.json`, `parameters.toml` and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into
+/// Writes `run.mcap` (the inputs' own messages and the result channels), `summary.json`, `parameters.toml` and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into
 /// `out_dir`, which is made if need be; returns their paths. Files of an earlier run are replaced, each at once.
 ///
 /// # Errors
 /// A folder or file that cannot be written, a model that its form cannot express.
-pub fn write_closed(run: &ClosedRun, out_dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
+pub fn write_closed(
+    run: &ClosedRun,
+    recordings: &[Recording],
+    out_dir: &Path,
+) -> Result<Vec<PathBuf>, ReportError> {
     let mut texts = vec![
         ("summary.json".to_owned(), closed_summary_json(run)?),
         ("parameters.toml".to_owned(), parameters_toml(run)?),
@@ -109,14 +116,41 @@ pub fn write_closed(run: &ClosedRun, out_dir: &Path) -> Result<Vec<PathBuf>, Rep
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let staged = texts.iter().map(|(name, text)| stage(&out_dir.join(name), text.as_bytes()));
     let staged = staged.collect::<Result<Vec<_>, ReportError>>()?;
-    staged
-        .into_iter()
-        .map(|file| {
-            let path = file.target().to_owned();
-            file.commit().map_err(at(&path))?;
-            Ok(path)
-        })
-        .collect()
+    let mut written = vec![write_run(run, recordings, &texts, out_dir)?];
+    for file in staged {
+        let path = file.target().to_owned();
+        file.commit().map_err(at(&path))?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// Writes `run.mcap` with the other files attached.
+fn write_run(
+    run: &ClosedRun,
+    recordings: &[Recording],
+    texts: &[(String, String)],
+    out_dir: &Path,
+) -> Result<PathBuf, ReportError> {
+    let attachment = |(name, text): &'_ (String, String)| {
+        let media_type = match name.rsplit_once('.').map(|(_, form)| form) {
+            Some("json") => "application/json",
+            Some("urdf") => "application/xml",
+            _ => "application/toml",
+        };
+        (name.clone(), media_type, text.clone())
+    };
+    let mut files: Vec<(String, &str, String)> = texts.iter().map(attachment).collect();
+    files.push(("pipeline.toml".into(), "application/toml", run.pipeline_text.clone()));
+    let attachments: Vec<Attachment<'_>> =
+        files.iter().map(|(name, media_type, text)| Attachment { name, media_type, text }).collect();
+    let about = [("version", VERSION), ("pipeline", &run.pipeline_name), ("summary_schema", CLOSED_SCHEMA)];
+    let about = about.map(|(key, value)| (key.to_owned(), value.to_owned())).into_iter().collect();
+    let path = out_dir.join("run.mcap");
+    let about = [("armcal/run", about)];
+    write_results(closed_messages(run), recordings, &attachments, run.end_ns(), &about, &path)
+        .map_err(at(&path))?;
+    Ok(path)
 }
 
 /// The summary of a run: indented JSON with a final newline.
@@ -152,7 +186,7 @@ fn recording(r: &ClosedRecording) -> RecordingSummary<'_> {
         name: &r.name,
         path: r.paths.first().map(|p| p.to_string_lossy().into_owned()).unwrap_or_default(),
         files: r.report.files.iter().map(|f| FileSummary { sha256: &f.sha256, bytes: f.bytes }).collect(),
-        dwells: r.dwells,
+        dwells: r.dwells.len(),
         open: r.open.iter().map(|o| OpenDwell { dwell: o.dwell.dwell, why: &o.why }).collect(),
         warnings: r.all_warnings(),
     }

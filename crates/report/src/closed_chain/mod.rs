@@ -1,6 +1,6 @@
 //! Results of two arms in a closed chain: the same tables, names and files as for one arm, with a prefix an arm.
 //!
-//! `ClosedRun -> write_closed -> files`: `summary.json`, `parameters.toml`, and each arm's calibrated model in the form it
+//! `ClosedRun -> write_closed -> files`: `run.mcap`, `summary.json`, `parameters.toml`, and each arm's calibrated model in the form it
 //! came in. An error is a closing error here: how far the joined tips are from where each arm puts the other.
 
 mod files;
@@ -11,7 +11,7 @@ pub use terminal::closed_terminal;
 
 use crate::run::{Status, status_of, without_repeats};
 use armcal_calibrate::{Calibration, ClosedChain, ClosedObservation};
-use armcal_core::{Rejection, Warning};
+use armcal_core::{Dwell, Rejection, Warning};
 use armcal_recording::RecordingReport;
 use std::path::PathBuf;
 
@@ -20,6 +20,8 @@ use std::path::PathBuf;
 pub struct ClosedRun {
     /// Name of the pipeline.
     pub pipeline_name: String,
+    /// Text of the pipeline, so that the result can be reproduced from itself.
+    pub pipeline_text: String,
     /// Both arms with their nominal parameters, and how they are joined.
     pub chain: ClosedChain,
     /// Text of each arm's model file, in the order of the chain.
@@ -43,8 +45,8 @@ pub struct ClosedRecording {
     pub paths: Vec<PathBuf>,
     /// What reading found; the streams are one an arm.
     pub report: RecordingReport,
-    /// Dwells in which both arms stood still.
-    pub dwells: usize,
+    /// Dwells in which both arms stood still, the joints of the first arm before those of the second.
+    pub dwells: Vec<Dwell>,
     /// Those in which the tips were not joined, and how that is known.
     pub open: Vec<Rejection>,
     /// What the user should know about it.
@@ -62,6 +64,24 @@ impl ClosedRun {
     /// Warnings that are not about one recording, each once.
     pub fn overall_warnings(&self) -> Vec<&Warning> {
         without_repeats(self.warnings.iter().chain(&self.calibration.warnings))
+    }
+}
+
+impl ClosedRun {
+    /// One arm's part of the joints of both.
+    pub(crate) fn of_arm<'q>(&self, arm: usize, joint_rad: &'q [f64]) -> &'q [f64] {
+        let first = self.chain.arms()[0].model.joint_count().min(joint_rad.len());
+        if arm == 0 { &joint_rad[..first] } else { &joint_rad[first..] }
+    }
+
+    /// When the first dwell begins [ns].
+    pub(crate) fn start_ns(&self) -> i64 {
+        self.recordings.iter().flat_map(|r| &r.dwells).map(|d| d.start_ns).min().unwrap_or(0)
+    }
+
+    /// When the last dwell ends [ns].
+    pub(crate) fn end_ns(&self) -> i64 {
+        self.recordings.iter().flat_map(|r| &r.dwells).map(|d| d.end_ns).max().unwrap_or(0)
     }
 }
 

@@ -36,8 +36,8 @@ fn recordings(pen: &Pen, run: &ClosedRun) -> String {
     for recording in &run.recordings {
         table.add_row(vec![
             Cell::new(printable(&recording.name)),
-            number(recording.dwells),
-            number(recording.dwells - recording.open.len()),
+            number(recording.dwells.len()),
+            number(recording.dwells.len() - recording.open.len()),
             number(recording.open.len()),
         ]);
     }

@@ -1,0 +1,97 @@
+//! The channels of two arms in a closed chain, under the names that one arm has.
+//!
+//! | topic | messages |
+//! |---|---|
+//! | `/armcal/arms` | one a dwell: both arms, nominal and calibrated |
+//! | `/armcal/arrows_calibrated` | one a dwell: its closing error, exaggerated; none where the tips were not joined |
+//! | `/armcal/dwells` | one a dwell, the joints of the first arm before those of the second |
+//! | `/armcal/residuals` | one a joined dwell: `measured_m` is where the first arm has the joined point, `predicted_m` the \
+//!   second |
+//! | `/armcal/parameters`, `/armcal/report`, `/armcal/log` | as for one arm |
+
+use super::arrows::all;
+use super::scene::{GREEN, GREY, arm};
+use super::shapes::{Rgba, arrow, entity, note};
+use super::{Messages, ResultMessage, facts, log};
+use crate::closed_chain::ClosedRun;
+use crate::findings::round_factor;
+use crate::text::conclusion_about;
+use armcal_core::Dwell;
+use armcal_core::robust::percentile;
+use foxglove::messages as fox;
+use foxglove::messages::log::Level;
+
+/// The 95th percentile of the closing errors is drawn this long [m].
+const LONG_ARROW_M: f64 = 0.05;
+const ARROW: Rgba = [0.9, 0.35, 0.1, 1.0];
+
+/// All result messages in the order of their log times.
+pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
+    let (mut out, begin_ns) = (Messages::default(), run.start_ns());
+    let (calibration, fit) = (&run.calibration, &run.calibration.fit);
+    let conclusion = conclusion_about(calibration, "closing error");
+    out.put("/armcal/parameters", begin_ns, &facts::parameters(fit, begin_ns));
+    let report = facts::calibration(&run.pipeline_name, calibration, conclusion.clone(), begin_ns);
+    out.put("/armcal/report", begin_ns, &report);
+    for warning in run.overall_warnings() {
+        log::put_warning(&mut out, begin_ns, warning);
+    }
+    let errors_m: Vec<f64> = calibration.residuals.iter().map(|r| r.fitted_m.norm()).collect();
+    let factor = round_factor(LONG_ARROW_M / percentile(&errors_m, 0.95).max(1e-6));
+    for recording in &run.recordings {
+        let start_ns = recording.dwells.first().map_or(begin_ns, |d| d.start_ns);
+        for warning in recording.all_warnings() {
+            log::put_warning(&mut out, start_ns, warning);
+        }
+        for dwell in &recording.dwells {
+            let time_ns = dwell.mid_ns();
+            out.put("/armcal/dwells", time_ns, &facts::dwell_message(&recording.name, dwell));
+            out.put("/armcal/arms", time_ns, &arms(run, dwell));
+            put_error(run, &recording.name, dwell, factor, &mut out);
+        }
+        for open in &recording.open {
+            let time_ns =
+                recording.dwells.iter().find(|d| d.id == open.dwell).map_or(start_ns, Dwell::mid_ns);
+            let why = format!("dwell {} not used: {}", open.dwell.dwell, open.why);
+            log::put(&mut out, time_ns, Level::Debug, "armcal.dwell", &recording.name, why);
+        }
+    }
+    log::put(&mut out, run.end_ns(), Level::Info, "armcal.calibrate", "", conclusion);
+    out.messages.sort_by_key(|m| m.log_ns);
+    out.messages
+}
+
+fn arms(run: &ClosedRun, dwell: &Dwell) -> fox::SceneUpdate {
+    let fitted = run.calibration.fit.values();
+    let mut entities = Vec::new();
+    for (index, own) in run.chain.arms().iter().enumerate() {
+        let joint_rad = run.of_arm(index, &dwell.joint_rad);
+        let sets = [("nominal", &run.calibration.nominal_values, GREY), ("calibrated", &fitted, GREEN)];
+        for (which, p, rgba) in sets {
+            let (id, p) = (format!("{}/{which}", own.name), run.chain.of_arm(index, p));
+            entities.push(arm(&id, &own.model, p, rgba, dwell.mid_ns(), joint_rad));
+        }
+    }
+    fox::SceneUpdate { deletions: Vec::new(), entities }
+}
+
+/// The closing error of a dwell as numbers and as an arrow; an open dwell takes the arrow before it away.
+fn put_error(run: &ClosedRun, recording: &str, dwell: &Dwell, factor: f64, out: &mut Messages) {
+    let time_ns = dwell.mid_ns();
+    let mut drawn = entity("errors/calibrated", time_ns);
+    drawn.metadata.push(note("exaggeration", factor));
+    let at = run.observations.iter().position(|o| o.dwell() == dwell.id);
+    if let Some((o, r)) = at.map(|i| (&run.observations[i], &run.calibration.residuals[i])) {
+        let fitted = run.calibration.fit.values();
+        let second = &run.chain.arms()[1].model;
+        let predicted_m = second.predicted_tip_in_world(run.chain.of_arm(1, &fitted), &o.arms[1]);
+        let measured_m = predicted_m + r.fitted_m;
+        let mut message = facts::error(recording, time_ns, r);
+        (message.measured_m, message.predicted_m) =
+            (Some(facts::vector(&measured_m)), Some(facts::vector(&predicted_m)));
+        out.put("/armcal/residuals", time_ns, &message);
+        drawn.arrows.extend(arrow(&measured_m, &(-r.fitted_m * factor), 0.0015, ARROW));
+    }
+    let update = fox::SceneUpdate { deletions: vec![all(time_ns)], entities: vec![drawn] };
+    out.put("/armcal/arrows_calibrated", time_ns, &update);
+}
