@@ -94,10 +94,14 @@ pub struct RecordingEntry {
 impl RecordingEntry {
     /// The recording's name.
     pub fn name(&self) -> String {
-        let stem =
-            || self.paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
-        self.name.clone().or_else(stem).unwrap_or_default()
+        recording_name(self.name.as_ref(), &self.paths)
     }
+}
+
+/// The given name, or the stem of the first file.
+pub(crate) fn recording_name(given: Option<&String>, paths: &[PathBuf]) -> String {
+    let stem = || paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
+    given.cloned().or_else(stem).unwrap_or_default()
 }
 
 /// The calibration table.
