@@ -55,4 +55,4 @@ pub use verification::{
     IsoReport, On, PathSample, Published, Verification, VerifiedRecording, VerifyConfig, verification_files,
     verification_json, verification_text,
 };
-pub use write::{InputMessages, OutputConfig, write_all};
+pub use write::{InputMessages, OutputConfig, write_all, write_brief};
