@@ -32,7 +32,7 @@ pub enum Command {
     },
     /// Channels, rates, gaps, clocks and occlusion of recordings, before a long run.
     Inspect {
-        /// MCAP files (parts of one recording), or one pipeline file to inspect what it would use.
+        /// MCAP files (parts of one recording) or s3://BUCKET/KEY, or one pipeline file to inspect what it would use.
         #[arg(required = true)]
         inputs: Vec<PathBuf>,
         /// Print JSON.
@@ -253,6 +253,29 @@ pub enum Command {
         /// Seed, instead of the file's own.
         #[arg(long)]
         seed: Option<u64>,
+    },
+    /// Thin recordings for repeated work: the wanted channels only, untouched, whatever else the files hold left out.
+    ///
+    /// Exit code 3 when the input was damaged: what is lost is said.
+    Extract {
+        /// MCAP files (parts of one recording), or s3://BUCKET/KEY.
+        #[arg(required = true)]
+        inputs: Vec<PathBuf>,
+        /// File for the thin recording.
+        #[arg(long)]
+        out: PathBuf,
+        /// Keep the channels that this pipeline reads.
+        #[arg(long, required_unless_present = "topics")]
+        pipeline: Option<PathBuf>,
+        /// Keep this topic; `*` stands for any characters. May be given again.
+        #[arg(long = "topic", value_name = "TOPIC")]
+        topics: Vec<String>,
+        /// Keep attachments too.
+        #[arg(long)]
+        attachments: bool,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
     },
     /// The residual problem of a pipeline as JSON, to solve it with another tool.
     Export {

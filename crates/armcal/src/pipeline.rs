@@ -82,7 +82,7 @@ pub struct Pipeline {
 pub struct RecordingEntry {
     /// Name used in parameters and outputs; the stem of the first file when absent.
     pub name: Option<String>,
-    /// Its files: one, or the parts of a split bag.
+    /// Its files: one, or the parts of a split bag; paths, or URLs such as `s3://bucket/key` (feature `s3`).
     pub paths: Vec<PathBuf>,
     /// Declared tilt of the board.
     #[serde(default)]
@@ -338,9 +338,9 @@ impl Pipeline {
         Ok(pipeline)
     }
 
-    /// A path of the pipeline file, resolved against its folder.
+    /// A path of the pipeline file, resolved against its folder; a URL stays as it is.
     pub fn resolve(&self, path: &Path) -> PathBuf {
-        self.folder.join(path)
+        armcal_recording::resolve(&self.folder, path)
     }
 
     /// Recordings that contradict each other.

@@ -12,8 +12,8 @@ pub struct Row {
     pub paths: Vec<String>,
     /// Size of its files [bytes].
     pub bytes: u64,
-    /// SHA-256 of its files, hexadecimal.
-    pub sha256: Vec<String>,
+    /// What its files hold: SHA-256, hexadecimal, or ETag, size and time of an object.
+    pub identity: Vec<String>,
     /// What was declared about its board's tilt, in words; recordings of different tilts have different board poses.
     pub tilt: String,
     /// Load at the tip [kg].

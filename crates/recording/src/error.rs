@@ -23,6 +23,37 @@ pub enum RecordingError {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A file could not be read on.
+    #[error("cannot read recording {}: {source}; was it shortened meanwhile?", path.display())]
+    Read {
+        /// The path.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// An object cannot be reached or read.
+    #[error("cannot read {url}: {why}")]
+    Object {
+        /// Its URL.
+        url: String,
+        /// Why, and what to do.
+        why: String,
+    },
+    /// A file without a usable summary cannot be copied to where it can be searched.
+    #[error(
+        "{} has no usable summary and must be copied to be searched, but its {bytes} bytes cannot be written to {}: \
+         {source}; set TMPDIR to a folder with enough room",
+        path.display(),
+        std::env::temp_dir().display()
+    )]
+    Spool {
+        /// The path or URL.
+        path: PathBuf,
+        /// Size [bytes].
+        bytes: u64,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
     /// A file is not an MCAP file.
     #[error("{} is not an MCAP recording: {why}", path.display())]
     NotMcap {
@@ -42,6 +73,16 @@ pub enum RecordingError {
         role: &'static str,
         /// Topic asked for.
         topic: String,
+        /// Nearest topic present.
+        nearest: Option<String>,
+        /// Topics present.
+        present: Vec<String>,
+    },
+    /// No channel matches a topic asked for by name or pattern.
+    #[error("no topic {pattern:?} in the recording{}; present: {}", did_you_mean(nearest), list(present))]
+    NoSuchTopic {
+        /// Name or pattern asked for.
+        pattern: String,
         /// Nearest topic present.
         nearest: Option<String>,
         /// Topics present.

@@ -9,7 +9,7 @@ use crate::poses::PoseTable;
 use crate::raw::RawChannel;
 use crate::records::Message;
 use crate::scalars::ScalarTable;
-use crate::sweep::sweep;
+use crate::sweep::{blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -92,8 +92,10 @@ pub(crate) fn gather(
         let unreadable = target(recording, index, request, &mut wanted)?;
         gathered.push(Gathered { unreadable, ..Gathered::default() });
     }
+    let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
     let (surveys, blocks) = sweep(
         &recording.files,
+        &blocks(&recording.files, &channels),
         |file| (file, requests.iter().map(|r| Batch::new(r.kind.role())).collect::<Vec<_>>()),
         |(file, batches), message| {
             for target in wanted[*file].get(&message.channel_id).into_iter().flatten() {
@@ -101,7 +103,7 @@ pub(crate) fn gather(
             }
         },
         |(_, batches)| batches.into_iter().zip(requests).map(|(b, r)| b.finish(r)).collect::<Vec<_>>(),
-    );
+    )?;
     recording.remember(surveys);
     for block in blocks {
         for (whole, part) in gathered.iter_mut().zip(block) {

@@ -1,12 +1,14 @@
-//! Where in a file its messages lie.
+//! Where in a file its messages lie, found by walking a map of it (files read by ranges: [`crate::index`]).
 //!
 //! The data section is always walked, record by record, without inflating anything: that costs a page a chunk and
 //! cannot be lied to by an index. The summary, once its CRC agrees, contributes the channel definitions and the
 //! statistics, and its chunk index leads past a spot where the walk lost its footing.
 
 use crate::channels::Definitions;
+use crate::map::Map;
 use crate::records::{ChunkHeader, Cursor, ENVELOPE, Message, RawRecord, Records, Stop, is_content};
 use crate::report::Source;
+use crate::sweep::Tally;
 use mcap::records::{ChunkIndex, Record, Statistics, op};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -25,6 +27,21 @@ pub(crate) struct Block {
     pub offset: usize,
     /// What it is.
     pub content: Content,
+    /// Channels with messages in it, where the index says; `None` where only looking tells.
+    pub holds: Option<Vec<u16>>,
+}
+
+impl Block {
+    /// A block of which only looking tells what it holds.
+    fn of(offset: usize, content: Content) -> Block {
+        Block { offset, content, holds: None }
+    }
+
+    /// The bytes to read for it, with the envelope of a chunk.
+    pub fn range(&self) -> Range<usize> {
+        let (Content::Chunk(body) | Content::CutChunk(body) | Content::Loose(body)) = &self.content;
+        self.offset..body.end
+    }
 }
 
 /// What a block holds; ranges are bytes of the file.
@@ -62,32 +79,40 @@ pub(crate) struct Layout {
     /// Whether `definitions` is known to be all there are; otherwise the chunks must be looked into.
     pub definitions_complete: bool,
     pub statistics: Option<Statistics>,
+    /// What the summary says of each channel, for those that are not read of a file read by ranges.
+    pub declared: BTreeMap<u16, Tally>,
     pub truncated_at: Option<usize>,
     pub damage: Vec<Damage>,
     /// Log time of the first message or chunk [ns].
     pub first_ns: Option<u64>,
-    indexed: Vec<ChunkIndex>,
-    summary_used: bool,
+    /// The chunk index, while it is needed to find a way past damage.
+    pub indexed: Vec<ChunkIndex>,
+    /// Whether a summary was already taken in.
+    pub summary_used: bool,
 }
 
 impl Layout {
     /// Finds the structure. The error says why the bytes are no MCAP file.
-    pub fn of(bytes: &[u8]) -> Result<Layout, String> {
+    pub fn of(map: &Map) -> Result<Layout, String> {
+        let bytes: &[u8] = map;
         check_magic(bytes)?;
         let mut layout = Layout::default();
         let mut from = Some(mcap::MAGIC.len());
         while let Some(start) = from {
             let mut records = Records::new(bytes, start, bytes.len());
-            from = match layout.walk_data(bytes, &mut records) {
+            from = match layout.walk_data(map, &mut records) {
                 DataSection::Ended(data_end) => {
                     layout.walk_summary(bytes, data_end, &mut records);
                     None
                 }
-                DataSection::Stopped(stop) => layout.recover(bytes, stop),
+                DataSection::Stopped(stop) => layout.recover(map, stop),
             };
         }
         layout.add_unvisited(bytes);
         layout.judge_definitions();
+        // The index has served, and of a long recording it is large.
+        layout.indexed = Vec::new();
+        map.release(0..bytes.len());
         Ok(layout)
     }
 
@@ -96,7 +121,7 @@ impl Layout {
         self.blocks.iter().filter(|b| !matches!(b.content, Content::Loose(_))).count()
     }
 
-    fn walk_data(&mut self, bytes: &[u8], records: &mut Records<'_>) -> DataSection {
+    fn walk_data(&mut self, map: &Map, records: &mut Records<'_>) -> DataSection {
         for record in records {
             let record = match record {
                 Ok(record) => record,
@@ -104,14 +129,15 @@ impl Layout {
             };
             match record.op {
                 op::DATA_END => {
-                    self.check_data_crc(bytes, &record);
+                    self.check_data_crc(map, &record);
                     return DataSection::Ended(body(&record).end);
                 }
                 op::FOOTER => return DataSection::Ended(record.offset),
                 _ => self.take(&record),
             }
+            map.passed(record.offset..body(&record).end);
         }
-        DataSection::Stopped(Stop::CutOff(bytes.len()))
+        DataSection::Stopped(Stop::CutOff(map.len()))
     }
 
     /// Takes in one record of the data section.
@@ -125,7 +151,7 @@ impl Layout {
             op::CHUNK => {
                 let start = ChunkHeader::parse(record.body).map(|(header, _)| header.start_ns);
                 self.start_at(start.filter(|ns| *ns > 0));
-                self.blocks.push(Block { offset: record.offset, content: Content::Chunk(body(record)) });
+                self.blocks.push(Block::of(record.offset, Content::Chunk(body(record))));
             }
             op::ATTACHMENT => self.attachments.push(body(record)),
             op::METADATA => self.metadata.push(body(record)),
@@ -152,14 +178,19 @@ impl Layout {
             last.end = range.end;
             return;
         }
-        self.blocks.push(Block { offset: range.start, content: Content::Loose(range) });
+        self.blocks.push(Block::of(range.start, Content::Loose(range)));
     }
 
     /// Chunks have their own CRCs; only for messages outside chunks does the one of the data section add anything.
-    fn check_data_crc(&mut self, bytes: &[u8], data_end: &RawRecord<'_>) {
+    fn check_data_crc(&mut self, map: &Map, data_end: &RawRecord<'_>) {
         let loose = self.blocks.iter().any(|b| matches!(b.content, Content::Loose(_)));
         let expected = Cursor::new(data_end.body).u32().unwrap_or(0);
-        if loose && expected != 0 && crc32fast::hash(&bytes[..data_end.offset]) != expected {
+        if !loose || expected == 0 {
+            return;
+        }
+        let mut crc = crc32fast::Hasher::new();
+        map.pieces(0..data_end.offset, |piece| crc.update(piece));
+        if crc.finalize() != expected {
             let why =
                 "the CRC of the data section disagrees: some of its messages outside chunks may be wrong";
             self.damaged(data_end.offset, why, true);
@@ -225,7 +256,8 @@ impl Layout {
 
     /// The walk stopped inside the data section: a cut-off file, or damage in the middle of a finished one. Returns
     /// where to go on.
-    fn recover(&mut self, bytes: &[u8], stop: Stop) -> Option<usize> {
+    fn recover(&mut self, map: &Map, stop: Stop) -> Option<usize> {
+        let bytes: &[u8] = map;
         let (Stop::CutOff(at) | Stop::ZeroOpcode(at)) = stop;
         let footer = bytes.len().checked_sub(FOOTER_BYTES + mcap::MAGIC.len()).filter(|f| *f >= at);
         let footer = footer.and_then(|f| {
@@ -236,7 +268,7 @@ impl Layout {
         match footer {
             Some(footer) => self.skip_damage(bytes, at, &footer),
             None => {
-                self.cut_off(bytes, stop, at);
+                self.cut_off(map, stop, at);
                 None
             }
         }
@@ -254,7 +286,7 @@ impl Layout {
         if let Some(chunk) = next.clone().filter(|r| r.start == at + ENVELOPE) {
             self.damaged(at, "the length of this chunk is wrong; the index has the right one", false);
             let end = chunk.end;
-            self.blocks.push(Block { offset: at, content: Content::Chunk(chunk) });
+            self.blocks.push(Block::of(at, Content::Chunk(chunk)));
             return Some(end);
         }
         let resume = next.map(|r| r.start - ENVELOPE);
@@ -271,24 +303,25 @@ impl Layout {
             chunks.map(|r| (r.start - ENVELOPE, r)).filter(|(offset, _)| !known.contains(offset)).collect();
         for (offset, range) in hidden {
             self.damaged(offset, "a chunk hidden by a record of wrong length; the index leads to it", false);
-            self.blocks.push(Block { offset, content: Content::Chunk(range) });
+            self.blocks.push(Block::of(offset, Content::Chunk(range)));
         }
         self.blocks.sort_by_key(|b| b.offset);
     }
 
     /// Ends without a footer: whatever of the last chunk is sound is still used.
-    fn cut_off(&mut self, bytes: &[u8], stop: Stop, at: usize) {
+    fn cut_off(&mut self, map: &Map, stop: Stop, at: usize) {
+        let bytes: &[u8] = map;
         self.truncated_at = Some(at);
         if let Stop::ZeroOpcode(_) = stop {
-            let zero_filled = bytes[at..].iter().all(|b| *b == 0);
+            let mut zero_filled = true;
+            map.pieces(at..bytes.len(), |piece| zero_filled &= piece.iter().all(|b| *b == 0));
             let what = if zero_filled { "zero-filled" } else { "not readable" };
             self.damaged(at, format!("the file is {what} from here on ({} bytes)", bytes.len() - at), true);
             self.doubt_last_block(bytes, at);
         } else {
             self.damaged(at, "the file is cut off here", true);
             if bytes.get(at) == Some(&op::CHUNK) && bytes.len() > at + ENVELOPE {
-                let content = Content::CutChunk(at + ENVELOPE..bytes.len());
-                self.blocks.push(Block { offset: at, content });
+                self.blocks.push(Block::of(at, Content::CutChunk(at + ENVELOPE..bytes.len())));
             }
         }
     }
@@ -355,7 +388,8 @@ fn indexed_chunk(bytes: &[u8], index: &ChunkIndex) -> Option<Range<usize>> {
     sound.then_some(offset + ENVELOPE..end)
 }
 
-fn check_magic(bytes: &[u8]) -> Result<(), String> {
+/// Says why bytes are not the start of an MCAP file.
+pub(crate) fn check_magic(bytes: &[u8]) -> Result<(), String> {
     if bytes.starts_with(mcap::MAGIC) {
         return Ok(());
     }

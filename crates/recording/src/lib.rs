@@ -1,31 +1,39 @@
 //! MCAP recordings in and out.
 //!
 //! Reading, in the order data flows through the modules:
-//! `map` (the file's bytes) -> `records` (record envelopes) -> `layout` (where messages lie, by index or by
-//! walking) -> `chunk` (inflated and checked) -> `sweep` (all blocks in parallel, results in file order) ->
+//! `bytes` (a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`) ->
+//! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
+//! `chunk` (inflated and checked) -> `sweep` (all blocks in parallel, results in file order) ->
 //! `decode` (messages to rows) -> `gather` (rows of a stream) -> `read` (columns: clock, cleaning, units).
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
 //! off or damaged. What is sound is used; what is not is reported with its byte offset and reason. Nothing panics
 //! on bad input.
 //!
-//! Writing: [`output::McapOutput`] into an [`atomic::AtomicFile`]; same messages, same bytes.
+//! Writing: [`output::McapOutput`] into an [`atomic::AtomicFile`]; same messages, same bytes. [`extract()`] does both: it
+//! writes a thin recording of the wanted channels.
 
 pub mod atomic;
+mod bytes;
 mod channels;
 mod chunk;
 mod clean;
 mod clock;
 pub mod decode;
 mod error;
+mod extract;
 mod gather;
+mod index;
 mod joints;
 mod layout;
 mod map;
+#[cfg(feature = "s3")]
+mod object;
 mod occlusion;
 mod open;
 pub mod output;
 mod poses;
+mod ranges;
 mod raw;
 mod read;
 mod records;
@@ -34,13 +42,16 @@ pub mod ros2;
 mod scalars;
 mod streams;
 mod sweep;
+mod url;
 
+pub use bytes::{Access, identity_of};
 pub use error::RecordingError;
-pub use map::sha256_of_file;
+pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use open::Recording;
-pub use raw::{Attachment, RawChannel, RawMessage, RawSchema};
+pub use raw::{Attachment, RawChannel, RawMessage, RawSchema, RawVisitor};
 pub use report::*;
 pub use streams::{Encoder, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams};
+pub use url::{is_url, list, resolve};
 
 #[cfg(test)]
 mod tests;

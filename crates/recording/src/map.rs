@@ -1,40 +1,91 @@
-//! The bytes of a file, memory-mapped, and their SHA-256.
+//! A file's bytes, memory-mapped, and its pages given back once they are used.
+//!
+//! Pages of a map count as the process's own memory from the moment they are touched. Reading a recording of many
+//! gigabytes once would therefore look, to whoever watches the memory, like holding all of it. So everything that
+//! passes over a map says which stretch it is done with, and the pages leave; they stay in the system's cache.
 
-use crate::RecordingError;
-use memmap2::Mmap;
 use sha2::{Digest as _, Sha256};
 use std::fs::File;
-use std::path::Path;
+use std::io;
+use std::ops::{Deref, Range};
 
-/// Maps a file read-only. An empty file or a folder is an error that says so.
-pub(crate) fn map(path: &Path) -> Result<Mmap, RecordingError> {
-    let open = |source| RecordingError::Open { path: path.to_owned(), source };
-    let file = File::open(path).map_err(open)?;
-    let about = file.metadata().map_err(open)?;
-    if about.is_dir() {
-        let why = "it is a folder; name the .mcap files in it".to_owned();
-        return Err(RecordingError::NotMcap { path: path.to_owned(), why });
+/// A map is given back in stretches of this size: large enough that it costs no time.
+const WINDOW_BYTES: usize = 1 << 20;
+/// A whole file is hashed in pieces of this size.
+const PIECE_BYTES: usize = 4 << 20;
+
+/// A file mapped read-only.
+pub(crate) struct Map(memmap2::Mmap);
+
+impl Map {
+    /// Maps a file that is not empty.
+    pub fn of(file: &File) -> io::Result<Map> {
+        #[expect(unsafe_code, reason = "mapping is the only way to read gigabytes without copying them")]
+        // SAFETY: the map is read-only and private to this process. Another process that truncates the file while it
+        // is mapped can still kill us with SIGBUS; recordings are finished files, which nobody truncates, and where
+        // somebody may (`crate::Access`), the file is not mapped.
+        let mapped = unsafe { memmap2::Mmap::map(file) }?;
+        Ok(Map(mapped))
     }
-    if about.is_file() && about.len() == 0 {
-        let why = "the file is empty".to_owned();
-        return Err(RecordingError::NotMcap { path: path.to_owned(), why });
+
+    /// Says that a pass in order of offsets is done with these bytes. They can be read again at any time.
+    pub fn passed(&self, range: Range<usize>) {
+        let window = range.start / WINDOW_BYTES;
+        if range.end / WINDOW_BYTES != window {
+            self.release(window * WINDOW_BYTES..range.end);
+        }
     }
-    #[expect(unsafe_code, reason = "mapping is the only way to read gigabytes without copying them")]
-    // SAFETY: the map is read-only and private to this process. Another process that truncates the file while it
-    // is mapped can still kill us with SIGBUS; recordings are finished files, which nobody truncates.
-    let mapped = unsafe { Mmap::map(&file) }.map_err(open)?;
-    Ok(mapped)
+
+    /// Takes the pages of a range out of the process's memory.
+    #[cfg(unix)]
+    pub fn release(&self, range: Range<usize>) {
+        let end = range.end.min(self.0.len());
+        if range.start < end {
+            #[expect(unsafe_code, reason = "there is no other way to give pages of a map back")]
+            // SAFETY: the map is of a file and nothing writes to it, so pages that leave come back with the same bytes.
+            // Memory that cannot be given back is no reason to stop reading.
+            let _ = unsafe {
+                self.0.unchecked_advise_range(
+                    memmap2::UncheckedAdvice::DontNeed,
+                    range.start,
+                    end - range.start,
+                )
+            };
+        }
+    }
+
+    /// Other systems manage the pages of a map themselves.
+    #[cfg(not(unix))]
+    pub fn release(&self, _: Range<usize>) {}
+
+    /// Hands the bytes of a range to `f` in order, piece by piece.
+    pub fn pieces(&self, range: Range<usize>, mut f: impl FnMut(&[u8])) {
+        let mut at = range.start;
+        while at < range.end {
+            let end = range.end.min(at + PIECE_BYTES);
+            f(&self.0[at..end]);
+            self.release(at..end);
+            at = end;
+        }
+    }
+
+    /// SHA-256 of the whole file, hexadecimal.
+    pub fn sha256_hex(&self) -> String {
+        let mut hasher = Sha256::new();
+        self.pieces(0..self.0.len(), |piece| hasher.update(piece));
+        hex(hasher)
+    }
 }
 
-/// SHA-256 of a file, hexadecimal.
-///
-/// # Errors
-/// A file that cannot be opened, is empty or a folder.
-pub fn sha256_of_file(path: &Path) -> Result<String, RecordingError> {
-    Ok(sha256_hex(&map(path)?))
+impl Deref for Map {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.0
+    }
 }
 
-/// SHA-256, hexadecimal.
-pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+/// A finished digest, hexadecimal.
+pub(crate) fn hex(hasher: Sha256) -> String {
+    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

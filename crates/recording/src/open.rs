@@ -1,90 +1,154 @@
 //! A recording: one or more files, opened, laid out, and reported on.
 
+use crate::bytes::{Access, FileBytes};
+use crate::index::{self, Found};
 use crate::layout::{Damage, Layout};
-use crate::map::{map, sha256_hex};
 use crate::raw::{Attachment, RawChannel, parse_metadata};
 use crate::records::ENVELOPE;
-use crate::sweep::{FileSurvey, Tally, sweep};
-use crate::{ChannelReport, FileReport, RecordingError, RecordingReport, Source, decode};
+use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep};
+use crate::{
+    ChannelReport, Fetched, FileReport, ObjectIdentity, RecordingError, RecordingReport, Source, decode,
+};
 use armcal_core::{Severity, Stage, Warning};
-use memmap2::Mmap;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// An opened recording, which may consist of several split files.
 pub struct Recording {
     pub(crate) files: Vec<RecordingFile>,
-    /// What a full pass found; filled by the first pass that happens to be made.
-    surveys: OnceLock<Vec<FileSurvey>>,
+    /// What the passes made so far have found in each file.
+    surveys: Mutex<Vec<FileSurvey>>,
     report: OnceLock<RecordingReport>,
 }
 
 /// One file of a recording.
 pub(crate) struct RecordingFile {
     pub path: PathBuf,
-    pub map: Mmap,
+    pub bytes: FileBytes,
+    /// Set where `bytes` are a copy of the whole file.
+    copied: Option<Copied>,
     pub layout: Layout,
     pub channels: BTreeMap<u16, Arc<RawChannel>>,
 }
 
+/// Where a copy came from.
+struct Copied {
+    fetched: Fetched,
+    object: Option<ObjectIdentity>,
+    /// Why the whole file was needed.
+    why: &'static str,
+}
+
 impl Recording {
-    /// Opens the files of one recording, in any order. Their structure is found without inflating anything, unless a
-    /// file has no sound summary.
+    /// Opens the files of one recording, in any order: paths, or URLs such as `s3://bucket/key` (feature `s3`). Local
+    /// files are mapped, unless the environment variable `ARMCAL_NO_MMAP` is set: see [`Access`].
     ///
     /// # Errors
-    /// No paths, a path listed twice, a file that cannot be opened or is not MCAP. A damaged MCAP file is no error:
-    /// see [`RecordingReport::warnings`].
+    /// As [`Recording::open_with`].
     pub fn open(paths: &[PathBuf]) -> Result<Recording, RecordingError> {
+        Recording::open_with(paths, Access::from_env())
+    }
+
+    /// Opens the files of one recording. Their structure is found without inflating anything, unless a file has no
+    /// sound summary. Objects, and local files with [`Access::Ranges`], are read by ranges: the summary first, later
+    /// only chunks with a wanted channel. One without a sound summary is copied whole to an unnamed file in the folder
+    /// for temporary files, and read from there.
+    ///
+    /// # Errors
+    /// No paths, a path listed twice, a file that cannot be opened or is not MCAP, an object that is not there or cannot
+    /// be reached. A damaged MCAP file is no error: see [`RecordingReport::warnings`].
+    pub fn open_with(paths: &[PathBuf], access: Access) -> Result<Recording, RecordingError> {
         if paths.is_empty() {
             return Err(RecordingError::NoFiles);
         }
         refuse_repeated(paths)?;
-        let mut files = paths.par_iter().map(|p| RecordingFile::open(p)).collect::<Result<Vec<_>, _>>()?;
+        let open = |path: &PathBuf| RecordingFile::open(path, access);
+        let mut files = paths.par_iter().map(open).collect::<Result<Vec<_>, _>>()?;
         files.sort_by_key(|f| f.layout.first_ns.unwrap_or(u64::MAX));
-        let mut recording = Recording { files, surveys: OnceLock::new(), report: OnceLock::new() };
-        recording.complete_definitions();
+        let surveys = Mutex::new(vec![FileSurvey::default(); files.len()]);
+        let mut recording = Recording { files, surveys, report: OnceLock::new() };
+        recording.complete_definitions()?;
         Ok(recording)
     }
 
     /// Files, channels and warnings about them; streams are empty until [`Recording::read`] has named them. The
-    /// first call makes a pass over the recording unless `read` has already made one, and hashes the files.
+    /// first call makes a pass over mapped files unless `read` has already made one, and hashes local files. Of files
+    /// read by ranges it tells what has been read until then.
     pub fn report(&self) -> &RecordingReport {
         self.report.get_or_init(|| {
-            let surveys = self.surveys.get_or_init(|| sweep(&self.files, |_| (), |(), _| (), |()| ()).0);
-            let hashes: Vec<String> = self.files.par_iter().map(|f| sha256_hex(&f.map)).collect();
-            let per_file = || self.files.iter().zip(surveys);
+            let unread = self.unread();
+            // Only fetching can fail, and of mapped files nothing is fetched.
+            if let Ok((found, _)) = sweep(&self.files, &unread, |_| (), |(), _| (), |()| ()) {
+                self.remember(found);
+            }
+            let hashes: Vec<_> = self.files.par_iter().map(RecordingFile::sha256_hex).collect();
+            let surveys = self.surveys();
+            let damage = |(file, hash): (&RecordingFile, &Result<String, RecordingError>), survey| {
+                let mut damage = file.damage(survey);
+                damage.extend(hash.as_ref().err().map(|e| Damage {
+                    offset: 0,
+                    why: format!("its bytes cannot be hashed: {e}"),
+                    lost: true,
+                }));
+                damage
+            };
+            let per_file = || self.files.iter().zip(&hashes).zip(surveys.iter());
+            let damage: Vec<Vec<Damage>> = per_file().map(|(file, survey)| damage(file, survey)).collect();
             RecordingReport {
-                files: per_file().zip(hashes).map(|((f, s), sha256)| f.report(s, sha256)).collect(),
-                channels: self.channel_reports(surveys),
+                files: per_file()
+                    .zip(&damage)
+                    .map(|(((f, hash), _), damage)| f.report(hash, damage))
+                    .collect(),
+                channels: self.channel_reports(&surveys),
                 streams: Vec::new(),
-                warnings: per_file().flat_map(|(f, s)| f.warnings(s)).collect(),
+                warnings: self.files.iter().zip(damage).flat_map(|(f, damage)| f.warnings(damage)).collect(),
             }
         })
     }
 
     /// Keeps what a pass found, so that the report needs no pass of its own.
-    pub(crate) fn remember(&self, surveys: Vec<FileSurvey>) {
-        // A pass always finds the same, so it does not matter which one came first.
-        let _ = self.surveys.set(surveys);
+    pub(crate) fn remember(&self, found: Vec<BlockSurvey>) {
+        let mut surveys = self.surveys();
+        for (at, survey) in found {
+            surveys[at.file].add(at.block, survey);
+        }
+    }
+
+    fn surveys(&self) -> MutexGuard<'_, Vec<FileSurvey>> {
+        // Whoever panicked while holding it has at worst left a block out, which another pass finds.
+        self.surveys.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Blocks of mapped files that no pass has seen.
+    fn unread(&self) -> Vec<At> {
+        let surveys = self.surveys();
+        let of_file = |((file, f), survey): ((usize, &RecordingFile), &FileSurvey)| {
+            let all = if let FileBytes::Mapped(_) = f.bytes { f.layout.blocks.len() } else { 0 };
+            let unread = (0..all).filter(|block| !survey.passed.contains(block));
+            unread.map(|block| At { file, block }).collect::<Vec<_>>()
+        };
+        self.files.iter().enumerate().zip(surveys.iter()).flat_map(of_file).collect()
     }
 
     /// Looks into the chunks for definitions where no summary repeats them all.
-    fn complete_definitions(&mut self) {
+    fn complete_definitions(&mut self) -> Result<(), RecordingError> {
         if self.files.iter().any(|f| !f.layout.definitions_complete) {
-            let (surveys, _) = sweep(&self.files, |_| (), |(), _| (), |()| ());
-            for (file, survey) in self.files.iter_mut().zip(&surveys) {
-                file.layout.definitions.merge(survey.definitions.clone());
+            let (found, _) = sweep(&self.files, &self.unread(), |_| (), |(), _| (), |()| ())?;
+            self.remember(found);
+            let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
+            for (file, survey) in self.files.iter_mut().zip(surveys) {
+                file.layout.definitions.merge(std::mem::take(&mut survey.definitions));
                 let first = survey.tallies.values().map(|t| t.first_ns).min();
                 file.layout.first_ns = first.or(file.layout.first_ns);
             }
-            self.remember(surveys);
         }
         for file in &mut self.files {
             file.channels = file.layout.definitions.resolve();
         }
+        Ok(())
     }
 
     fn channel_reports(&self, surveys: &[FileSurvey]) -> Vec<ChannelReport> {
@@ -98,8 +162,8 @@ impl Recording {
                     .map_or_else(Default::default, |s| (s.name.clone(), s.encoding.clone()));
                 let key = (channel.topic.clone(), schema, encoding, channel.message_encoding.clone());
                 let (tally, _) = merged.entry(key).or_insert_with(|| (None, channel.clone()));
-                if let Some(found) = survey.tallies.get(id) {
-                    tally.get_or_insert(Tally { messages: 0, ..*found }).add(*found);
+                if let Some(found) = file.tally(survey, *id) {
+                    tally.get_or_insert(Tally { messages: 0, ..found }).add(found);
                 }
             }
         }
@@ -121,16 +185,70 @@ impl Recording {
 }
 
 impl RecordingFile {
-    fn open(path: &Path) -> Result<RecordingFile, RecordingError> {
-        let map = map(path)?;
-        let layout =
-            Layout::of(&map).map_err(|why| RecordingError::NotMcap { path: path.to_owned(), why })?;
-        Ok(RecordingFile { path: path.to_owned(), map, layout, channels: BTreeMap::new() })
+    fn open(path: &Path, access: Access) -> Result<RecordingFile, RecordingError> {
+        let not_mcap = |why: String| RecordingError::NotMcap { path: path.to_owned(), why };
+        let mut file = RecordingFile {
+            path: path.to_owned(),
+            bytes: FileBytes::open(path, access)?,
+            copied: None,
+            layout: Layout::default(),
+            channels: BTreeMap::new(),
+        };
+        if let FileBytes::Ranged(ranged) = &file.bytes {
+            match index::find(ranged)? {
+                Found::Layout(layout) => file.layout = *layout,
+                Found::NotMcap(why) => return Err(not_mcap(why)),
+                Found::Unusable(why) => {
+                    let map = ranged.spool(path)?;
+                    let copied = Copied { fetched: ranged.fetched(), object: ranged.object.clone(), why };
+                    (file.copied, file.bytes) = (Some(copied), FileBytes::Mapped(map));
+                }
+            }
+        }
+        if let FileBytes::Mapped(map) = &file.bytes {
+            file.layout = Layout::of(map).map_err(not_mcap)?;
+        }
+        Ok(file)
     }
 
-    /// Everything wrong with the file, by offset.
+    /// Hash of a local file; an object is identified by its store.
+    fn sha256_hex(&self) -> Result<String, RecordingError> {
+        match (&self.bytes, self.object()) {
+            (_, Some(_)) => Ok(String::new()),
+            (FileBytes::Mapped(map), None) => Ok(map.sha256_hex()),
+            (FileBytes::Ranged(ranged), None) => ranged.sha256_hex(),
+        }
+    }
+
+    fn object(&self) -> Option<&ObjectIdentity> {
+        match (&self.bytes, &self.copied) {
+            (_, Some(copied)) => copied.object.as_ref(),
+            (FileBytes::Ranged(ranged), None) => ranged.object.as_ref(),
+            (FileBytes::Mapped(_), None) => None,
+        }
+    }
+
+    /// Whether every block that may hold messages of a channel was passed over.
+    fn all_read(&self, survey: &FileSurvey, channel: u16) -> bool {
+        let blocks = self.layout.blocks.iter().enumerate();
+        let mut may_hold = blocks.filter(|(_, b)| b.holds.as_ref().is_none_or(|ids| ids.contains(&channel)));
+        may_hold.all(|(block, _)| survey.passed.contains(&block))
+    }
+
+    /// Messages of a channel: those found, or, where it was not read, those that the summary declares.
+    fn tally(&self, survey: &FileSurvey, channel: u16) -> Option<Tally> {
+        let tallies = if self.all_read(survey, channel) { &survey.tallies } else { &self.layout.declared };
+        tallies.get(&channel).copied()
+    }
+
+    /// Everything wrong with the file, as far as it was read, by offset.
     fn damage(&self, survey: &FileSurvey) -> Vec<Damage> {
         let mut all: Vec<Damage> = self.layout.damage.iter().chain(&survey.damage).cloned().collect();
+        all.extend(self.copied.as_ref().map(|copied| Damage {
+            offset: 0,
+            why: format!("{}, so all of it was read", copied.why),
+            lost: false,
+        }));
         let strangers = survey.tallies.iter().filter(|(id, _)| !self.channels.contains_key(id));
         all.extend(strangers.map(|(id, tally)| Damage {
             offset: 0,
@@ -140,64 +258,76 @@ impl RecordingFile {
             ),
             lost: true,
         }));
-        let found: u64 = survey.tallies.values().map(|t| t.messages).sum();
-        if let Some(declared) =
-            self.layout.statistics.as_ref().map(|s| s.message_count).filter(|n| *n != found)
-        {
-            let why = format!("its statistics declare {declared} messages, {found} are usable");
-            all.push(Damage { offset: 0, why, lost: declared > found });
-        }
+        all.extend(self.miscounted(survey));
         all.extend(self.bad_extras());
         all.sort_by_key(|d| d.offset);
         all
     }
 
-    /// Attachments and metadata that cannot be passed on.
-    fn bad_extras(&self) -> impl Iterator<Item = Damage> {
+    /// Statistics that disagree with what was found; of a file read in parts, on the channels that were read.
+    fn miscounted(&self, survey: &FileSurvey) -> Option<Damage> {
+        let statistics = self.layout.statistics.as_ref()?;
+        let found = |id: &u16| survey.tallies.get(id).map_or(0, |t| t.messages);
+        let (declared, found): (u64, u64) = if survey.passed.len() == self.layout.blocks.len() {
+            (statistics.message_count, survey.tallies.values().map(|t| t.messages).sum())
+        } else {
+            let read =
+                || statistics.channel_message_counts.iter().filter(|(id, _)| self.all_read(survey, **id));
+            (read().map(|(_, declared)| declared).sum(), read().map(|(id, _)| found(id)).sum())
+        };
+        let why = format!("its statistics declare {declared} messages, {found} are usable");
+        (declared != found).then(|| Damage { offset: 0, why, lost: declared > found })
+    }
+
+    /// Attachments and metadata that cannot be passed on; those of files read by ranges are judged when they are read.
+    fn bad_extras(&self) -> Vec<Damage> {
+        let FileBytes::Mapped(map) = &self.bytes else { return Vec::new() };
         let bad = |range: &Range<usize>, what| Damage {
             offset: range.start - ENVELOPE,
             why: format!("{what} is damaged and not passed on"),
             lost: true,
         };
-        let layout = &self.layout;
-        let attachments =
-            layout.attachments.iter().filter(|r| Attachment::parse(&self.map[(*r).clone()]).is_none());
-        let metadata = layout.metadata.iter().filter(|r| parse_metadata(&self.map[(*r).clone()]).is_none());
-        attachments
-            .map(move |r| bad(r, "an attachment"))
-            .chain(metadata.map(move |r| bad(r, "a metadata record")))
+        let mut damage = Vec::new();
+        for range in &self.layout.attachments {
+            damage.extend(
+                Attachment::parse(&map[range.clone()]).is_none().then(|| bad(range, "an attachment")),
+            );
+            map.passed(range.clone());
+        }
+        for range in &self.layout.metadata {
+            let sound = parse_metadata(&map[range.clone()]).is_some();
+            damage.extend((!sound).then(|| bad(range, "a metadata record")));
+        }
+        damage
     }
 
-    fn report(&self, survey: &FileSurvey, sha256: String) -> FileReport {
+    fn report(&self, sha256: &Result<String, RecordingError>, damage: &[Damage]) -> FileReport {
         FileReport {
             path: self.path.clone(),
-            bytes: self.map.len() as u64,
-            sha256,
+            bytes: self.bytes.len(),
+            sha256: sha256.as_ref().cloned().unwrap_or_default(),
+            object: self.object().cloned(),
+            fetched: self.copied.as_ref().map(|c| c.fetched).or_else(|| self.bytes.fetched()),
             source: self.layout.source.unwrap_or(Source::Scan),
             profile: self.layout.profile.clone(),
             library: self.layout.library.clone(),
             chunks: self.layout.chunks(),
             truncated_at: self.layout.truncated_at.map(|at| at as u64),
-            damaged: self.damage(survey).into_iter().map(|d| (d.offset as u64, d.why)).collect(),
+            damaged: damage.iter().map(|d| (d.offset as u64, d.why.clone())).collect(),
         }
     }
 
-    fn warnings(&self, survey: &FileSurvey) -> Vec<Warning> {
+    fn warnings(&self, damage: Vec<Damage>) -> Vec<Warning> {
         let warn = |d: Damage| {
             let (severity, code) = match d.lost {
                 true => (Severity::DataLost, "recording-damaged"),
                 false => (Severity::Notice, "recording-irregular"),
             };
             let subject = self.path.display().to_string();
-            Warning::new(
-                severity,
-                Stage::Recording,
-                code,
-                subject,
-                format!("at byte {}: {}", d.offset, d.why),
-            )
+            let text = format!("at byte {}: {}", d.offset, d.why);
+            Warning::new(severity, Stage::Recording, code, subject, text)
         };
-        self.damage(survey).into_iter().map(warn).collect()
+        damage.into_iter().map(warn).collect()
     }
 }
 

@@ -1,11 +1,13 @@
 //! Messages, attachments and metadata as they are in the file, for pass-through.
 
+use crate::open::RecordingFile;
 use crate::records::{Cursor, Message};
-use crate::sweep::{Step, blocks, inflate};
+use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records};
 use crate::{Recording, RecordingError};
 use mcap::records::{Metadata, Record, op};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A schema as the file has it.
@@ -86,25 +88,49 @@ impl<'a> Attachment<'a> {
     }
 }
 
+/// Takes messages in order; an error stops the pass.
+pub type RawVisitor<'a> = dyn FnMut(RawMessage<'_>) -> Result<(), RecordingError> + Send + 'a;
+
 impl Recording {
     /// Hands every sound message to `f`, file by file in time order, in file order within each. Messages whose
     /// channel definition is lost are not handed out. The first error stops the pass.
-    pub fn for_each_raw(
+    pub fn for_each_raw(&self, f: &mut RawVisitor<'_>) -> Result<(), RecordingError> {
+        self.for_each_raw_of(&|_| true, f)
+    }
+
+    /// The same for the messages of wanted channels. Of files read by ranges only the chunks with such are read.
+    pub fn for_each_raw_of(
         &self,
-        f: &mut dyn FnMut(RawMessage<'_>) -> Result<(), RecordingError>,
+        wanted: &dyn Fn(&RawChannel) -> bool,
+        f: &mut RawVisitor<'_>,
     ) -> Result<(), RecordingError> {
-        // A few chunks ahead in parallel, so that memory stays at a few chunks whatever the file's size.
+        let ids = |file: &RecordingFile| -> BTreeSet<u16> {
+            file.channels.iter().filter(|(_, channel)| wanted(channel)).map(|(id, _)| *id).collect()
+        };
+        let ids: Vec<BTreeSet<u16>> = self.files.iter().map(ids).collect();
+        for_each_batch(&self.files, &blocks(&self.files, &ids), |batch| self.hand_out(&batch, &ids, f))
+    }
+
+    fn hand_out(
+        &self,
+        batch: &Batch<'_>,
+        ids: &[BTreeSet<u16>],
+        f: &mut RawVisitor<'_>,
+    ) -> Result<(), RecordingError> {
+        // A few blocks ahead in parallel, so that memory stays at a few of them whatever the file's size.
         let ahead = 2 * rayon::current_num_threads();
-        for batch in blocks(&self.files).chunks(ahead) {
-            let inflated: Vec<Step> = batch.par_iter().map(|at| inflate(&self.files, *at)).collect();
-            for (at, step) in batch.iter().zip(&inflated) {
+        for (blocks, fetched) in batch.blocks.chunks(ahead).zip(batch.fetched.chunks(ahead)) {
+            let work = blocks.par_iter().zip(fetched);
+            let inflated: Vec<(Cow<'_, [u8]>, BlockSurvey)> =
+                work.map(|(at, fetched)| inflate(&self.files, *at, fetched.as_ref())).collect();
+            let mut surveys = Vec::with_capacity(inflated.len());
+            for (bytes, (at, survey)) in inflated {
                 let file = &self.files[at.file];
-                for record in step.records(&file.map) {
-                    let Some(message) =
-                        (record.op == op::MESSAGE).then(|| Message::parse(record.body)).flatten()
-                    else {
+                let messages = records(&bytes).filter(|r| r.op == op::MESSAGE);
+                for message in messages.filter_map(|r| Message::parse(r.body)) {
+                    if !ids[at.file].contains(&message.channel_id) {
                         continue;
-                    };
+                    }
                     if let Some(channel) = file.channels.get(&message.channel_id) {
                         f(RawMessage {
                             channel,
@@ -115,21 +141,45 @@ impl Recording {
                         })?;
                     }
                 }
+                file.bytes.passed(file.layout.blocks[at.block].range());
+                surveys.push((at, survey));
+            }
+            self.remember(surveys);
+        }
+        Ok(())
+    }
+
+    /// Hands every sound attachment to `f`, one at a time in memory, in file order. The first error stops the pass.
+    pub fn for_each_attachment(
+        &self,
+        f: &mut dyn FnMut(Attachment<'_>) -> Result<(), RecordingError>,
+    ) -> Result<(), RecordingError> {
+        for file in &self.files {
+            for range in &file.layout.attachments {
+                let body = file.bytes.read(range.clone())?;
+                Attachment::parse(&body).map_or(Ok(()), &mut *f)?;
+                file.bytes.passed(range.clone());
             }
         }
         Ok(())
     }
 
-    /// Every sound attachment, in file order.
-    pub fn attachments(&self) -> Vec<Attachment<'_>> {
-        let bodies = self.files.iter().flat_map(|f| f.layout.attachments.iter().map(|r| &f.map[r.clone()]));
-        bodies.filter_map(Attachment::parse).collect()
+    /// Every metadata record that can be read, as (name, entries), in file order.
+    pub fn metadata(&self) -> Result<Vec<(String, BTreeMap<String, String>)>, RecordingError> {
+        let ranges = self.files.iter().flat_map(|file| file.layout.metadata.iter().map(move |r| (file, r)));
+        let bodies = ranges.map(|(file, range)| file.bytes.read(range.clone()));
+        bodies.filter_map(|body| body.map(|body| parse_metadata(&body)).transpose()).collect()
     }
 
-    /// Every metadata record that can be read, as (name, entries), in file order.
-    pub fn metadata(&self) -> Vec<(String, BTreeMap<String, String>)> {
-        let bodies = self.files.iter().flat_map(|f| f.layout.metadata.iter().map(|r| &f.map[r.clone()]));
-        bodies.filter_map(parse_metadata).collect()
+    /// Every channel of the recording, in file order, each once.
+    pub fn channels(&self) -> Vec<Arc<RawChannel>> {
+        let mut channels: Vec<Arc<RawChannel>> = Vec::new();
+        for channel in self.files.iter().flat_map(|file| file.channels.values()) {
+            if !channels.contains(channel) {
+                channels.push(channel.clone());
+            }
+        }
+        channels
     }
 }
 

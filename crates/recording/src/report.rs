@@ -17,12 +17,19 @@ pub enum Source {
 /// One file of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FileReport {
-    /// Path as given.
+    /// Path or URL as given.
     pub path: PathBuf,
     /// Size [bytes].
     pub bytes: u64,
-    /// SHA-256 of the whole file, hexadecimal.
+    /// SHA-256 of the whole file, hexadecimal; empty for an object, which is not read whole to be hashed.
     pub sha256: String,
+    /// What identifies an object in its store instead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<ObjectIdentity>,
+    /// What was read, of a file read by ranges. What was not read was not judged either: the numbers of messages of
+    /// channels nobody asked for are then those that the file's summary declares, and damage is told of what was read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fetched: Option<Fetched>,
     /// How its records were found.
     pub source: Source,
     /// Profile of the MCAP header (`ros2`, `ros1`, empty).
@@ -37,6 +44,41 @@ pub struct FileReport {
     pub damaged: Vec<(u64, String)>,
 }
 
+impl FileReport {
+    /// What tells this content from any other: the SHA-256, or `object:` with ETag, size and time of the last change.
+    pub fn identity(&self) -> String {
+        match &self.object {
+            Some(object) => object.identity(self.bytes),
+            None => self.sha256.clone(),
+        }
+    }
+}
+
+/// What a store says of an object. A store gives changed content another ETag.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ObjectIdentity {
+    /// ETag.
+    pub etag: String,
+    /// Time of the last change (RFC 3339).
+    pub last_modified: String,
+}
+
+impl ObjectIdentity {
+    /// The same in one line, of an object of this size.
+    pub(crate) fn identity(&self, bytes: u64) -> String {
+        format!("object:etag={},bytes={bytes},modified={}", self.etag, self.last_modified)
+    }
+}
+
+/// How much of a file was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Fetched {
+    /// Bytes read; more than the file has where parts were read twice.
+    pub bytes: u64,
+    /// Requests made, repetitions after failures not counted.
+    pub requests: u64,
+}
+
 /// One channel (same topic, schema and encoding in all files of the recording).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelReport {
@@ -48,7 +90,7 @@ pub struct ChannelReport {
     pub schema_encoding: String,
     /// Message encoding (`cdr`, `ros1`, `protobuf`, `json`, ...).
     pub message_encoding: String,
-    /// Messages found.
+    /// Messages found; for channels that were not read of a file read by ranges, what its summary declares.
     pub messages: u64,
     /// First log time [ns].
     pub first_ns: i64,

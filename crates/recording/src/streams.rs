@@ -26,6 +26,20 @@ pub struct Streams {
     pub temperature: Option<ScalarStream>,
 }
 
+impl Streams {
+    /// Topics of all streams, each once, in order.
+    pub fn topics(&self) -> Vec<&str> {
+        let joints = [Some(&self.joints), self.set_points.as_ref()];
+        let poses = [&self.tip, &self.base, &self.table];
+        let topics = joints.into_iter().flatten().map(|s| s.topic.as_str());
+        let topics = topics.chain(poses.into_iter().flatten().map(|s| s.topic.as_str()));
+        let mut topics: Vec<&str> = topics.chain(self.temperature.iter().map(|s| s.topic.as_str())).collect();
+        topics.sort_unstable();
+        topics.dedup();
+        topics
+    }
+}
+
 /// A stream of joint readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,27 +1,42 @@
-//! One pass over every block of every file, in parallel, with results in file order.
+//! One pass over blocks, in parallel, with results in file order.
+//!
+//! Of a mapped file every block is passed over, so that all of it is judged. Of a file read by ranges only those blocks
+//! are that may hold a wanted channel: some at a time, the next ones on their way while these are worked on.
 
+use crate::RecordingError;
+use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
+use crate::index::{body_of_chunk, holding};
 use crate::layout::{Content, Damage};
 use crate::open::RecordingFile;
 use crate::records::{Message, RawRecord, Records};
+use bytes::Bytes;
 use mcap::records::op;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Blocks of a file read by ranges are fetched up to this at a time.
+const BATCH_BYTES: usize = 16 << 20;
 
 /// Names a block: file, then block in the file.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct At {
     pub file: usize,
     pub block: usize,
 }
 
-/// Every block of the recording, in file order.
-pub(crate) fn blocks(files: &[RecordingFile]) -> Vec<At> {
-    let of_file = |(file, f): (usize, &RecordingFile)| {
-        (0..f.layout.blocks.len()).map(move |block| At { file, block }).collect::<Vec<_>>()
+/// The blocks to pass over for these channels of each file, in file order.
+pub(crate) fn blocks(files: &[RecordingFile], wanted: &[BTreeSet<u16>]) -> Vec<At> {
+    let of_file = |((file, f), wanted): ((usize, &RecordingFile), &BTreeSet<u16>)| {
+        let blocks = match f.bytes {
+            FileBytes::Mapped(_) => (0..f.layout.blocks.len()).collect(),
+            FileBytes::Ranged(_) => holding(&f.layout.blocks, wanted),
+        };
+        blocks.into_iter().map(move |block| At { file, block }).collect::<Vec<_>>()
     };
-    files.iter().enumerate().flat_map(of_file).collect()
+    files.iter().enumerate().zip(wanted).flat_map(of_file).collect()
 }
 
 /// Messages of one channel.
@@ -46,9 +61,18 @@ pub(crate) struct FileSurvey {
     pub tallies: BTreeMap<u16, Tally>,
     pub definitions: Definitions,
     pub damage: Vec<Damage>,
+    /// Blocks that were passed over.
+    pub passed: BTreeSet<usize>,
 }
 
 impl FileSurvey {
+    /// Takes in what a block showed, unless an earlier pass has.
+    pub fn add(&mut self, block: usize, found: FileSurvey) {
+        if self.passed.insert(block) {
+            self.merge(found);
+        }
+    }
+
     fn count(&mut self, message: &Message<'_>) {
         let one = Tally { messages: 1, first_ns: message.log_ns, last_ns: message.log_ns };
         self.tallies.entry(message.channel_id).and_modify(|t| t.add(one)).or_insert(one);
@@ -63,104 +87,190 @@ impl FileSurvey {
     }
 }
 
-/// Passes over all blocks. `start` makes the collector of a block, `each` sees every sound message of it in
-/// order, `finish` keeps what is worth keeping. Returns one survey a file, and what was kept in file order.
+/// What a block showed besides what was collected.
+pub(crate) type BlockSurvey = (At, FileSurvey);
+
+/// Passes over blocks. `start` makes the collector of a block, `each` sees every sound message of it in order, `finish`
+/// keeps what is worth keeping. Returns a survey of each block, and what was kept, both in file order.
+///
+/// # Errors
+/// Bytes that cannot be fetched; of mapped files there are none.
 pub(crate) fn sweep<C, D: Send>(
     files: &[RecordingFile],
+    blocks: &[At],
     start: impl Fn(usize) -> C + Sync,
     each: impl Fn(&mut C, &Message<'_>) + Sync,
     finish: impl Fn(C) -> D + Sync,
-) -> (Vec<FileSurvey>, Vec<D>) {
-    let results: Vec<(At, FileSurvey, D)> = blocks(files)
-        .into_par_iter()
-        .map_init(Inflater::default, |inflater, at| {
-            let mut collector = start(at.file);
-            let mut survey = FileSurvey::default();
-            let file = &files[at.file];
-            let (records, damage) = open_block(file, at, inflater);
-            survey.damage.extend(damage);
-            for record in records {
-                if !file.layout.definitions_complete {
-                    survey.definitions.absorb(&record);
-                }
-                if record.op != op::MESSAGE {
-                    continue;
-                }
-                match Message::parse(record.body) {
-                    Some(message) => {
-                        survey.count(&message);
-                        each(&mut collector, &message);
-                    }
-                    None => survey.damage.push(Damage {
-                        offset: file.layout.blocks[at.block].offset,
-                        why: "a message shorter than its header is dropped".to_owned(),
-                        lost: true,
-                    }),
-                }
-            }
-            (at, survey, finish(collector))
-        })
-        .collect();
-    let mut surveys = vec![FileSurvey::default(); files.len()];
-    let mut collectors = Vec::with_capacity(results.len());
-    for (at, survey, collector) in results {
-        surveys[at.file].merge(survey);
-        collectors.push(collector);
+) -> Result<(Vec<BlockSurvey>, Vec<D>), RecordingError> {
+    let one = |inflater: &mut Inflater, at: At, fetched: Option<&Bytes>| {
+        let file = &files[at.file];
+        let mut collector = start(at.file);
+        let (bytes, damage) = judge(file, at, fetched, inflater);
+        let survey = survey(file, at, bytes, damage, |message| each(&mut collector, message));
+        file.bytes.passed(file.layout.blocks[at.block].range());
+        ((at, survey), finish(collector))
+    };
+    let (mut surveys, mut kept) = (Vec::with_capacity(blocks.len()), Vec::with_capacity(blocks.len()));
+    for_each_batch(files, blocks, |batch| {
+        let work = batch.blocks.par_iter().zip(&batch.fetched);
+        let results: Vec<(BlockSurvey, D)> = work
+            .map_init(Inflater::default, |inflater, (at, fetched)| one(inflater, *at, fetched.as_ref()))
+            .collect();
+        let (found, collected): (Vec<_>, Vec<_>) = results.into_iter().unzip();
+        surveys.extend(found);
+        kept.extend(collected);
+        Ok(())
+    })?;
+    Ok((surveys, kept))
+}
+
+/// Blocks that are worked on together, and what was fetched of them.
+pub(crate) struct Batch<'a> {
+    pub blocks: &'a [At],
+    /// `None` for blocks of mapped files.
+    pub fetched: Vec<Option<Bytes>>,
+}
+
+/// Hands blocks to `work` batch by batch, in order, while the next batch is fetched.
+pub(crate) fn for_each_batch(
+    files: &[RecordingFile],
+    blocks: &[At],
+    mut work: impl FnMut(Batch<'_>) -> Result<(), RecordingError> + Send,
+) -> Result<(), RecordingError> {
+    let mut batches = batches(files, blocks).into_iter();
+    let mut ready = batches.next().map(|batch| fetch(files, batch)).transpose()?;
+    while let Some(batch) = ready {
+        let next = batches.next();
+        let (done, fetched) =
+            rayon::join(|| work(batch), || next.map(|batch| fetch(files, batch)).transpose());
+        done?;
+        ready = fetched?;
     }
-    (surveys, collectors)
+    Ok(())
 }
 
-/// The records of a block, held: for passes that hand messages out in order.
-pub(crate) enum Step {
-    /// Inflated records, ending at a whole record.
-    Inflated(Vec<u8>),
-    /// Records in the file itself.
-    InFile(std::ops::Range<usize>),
-}
-
-impl Step {
-    /// The records.
-    pub fn records<'a>(&'a self, file: &'a [u8]) -> impl Iterator<Item = RawRecord<'a>> {
-        let records = match self {
-            Step::Inflated(bytes) => Records::new(bytes, 0, bytes.len()),
-            Step::InFile(range) => Records::new(file, range.start, range.end),
-        };
-        records.map_while(Result::ok)
+/// Splits blocks: those of mapped files all at once, those of files read by ranges by size.
+fn batches<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Vec<&'a [At]> {
+    let ranged = |at: &At| matches!(files[at.file].bytes, FileBytes::Ranged(_));
+    let mut batches = Vec::new();
+    let (mut from, mut bytes) = (0, 0);
+    for (i, at) in blocks.iter().enumerate() {
+        let size = if ranged(at) { files[at.file].layout.blocks[at.block].range().len() } else { 0 };
+        let other_file = i > from && blocks[i - 1].file != at.file && (ranged(at) || ranged(&blocks[i - 1]));
+        if i > from && (other_file || bytes + size > BATCH_BYTES) {
+            batches.push(&blocks[from..i]);
+            (from, bytes) = (i, 0);
+        }
+        bytes += size;
     }
-}
-
-/// Inflates a block, or points to it where it needs no inflating. A bad one is empty.
-pub(crate) fn inflate(files: &[RecordingFile], at: At) -> Step {
-    let file = &files[at.file];
-    if let Content::Loose(range) = &file.layout.blocks[at.block].content {
-        return Step::InFile(range.clone());
+    if from < blocks.len() {
+        batches.push(&blocks[from..]);
     }
-    let mut inflater = Inflater::default();
-    Step::Inflated(judge(file, at, &mut inflater).0.to_vec())
+    batches
 }
 
-fn open_block<'a>(
-    file: &'a RecordingFile,
+fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, RecordingError> {
+    let file = blocks.first().map(|at| &files[at.file]);
+    let fetched = match file {
+        Some(RecordingFile { bytes: FileBytes::Ranged(ranged), layout, .. }) => {
+            let ranges: Vec<_> = blocks.iter().map(|at| layout.blocks[at.block].range()).collect();
+            ranged.read(&ranges)?.into_iter().map(Some).collect()
+        }
+        _ => vec![None; blocks.len()],
+    };
+    Ok(Batch { blocks, fetched })
+}
+
+/// The records of a block, held for passes that hand messages out in order, and the survey of it. A bad one is empty.
+pub(crate) fn inflate<'a>(
+    files: &'a [RecordingFile],
     at: At,
-    inflater: &'a mut Inflater,
-) -> (impl Iterator<Item = RawRecord<'a>>, Option<Damage>) {
-    let (bytes, damage) = judge(file, at, inflater);
-    (Records::new(bytes, 0, bytes.len()).map_while(Result::ok), damage)
+    fetched: Option<&'a Bytes>,
+) -> (Cow<'a, [u8]>, BlockSurvey) {
+    let file = &files[at.file];
+    let mut inflater = Inflater::default();
+    let (bytes, damage) = judge(file, at, fetched, &mut inflater);
+    let survey = (at, survey(file, at, bytes, damage, |_| ()));
+    let loose = matches!(file.layout.blocks[at.block].content, Content::Loose(_));
+    match loose.then(|| stored(file, at, fetched).ok()).flatten() {
+        Some(bytes) => (bytes.into(), survey),
+        None => (bytes.to_vec().into(), survey),
+    }
+}
+
+/// The records of a block's bytes.
+pub(crate) fn records(bytes: &[u8]) -> impl Iterator<Item = RawRecord<'_>> {
+    Records::new(bytes, 0, bytes.len()).map_while(Result::ok)
+}
+
+/// Counts the messages of a block and hands them to `each`.
+fn survey(
+    file: &RecordingFile,
+    at: At,
+    bytes: &[u8],
+    damage: Option<Damage>,
+    mut each: impl FnMut(&Message<'_>),
+) -> FileSurvey {
+    let mut survey = FileSurvey::default();
+    survey.damage.extend(damage);
+    for record in records(bytes) {
+        if !file.layout.definitions_complete {
+            survey.definitions.absorb(&record);
+        }
+        if record.op != op::MESSAGE {
+            continue;
+        }
+        match Message::parse(record.body) {
+            Some(message) => {
+                survey.count(&message);
+                each(&message);
+            }
+            None => survey.damage.push(Damage {
+                offset: file.layout.blocks[at.block].offset,
+                why: "a message shorter than its header is dropped".to_owned(),
+                lost: true,
+            }),
+        }
+    }
+    survey
+}
+
+/// The bytes of a block as they are in the file: the body of a chunk, or records outside chunks.
+fn stored<'a>(file: &'a RecordingFile, at: At, fetched: Option<&'a Bytes>) -> Result<&'a [u8], String> {
+    let content = &file.layout.blocks[at.block].content;
+    match (&file.bytes, fetched) {
+        (FileBytes::Mapped(map), _) => {
+            let (Content::Chunk(body) | Content::CutChunk(body) | Content::Loose(body)) = content;
+            Ok(&map[body.clone()])
+        }
+        (FileBytes::Ranged(_), Some(bytes)) if matches!(content, Content::Loose(_)) => Ok(bytes),
+        (FileBytes::Ranged(_), Some(bytes)) => body_of_chunk(bytes),
+        (FileBytes::Ranged(_), None) => Err("it was not read".to_owned()),
+    }
 }
 
 /// The usable record bytes of a block, and what is wrong with the rest.
-fn judge<'a>(file: &'a RecordingFile, at: At, inflater: &'a mut Inflater) -> (&'a [u8], Option<Damage>) {
+fn judge<'a>(
+    file: &'a RecordingFile,
+    at: At,
+    fetched: Option<&'a Bytes>,
+    inflater: &'a mut Inflater,
+) -> (&'a [u8], Option<Damage>) {
     let block = &file.layout.blocks[at.block];
     let damage = |why: String| Some(Damage { offset: block.offset, why, lost: true });
+    let body = match stored(file, at, fetched) {
+        Ok(body) => body,
+        Err(why) => return (&[], damage(format!("chunk dropped: {why}"))),
+    };
     match &block.content {
-        Content::Loose(range) => (&file.map[range.clone()], None),
-        Content::Chunk(range) => match inflater.whole(&file.map[range.clone()]) {
+        Content::Loose(_) if well_formed(body) => (body, None),
+        Content::Loose(_) => (body, damage("from somewhere here on, records cannot be read".into())),
+        Content::Chunk(_) => match inflater.whole(body) {
             Ok(bytes) if well_formed(bytes) => (bytes, None),
             Ok(_) => (&[], damage("chunk dropped: its records do not add up to its size".into())),
             Err(why) => (&[], damage(format!("chunk dropped: {why}"))),
         },
-        Content::CutChunk(range) => {
-            let body = &file.map[range.clone()];
+        Content::CutChunk(_) => {
             let sound = body.iter().rposition(|b| *b != 0).map_or(0, |i| i + 1);
             if inflater.whole(body).is_ok_and(well_formed) {
                 return (inflater.whole(body).unwrap_or_default(), None);

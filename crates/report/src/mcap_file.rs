@@ -106,12 +106,13 @@ fn add_channel(channel: &RawChannel, out: &mut McapOutput) -> Result<u16, Record
 
 /// Attachments and metadata of the input, without those of an earlier run.
 fn copy_extras(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingError> {
-    for a in input.attachments() {
-        if !a.name.starts_with(OWN) {
-            out.attach(a.name, a.media_type, a.log_ns, a.create_ns, a.data)?;
+    input.for_each_attachment(&mut |a| {
+        if a.name.starts_with(OWN) {
+            return Ok(());
         }
-    }
-    for (name, entries) in input.metadata() {
+        out.attach(a.name, a.media_type, a.log_ns, a.create_ns, a.data)
+    })?;
+    for (name, entries) in input.metadata()? {
         if !name.starts_with(OWN) {
             out.metadata(&name, &entries)?;
         }
@@ -169,7 +170,7 @@ fn about_input(run: &Run) -> BTreeMap<String, String> {
             let prefix = format!("recording{i}.file{j}");
             let path = recording.given_path(file).to_string_lossy().into_owned();
             entries.insert(format!("{prefix}.path"), path);
-            entries.insert(format!("{prefix}.sha256"), file.sha256.clone());
+            entries.insert(format!("{prefix}.sha256"), file.identity());
             entries.insert(format!("{prefix}.bytes"), file.bytes.to_string());
             entries.insert(format!("{prefix}.profile"), file.profile.clone());
         }

@@ -9,7 +9,7 @@ use crate::{PastRunError, ReportError};
 use armcal_calibrate::Estimate;
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
-use armcal_recording::{Recording, RecordingError};
+use armcal_recording::{FileReport, Recording, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -243,11 +243,18 @@ fn attached(path: &Path) -> Result<String, PastRunError> {
     let at = |source: RecordingError| PastRunError::Open { path: path.to_owned(), source: Box::new(source) };
     let recording = Recording::open(&[PathBuf::from(path)]).map_err(at)?;
     let name = format!("armcal/{FILE}");
-    let found = recording.attachments().into_iter().find(|a| a.name == name);
+    let mut found = None;
+    recording
+        .for_each_attachment(&mut |a| {
+            if a.name == name && found.is_none() {
+                found = Some(String::from_utf8_lossy(a.data).into_owned());
+            }
+            Ok(())
+        })
+        .map_err(at)?;
     let missing =
         || PastRunError::NoModel { path: path.to_owned(), why: format!("it has no attachment {name}") };
-    let found = found.ok_or_else(missing)?;
-    Ok(String::from_utf8_lossy(found.data).into_owned())
+    found.ok_or_else(missing)
 }
 
 /// The nominal arm's file; the ends of a URDF chain are what the pipeline says.
@@ -270,7 +277,7 @@ fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFact
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     RecordingFacts {
         name: recording.name.clone(),
-        sha256: recording.report.files.iter().map(|f| f.sha256.clone()).collect(),
+        sha256: recording.report.files.iter().map(FileReport::identity).collect(),
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
         last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),
         load_kg: own.last().map_or(0.0, |o| o.load_kg),

@@ -156,14 +156,21 @@ impl PastRun {
         if residuals.is_empty() {
             return Err(missing("/armcal/residuals"));
         }
-        let attachments = recording.attachments();
-        let summary = attachments.iter().find(|a| a.name == "armcal/summary.json");
+        let mut summary = None;
+        recording
+            .for_each_attachment(&mut |a| {
+                if a.name == "armcal/summary.json" && summary.is_none() {
+                    summary = serde_json::from_slice(a.data).ok();
+                }
+                Ok(())
+            })
+            .map_err(at)?;
         Ok(PastRun {
             pipeline: report.pipeline,
             effects: report.effects,
             residuals: residuals.into_iter().map(PastResidual::from).collect(),
             parameters: parameters.into_iter().flat_map(|p| p.parameters).map(PastParameter::from).collect(),
-            summary: summary.and_then(|a| serde_json::from_slice(a.data).ok()).unwrap_or_default(),
+            summary: summary.unwrap_or_default(),
             path,
         })
     }

@@ -176,15 +176,16 @@ impl RecordingRun {
         self.paths.iter().find(|given| file.path.ends_with(given)).unwrap_or(&file.path)
     }
 
-    /// SHA-256 of the file; of the hexadecimal digests of all files, one a line, for a split recording.
+    /// SHA-256 of the file (of an object its [`FileReport::identity`]); of those of all files, one a line, for a split
+    /// recording.
     pub fn sha256(&self) -> String {
         match self.report.files.as_slice() {
             [] => String::new(),
-            [file] => file.sha256.clone(),
+            [file] => file.identity(),
             files => {
                 let mut hasher = Sha256::new();
                 for file in files {
-                    hasher.update(format!("{}\n", file.sha256));
+                    hasher.update(format!("{}\n", file.identity()));
                 }
                 hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
             }

@@ -50,7 +50,7 @@ struct RecordingSummary<'a> {
     name: &'a str,
     path: String,
     sha256: String,
-    files: Vec<FileSummary<'a>>,
+    files: Vec<FileSummary>,
     dwells: usize,
     associated: usize,
     rejected: Vec<RejectedDwell<'a>>,
@@ -66,9 +66,10 @@ struct RecordingSummary<'a> {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct FileSummary<'a> {
+struct FileSummary {
     path: String,
-    sha256: &'a str,
+    /// Of an object in a store its identity there, which begins with `object:`.
+    sha256: String,
     bytes: u64,
 }
 
@@ -181,7 +182,7 @@ fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
             .report
             .files
             .iter()
-            .map(|f| FileSummary { path: path_text(r.given_path(f)), sha256: &f.sha256, bytes: f.bytes })
+            .map(|f| FileSummary { path: path_text(r.given_path(f)), sha256: f.identity(), bytes: f.bytes })
             .collect(),
         dwells: r.dwells.len(),
         associated: run.associated(r),

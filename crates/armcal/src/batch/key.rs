@@ -3,7 +3,7 @@
 use super::Manifest;
 use crate::error::Error;
 use crate::pipeline::{Pipeline, RecordingEntry};
-use armcal_recording::{atomic, sha256_of_file};
+use armcal_recording::{atomic, identity_of};
 use armcal_report::VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -28,7 +28,7 @@ struct Seen {
     path: String,
     bytes: u64,
     modified_ns: u128,
-    sha256: String,
+    identity: String,
 }
 
 impl Keys {
@@ -58,7 +58,7 @@ impl Keys {
         let in_recording = |source| Error::Recording { recording: entry.name(), source };
         let mut parts = vec![self.common.clone(), declared(entry)];
         for path in &entry.paths {
-            parts.push(self.sha256(path).map_err(in_recording)?);
+            parts.push(self.identity(path).map_err(in_recording)?);
         }
         Ok(hash(parts))
     }
@@ -70,8 +70,8 @@ impl Keys {
         hash(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
     }
 
-    /// Hash of a file; remembered as long as size and modification time stay.
-    fn sha256(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
+    /// What a file holds, as a hash; remembered as long as size and modification time stay.
+    fn identity(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
         let name = path.to_string_lossy().into_owned();
         let memory = self.seen.join(format!("{}.json", &hash([name.clone()])[..32]));
         let now = std::fs::metadata(path).ok().map(|about| {
@@ -83,19 +83,19 @@ impl Keys {
             let same = known.path == name && known.bytes == bytes && known.modified_ns == modified_ns;
             // A file system without modification times cannot tell.
             if same && modified_ns != 0 {
-                return Ok(known.sha256);
+                return Ok(known.identity);
             }
         }
-        let sha256 = sha256_of_file(path)?;
+        let identity = identity_of(path)?;
         if let Some((bytes, modified_ns)) = now {
-            let seen = Seen { path: name, bytes, modified_ns, sha256: sha256.clone() };
+            let seen = Seen { path: name, bytes, modified_ns, identity: identity.clone() };
             // A memory that cannot be written costs time only.
             if let Ok(text) = serde_json::to_vec(&seen) {
                 let _ = std::fs::create_dir_all(&self.seen);
                 let _ = atomic::write(&memory, &text);
             }
         }
-        Ok(sha256)
+        Ok(identity)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
+use armcal_recording::{is_url, list, resolve};
 use armcal_table::Tilt;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -58,7 +59,7 @@ impl Manifest {
         };
         let mut entries = file.recordings;
         for entry in &mut entries {
-            entry.paths = entry.paths.iter().flat_map(|p| parts(&folder.join(p))).collect();
+            entry.paths = entry.paths.iter().flat_map(|p| parts(&resolve(&folder, p))).collect();
         }
         let pipeline = file.pipeline.map(|p| folder.join(p));
         Manifest { entries, pipeline }.checked(&path.display().to_string())
@@ -72,12 +73,15 @@ impl Manifest {
             if is_manifest(Path::new(input)) {
                 return Err(bad("a manifest file must be the only input".into()));
             }
-            let matches = glob::glob(input).map_err(|e| bad(e.to_string()))?;
             let before = files.len();
-            for found in matches {
-                let found = found.map_err(|e| bad(e.to_string()))?;
-                let found = std::path::absolute(&found).unwrap_or(found);
-                files.extend(parts(&found).into_iter().filter(|p| !p.starts_with(&out)));
+            if is_url(Path::new(input)) {
+                files.extend(list(input).map_err(|e| bad(e.to_string()))?.into_iter().map(PathBuf::from));
+            } else {
+                for found in glob::glob(input).map_err(|e| bad(e.to_string()))? {
+                    let found = found.map_err(|e| bad(e.to_string()))?;
+                    let found = std::path::absolute(&found).unwrap_or(found);
+                    files.extend(parts(&found).into_iter().filter(|p| !p.starts_with(&out)));
+                }
             }
             if files.len() == before {
                 return Err(bad("matches no recording; quote a pattern such as 'lab/**/*.mcap'".into()));

@@ -12,7 +12,7 @@ use armcal_calibrate::{
 use armcal_core::{JointSamples, Rejection, Samples};
 use armcal_dwell::detect_dwells;
 use armcal_model::{Frames, Model, Session};
-use armcal_recording::{JointStream, Recording, Streams};
+use armcal_recording::{JointStream, Recording, RecordingReport, Streams};
 use armcal_report::{ClosedRecording, ClosedRun};
 use std::path::PathBuf;
 
@@ -85,20 +85,23 @@ fn seen_in(
 ) -> Result<(Recording, ClosedRecording), Error> {
     let name = entry.name();
     let in_recording = |source| Error::Recording { recording: name.clone(), source };
-    let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.folder.join(p)).collect();
+    let paths: Vec<PathBuf> =
+        entry.paths.iter().map(|p| armcal_recording::resolve(&pipeline.folder, p)).collect();
     let recording = Recording::open(&paths).map_err(in_recording)?;
-    let (mut report, mut warnings) = (recording.report().clone(), Vec::new());
+    let (mut streams, mut warnings) = (Vec::new(), Vec::new());
     let mut joints: Vec<JointSamples> = Vec::new();
     for arm in &pipeline.arms {
-        let (samples, streams, said) = recording.read(&joints_only(&arm.joints)).map_err(in_recording)?;
+        let (samples, of_arm, said) = recording.read(&joints_only(&arm.joints)).map_err(in_recording)?;
         joints.push(samples.joints);
         let named = |w: armcal_core::Warning| {
             let subject = format!("{}: {}", arm.name, w.subject);
             armcal_core::Warning { subject, ..w }
         };
         warnings.extend(said.into_iter().map(named));
-        report.streams.extend(streams);
+        streams.extend(of_arm);
     }
+    // What was read is known only now.
+    let report = RecordingReport { streams, ..recording.report().clone() };
     let names = [0, 1].map(|i| pipeline.arms[i].name.as_str());
     let unjoined = |problem: String| two_arms(format!("recording `{name}`: {problem}"));
     let joints = <[JointSamples; 2]>::try_from(joints)

@@ -85,14 +85,17 @@ fn file_line(file: &FileReport) -> String {
         armcal_recording::Source::Scan => "scan",
     };
     let mut line = format!(
-        "{}: {:.2} MB, {} chunks by {found}, profile {:?}, library {:?}, sha256 {}",
+        "{}: {:.2} MB, {} chunks by {found}, profile {:?}, library {:?}, {}",
         file.path.display(),
         file.bytes as f64 / 1e6,
         file.chunks,
         file.profile,
         file.library,
-        file.sha256.get(..12).unwrap_or(&file.sha256),
+        identity(file),
     );
+    if let Some(fetched) = file.fetched {
+        let _ = write!(line, ", {:.2} MB read by {} requests", fetched.bytes as f64 / 1e6, fetched.requests);
+    }
     if let Some(byte) = file.truncated_at {
         let _ = write!(line, ", cut off at byte {byte}");
     }
@@ -100,6 +103,14 @@ fn file_line(file: &FileReport) -> String {
         let _ = write!(line, "\n    damaged at byte {offset}: {reason}");
     }
     line
+}
+
+/// The beginning of a hash is enough for people.
+fn identity(file: &FileReport) -> String {
+    match &file.object {
+        Some(object) => format!("etag {}, changed {}", object.etag, object.last_modified),
+        None => format!("sha256 {}", file.sha256.get(..12).unwrap_or(&file.sha256)),
+    }
 }
 
 fn channels(channels: &[ChannelReport]) -> Table {

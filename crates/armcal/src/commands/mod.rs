@@ -8,6 +8,7 @@ mod compensate;
 mod diagnose;
 mod effects;
 mod export;
+mod extract;
 mod inspect;
 mod plan;
 mod run;
@@ -81,6 +82,10 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         }
         Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
+        Command::Extract { inputs, out, pipeline, topics, attachments, json } => {
+            let (pipeline, attachments, json) = (pipeline.as_deref(), *attachments, *json);
+            extract::run(&extract::Request { inputs, out, pipeline, topics, attachments, json })
+        }
     }
 }
 

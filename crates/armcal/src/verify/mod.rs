@@ -187,7 +187,7 @@ fn frames_fitted(model: &Model) -> Warning {
 /// A recording that the calibration saw proves nothing.
 fn same_files(past: &PastModel, seen: &[Seen]) -> Vec<Warning> {
     let known: BTreeSet<&String> = past.recordings.iter().flat_map(|r| &r.sha256).collect();
-    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| known.contains(&f.sha256));
+    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| known.contains(&f.identity()));
     let warn = |s: &Seen| {
         let message =
             "the calibration was made from this recording: its error here says nothing about new ones";

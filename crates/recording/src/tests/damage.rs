@@ -47,7 +47,9 @@ fn sound_files_of_every_layout_are_read_whole_and_without_a_word() {
 fn the_report_hashes_the_file() {
     // sha256sum of the three letters "abc", FIPS 180-2 appendix B.1.
     let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-    assert_eq!(crate::map::sha256_hex(b"abc"), abc);
+    let disk = OnDisk::new(&[b"abc".to_vec()]);
+    let map = crate::map::Map::of(&std::fs::File::open(disk.path("part_0.mcap")).expect("there"));
+    assert_eq!(map.expect("mapped").sha256_hex(), abc);
     let recording = open(&mcap_bytes(&[opaque("/a", 3)], &Style::default()));
     assert_eq!(recording.report().files[0].sha256.len(), 64);
 }

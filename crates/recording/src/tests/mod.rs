@@ -4,9 +4,10 @@ mod conformance;
 mod damage;
 mod mutation;
 mod output;
+mod ranges;
 mod streams;
 
-use crate::Recording;
+use crate::{Access, Recording};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 use std::collections::BTreeMap;
@@ -113,7 +114,11 @@ impl OnDisk {
     }
 
     pub fn open(&self) -> Result<Recording, crate::RecordingError> {
-        Recording::open(&self.paths)
+        self.open_with(Access::Mapped)
+    }
+
+    pub fn open_with(&self, access: Access) -> Result<Recording, crate::RecordingError> {
+        Recording::open_with(&self.paths, access)
     }
 }
 
@@ -131,6 +136,34 @@ pub(crate) fn raw_count(recording: &Recording) -> u64 {
     });
     pass.expect("nothing stops the pass");
     count
+}
+
+/// Name, media type, log and creation time [ns] and data of an attachment.
+pub(crate) type OwnedAttachment = (String, String, u64, u64, Vec<u8>);
+
+/// Every sound attachment.
+pub(crate) fn attachments(recording: &Recording) -> Vec<OwnedAttachment> {
+    let mut all = Vec::new();
+    let pass = recording.for_each_attachment(&mut |a| {
+        all.push((a.name.to_owned(), a.media_type.to_owned(), a.log_ns, a.create_ns, a.data.to_vec()));
+        Ok(())
+    });
+    pass.expect("nothing stops the pass");
+    all
+}
+
+/// A message's topic, sequence, log and publish time [ns] and data.
+pub(crate) type OwnedMessage = (String, u32, u64, u64, Vec<u8>);
+
+/// Every sound message of a topic.
+pub(crate) fn messages_of(recording: &Recording, topic: &str) -> Vec<OwnedMessage> {
+    let mut all = Vec::new();
+    let pass = recording.for_each_raw_of(&|c| c.topic == topic, &mut |m| {
+        all.push((m.channel.topic.clone(), m.sequence, m.log_ns, m.publish_ns, m.data.to_vec()));
+        Ok(())
+    });
+    pass.expect("nothing stops the pass");
+    all
 }
 
 /// A track of `n` opaque messages of 40 bytes, 10 ms apart, hard to compress.

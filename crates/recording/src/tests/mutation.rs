@@ -1,6 +1,7 @@
 //! Whatever happens to the bytes, reading neither panics nor invents messages.
 
-use super::{OnDisk, Style, mcap_bytes, opaque, raw_count};
+use super::{OnDisk, Style, attachments, mcap_bytes, opaque, raw_count};
+use crate::Access;
 use mcap::Compression;
 use proptest::prelude::*;
 
@@ -37,13 +38,16 @@ proptest! {
         if let Some(cut) = cut {
             bytes.truncate(cut.index(bytes.len()));
         }
-        if let Ok(recording) = OnDisk::new(&[bytes]).open() {
-            let report = recording.report();
-            let counted: u64 = report.channels.iter().map(|c| c.messages).sum();
-            prop_assert!(counted <= N, "{counted} of {N}");
-            prop_assert_eq!(raw_count(&recording), counted);
-            recording.attachments();
-            recording.metadata();
+        let disk = OnDisk::new(&[bytes]);
+        for access in [Access::Mapped, Access::Ranges] {
+            if let Ok(recording) = disk.open_with(access) {
+                let found = raw_count(&recording);
+                prop_assert!(found <= N, "{found} of {N}");
+                let counted: u64 = recording.report().channels.iter().map(|c| c.messages).sum();
+                prop_assert_eq!(found, counted);
+                attachments(&recording);
+                recording.metadata().expect("a local file is there");
+            }
         }
     }
 }

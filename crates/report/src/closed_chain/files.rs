@@ -51,15 +51,15 @@ struct Summary<'a> {
 struct RecordingSummary<'a> {
     name: &'a str,
     path: String,
-    files: Vec<FileSummary<'a>>,
+    files: Vec<FileSummary>,
     dwells: usize,
     open: Vec<OpenDwell<'a>>,
     warnings: Vec<&'a Warning>,
 }
 
 #[derive(Serialize)]
-struct FileSummary<'a> {
-    sha256: &'a str,
+struct FileSummary {
+    sha256: String,
     bytes: u64,
 }
 
@@ -185,7 +185,7 @@ fn recording(r: &ClosedRecording) -> RecordingSummary<'_> {
     RecordingSummary {
         name: &r.name,
         path: r.paths.first().map(|p| p.to_string_lossy().into_owned()).unwrap_or_default(),
-        files: r.report.files.iter().map(|f| FileSummary { sha256: &f.sha256, bytes: f.bytes }).collect(),
+        files: r.report.files.iter().map(|f| FileSummary { sha256: f.identity(), bytes: f.bytes }).collect(),
         dwells: r.dwells.len(),
         open: r.open.iter().map(|o| OpenDwell { dwell: o.dwell.dwell, why: &o.why }).collect(),
         warnings: r.all_warnings(),

@@ -74,7 +74,7 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingRow {
             .iter()
             .map(|f| FileRow {
                 path: r.given_path(f).to_string_lossy().into_owned(),
-                sha256: f.sha256.clone(),
+                sha256: f.identity(),
                 bytes: f.bytes,
                 damage: match (f.truncated_at, f.damaged.len()) {
                     (None, 0) => "none".into(),

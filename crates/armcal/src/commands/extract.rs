@@ -1,0 +1,85 @@
+//! `armcal extract`: a thin recording of the wanted channels.
+
+use super::{Outcome, json_text, print};
+use crate::error::Error;
+use crate::pipeline::Job;
+use armcal_core::Severity;
+use armcal_recording::{Extract, Extracted, Recording, RecordingReport, extract};
+use armcal_report::printable;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// What the command is asked to do.
+pub struct Request<'a> {
+    /// Files of one recording.
+    pub inputs: &'a [PathBuf],
+    /// Where the thin recording goes.
+    pub out: &'a Path,
+    /// Pipeline whose channels are kept.
+    pub pipeline: Option<&'a Path>,
+    /// Topics that are kept besides.
+    pub topics: &'a [String],
+    /// Whether attachments are kept.
+    pub attachments: bool,
+    /// Print JSON.
+    pub json: bool,
+}
+
+/// Writes the thin recording, and says what is in it and what of the input was lost.
+pub fn run(asked: &Request<'_>) -> Result<Outcome, Error> {
+    let mut topics = asked.pipeline.map_or(Ok(Vec::new()), topics_of)?;
+    topics.extend_from_slice(asked.topics);
+    let name = asked.inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
+    let recording = Recording::open(asked.inputs)
+        .map_err(|source| Error::Recording { recording: name.clone(), source })?;
+    let wanted = Extract { topics: &topics, attachments: asked.attachments };
+    let extracted = extract(&recording, &wanted, asked.out)
+        .map_err(|source| Error::Recording { recording: name, source })?;
+    let report = recording.report();
+    print(&if asked.json { json(&extracted, report)? } else { text(asked.out, &extracted, report) });
+    let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
+    Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
+}
+
+/// The topics that a pipeline reads, as patterns that match nothing else.
+fn topics_of(path: &Path) -> Result<Vec<String>, Error> {
+    let literal = |topic: &str| glob::Pattern::escape(topic);
+    Ok(match Job::load(path)? {
+        Job::OneArm(pipeline) => pipeline.streams.topics().into_iter().map(literal).collect(),
+        Job::TwoArms(pipeline) => pipeline.arms.iter().map(|arm| literal(&arm.joints.topic)).collect(),
+    })
+}
+
+fn text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {
+    let bytes: u64 = report.files.iter().map(|f| f.bytes).sum();
+    let size = std::fs::metadata(out).map(|about| about.len()).unwrap_or(0);
+    let mut text = format!("{}: {:.2} of {:.2} MB", out.display(), size as f64 / 1e6, bytes as f64 / 1e6);
+    for fetched in report.files.iter().filter_map(|f| f.fetched) {
+        let _ = write!(text, ", {:.2} MB read by {} requests", fetched.bytes as f64 / 1e6, fetched.requests);
+    }
+    text.push('\n');
+    for (topic, messages) in &extracted.topics {
+        let _ = writeln!(text, "  {}: {messages} messages", printable(topic));
+    }
+    if extracted.attachments > 0 {
+        let _ = writeln!(text, "  {} attachments", extracted.attachments);
+    }
+    for warning in &report.warnings {
+        let _ = writeln!(text, "  warning: {warning}");
+    }
+    text
+}
+
+fn json(extracted: &Extracted, report: &RecordingReport) -> Result<String, Error> {
+    let topics: Vec<_> = extracted
+        .topics
+        .iter()
+        .map(|(topic, messages)| serde_json::json!({"topic": topic, "messages": messages}))
+        .collect();
+    json_text(&serde_json::json!({
+        "topics": topics,
+        "attachments": extracted.attachments,
+        "files": report.files,
+        "warnings": report.warnings,
+    }))
+}

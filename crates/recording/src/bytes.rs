@@ -1,0 +1,110 @@
+//! Where the bytes of a file come from: a memory map, or ranges read on demand.
+//!
+//! Everything after [`crate::layout`] asks a [`FileBytes`]; nothing else knows which of the two it is.
+
+use crate::map::Map;
+use crate::ranges::Ranged;
+use crate::{Fetched, RecordingError, url};
+use std::borrow::Cow;
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+
+/// How local files are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Access {
+    /// Memory-mapped: the fastest, and all of a file is judged. A mapped file must not be truncated by anybody while it
+    /// is read, which would kill the process (SIGBUS).
+    #[default]
+    Mapped,
+    /// By ranges, as from object storage: for files on network storage or in the hands of other programs. A file that
+    /// is shortened meanwhile is an error. Chunks without a wanted channel are not read, and not judged.
+    Ranges,
+}
+
+impl Access {
+    /// [`Access::Ranges`] where the environment variable `ARMCAL_NO_MMAP` is set to something other than 0.
+    pub fn from_env() -> Access {
+        match std::env::var_os("ARMCAL_NO_MMAP") {
+            Some(value) if !value.is_empty() && value != "0" => Access::Ranges,
+            _ => Access::Mapped,
+        }
+    }
+}
+
+/// What tells the content of a file or object from any other, without reading its records: as
+/// [`crate::FileReport::identity`].
+///
+/// # Errors
+/// A file or object that cannot be opened or read, is empty or a folder.
+pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
+    match FileBytes::open(path, Access::from_env())? {
+        FileBytes::Mapped(map) => Ok(map.sha256_hex()),
+        FileBytes::Ranged(ranged) => match &ranged.object {
+            Some(object) => Ok(object.identity(ranged.len())),
+            None => ranged.sha256_hex(),
+        },
+    }
+}
+
+/// The bytes of one file.
+pub(crate) enum FileBytes {
+    /// All there, page by page.
+    Mapped(Map),
+    /// Read when asked for.
+    Ranged(Ranged),
+}
+
+impl FileBytes {
+    /// Opens a file, or an object by its URL. An empty file or a folder is an error that says so.
+    pub fn open(path: &Path, access: Access) -> Result<FileBytes, RecordingError> {
+        if url::is_url(path) {
+            return Ok(FileBytes::Ranged(url::open(path)?));
+        }
+        let open = |source| RecordingError::Open { path: path.to_owned(), source };
+        let file = File::open(path).map_err(open)?;
+        let about = file.metadata().map_err(open)?;
+        let refused = |why: &str| RecordingError::NotMcap { path: path.to_owned(), why: why.to_owned() };
+        if about.is_dir() {
+            return Err(refused("it is a folder; name the .mcap files in it"));
+        }
+        if about.is_file() && about.len() == 0 {
+            return Err(refused("the file is empty"));
+        }
+        match access {
+            Access::Mapped => Map::of(&file).map(FileBytes::Mapped).map_err(open),
+            Access::Ranges => Ranged::local(file, path).map(FileBytes::Ranged),
+        }
+    }
+
+    /// Size of the file [bytes].
+    pub fn len(&self) -> u64 {
+        match self {
+            FileBytes::Mapped(map) => map.len() as u64,
+            FileBytes::Ranged(ranged) => ranged.len(),
+        }
+    }
+
+    /// One range, borrowed where it is mapped.
+    pub fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, RecordingError> {
+        match self {
+            FileBytes::Mapped(map) => Ok(map.get(range).unwrap_or_default().into()),
+            FileBytes::Ranged(ranged) => Ok(Vec::from(ranged.read_one(range)?).into()),
+        }
+    }
+
+    /// Says that a pass is done with a range.
+    pub fn passed(&self, range: Range<usize>) {
+        if let FileBytes::Mapped(map) = self {
+            map.passed(range);
+        }
+    }
+
+    /// What was read, where only parts are.
+    pub fn fetched(&self) -> Option<Fetched> {
+        match self {
+            FileBytes::Mapped(_) => None,
+            FileBytes::Ranged(ranged) => Some(ranged.fetched()),
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! The layout of a file that is read by ranges, out of its summary alone.
+//!
+//! Walking the data section, as [`crate::layout`] does with a mapped file, would fetch something at every chunk. Here the
+//! summary is believed, but only if everything it says fits together and accounts for every byte of the data section;
+//! a chunk is checked against it again when it is read. Anything else makes it unusable, and the file is read whole.
+
+use crate::RecordingError;
+use crate::channels::Definitions;
+use crate::layout::{Block, Content, Layout, check_magic};
+use crate::ranges::Ranged;
+use crate::records::{Cursor, ENVELOPE, Records};
+use crate::report::Source;
+use crate::sweep::Tally;
+use bytes::Bytes;
+use mcap::records::{ChunkIndex, Record, Statistics, op};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// Footer record.
+const FOOTER_BYTES: usize = ENVELOPE + 20;
+/// DataEnd record, the last before the summary.
+const DATA_END_BYTES: usize = ENVELOPE + 4;
+/// The header record is looked for in so many bytes.
+const HEAD_BYTES: usize = 4096;
+/// A larger summary is not read into memory.
+const MAX_SUMMARY_BYTES: usize = 256 << 20;
+/// More than this between the records that the summary knows is not read as one block.
+const MAX_GAP_BYTES: usize = 16 << 20;
+
+/// What the summary of a file is good for.
+pub(crate) enum Found {
+    /// Everything.
+    Layout(Box<Layout>),
+    /// Nothing, and why: the file must be walked.
+    Unusable(&'static str),
+    /// The file is no MCAP file, and why.
+    NotMcap(String),
+}
+
+/// Finds the structure of a file with two or three requests.
+pub(crate) fn find(file: &Ranged) -> Result<Found, RecordingError> {
+    let size = file.len() as usize;
+    let head = file.read_one(0..HEAD_BYTES)?;
+    if let Err(why) = check_magic(&head) {
+        return Ok(Found::NotMcap(why));
+    }
+    let end = size.saturating_sub(FOOTER_BYTES + mcap::MAGIC.len());
+    let footer = file.read_one(end..size)?;
+    let Some((summary_start, crc)) = parse_footer(&footer) else {
+        return Ok(Found::Unusable("it does not end with a footer"));
+    };
+    if summary_start == 0 {
+        return Ok(Found::Unusable("it has no summary"));
+    }
+    let sound = (mcap::MAGIC.len() + DATA_END_BYTES..end).contains(&summary_start);
+    if !sound || end - summary_start > MAX_SUMMARY_BYTES {
+        return Ok(Found::Unusable("its footer does not point to a summary"));
+    }
+    let bytes = file.read_one(summary_start - DATA_END_BYTES..end + ENVELOPE + 16)?;
+    let (data_end, summary) = bytes.split_at(DATA_END_BYTES);
+    if crc != 0 && crc32fast::hash(summary) != crc {
+        return Ok(Found::Unusable("the CRC of its summary disagrees"));
+    }
+    if data_end[0] != op::DATA_END {
+        return Ok(Found::Unusable("no end of the data stands before its summary"));
+    }
+    let listed = Bytes::copy_from_slice(&summary[..end - summary_start]);
+    let layout =
+        Summary::parse(&listed).and_then(|summary| summary.layout(&head, summary_start - DATA_END_BYTES));
+    Ok(layout.map_or_else(Found::Unusable, |layout| Found::Layout(Box::new(layout))))
+}
+
+/// Start of the summary, and its CRC.
+fn parse_footer(bytes: &[u8]) -> Option<(usize, u32)> {
+    let body = bytes.strip_suffix(mcap::MAGIC)?;
+    let record = Records::new(body, 0, FOOTER_BYTES).next()?.ok()?;
+    let mut fields = Cursor::new(record.body);
+    let (start, _, crc) = (fields.u64()?, fields.u64()?, fields.u32()?);
+    (record.op == op::FOOTER).then_some((usize::try_from(start).ok()?, crc))
+}
+
+/// The records of a summary.
+#[derive(Default)]
+struct Summary {
+    definitions: Definitions,
+    statistics: Option<Statistics>,
+    chunks: Vec<ChunkIndex>,
+    /// Where attachments and metadata records are: offset and length.
+    attachments: Vec<(u64, u64)>,
+    metadata: Vec<(u64, u64)>,
+}
+
+impl Summary {
+    fn parse(bytes: &[u8]) -> Result<Summary, &'static str> {
+        let mut summary = Summary::default();
+        for record in Records::new(bytes, 0, bytes.len()) {
+            let record = record.map_err(|_| "a record of its summary is cut off")?;
+            summary.definitions.absorb(&record);
+            match mcap::parse_record(record.op, record.body) {
+                Ok(Record::Statistics(statistics)) => summary.statistics = Some(statistics),
+                Ok(Record::ChunkIndex(chunk)) => summary.chunks.push(chunk),
+                Ok(Record::AttachmentIndex(a)) => summary.attachments.push((a.offset, a.length)),
+                Ok(Record::MetadataIndex(m)) => summary.metadata.push((m.offset, m.length)),
+                Ok(_) => {}
+                Err(_) => return Err("a record of its summary cannot be read"),
+            }
+        }
+        Ok(summary)
+    }
+
+    /// The layout of a data section that ends at `data_end`.
+    fn layout(mut self, head: &[u8], data_end: usize) -> Result<Layout, &'static str> {
+        let statistics = self.statistics.take().ok_or("its summary has no statistics")?;
+        self.check(&statistics)?;
+        let header = Records::new(head, mcap::MAGIC.len(), head.len()).next().and_then(Result::ok);
+        let header = header.filter(|r| r.op == op::HEADER).ok_or("no header can be read at its start")?;
+        let Ok(Record::Header(words)) = mcap::parse_record(header.op, header.body) else {
+            return Err("its header cannot be read");
+        };
+        let data = header.offset + ENVELOPE + header.body.len()..data_end;
+        let blocks = self.blocks(&data)?;
+        let bodies = |records: &[(u64, u64)]| -> Result<Vec<Range<usize>>, &'static str> {
+            let body = |(offset, length): &(u64, u64)| {
+                range(*offset, *length).map(|r| r.start + ENVELOPE..r.end).filter(|r| r.start <= r.end)
+            };
+            records.iter().map(|r| body(r).ok_or(OUTSIDE)).collect()
+        };
+        Ok(Layout {
+            profile: words.profile,
+            library: words.library,
+            source: Some(Source::Index),
+            blocks,
+            attachments: bodies(&self.attachments)?,
+            metadata: bodies(&self.metadata)?,
+            first_ns: self.chunks.iter().map(|c| c.message_start_time).filter(|ns| *ns > 0).min(),
+            declared: declared(&statistics, &self.chunks),
+            definitions: self.definitions,
+            definitions_complete: true,
+            statistics: Some(statistics),
+            ..Layout::default()
+        })
+    }
+
+    /// Whether the parts of the summary agree with each other.
+    fn check(&self, statistics: &Statistics) -> Result<(), &'static str> {
+        let counts = [
+            (statistics.chunk_count, self.chunks.len()),
+            (statistics.attachment_count, self.attachments.len()),
+            (statistics.metadata_count, self.metadata.len()),
+        ];
+        if counts.iter().any(|(declared, listed)| *declared as usize != *listed) {
+            return Err("its summary lists other numbers of records than its statistics");
+        }
+        let listed = self.chunks.iter().flat_map(|c| c.message_index_offsets.keys());
+        let mut used = listed.chain(statistics.channel_message_counts.keys());
+        if used.any(|id| !self.definitions.contains(*id)) {
+            return Err("its summary does not define all of its channels");
+        }
+        let counted: u64 = statistics.channel_message_counts.values().fold(0, |n, c| n.saturating_add(*c));
+        if counted != statistics.message_count {
+            return Err("its statistics do not add up");
+        }
+        Ok(())
+    }
+
+    /// The chunks, and as blocks of unknown content whatever lies between the records that the summary knows.
+    fn blocks(&self, data: &Range<usize>) -> Result<Vec<Block>, &'static str> {
+        let mut known: Vec<(Range<usize>, Option<Block>)> = Vec::new();
+        for (offset, length) in self.attachments.iter().chain(&self.metadata) {
+            known.push((range(*offset, *length).ok_or(OUTSIDE)?, None));
+        }
+        for chunk in &self.chunks {
+            let record = range(chunk.chunk_start_offset, chunk.chunk_length)
+                .filter(|r| r.len() > ENVELOPE)
+                .ok_or(OUTSIDE)?;
+            let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
+            let indexed = !chunk.message_index_offsets.is_empty();
+            let block = Block {
+                offset: record.start,
+                content: Content::Chunk(record.start + ENVELOPE..record.end),
+                holds: indexed.then(|| chunk.message_index_offsets.keys().copied().collect()),
+            };
+            known.push((record.start..indexes.end, Some(block)));
+        }
+        known.sort_by_key(|(range, _)| (range.start, range.end));
+        let mut blocks = Vec::new();
+        let mut at = data.start;
+        for (range, block) in known.into_iter().chain([(data.end..data.end, None)]) {
+            if range.start < at || range.end > data.end {
+                return Err(OUTSIDE);
+            }
+            if range.start - at > MAX_GAP_BYTES {
+                return Err("a large part of it is in no chunk");
+            }
+            if range.start > at {
+                blocks.push(Block { offset: at, content: Content::Loose(at..range.start), holds: None });
+            }
+            at = range.end;
+            blocks.extend(block);
+        }
+        Ok(blocks)
+    }
+}
+
+const OUTSIDE: &str = "its summary lists records that overlap or lie outside the data";
+
+fn range(offset: u64, length: u64) -> Option<Range<usize>> {
+    let end = usize::try_from(offset.checked_add(length)?).ok()?;
+    Some(usize::try_from(offset).ok()?..end)
+}
+
+/// Messages of each channel as the statistics count them; first and last are times of the chunks that hold any.
+fn declared(statistics: &Statistics, chunks: &[ChunkIndex]) -> BTreeMap<u16, Tally> {
+    let mut times: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
+    for chunk in chunks {
+        for id in chunk.message_index_offsets.keys() {
+            let (first, last) = times.entry(*id).or_insert((u64::MAX, 0));
+            *first = chunk.message_start_time.min(*first);
+            *last = chunk.message_end_time.max(*last);
+        }
+    }
+    let of_file = (statistics.message_start_time, statistics.message_end_time);
+    let tally = |(id, messages): (&u16, &u64)| {
+        let (first_ns, last_ns) = times.get(id).copied().unwrap_or(of_file);
+        (*id, Tally { messages: *messages, first_ns, last_ns })
+    };
+    statistics.channel_message_counts.iter().filter(|(_, n)| **n > 0).map(tally).collect()
+}
+
+/// The body of a chunk read together with its envelope, if that is what the index said.
+pub(crate) fn body_of_chunk(record: &[u8]) -> Result<&[u8], String> {
+    match Records::new(record, 0, record.len()).next() {
+        Some(Ok(found)) if found.op == op::CHUNK && found.body.len() + ENVELOPE == record.len() => {
+            Ok(found.body)
+        }
+        _ => Err("there is no chunk of the length that the index says".to_owned()),
+    }
+}
+
+/// Numbers the blocks that may hold one of these channels.
+pub(crate) fn holding(blocks: &[Block], wanted: &BTreeSet<u16>) -> Vec<usize> {
+    let may_hold =
+        |block: &Block| block.holds.as_ref().is_none_or(|ids| ids.iter().any(|id| wanted.contains(id)));
+    (0..blocks.len()).filter(|i| !wanted.is_empty() && may_hold(&blocks[*i])).collect()
+}
