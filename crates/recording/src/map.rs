@@ -9,13 +9,18 @@ use std::path::Path;
 /// Maps a file read-only. An empty file or a folder is an error that says so.
 pub(crate) fn map(path: &Path) -> Result<Mmap, RecordingError> {
     let open = |source| RecordingError::Open { path: path.to_owned(), source };
-    let file = File::open(path).map_err(open)?;
-    let about = file.metadata().map_err(open)?;
+    // Looked at before it is opened: opening a pipe waits for whoever writes to it.
+    let about = std::fs::metadata(path).map_err(open)?;
     if about.is_dir() {
         let why = "it is a folder; name the .mcap files in it".to_owned();
         return Err(RecordingError::NotMcap { path: path.to_owned(), why });
     }
-    if about.is_file() && about.len() == 0 {
+    if !about.is_file() {
+        let why = "it is a pipe or a device; copy it into a file first".to_owned();
+        return Err(RecordingError::NotMcap { path: path.to_owned(), why });
+    }
+    let file = File::open(path).map_err(open)?;
+    if file.metadata().map_err(open)?.len() == 0 {
         let why = "the file is empty".to_owned();
         return Err(RecordingError::NotMcap { path: path.to_owned(), why });
     }

@@ -2,7 +2,7 @@
 
 use crate::layout::{Damage, Layout};
 use crate::map::{map, sha256_hex};
-use crate::raw::{Attachment, RawChannel, parse_metadata};
+use crate::raw::{Attachment, RawChannel, RawSchema, parse_metadata};
 use crate::records::ENVELOPE;
 use crate::sweep::{FileSurvey, Tally, sweep};
 use crate::{ChannelReport, FileReport, RecordingError, RecordingReport, Source, decode};
@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
+
+/// Places of damage told one by one; of more, only how many there are: a file can hold millions.
+const DAMAGE_TOLD: usize = 50;
 
 /// An opened recording, which may consist of several split files.
 pub struct Recording {
@@ -103,6 +106,8 @@ impl Recording {
                 }
             }
         }
+        // Thousands of channels may share one schema, which is compiled once.
+        let mut known: BTreeMap<Compiled, Result<String, String>> = BTreeMap::new();
         let report = |(key, (tally, channel)): (Key, (Option<Tally>, Arc<RawChannel>))| {
             let tally = tally.unwrap_or(Tally { messages: 0, first_ns: 0, last_ns: 0 });
             ChannelReport {
@@ -113,7 +118,7 @@ impl Recording {
                 messages: tally.messages,
                 first_ns: ns(tally.first_ns),
                 last_ns: ns(tally.last_ns),
-                decodable: readable_as(&channel),
+                decodable: known.entry(compiled(&channel)).or_insert_with(|| readable_as(&channel)).clone(),
             }
         };
         merged.into_iter().map(report).collect()
@@ -149,7 +154,7 @@ impl RecordingFile {
         }
         all.extend(self.bad_extras());
         all.sort_by_key(|d| d.offset);
-        all
+        summarised(all)
     }
 
     /// Attachments and metadata that cannot be passed on.
@@ -201,9 +206,26 @@ impl RecordingFile {
     }
 }
 
+/// The first places of damage, and how many more there are.
+fn summarised(mut all: Vec<Damage>) -> Vec<Damage> {
+    let more = all.split_off(DAMAGE_TOLD.min(all.len()));
+    if let Some(first) = more.first() {
+        let why = format!("{} more places of damage from here on", more.len());
+        all.push(Damage { offset: first.offset, why, lost: more.iter().any(|d| d.lost) });
+    }
+    all
+}
+
 /// Log times are unsigned in MCAP; beyond the year 2262 they saturate.
 pub(crate) fn ns(unsigned: u64) -> i64 {
     i64::try_from(unsigned).unwrap_or(i64::MAX)
+}
+
+/// What decides how messages are read: a schema in memory, and the message encoding.
+type Compiled = (Option<*const RawSchema>, String);
+
+fn compiled(channel: &RawChannel) -> Compiled {
+    (channel.schema.as_ref().map(Arc::as_ptr), channel.message_encoding.clone())
 }
 
 fn readable_as(channel: &RawChannel) -> Result<String, String> {

@@ -79,6 +79,7 @@ pub(crate) fn sweep<C, D: Send>(
             let file = &files[at.file];
             let (records, damage) = open_block(file, at, inflater);
             survey.damage.extend(damage);
+            let mut short = 0_u64;
             for record in records {
                 if !file.layout.definitions_complete {
                     survey.definitions.absorb(&record);
@@ -91,12 +92,13 @@ pub(crate) fn sweep<C, D: Send>(
                         survey.count(&message);
                         each(&mut collector, &message);
                     }
-                    None => survey.damage.push(Damage {
-                        offset: file.layout.blocks[at.block].offset,
-                        why: "a message shorter than its header is dropped".to_owned(),
-                        lost: true,
-                    }),
+                    None => short += 1,
                 }
+            }
+            if short > 0 {
+                let offset = file.layout.blocks[at.block].offset;
+                let why = format!("messages shorter than their header are dropped ({short} here)");
+                survey.damage.push(Damage { offset, why, lost: true });
             }
             (at, survey, finish(collector))
         })

@@ -51,7 +51,7 @@ pub enum DecodeError {
         body: String,
     },
     /// Several bodies in a channel, and none or an ambiguous one asked for.
-    #[error("several bodies on this channel, set `body` to one of: {}", .bodies.join(", "))]
+    #[error("several bodies on this channel, set `body` to one of: {}", listed(bodies))]
     SeveralBodies {
         /// The bodies, in the order of the message.
         bodies: Vec<String>,
@@ -106,4 +106,14 @@ pub enum DecodeError {
         /// Role of the rows.
         rows: Role,
     },
+}
+
+/// At most twenty names.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
 }
