@@ -7,6 +7,8 @@ use std::io::Read as _;
 const MAX_CHUNK_BYTES: u64 = 1 << 30;
 /// A claim of up to this is reserved at once; a larger one grows as the chunk inflates.
 const RESERVED_BYTES: usize = 16 << 20;
+/// What is reserved before anything has been read from a stream: more than a block of either codec at its default.
+const FIRST_STEP_BYTES: usize = 128 << 10;
 /// What one compressed byte can stand for at most: a zstd block of 128 KiB may be a repeated byte, written in 4 (RFC 8878,
 /// 3.1.1.2.2), and a byte of an lz4 match length is 255 (lz4 block format).
 const ZSTD_RATIO: u64 = (128 << 10) / 4;
@@ -101,11 +103,20 @@ impl Inflater {
     }
 }
 
-/// Reads at most one byte more than `size`, so that too much is noticed and a bomb is not inflated.
-fn stream_into(buffer: &mut Vec<u8>, reader: impl std::io::Read, size: usize) -> Result<(), String> {
+/// Reads at most one byte more than `size`, so that too much is noticed and a bomb is not inflated. The buffer grows to
+/// twice what has been read, and never beyond what is asked for.
+fn stream_into(buffer: &mut Vec<u8>, mut reader: impl std::io::Read, size: usize) -> Result<(), String> {
     buffer.clear();
-    let limit = size as u64 + 1;
-    reader.take(limit).read_to_end(buffer).map(drop).map_err(|e| format!("it does not inflate: {e}"))
+    let limit = size + 1;
+    while buffer.len() < limit {
+        let step = buffer.len().max(FIRST_STEP_BYTES).min(limit - buffer.len());
+        buffer.reserve_exact(step);
+        let read = reader.by_ref().take(step as u64).read_to_end(buffer);
+        if read.map_err(|e| format!("it does not inflate: {e}"))? < step {
+            break;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

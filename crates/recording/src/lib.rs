@@ -35,7 +35,7 @@ mod scalars;
 mod streams;
 mod sweep;
 
-pub use error::RecordingError;
+pub use error::{RecordingError, shortened};
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawSchema};
 pub use report::*;

@@ -25,7 +25,10 @@ pub enum DecodeError {
         why: String,
     },
     /// The schema is sound, but holds nothing armcal reads in any role.
-    #[error("{schema} holds no joints, pose or scalar that armcal knows (its fields: {fields})")]
+    #[error(
+        "{schema} holds no joints, pose or scalar that armcal knows (its fields: {})",
+        crate::shortened(fields)
+    )]
     Unknown {
         /// Name of the schema.
         schema: String,
@@ -111,7 +114,7 @@ pub enum DecodeError {
 /// At most twenty names.
 fn listed(names: &[String]) -> String {
     const SHOWN: usize = 20;
-    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let shown = names.iter().take(SHOWN).map(|n| crate::shortened(n)).collect::<Vec<_>>().join(", ");
     match names.len().saturating_sub(SHOWN) {
         0 => shown,
         more => format!("{shown} and {more} more"),

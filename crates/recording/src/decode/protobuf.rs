@@ -13,6 +13,7 @@ use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 /// Full names of messages may take this many bytes for each of their schema. Each repeats the names around it, so that
 /// one long name around many messages would take the square of what the file holds.
@@ -104,7 +105,8 @@ fn by_name(set: FileDescriptorSet, most_bytes: usize) -> Result<BTreeMap<String,
     for file in set.file {
         let implicit_presence = file.syntax() == "proto3";
         let scope = if file.package().is_empty() { String::new() } else { format!(".{}", file.package()) };
-        let mut open: Vec<(String, DescriptorProto)> =
+        let scope: Rc<str> = scope.into();
+        let mut open: Vec<(Rc<str>, DescriptorProto)> =
             file.message_type.into_iter().map(|message| (scope.clone(), message)).collect();
         while let Some((scope, mut message)) = open.pop() {
             let name = format!("{scope}.{}", message.name());
@@ -112,9 +114,9 @@ fn by_name(set: FileDescriptorSet, most_bytes: usize) -> Result<BTreeMap<String,
             if bytes > most_bytes {
                 return Err("the names of its nested messages are out of all proportion".to_owned());
             }
-            open.extend(
-                std::mem::take(&mut message.nested_type).into_iter().map(|inner| (name.clone(), inner)),
-            );
+            let inside: Rc<str> = name.as_str().into();
+            let nested = std::mem::take(&mut message.nested_type);
+            open.extend(nested.into_iter().map(|inner| (inside.clone(), inner)));
             all.insert(name, Descriptor { implicit_presence, message });
         }
     }
