@@ -14,8 +14,6 @@ triple="$(rustc -vV | sed -n 's/^host: //p')"
 cargo fuzz build "${build[@]}"
 "target/$triple/release/seeds"
 
-# One thread, so that what an input reaches does not depend on how threads meet.
-export RAYON_NUM_THREADS=1
 for target in "${targets[@]}"; do
     echo "== $target, $seconds s"
     mkdir -p "corpus/$target" "artifacts/$target" "regressions/$target"

@@ -234,7 +234,9 @@ mod tests {
         };
         assert!(message("name = \"b\"").contains("no cavities"));
         let many = |n| (0..n).map(|i| format!("\n[[cavities]]\nname = \"{i}\"\nxyz_mm = [{}, 0, 0]", 2 * i));
-        assert!(message(&format!("name = \"b\"{}", many(5001).collect::<String>())).contains("5001 cavities"));
+        assert!(
+            message(&format!("name = \"b\"{}", many(5001).collect::<String>())).contains("5001 cavities")
+        );
         assert!(message(&two("[0, 0, nan]", "\"b\"\nxyz_mm = [9, 0, 0]")).contains("cavity `a`"));
         assert!(message(&two("[0, 0, inf]", "\"b\"\nxyz_mm = [9, 0, 0]")).contains("cavity `a`"));
         assert!(message(&two("[0, 0, 0]", "\"a\"\nxyz_mm = [9, 0, 0]")).contains("both named `a`"));

@@ -90,7 +90,9 @@ fn print(text: &str) {
 /// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and our
 /// own colours stay; the others become `\u001b`, which also leaves JSON what it is.
 pub fn harmless(text: &str) -> Cow<'_, str> {
-    let is_harmless = |c: char| !c.is_control() || matches!(c, '\n' | '\t');
+    // Overrides of the writing direction would let a name rewrite the rest of its line.
+    let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_harmless = |c: char| matches!(c, '\n' | '\t') || !c.is_control() && !turns(c);
     if text.chars().all(is_harmless) {
         return Cow::Borrowed(text);
     }
@@ -140,6 +142,7 @@ mod tests {
             ("\u{9b}31mx", "\\u009b31mx"),
             ("ab\u{8}\u{7f}\r", "ab\\u0008\\u007f\\u000d"),
             ("\u{1b}", "\\u001b"),
+            ("a\u{202e}b", "a\\u202eb"),
             ("\u{1b}[31", "\\u001b[31"),
         ] {
             assert_eq!(harmless(evil), shown);

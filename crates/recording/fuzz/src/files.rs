@@ -114,7 +114,10 @@ pub fn results(bytes: &[u8]) {
         2 => {
             let joints = ["joint1", "joint2", "joint3"].map(str::to_owned);
             if let Ok(spec) = EffectSpec::parse(text, &joints) {
-                assert_eq!(EffectSpec::parse(&spec.to_string(), &joints).map(|s| s.to_string()), Ok(spec.to_string()));
+                assert_eq!(
+                    EffectSpec::parse(&spec.to_string(), &joints).map(|s| s.to_string()),
+                    Ok(spec.to_string())
+                );
                 let _ = place(&[EffectTable::from(&spec)]);
             }
         }
@@ -142,7 +145,8 @@ fn place(effects: &[EffectTable]) -> Option<()> {
 }
 
 fn in_file(text: &str, suffix: &str) -> tempfile::NamedTempFile {
-    let folder = Some(Path::new("/dev/shm")).filter(|f| f.is_dir()).map_or_else(std::env::temp_dir, Path::to_owned);
+    let folder =
+        Some(Path::new("/dev/shm")).filter(|f| f.is_dir()).map_or_else(std::env::temp_dir, Path::to_owned);
     let mut file = tempfile::Builder::new().suffix(suffix).tempfile_in(folder).expect("a temporary file");
     file.write_all(text.as_bytes()).expect("a temporary file");
     file

@@ -7,3 +7,10 @@ pub mod files;
 pub mod memory;
 pub mod recordings;
 pub mod structured;
+
+/// Makes this thread the only one that works: what an input reaches must not depend on how threads meet, and handing
+/// each input to another thread would take longer than most inputs.
+pub fn on_this_thread() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("no pool was made before");
+}

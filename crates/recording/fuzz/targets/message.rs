@@ -1,10 +1,12 @@
 //! A schema and a message, every encoding.
 #![no_main]
 
-#[global_allocator]
-static COUNTING: armcal_fuzz::memory::Counting = armcal_fuzz::memory::Counting;
+use armcal_fuzz::{memory, recordings};
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let ((), peak) = armcal_fuzz::memory::peak_bytes(|| armcal_fuzz::recordings::message(bytes));
-    assert!(peak <= armcal_fuzz::recordings::bound(bytes.len()), "{peak} bytes for {}", bytes.len());
+#[global_allocator]
+static COUNTING: memory::Counting = memory::Counting;
+
+libfuzzer_sys::fuzz_target!(init: armcal_fuzz::on_this_thread(), |bytes: &[u8]| {
+    let ((), peak) = memory::peak_bytes(|| recordings::message(bytes));
+    assert!(peak <= recordings::bound(bytes.len()), "{peak} bytes for {}", bytes.len());
 });
