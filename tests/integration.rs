@@ -17,6 +17,18 @@ mod real_robots;
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
 
+/// Does every kind of damage to a recording cost exactly what it must, and is that said?
+mod corrupt_recordings;
+
+/// Are results whole whatever happens to the disk, the folder or the process?
+mod write_faults;
+
+/// Do names out of a recording stay names?
+mod hostile_names;
+
+/// Do files that people write, however wrong, end in words?
+mod fuzzed_files;
+
 /// Does bad input give a clear error or a counted warning, and never half a file?
 mod bad_input;
 

@@ -2,6 +2,7 @@
 
 pub mod browser;
 pub mod conformance;
+pub mod damage;
 pub mod slurm;
 
 use serde_json::Value;
@@ -66,6 +67,18 @@ pub fn paper_pipeline(recordings: &Path) -> String {
     text.replace("\"../fixtures/paper/", &format!("\"{}/", recordings.display()))
         .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
         .replace("\"models/", &format!("\"{}/models/", pipelines.display()))
+}
+
+/// The text of `pipelines/paper-normal.toml` without its diagnosis, usable from any folder, its recording looked for in
+/// `recordings`.
+pub fn quick_pipeline(recordings: &Path) -> String {
+    let pipelines = root().join("pipelines");
+    let text = std::fs::read_to_string(pipelines.join("paper-normal.toml")).expect("pipeline");
+    let text = text
+        .replace("\"../fixtures/paper/", &format!("\"{}/", recordings.display()))
+        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
+        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    text + "\n[diagnosis]\nenabled = false\n"
 }
 
 /// Runs a pipeline; panics with its words unless it exits with one of `codes`. Returns `summary.json`.

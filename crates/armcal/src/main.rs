@@ -15,7 +15,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Broken) => ExitCode::FAILURE,
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = writeln!(std::io::stderr(), "error: {}", commands::harmless(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
     }

@@ -122,8 +122,8 @@ impl DiagnosisConfig {
         if self.max_weighed < 20 {
             return refuse("max_weighed", self.max_weighed.to_string(), "20 or more");
         }
-        if self.resamplings < 99 {
-            return refuse("resamplings", self.resamplings.to_string(), "99 or more");
+        if !(99..=99_999).contains(&self.resamplings) {
+            return refuse("resamplings", self.resamplings.to_string(), "99 to 99999");
         }
         Ok(())
     }

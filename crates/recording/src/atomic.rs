@@ -1,10 +1,20 @@
 //! Files that appear whole or not at all.
+//!
+//! A file is written under a hidden name beside its own, `.NAME.xxxxxx.part`, and renamed when it is complete. Its writer
+//! holds a lock on it, which the system lets go when the process ends, however it ends: whoever writes the same file
+//! next removes the parts that nobody holds any more.
 
 use crate::RecordingError;
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+
+const SUFFIX: &str = ".part";
+/// Random characters in the name of a part.
+const RANDOM_BYTES: usize = 6;
+/// Between making a part and locking it, another process may take it for abandoned; then another one is made.
+const TRIES: usize = 10;
 
 /// A file under construction: written under a temporary name in the folder of its target, synced and renamed by
 /// [`AtomicFile::commit`]. Dropped without that, it disappears and the target stays as it was.
@@ -23,12 +33,21 @@ impl AtomicFile {
         };
         let mut builder = tempfile::Builder::new();
         let prefix = format!(".{}.", name.to_string_lossy());
-        builder.prefix(&prefix).suffix(".part");
+        builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM_BYTES);
         // Like any newly created file: readable by all, as far as the umask lets it.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let temporary = builder.tempfile_in(folder(target)).map_err(|e| refused(e.to_string()))?;
-        Ok(AtomicFile { temporary, target: target.to_owned() })
+        remove_abandoned(folder(target), &prefix);
+        for _ in 0..TRIES {
+            let temporary = builder.tempfile_in(folder(target)).map_err(|e| refused(e.to_string()))?;
+            // Where a file system knows no locks, no part is ever removed by another process.
+            let locked = temporary.as_file().try_lock();
+            let held = !matches!(locked, Err(TryLockError::WouldBlock)) && temporary.path().exists();
+            if held {
+                return Ok(AtomicFile { temporary, target: target.to_owned() });
+            }
+        }
+        Err(refused("another process keeps removing its unfinished file".into()))
     }
 
     /// Where the file will be.
@@ -74,6 +93,25 @@ pub fn write(target: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
     file.commit()
 }
 
+/// Removes what writers of the same file left when they were killed. What cannot be looked at is left alone: the file
+/// itself can be written all the same.
+fn remove_abandoned(folder: &Path, prefix: &str) {
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let random = name.to_str().and_then(|n| n.strip_prefix(prefix)?.strip_suffix(SUFFIX));
+        let is_part =
+            random.is_some_and(|r| r.len() == RANDOM_BYTES && r.bytes().all(|b| b.is_ascii_alphanumeric()));
+        if !is_part || !entry.file_type().is_ok_and(|t| t.is_file()) {
+            continue;
+        }
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn folder(target: &Path) -> &Path {
     target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -100,6 +138,43 @@ mod tests {
         assert_eq!(std::fs::read(&target).expect("readable"), b"old");
         write(&target, b"new").expect("writable");
         assert_eq!(std::fs::read(&target).expect("readable"), b"new");
+    }
+
+    #[test]
+    fn parts_of_the_dead_are_removed_and_those_of_the_living_are_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        let alive = AtomicFile::create(&path("out.bin")).expect("writable");
+        // A part that nobody holds, and files that only look like one: another target's, a user's, a folder.
+        for name in [".out.bin.abc123.part", ".other.bin.abc123.part", ".out.bin.notes.part", ".out.bin.part"]
+        {
+            std::fs::write(path(name), b"half").expect("writable");
+        }
+        std::fs::create_dir(path(".out.bin.folder.part")).expect("writable");
+        write(&path("out.bin"), b"whole").expect("writable");
+        let mut left = names(folder.path());
+        left.retain(|name| !alive.temporary.path().ends_with(name));
+        left.sort();
+        let kept = [".other.bin.abc123.part", ".out.bin.folder.part", ".out.bin.notes.part", ".out.bin.part"];
+        assert_eq!(left, [&kept[..], &["out.bin"]].concat());
+        assert!(alive.temporary.path().exists());
+        alive.commit().expect("the living one is still whole");
+        assert_eq!(std::fs::read(path("out.bin")).expect("readable"), b"");
+    }
+
+    #[test]
+    fn many_writers_of_one_file_do_not_disturb_each_other() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = folder.path().join("out.bin");
+        std::thread::scope(|scope| {
+            for writer in 0..8_u8 {
+                let target = &target;
+                scope.spawn(move || (0..50).for_each(|_| write(target, &[writer; 999]).expect("written")));
+            }
+        });
+        let bytes = std::fs::read(&target).expect("readable");
+        assert!(bytes.len() == 999 && bytes.iter().all(|b| *b == bytes[0]));
+        assert_eq!(names(folder.path()), ["out.bin"]);
     }
 
     #[test]

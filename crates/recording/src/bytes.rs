@@ -62,13 +62,17 @@ impl FileBytes {
             return Ok(FileBytes::Ranged(url::open(path)?));
         }
         let open = |source| RecordingError::Open { path: path.to_owned(), source };
-        let file = File::open(path).map_err(open)?;
-        let about = file.metadata().map_err(open)?;
         let refused = |why: &str| RecordingError::NotMcap { path: path.to_owned(), why: why.to_owned() };
+        // Looked at before it is opened: opening a pipe waits for whoever writes to it.
+        let about = std::fs::metadata(path).map_err(open)?;
         if about.is_dir() {
             return Err(refused("it is a folder; name the .mcap files in it"));
         }
-        if about.is_file() && about.len() == 0 {
+        if !about.is_file() {
+            return Err(refused("it is a pipe or a device; copy it into a file first"));
+        }
+        let file = File::open(path).map_err(open)?;
+        if file.metadata().map_err(open)?.len() == 0 {
             return Err(refused("the file is empty"));
         }
         match access {

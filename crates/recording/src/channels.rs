@@ -1,8 +1,8 @@
 //! Channel and schema definitions of one file.
 
 use crate::raw::{RawChannel, RawSchema};
-use crate::records::RawRecord;
-use mcap::records::{Channel, Record, op};
+use crate::records::{Cursor, RawRecord};
+use mcap::records::op;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -13,20 +13,29 @@ pub(crate) struct Definitions {
     channels: BTreeMap<u16, Channel>,
 }
 
+/// A channel that names its schema by id; 0 for none.
+#[derive(Debug, Clone)]
+struct Channel {
+    schema_id: u16,
+    topic: String,
+    message_encoding: String,
+    metadata: BTreeMap<String, String>,
+}
+
 impl Definitions {
     /// Takes a schema or channel record in; any other, and one that does not parse, is left alone.
     pub fn absorb(&mut self, record: &RawRecord<'_>) {
-        if !matches!(record.op, op::SCHEMA | op::CHANNEL) {
-            return;
-        }
-        match mcap::parse_record(record.op, record.body) {
-            Ok(Record::Schema { header, data }) if header.id != 0 => {
-                let schema =
-                    RawSchema { name: header.name, encoding: header.encoding, data: data.into_owned() };
-                self.schemas.entry(header.id).or_insert_with(|| Arc::new(schema));
+        let fields = Cursor::new(record.body);
+        match record.op {
+            op::SCHEMA => {
+                if let Some((id, schema)) = schema(fields).filter(|(id, _)| *id != 0) {
+                    self.schemas.entry(id).or_insert_with(|| Arc::new(schema));
+                }
             }
-            Ok(Record::Channel(channel)) => {
-                self.channels.entry(channel.id).or_insert(channel);
+            op::CHANNEL => {
+                if let Some((id, channel)) = channel(fields) {
+                    self.channels.entry(id).or_insert(channel);
+                }
             }
             _ => {}
         }
@@ -57,4 +66,17 @@ impl Definitions {
         };
         self.channels.iter().map(|(id, c)| (*id, Arc::new(with_schema(c)))).collect()
     }
+}
+
+fn schema(mut fields: Cursor<'_>) -> Option<(u16, RawSchema)> {
+    let id = fields.u16()?;
+    let (name, encoding) = (fields.string()?, fields.string()?);
+    Some((id, RawSchema { name, encoding, data: fields.bytes()?.to_vec() }))
+}
+
+fn channel(mut fields: Cursor<'_>) -> Option<(u16, Channel)> {
+    let (id, schema_id) = (fields.u16()?, fields.u16()?);
+    let (topic, message_encoding) = (fields.string()?, fields.string()?);
+    let metadata = fields.map(Cursor::string, Cursor::string)?;
+    Some((id, Channel { schema_id, topic, message_encoding, metadata }))
 }

@@ -1,5 +1,6 @@
 //! What can go wrong with a recording, in words that say what to do next.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Why a recording could not be opened, read or written.
@@ -194,11 +195,23 @@ fn list(names: &[String]) -> String {
     if names.is_empty() {
         return "none".to_owned();
     }
-    let mut text = names.iter().take(SHOWN).map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
+    let mut text =
+        names.iter().take(SHOWN).map(|n| format!("{:?}", shortened(n))).collect::<Vec<_>>().join(", ");
     if names.len() > SHOWN {
         text += &format!(" and {} more", names.len() - SHOWN);
     }
     text
+}
+
+/// Longest text from a recording that is shown or searched whole [characters]; names are far shorter.
+const LONGEST: usize = 200;
+
+/// A text from a recording as it is shown: cut, with its length, where it would fill screens.
+pub fn shortened(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(LONGEST) {
+        None => Cow::Borrowed(text),
+        Some((end, _)) => Cow::Owned(format!("{}... ({} bytes)", &text[..end], text.len())),
+    }
 }
 
 /// The candidate most like `wanted`, when one is like it at all.
@@ -206,6 +219,8 @@ pub(crate) fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a
     let lower = wanted.to_lowercase();
     candidates
         .into_iter()
+        // Likeness takes time and memory in proportion to both lengths.
+        .filter(|c| c.len() <= LONGEST)
         .map(|c| (likeness(&lower, &c.to_lowercase()), c))
         .filter(|(likeness, _)| *likeness > 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))

@@ -8,11 +8,11 @@ use crate::RecordingError;
 use crate::channels::Definitions;
 use crate::layout::{Block, Content, Layout, check_magic};
 use crate::ranges::Ranged;
-use crate::records::{Cursor, ENVELOPE, Records};
+use crate::records::{ChunkIndex, Cursor, ENVELOPE, RawRecord, Records, Statistics};
 use crate::report::Source;
 use crate::sweep::Tally;
 use bytes::Bytes;
-use mcap::records::{ChunkIndex, Record, Statistics, op};
+use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -96,16 +96,21 @@ impl Summary {
         for record in Records::new(bytes, 0, bytes.len()) {
             let record = record.map_err(|_| "a record of its summary is cut off")?;
             summary.definitions.absorb(&record);
-            match mcap::parse_record(record.op, record.body) {
-                Ok(Record::Statistics(statistics)) => summary.statistics = Some(statistics),
-                Ok(Record::ChunkIndex(chunk)) => summary.chunks.push(chunk),
-                Ok(Record::AttachmentIndex(a)) => summary.attachments.push((a.offset, a.length)),
-                Ok(Record::MetadataIndex(m)) => summary.metadata.push((m.offset, m.length)),
-                Ok(_) => {}
-                Err(_) => return Err("a record of its summary cannot be read"),
-            }
+            summary.absorb(&record).ok_or("a record of its summary cannot be read")?;
         }
         Ok(summary)
+    }
+
+    fn absorb(&mut self, record: &RawRecord<'_>) -> Option<()> {
+        let place = |mut fields: Cursor<'_>| Some((fields.u64()?, fields.u64()?));
+        match record.op {
+            op::STATISTICS => self.statistics = Some(Statistics::parse(record.body)?),
+            op::CHUNK_INDEX => self.chunks.push(ChunkIndex::parse(record.body)?),
+            op::ATTACHMENT_INDEX => self.attachments.push(place(Cursor::new(record.body))?),
+            op::METADATA_INDEX => self.metadata.push(place(Cursor::new(record.body))?),
+            _ => {}
+        }
+        Some(())
     }
 
     /// The layout of a data section that ends at `data_end`.
@@ -114,9 +119,8 @@ impl Summary {
         self.check(&statistics)?;
         let header = Records::new(head, mcap::MAGIC.len(), head.len()).next().and_then(Result::ok);
         let header = header.filter(|r| r.op == op::HEADER).ok_or("no header can be read at its start")?;
-        let Ok(Record::Header(words)) = mcap::parse_record(header.op, header.body) else {
-            return Err("its header cannot be read");
-        };
+        let mut words = Cursor::new(header.body);
+        let words = words.string().zip(words.string()).ok_or("its header cannot be read")?;
         let data = header.offset + ENVELOPE + header.body.len()..data_end;
         let blocks = self.blocks(&data)?;
         let bodies = |records: &[(u64, u64)]| -> Result<Vec<Range<usize>>, &'static str> {
@@ -126,13 +130,13 @@ impl Summary {
             records.iter().map(|r| body(r).ok_or(OUTSIDE)).collect()
         };
         Ok(Layout {
-            profile: words.profile,
-            library: words.library,
+            profile: words.0,
+            library: words.1,
             source: Some(Source::Index),
             blocks,
             attachments: bodies(&self.attachments)?,
             metadata: bodies(&self.metadata)?,
-            first_ns: self.chunks.iter().map(|c| c.message_start_time).filter(|ns| *ns > 0).min(),
+            first_ns: self.chunks.iter().map(|c| c.start_ns).filter(|ns| *ns > 0).min(),
             declared: declared(&statistics, &self.chunks),
             definitions: self.definitions,
             definitions_complete: true,
@@ -151,7 +155,7 @@ impl Summary {
         if counts.iter().any(|(declared, listed)| *declared as usize != *listed) {
             return Err("its summary lists other numbers of records than its statistics");
         }
-        let listed = self.chunks.iter().flat_map(|c| c.message_index_offsets.keys());
+        let listed = self.chunks.iter().flat_map(|c| c.message_indexes.keys());
         let mut used = listed.chain(statistics.channel_message_counts.keys());
         if used.any(|id| !self.definitions.contains(*id)) {
             return Err("its summary does not define all of its channels");
@@ -170,15 +174,15 @@ impl Summary {
             known.push((range(*offset, *length).ok_or(OUTSIDE)?, None));
         }
         for chunk in &self.chunks {
-            let record = range(chunk.chunk_start_offset, chunk.chunk_length)
+            let record = range(chunk.chunk_start, chunk.chunk_length)
                 .filter(|r| r.len() > ENVELOPE)
                 .ok_or(OUTSIDE)?;
             let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
-            let indexed = !chunk.message_index_offsets.is_empty();
+            let indexed = !chunk.message_indexes.is_empty();
             let block = Block {
                 offset: record.start,
                 content: Content::Chunk(record.start + ENVELOPE..record.end),
-                holds: indexed.then(|| chunk.message_index_offsets.keys().copied().collect()),
+                holds: indexed.then(|| chunk.message_indexes.keys().copied().collect()),
             };
             known.push((record.start..indexes.end, Some(block)));
         }
@@ -213,13 +217,13 @@ fn range(offset: u64, length: u64) -> Option<Range<usize>> {
 fn declared(statistics: &Statistics, chunks: &[ChunkIndex]) -> BTreeMap<u16, Tally> {
     let mut times: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
     for chunk in chunks {
-        for id in chunk.message_index_offsets.keys() {
+        for id in chunk.message_indexes.keys() {
             let (first, last) = times.entry(*id).or_insert((u64::MAX, 0));
-            *first = chunk.message_start_time.min(*first);
-            *last = chunk.message_end_time.max(*last);
+            *first = chunk.start_ns.min(*first);
+            *last = chunk.end_ns.max(*last);
         }
     }
-    let of_file = (statistics.message_start_time, statistics.message_end_time);
+    let of_file = (statistics.start_ns, statistics.end_ns);
     let tally = |(id, messages): (&u16, &u64)| {
         let (first_ns, last_ns) = times.get(id).copied().unwrap_or(of_file);
         (*id, Tally { messages: *messages, first_ns, last_ns })

@@ -6,10 +6,12 @@
 
 use crate::channels::Definitions;
 use crate::map::Map;
-use crate::records::{ChunkHeader, Cursor, ENVELOPE, Message, RawRecord, Records, Stop, is_content};
+use crate::records::{
+    ChunkHeader, ChunkIndex, Cursor, ENVELOPE, Message, RawRecord, Records, Statistics, Stop, is_content,
+};
 use crate::report::Source;
 use crate::sweep::Tally;
-use mcap::records::{ChunkIndex, Record, Statistics, op};
+use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -144,8 +146,9 @@ impl Layout {
     fn take(&mut self, record: &RawRecord<'_>) {
         match record.op {
             op::HEADER => {
-                if let Ok(Record::Header(header)) = mcap::parse_record(record.op, record.body) {
-                    (self.profile, self.library) = (header.profile, header.library);
+                let mut fields = Cursor::new(record.body);
+                if let (Some(profile), Some(library)) = (fields.string(), fields.string()) {
+                    (self.profile, self.library) = (profile, library);
                 }
             }
             op::CHUNK => {
@@ -235,12 +238,13 @@ impl Layout {
         }
         for record in summary {
             self.definitions.absorb(record);
-            match mcap::parse_record(record.op, record.body).ok() {
-                Some(Record::Statistics(statistics)) => self.statistics = Some(statistics),
-                Some(Record::ChunkIndex(index)) => self.indexed.push(index),
+            match record.op {
+                op::STATISTICS => self.statistics = Statistics::parse(record.body).or(self.statistics.take()),
+                op::CHUNK_INDEX => self.indexed.extend(ChunkIndex::parse(record.body)),
                 _ => {}
             }
         }
+        self.indexed.sort_by_key(|c| c.chunk_start);
     }
 
     fn check_end(&mut self, bytes: &[u8], end: usize) {
@@ -277,12 +281,11 @@ impl Layout {
     /// Finished but damaged at `at`: the chunk index knows where the next chunk is, from which the walk goes on.
     fn skip_damage(&mut self, bytes: &[u8], at: usize, footer: &RawRecord<'_>) -> Option<usize> {
         let start = Cursor::new(footer.body).u64().and_then(|s| usize::try_from(s).ok());
-        if let Some(start) = start.filter(|s| (at..footer.offset).contains(s)) {
+        if let Some(start) = start.filter(|s| !self.summary_used && (at..footer.offset).contains(s)) {
             let summary: Vec<_> = Records::new(bytes, start, footer.offset).flatten().collect();
             self.use_summary(bytes, start, footer, &summary);
         }
-        let chunks = self.indexed.iter().filter_map(|c| indexed_chunk(bytes, c));
-        let next = chunks.filter(|r| r.start >= at + ENVELOPE).min_by_key(|r| r.start);
+        let next = self.next_indexed(bytes, at);
         if let Some(chunk) = next.clone().filter(|r| r.start == at + ENVELOPE) {
             self.damaged(at, "the length of this chunk is wrong; the index has the right one", false);
             let end = chunk.end;
@@ -295,13 +298,25 @@ impl Layout {
         resume
     }
 
-    /// A record whose length is wrong can hide chunks from the walk; the index still has them.
+    /// The first chunk of the index that starts at `at` or later; its body.
+    fn next_indexed(&self, bytes: &[u8], at: usize) -> Option<Range<usize>> {
+        let from = self.indexed.partition_point(|c| c.chunk_start < at as u64);
+        self.indexed[from..].iter().find_map(|c| indexed_chunk(bytes, c))
+    }
+
+    /// A record whose length is wrong can hide chunks from the walk; the index still has them. Chunks that overlap are
+    /// a lie that would have the same bytes inflated again and again: the first of them counts.
     fn add_unvisited(&mut self, bytes: &[u8]) {
         let known: BTreeSet<usize> = self.blocks.iter().map(|b| b.offset).collect();
         let chunks = self.indexed.iter().filter_map(|c| indexed_chunk(bytes, c));
-        let hidden: BTreeMap<usize, Range<usize>> =
-            chunks.map(|r| (r.start - ENVELOPE, r)).filter(|(offset, _)| !known.contains(offset)).collect();
-        for (offset, range) in hidden {
+        let hidden: Vec<Range<usize>> = chunks.filter(|r| !known.contains(&(r.start - ENVELOPE))).collect();
+        let mut free_from = 0;
+        for range in hidden {
+            let offset = range.start - ENVELOPE;
+            if offset < free_from {
+                continue;
+            }
+            free_from = range.end;
             self.damaged(offset, "a chunk hidden by a record of wrong length; the index leads to it", false);
             self.blocks.push(Block::of(offset, Content::Chunk(range)));
         }
@@ -357,7 +372,7 @@ impl Layout {
     fn judge_definitions(&mut self) {
         let chunked = self.chunks() > 0;
         let mut used: BTreeSet<u16> =
-            self.indexed.iter().flat_map(|c| c.message_index_offsets.keys().copied()).collect();
+            self.indexed.iter().flat_map(|c| c.message_indexes.keys().copied()).collect();
         used.extend(self.statistics.iter().flat_map(|s| s.channel_message_counts.keys().copied()));
         let known = !used.is_empty() && used.iter().all(|id| self.definitions.contains(*id));
         let empty = self.statistics.as_ref().is_some_and(|s| s.message_count == 0);
@@ -382,7 +397,7 @@ fn body(record: &RawRecord<'_>) -> Range<usize> {
 
 /// The body of an indexed chunk, if the file really has a chunk there.
 fn indexed_chunk(bytes: &[u8], index: &ChunkIndex) -> Option<Range<usize>> {
-    let offset = usize::try_from(index.chunk_start_offset).ok()?;
+    let offset = usize::try_from(index.chunk_start).ok()?;
     let end = offset.checked_add(usize::try_from(index.chunk_length).ok()?)?;
     let sound = end <= bytes.len() && offset + ENVELOPE < end && bytes.get(offset) == Some(&op::CHUNK);
     sound.then_some(offset + ENVELOPE..end)

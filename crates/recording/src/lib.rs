@@ -45,7 +45,7 @@ mod sweep;
 mod url;
 
 pub use bytes::{Access, identity_of};
-pub use error::RecordingError;
+pub use error::{RecordingError, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawSchema, RawVisitor};

@@ -3,7 +3,7 @@
 use crate::bytes::{Access, FileBytes};
 use crate::index::{self, Found};
 use crate::layout::{Damage, Layout};
-use crate::raw::{Attachment, RawChannel, parse_metadata};
+use crate::raw::{Attachment, RawChannel, RawSchema, parse_metadata};
 use crate::records::ENVELOPE;
 use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep};
 use crate::{
@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+/// Places of damage told one by one; of more, only how many there are: a file can hold millions.
+const DAMAGE_TOLD: usize = 50;
 
 /// An opened recording, which may consist of several split files.
 pub struct Recording {
@@ -167,6 +170,8 @@ impl Recording {
                 }
             }
         }
+        // Thousands of channels may share one schema, which is compiled once.
+        let mut known: BTreeMap<Compiled, Result<String, String>> = BTreeMap::new();
         let report = |(key, (tally, channel)): (Key, (Option<Tally>, Arc<RawChannel>))| {
             let tally = tally.unwrap_or(Tally { messages: 0, first_ns: 0, last_ns: 0 });
             ChannelReport {
@@ -177,7 +182,7 @@ impl Recording {
                 messages: tally.messages,
                 first_ns: ns(tally.first_ns),
                 last_ns: ns(tally.last_ns),
-                decodable: readable_as(&channel),
+                decodable: known.entry(compiled(&channel)).or_insert_with(|| readable_as(&channel)).clone(),
             }
         };
         merged.into_iter().map(report).collect()
@@ -261,7 +266,7 @@ impl RecordingFile {
         all.extend(self.miscounted(survey));
         all.extend(self.bad_extras());
         all.sort_by_key(|d| d.offset);
-        all
+        summarised(all)
     }
 
     /// Statistics that disagree with what was found; of a file read in parts, on the channels that were read.
@@ -331,9 +336,26 @@ impl RecordingFile {
     }
 }
 
+/// The first places of damage, and how many more there are.
+fn summarised(mut all: Vec<Damage>) -> Vec<Damage> {
+    let more = all.split_off(DAMAGE_TOLD.min(all.len()));
+    if let Some(first) = more.first() {
+        let why = format!("{} more places of damage from here on", more.len());
+        all.push(Damage { offset: first.offset, why, lost: more.iter().any(|d| d.lost) });
+    }
+    all
+}
+
 /// Log times are unsigned in MCAP; beyond the year 2262 they saturate.
 pub(crate) fn ns(unsigned: u64) -> i64 {
     i64::try_from(unsigned).unwrap_or(i64::MAX)
+}
+
+/// What decides how messages are read: a schema in memory, and the message encoding.
+type Compiled = (Option<*const RawSchema>, String);
+
+fn compiled(channel: &RawChannel) -> Compiled {
+    (channel.schema.as_ref().map(Arc::as_ptr), channel.message_encoding.clone())
 }
 
 fn readable_as(channel: &RawChannel) -> Result<String, String> {

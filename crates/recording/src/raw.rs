@@ -4,7 +4,7 @@ use crate::open::RecordingFile;
 use crate::records::{Cursor, Message};
 use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records};
 use crate::{Recording, RecordingError};
-use mcap::records::{Metadata, Record, op};
+use mcap::records::op;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -69,11 +69,7 @@ impl<'a> Attachment<'a> {
     pub(crate) fn parse(body: &'a [u8]) -> Option<Attachment<'a>> {
         let mut c = Cursor::new(body);
         let (log_ns, create_ns) = (c.u64()?, c.u64()?);
-        let mut text = || {
-            let length = c.u32()?;
-            std::str::from_utf8(c.take(u64::from(length))?).ok()
-        };
-        let (name, media_type) = (text()?, text()?);
+        let (name, media_type) = (c.text()?, c.text()?);
         let length = c.u64()?;
         let data = c.take(length)?;
         let covered = body.len() - c.rest().len();
@@ -185,8 +181,6 @@ impl Recording {
 
 /// Name and entries of a metadata record; `None` when it is malformed.
 pub(crate) fn parse_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
-    match mcap::parse_record(op::METADATA, body) {
-        Ok(Record::Metadata(Metadata { name, metadata })) => Some((name, metadata)),
-        _ => None,
-    }
+    let mut fields = Cursor::new(body);
+    Some((fields.string()?, fields.map(Cursor::string, Cursor::string)?))
 }

@@ -1,8 +1,11 @@
 //! Record envelopes of the MCAP format (<https://mcap.dev/spec>): opcode, length, body.
 //!
-//! Every length is checked against the bytes that are there before anything is sliced or allocated.
+//! Every length is checked against the bytes that are there before anything is sliced or allocated. That is why records
+//! are parsed here and not by `mcap::parse_record`, which reserves what a string's length claims, up to 4 GiB, before it
+//! looks whether the record holds that much.
 
 use mcap::records::op;
+use std::collections::BTreeMap;
 
 /// Bytes of opcode and length before the body of a record.
 pub(crate) const ENVELOPE: usize = 9;
@@ -97,10 +100,34 @@ impl<'a> Cursor<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    pub fn string(&mut self) -> Option<String> {
+    /// Bytes with their length before them.
+    pub fn bytes(&mut self) -> Option<&'a [u8]> {
         let length = self.u32()?;
-        let bytes = self.take(u64::from(length))?;
-        String::from_utf8(bytes.to_vec()).ok()
+        self.take(u64::from(length))
+    }
+
+    pub fn text(&mut self) -> Option<&'a str> {
+        std::str::from_utf8(self.bytes()?).ok()
+    }
+
+    pub fn string(&mut self) -> Option<String> {
+        self.text().map(str::to_owned)
+    }
+
+    /// A map as MCAP writes one, its size in bytes first; `None` where a key comes twice.
+    pub fn map<K: Ord, V>(
+        &mut self,
+        key: impl Fn(&mut Cursor<'a>) -> Option<K>,
+        value: impl Fn(&mut Cursor<'a>) -> Option<V>,
+    ) -> Option<BTreeMap<K, V>> {
+        let mut entries = Cursor::new(self.bytes()?);
+        let mut map = BTreeMap::new();
+        while !entries.rest.is_empty() {
+            if map.insert(key(&mut entries)?, value(&mut entries)?).is_some() {
+                return None;
+            }
+        }
+        Some(map)
     }
 }
 
@@ -157,4 +184,60 @@ impl ChunkHeader {
 /// Whether the opcode defines or carries a message, in a chunk or outside.
 pub(crate) fn is_content(opcode: u8) -> bool {
     matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
+}
+
+/// The fields of a chunk index record that lead to the chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ChunkIndex {
+    pub start_ns: u64,
+    pub end_ns: u64,
+    pub chunk_start: u64,
+    pub chunk_length: u64,
+    /// Channels with messages in the chunk, with the offset of their message index.
+    pub message_indexes: BTreeMap<u16, u64>,
+    /// Length of the message indexes, which follow the chunk.
+    pub message_index_length: u64,
+}
+
+impl ChunkIndex {
+    pub fn parse(body: &[u8]) -> Option<ChunkIndex> {
+        let mut c = Cursor::new(body);
+        Some(ChunkIndex {
+            start_ns: c.u64()?,
+            end_ns: c.u64()?,
+            chunk_start: c.u64()?,
+            chunk_length: c.u64()?,
+            message_indexes: c.map(Cursor::u16, Cursor::u64)?,
+            message_index_length: c.u64()?,
+        })
+    }
+}
+
+/// The fields of a statistics record that say how much there should be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Statistics {
+    pub message_count: u64,
+    pub attachment_count: u32,
+    pub metadata_count: u32,
+    pub chunk_count: u32,
+    pub start_ns: u64,
+    pub end_ns: u64,
+    pub channel_message_counts: BTreeMap<u16, u64>,
+}
+
+impl Statistics {
+    pub fn parse(body: &[u8]) -> Option<Statistics> {
+        let mut c = Cursor::new(body);
+        let message_count = c.u64()?;
+        let (_schemas, _channels) = (c.u16()?, c.u32()?);
+        Some(Statistics {
+            message_count,
+            attachment_count: c.u32()?,
+            metadata_count: c.u32()?,
+            chunk_count: c.u32()?,
+            start_ns: c.u64()?,
+            end_ns: c.u64()?,
+            channel_message_counts: c.map(Cursor::u16, Cursor::u64)?,
+        })
+    }
 }

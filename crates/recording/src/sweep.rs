@@ -213,6 +213,7 @@ fn survey(
 ) -> FileSurvey {
     let mut survey = FileSurvey::default();
     survey.damage.extend(damage);
+    let mut short = 0_u64;
     for record in records(bytes) {
         if !file.layout.definitions_complete {
             survey.definitions.absorb(&record);
@@ -225,12 +226,13 @@ fn survey(
                 survey.count(&message);
                 each(&message);
             }
-            None => survey.damage.push(Damage {
-                offset: file.layout.blocks[at.block].offset,
-                why: "a message shorter than its header is dropped".to_owned(),
-                lost: true,
-            }),
+            None => short += 1,
         }
+    }
+    if short > 0 {
+        let offset = file.layout.blocks[at.block].offset;
+        let why = format!("messages shorter than their header are dropped ({short} here)");
+        survey.damage.push(Damage { offset, why, lost: true });
     }
     survey
 }

@@ -12,6 +12,8 @@ use std::path::Path;
 
 /// Cavities closer together than this are taken for a slip in the file [m].
 const COINCIDENT_M: f64 = 1e-3;
+/// Cavities are compared with each other, so that more than this would take hours and gigabytes.
+const MOST_CAVITIES: usize = 5_000;
 /// A coordinate beyond this is taken for metres or micrometres written where millimetres belong [mm].
 const LARGEST_MM: f64 = 10_000.0;
 
@@ -98,6 +100,10 @@ impl BoardFile {
         }
         if self.cavities.is_empty() {
             return Err(invalid("it has no cavities; add [[cavities]] with name and xyz_mm".into()));
+        }
+        if self.cavities.len() > MOST_CAVITIES {
+            let n = self.cavities.len();
+            return Err(invalid(format!("it has {n} cavities; at most {MOST_CAVITIES} can be told apart")));
         }
         if let Some(c) = self.cavities.iter().find(|c| c.name.trim().is_empty()) {
             return Err(invalid(format!("the cavity at xyz_mm = {:?} has an empty name", c.xyz_mm)));
@@ -227,6 +233,10 @@ mod tests {
             format!("name = \"b\"\n[[cavities]]\nname = \"a\"\nxyz_mm = {a}\n[[cavities]]\nname = {b}")
         };
         assert!(message("name = \"b\"").contains("no cavities"));
+        let many = |n| (0..n).map(|i| format!("\n[[cavities]]\nname = \"{i}\"\nxyz_mm = [{}, 0, 0]", 2 * i));
+        assert!(
+            message(&format!("name = \"b\"{}", many(5001).collect::<String>())).contains("5001 cavities")
+        );
         assert!(message(&two("[0, 0, nan]", "\"b\"\nxyz_mm = [9, 0, 0]")).contains("cavity `a`"));
         assert!(message(&two("[0, 0, inf]", "\"b\"\nxyz_mm = [9, 0, 0]")).contains("cavity `a`"));
         assert!(message(&two("[0, 0, 0]", "\"a\"\nxyz_mm = [9, 0, 0]")).contains("both named `a`"));

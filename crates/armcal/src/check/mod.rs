@@ -13,7 +13,7 @@ pub mod markdown;
 mod measured;
 mod numbers;
 mod reasons;
-mod reference;
+pub mod reference;
 pub mod section;
 mod shifts;
 pub mod text;

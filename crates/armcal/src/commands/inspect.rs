@@ -4,7 +4,7 @@ use super::{Outcome, print};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use armcal_core::Severity;
-use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport};
+use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::{RULED, printable};
 use comfy_table::Table;
 use std::fmt::Write as _;
@@ -73,7 +73,7 @@ fn text(name: &str, report: &RecordingReport) -> String {
         }
     }
     for warning in &report.warnings {
-        let _ = writeln!(out, "  warning: {warning}");
+        let _ = writeln!(out, "  warning: {}", printable(&warning.to_string()));
     }
     out.push('\n');
     out
@@ -89,8 +89,8 @@ fn file_line(file: &FileReport) -> String {
         file.path.display(),
         file.bytes as f64 / 1e6,
         file.chunks,
-        file.profile,
-        file.library,
+        shortened(&file.profile),
+        shortened(&file.library),
         identity(file),
     );
     if let Some(fetched) = file.fetched {
@@ -100,7 +100,7 @@ fn file_line(file: &FileReport) -> String {
         let _ = write!(line, ", cut off at byte {byte}");
     }
     for (offset, reason) in &file.damaged {
-        let _ = write!(line, "\n    damaged at byte {offset}: {reason}");
+        let _ = write!(line, "\n    damaged at byte {offset}: {}", printable(reason));
     }
     line
 }
@@ -122,14 +122,14 @@ fn channels(channels: &[ChannelReport]) -> Table {
         let duration_s = (c.last_ns - c.first_ns) as f64 * 1e-9;
         let rate_hz = if duration_s > 0.0 { (c.messages.saturating_sub(1)) as f64 / duration_s } else { 0.0 };
         table.add_row([
-            printable(&c.topic),
-            printable(&c.schema),
-            format!("{}/{}", c.schema_encoding, c.message_encoding),
+            printable(&shortened(&c.topic)),
+            printable(&shortened(&c.schema)),
+            printable(&shortened(&format!("{}/{}", c.schema_encoding, c.message_encoding))),
             c.messages.to_string(),
             format!("{rate_hz:.1}"),
             format!("{:.2}", (c.first_ns - start_ns) as f64 * 1e-9),
             format!("{duration_s:.2}"),
-            c.decodable.clone().unwrap_or_else(|why| format!("no: {why}")),
+            c.decodable.clone().unwrap_or_else(|why| format!("no: {}", printable(&shortened(&why)))),
         ]);
     }
     table
@@ -153,7 +153,7 @@ fn streams(streams: &[StreamReport]) -> Table {
     for s in streams {
         table.add_row([
             s.role.clone(),
-            printable(&s.topic),
+            printable(&shortened(&s.topic)),
             format!("{}/{}", s.rows, s.messages),
             format!("{:.1}", s.rate_hz),
             format!("{:.3}", s.largest_gap_s),

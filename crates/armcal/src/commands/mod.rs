@@ -23,6 +23,7 @@ use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
 use crate::error::Error;
 use armcal_report::TerminalStyle;
+use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
 
 /// How a command ended when it did not fail.
@@ -103,7 +104,36 @@ fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
 /// Prints a result; a reader that closed the pipe is not an error.
 fn print(text: &str) {
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+    let _ = stdout.write_all(harmless(text).as_bytes()).and_then(|()| stdout.flush());
+}
+
+/// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and our
+/// own colours stay; the others become `\u001b`, which also leaves JSON what it is.
+pub fn harmless(text: &str) -> Cow<'_, str> {
+    // Overrides of the writing direction would let a name rewrite the rest of its line.
+    let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_harmless = |c: char| matches!(c, '\n' | '\t') || !c.is_control() && !turns(c);
+    if text.chars().all(is_harmless) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let taken = colour_code(rest).unwrap_or(&rest[..c.len_utf8()]);
+        match is_harmless(c) || taken.len() > 1 && c == '\u{1b}' {
+            true => shown.push_str(taken),
+            false => shown.push_str(&format!("\\u{:04x}", u32::from(c))),
+        }
+        rest = &rest[taken.len()..];
+    }
+    Cow::Owned(shown)
+}
+
+/// The colour code a text begins with: `ESC [ numbers m`.
+fn colour_code(text: &str) -> Option<&str> {
+    let numbers = text.strip_prefix("\u{1b}[")?;
+    let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
+    numbers[end..].starts_with('m').then(|| &text[..end + "\u{1b}[m".len()])
 }
 
 /// Colours on a terminal, unless the user asked for none.
@@ -115,4 +145,30 @@ fn style() -> TerminalStyle {
 /// A value as indented JSON, ending in a newline.
 fn json_text(value: &impl serde::Serialize) -> Result<String, Error> {
     serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(Error::Json)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::harmless;
+
+    #[test]
+    fn only_colours_and_lines_reach_the_terminal_as_they_are() {
+        let ours = "\u{1b}[1mtitle\u{1b}[0m\n\tcell \u{1b}[38;5;11mü\u{1b}[39m";
+        assert_eq!(harmless(ours), ours);
+        // Title, clipboard, screen, cursor, a C1 introducer, backspaces, carriage return.
+        for (evil, shown) in [
+            ("\u{1b}]0;pwned\u{7}", "\\u001b]0;pwned\\u0007"),
+            ("\u{1b}[2J\u{1b}[H", "\\u001b[2J\\u001b[H"),
+            ("\u{9b}31mx", "\\u009b31mx"),
+            ("ab\u{8}\u{7f}\r", "ab\\u0008\\u007f\\u000d"),
+            ("\u{1b}", "\\u001b"),
+            ("a\u{202e}b", "a\\u202eb"),
+            ("\u{1b}[31", "\\u001b[31"),
+        ] {
+            assert_eq!(harmless(evil), shown);
+        }
+        let json = serde_json::json!({ "name": "a\u{9b}b\u{7f}" });
+        let printed = serde_json::from_str::<serde_json::Value>(&harmless(&json.to_string()));
+        assert_eq!(printed.ok(), Some(json));
+    }
 }

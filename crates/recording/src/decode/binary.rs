@@ -189,6 +189,10 @@ impl Compiler<'_> {
     /// Appends a step, in its place those of the message it stands for, if there is one of it and it is flattened;
     /// joins numbers of the same size that are skipped one after another.
     fn append(&self, steps: &mut Vec<Step>, step: Step) {
+        // ROS 1 knows messages without bytes. A schema of a few lines can nest billions of them, so they take no step.
+        if self.encoding == Encoding::Ros1 && self.min_bytes(&step) == 0 {
+            return;
+        }
         match step.what {
             What::Read(program) if self.flatten && step.repeat == Repeat::Once => {
                 self.append_all(steps, program);

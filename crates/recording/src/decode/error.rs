@@ -1,14 +1,17 @@
 //! Why a channel or a message cannot be decoded.
 
 use super::Role;
+use crate::shortened;
 
 /// Why a channel or a message cannot be decoded. The caller adds file and topic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// Nobody here reads this pair of encodings.
     #[error(
-        "cannot read message encoding `{message}` with schema encoding `{schema}`; supported are cdr with ros2msg, \
-         ros1 with ros1msg, protobuf with protobuf, json with jsonschema: record or convert the channel as one of these"
+        "cannot read message encoding `{}` with schema encoding `{}`; supported are cdr with ros2msg, ros1 with ros1msg, \
+         protobuf with protobuf, json with jsonschema: record or convert the channel as one of these",
+        shortened(message),
+        shortened(schema)
     )]
     Encoding {
         /// Schema encoding of the channel.
@@ -17,7 +20,7 @@ pub enum DecodeError {
         message: String,
     },
     /// The schema text of the channel is unusable.
-    #[error("the schema of {schema} in the file cannot be used: {why}")]
+    #[error("the schema of {} in the file cannot be used: {}", shortened(schema), shortened(why))]
     Schema {
         /// Name of the schema.
         schema: String,
@@ -25,7 +28,11 @@ pub enum DecodeError {
         why: String,
     },
     /// The schema is sound, but holds nothing armcal reads in any role.
-    #[error("{schema} holds no joints, pose or scalar that armcal knows (its fields: {fields})")]
+    #[error(
+        "{} holds no joints, pose or scalar that armcal knows (its fields: {})",
+        shortened(schema),
+        shortened(fields)
+    )]
     Unknown {
         /// Name of the schema.
         schema: String,
@@ -33,7 +40,7 @@ pub enum DecodeError {
         fields: String,
     },
     /// The schema is read in another role than the one asked for.
-    #[error("{schema} holds {found}, not {wanted}: choose another topic for the {wanted}")]
+    #[error("{} holds {found}, not {wanted}: choose another topic for the {wanted}", shortened(schema))]
     OtherRole {
         /// Name of the schema.
         schema: String,
@@ -43,7 +50,10 @@ pub enum DecodeError {
         found: Role,
     },
     /// A body was asked for on a channel whose messages do not name bodies.
-    #[error("{schema} does not name the body it tracks: remove `body = \"{body}\"` from this stream")]
+    #[error(
+        "{} does not name the body it tracks: remove `body = \"{body}\"` from this stream",
+        shortened(schema)
+    )]
     NoBodyName {
         /// Name of the schema.
         schema: String,
@@ -51,7 +61,7 @@ pub enum DecodeError {
         body: String,
     },
     /// Several bodies in a channel, and none or an ambiguous one asked for.
-    #[error("several bodies on this channel, set `body` to one of: {}", .bodies.join(", "))]
+    #[error("several bodies on this channel, set `body` to one of: {}", listed(bodies))]
     SeveralBodies {
         /// The bodies, in the order of the message.
         bodies: Vec<String>,
@@ -106,4 +116,14 @@ pub enum DecodeError {
         /// Role of the rows.
         rows: Role,
     },
+}
+
+/// At most twenty names.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    let shown = names.iter().take(SHOWN).map(|n| shortened(n)).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
 }

@@ -157,6 +157,8 @@ fn split_repeat(type_text: &str) -> Result<(&str, Repeat), String> {
         return Ok((base, Repeat::Sequence));
     }
     match inside.parse() {
+        // rosidl refuses it too; in a message without bytes, loops over it would cost nothing and never end.
+        Ok(0) => Err(format!("`{type_text}`: a fixed list has at least one element")),
         Ok(count) => Ok((base, Repeat::Fixed(count))),
         Err(_) => Err(format!("`{type_text}`: `{inside}` is not a number of elements")),
     }

@@ -3,6 +3,7 @@
 use super::sink::{Sink, Stamp};
 use super::slot::Slot;
 use super::{DecodeError, PoseRows};
+use std::collections::BTreeSet;
 use std::io::Write as _;
 
 /// Stands for the frame of the message until it is known.
@@ -18,8 +19,10 @@ pub(super) struct PoseSink<'r, 'm> {
     in_item: bool,
     message: Gathered<'m>,
     item: Gathered<'m>,
-    /// All bodies that came through the filter, once there are several.
-    several: Vec<String>,
+    /// All bodies that came through the filter, by number, in the order of the message, once there are several.
+    several: Vec<u32>,
+    /// The same, to look up.
+    known: BTreeSet<u32>,
     missing: Option<&'static str>,
 }
 
@@ -50,6 +53,7 @@ impl<'r, 'm> PoseSink<'r, 'm> {
             message: Gathered::default(),
             item: Gathered::default(),
             several: Vec::new(),
+            known: BTreeSet::new(),
             missing: None,
         }
     }
@@ -63,7 +67,8 @@ impl<'r, 'm> PoseSink<'r, 'm> {
         let checked = decoded.and_then(|()| match self.missing {
             Some(field) => Err(DecodeError::Missing { field: field.to_owned() }),
             None if !self.several.is_empty() => {
-                Err(DecodeError::SeveralBodies { bodies: std::mem::take(&mut self.several) })
+                let name = |body: &u32| self.rows.bodies.text(*body).to_owned();
+                Err(DecodeError::SeveralBodies { bodies: self.several.iter().map(name).collect() })
             }
             None => Ok(()),
         });
@@ -86,9 +91,8 @@ impl<'r, 'm> PoseSink<'r, 'm> {
         let Some(body) = self.wanted_body(gathered) else { return };
         if self.rows.len() > self.start && self.rows.body_of_row[self.start] != body {
             for body in [self.rows.body_of_row[self.start], body] {
-                let name = self.rows.bodies.text(body);
-                if !self.several.iter().any(|known| known == name) {
-                    self.several.push(name.to_owned());
+                if self.known.insert(body) {
+                    self.several.push(body);
                 }
             }
             return;

@@ -13,6 +13,11 @@ use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorSet};
 use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// Full names of messages may take this many bytes for each of their schema. Each repeats the names around it, so that
+/// one long name around many messages would take the square of what the file holds.
+const NAME_BYTES_A_BYTE: usize = 16;
 
 /// The descriptors of a schema, in the order of its [`Types`].
 #[derive(Debug)]
@@ -33,7 +38,7 @@ impl Schema {
     /// Reads the `FileDescriptorSet` of a channel whose messages are of type `schema`.
     pub(super) fn read(schema: &str, data: &[u8]) -> Result<Schema, String> {
         let set = FileDescriptorSet::decode(data).map_err(|e| format!("not a FileDescriptorSet: {e}"))?;
-        let all = by_name(set);
+        let all = by_name(set, NAME_BYTES_A_BYTE.saturating_mul(data.len()))?;
         let root = format!(".{}", schema.trim_start_matches('.'));
         if !all.contains_key(&root) {
             return Err(format!("its FileDescriptorSet does not define {schema}"));
@@ -92,23 +97,30 @@ impl Schema {
     }
 }
 
-/// All message types of a descriptor set by full name, `.package.Outer.Inner`.
-fn by_name(set: FileDescriptorSet) -> BTreeMap<String, Descriptor> {
+/// All message types of a descriptor set by full name, `.package.Outer.Inner`; an error if the names take more than
+/// `most_bytes` together.
+fn by_name(set: FileDescriptorSet, most_bytes: usize) -> Result<BTreeMap<String, Descriptor>, String> {
     let mut all = BTreeMap::new();
+    let mut bytes = 0;
     for file in set.file {
         let implicit_presence = file.syntax() == "proto3";
         let scope = if file.package().is_empty() { String::new() } else { format!(".{}", file.package()) };
-        let mut open: Vec<(String, DescriptorProto)> =
+        let scope: Rc<str> = scope.into();
+        let mut open: Vec<(Rc<str>, DescriptorProto)> =
             file.message_type.into_iter().map(|message| (scope.clone(), message)).collect();
         while let Some((scope, mut message)) = open.pop() {
             let name = format!("{scope}.{}", message.name());
-            open.extend(
-                std::mem::take(&mut message.nested_type).into_iter().map(|inner| (name.clone(), inner)),
-            );
+            bytes += name.len();
+            if bytes > most_bytes {
+                return Err("the names of its nested messages are out of all proportion".to_owned());
+            }
+            let inside: Rc<str> = name.as_str().into();
+            let nested = std::mem::take(&mut message.nested_type);
+            open.extend(nested.into_iter().map(|inner| (inside.clone(), inner)));
             all.insert(name, Descriptor { implicit_presence, message });
         }
     }
-    all
+    Ok(all)
 }
 
 fn is_list(field: &FieldDescriptorProto) -> bool {
