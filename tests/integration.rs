@@ -75,3 +75,10 @@ mod batch;
 
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
+
+/// Does a recording in a bucket give what it gives on disk, for a fraction of its bytes?
+#[cfg(feature = "s3")]
+mod object_storage;
+
+/// Does a thin recording hold the wanted channels untouched, and give the same numbers?
+mod extract;

@@ -16,7 +16,7 @@ pub(crate) const TAIL_BYTES: u64 = 256 << 10;
 /// Wanted ranges that are no further apart than this are read at once: a request costs more than these bytes.
 const GAP_BYTES: u64 = 256 << 10;
 /// Ranges are not joined beyond this, so that several requests can be under way.
-const JOINED_BYTES: u64 = 4 << 20;
+const JOINED_BYTES: u64 = 2 << 20;
 /// A file that is copied whole is read in rounds of [`PIECES`] pieces of this size.
 const PIECE_BYTES: u64 = 4 << 20;
 const PIECES: u64 = 8;

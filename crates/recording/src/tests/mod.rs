@@ -2,6 +2,7 @@
 
 mod conformance;
 mod damage;
+mod memory;
 mod mutation;
 mod output;
 mod ranges;
