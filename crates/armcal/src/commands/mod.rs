@@ -9,6 +9,7 @@ mod effects;
 mod export;
 mod inspect;
 mod plan;
+mod pool;
 mod run;
 mod score;
 mod simulate;
@@ -21,6 +22,7 @@ use crate::cli::{Cli, Command};
 use crate::error::Error;
 use armcal_report::TerminalStyle;
 use std::io::{IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
 
 /// How a command ended when it did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +57,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             let (dwells, margin_deg, json) = (*dwells, *margin, *json);
             plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
         }
+        Command::Pool { pipeline, results, out, json } => pool::run(pipeline, results, out, *json),
         Command::Run { pipeline, out, json } => run::run(pipeline, out, *json),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
@@ -84,6 +87,13 @@ fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
 fn print(text: &str) {
     let mut stdout = std::io::stdout().lock();
     let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+}
+
+/// Says which files were written where.
+fn print_written(out: &Path, written: &[PathBuf]) {
+    let names: Vec<String> =
+        written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
+    print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));
 }
 
 /// Colours on a terminal, unless the user asked for none.
