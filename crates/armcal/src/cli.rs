@@ -88,6 +88,20 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// One calibration of many recordings: pools what earlier runs observed, each recording with parameters of its own.
+    Pool {
+        /// Pipeline file: model, frames, effects, fit, hold-out, [pool].
+        pipeline: PathBuf,
+        /// Folders with results of `armcal run`, searched for observations.json in all their folders.
+        #[arg(required = true)]
+        results: Vec<PathBuf>,
+        /// Folder for the results; created if missing.
+        #[arg(long, default_value = "pool")]
+        out: PathBuf,
+        /// Print pool.json instead of the table.
+        #[arg(long)]
+        json: bool,
+    },
     /// The catalogue of physical effects: meaning, equation, signature, confusions, source.
     Effects {
         /// One of them.

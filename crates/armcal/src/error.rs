@@ -147,6 +147,37 @@ pub enum Error {
     /// Reading back the result of an earlier run.
     #[error(transparent)]
     PastRun(#[from] armcal_report::PastRunError),
+    /// A folder without results to pool.
+    #[error(
+        "{} holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones again",
+        folder.display()
+    )]
+    NoResults {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A result that does not belong into the pool.
+    #[error("{} cannot be pooled: {problem}", result.display())]
+    Unpoolable {
+        /// Its observations.
+        result: PathBuf,
+        /// How it contradicts the pipeline.
+        problem: String,
+    },
+    /// A recording in two results.
+    #[error(
+        "{file} would count twice: the same file is in {} and in {}; name only one of these results",
+        first.display(),
+        second.display()
+    )]
+    PooledTwice {
+        /// Path of the recording's file.
+        file: String,
+        /// One result.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
     /// The result lacks a parameter of the arm.
     #[error(
         "{} has no parameter {parameter}: its arm is not the one of this pipeline; name the [model] it was calibrated with",

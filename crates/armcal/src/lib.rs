@@ -12,6 +12,7 @@ pub mod compensate;
 pub mod error;
 pub mod pipeline;
 pub mod plan;
+pub mod pool;
 pub mod progress;
 pub mod score;
 pub mod stages;

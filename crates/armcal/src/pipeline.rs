@@ -6,6 +6,7 @@
 use crate::check::CheckSection;
 use crate::closed_chain::ClosedPipeline;
 use crate::error::Error;
+use crate::pool::PoolSection;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
@@ -56,6 +57,9 @@ pub struct Pipeline {
     /// What the fit must not see.
     #[serde(default)]
     pub holdout: HoldoutConfig,
+    /// What each recording has for itself when many are pooled.
+    #[serde(default)]
+    pub pool: PoolSection,
     /// How the missing effect is looked for.
     #[serde(default)]
     pub diagnosis: DiagnosisConfig,
@@ -243,7 +247,7 @@ pub struct ParameterOverride {
 }
 
 /// Which dwells become observations.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObservationsSection {
     /// Dwells in a cavity.
@@ -381,6 +385,7 @@ impl Pipeline {
         if self.table.is_none() && self.streams.tip.is_none() {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
         }
+        self.pool.check(path)?;
         match (&self.model.dh, &self.model.urdf) {
             (Some(_), None) | (None, Some(_)) => Ok(()),
             _ => fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into()),

@@ -12,16 +12,17 @@
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
 use crate::fit::{Near, fit_near};
-use crate::frames::{self, is_of};
+use crate::frames;
 use crate::holdout::{self, Holdout};
 use crate::model_problem::{ModelProblem, describe, position_covariance_m2};
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
-use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
+use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, Scene, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Calibrates `model` on `observations` and judges it on those held out.
 pub fn calibrate(
@@ -30,13 +31,23 @@ pub fn calibrate(
     config: &FitConfig,
     holdout: &HoldoutConfig,
 ) -> Result<Calibration, CalibrateError> {
+    calibrate_scene(model.into(), observations, config, holdout)
+}
+
+/// The same for a model or a pool.
+pub(crate) fn calibrate_scene(
+    scene: Scene<'_>,
+    observations: &[Observation],
+    config: &FitConfig,
+    holdout: &HoldoutConfig,
+) -> Result<Calibration, CalibrateError> {
     config.check()?;
     if observations.is_empty() {
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
-    let frame_names = frames::frame_names(model);
+    let frame_names = frames::frame_names(scene.model());
     let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
-    judged(&Judge { model, observations, config }, &holdout, config)
+    judged(&Judge { scene, observations, config }, &holdout, config)
 }
 
 /// Observations that can be fitted without some of them, and the error of each.
@@ -57,7 +68,7 @@ pub(crate) fn judged(
 ) -> Result<Calibration, CalibrateError> {
     if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
         let turn = judge.turn(held, None)?;
-        return pool(judge, holdout, std::slice::from_ref(&turn), turn.clone());
+        return gathered(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
     let last = judge.turn(&[], None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
@@ -66,7 +77,7 @@ pub(crate) fn judged(
     let turns: Vec<Result<Turn, CalibrateError>> =
         holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
-    pool(judge, holdout, &turns, last)
+    gathered(judge, holdout, &turns, last)
 }
 
 /// A fit outside a held-out set, completed by the frames that only the held-out set shows.
@@ -75,6 +86,8 @@ pub(crate) struct Turn {
     pub fit: Fit,
     /// Parameters that give the nominal errors.
     pub nominal_values: Vec<f64>,
+    /// Parameters of the fit.
+    pub values: Vec<f64>,
     /// Index into the fit's weights of every observation it saw.
     weight_of: Vec<Option<usize>>,
     pub warnings: Vec<Warning>,
@@ -86,7 +99,7 @@ impl Turn {
         let mut seen = 0..;
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let weight_of = (0..observations).map(|i| if is_held(i) { None } else { seen.next() }).collect();
-        Turn { fit, nominal_values, weight_of, warnings: Vec::new() }
+        Turn { values: fit.values(), fit, nominal_values, weight_of, warnings: Vec::new() }
     }
 
     /// Robust weight of an observation in the fit; 1 where it did not take part.
@@ -96,7 +109,7 @@ impl Turn {
 }
 
 /// Residuals and errors of all turns and the last fit.
-fn pool(
+fn gathered(
     judge: &dyn Judged,
     holdout: &Holdout,
     turns: &[Turn],
@@ -141,7 +154,7 @@ fn pool(
 }
 
 struct Judge<'a> {
-    model: &'a Model,
+    scene: Scene<'a>,
     observations: &'a [Observation],
     config: &'a FitConfig,
 }
@@ -155,12 +168,13 @@ impl Judged for Judge<'_> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
             let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
-            ModelProblem::new(self.model, chosen.map(|(_, o)| o), self.config)
+            ModelProblem::new(self.scene, chosen.map(|(_, o)| o), self.config)
         };
         let (train, test) = (side(false)?, side(true)?);
         let unseen = self.frames_only_in(&test, &train);
-        let of_unseen = |p: &Parameter| unseen.iter().any(|frame| is_of(p, frame));
-        let mut nominal_values = frames::fit_on(&train, self.model, self.config)?;
+        let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
+        let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
+        let mut nominal_values = frames::fit_on(&train, self.config)?;
         let free = |p: &Parameter| p.free && !of_unseen(p);
         let mut fit = match near.map(|fit| self.near(fit, &nominal_values, &of_unseen)) {
             Some(near) => fit_near(&train, &near, &free, self.config)?,
@@ -168,8 +182,8 @@ impl Judged for Judge<'_> {
         };
         let mut warnings = Vec::new();
         if !unseen.is_empty() {
-            nominal_values = frames::fit_some(&test, self.model, nominal_values, self.config, &of_unseen)?;
-            let start = frames::fit_some(&test, self.model, fit.values(), self.config, &of_unseen)?;
+            nominal_values = frames::fit_some(&test, nominal_values, self.config, &of_unseen)?;
+            let start = frames::fit_some(&test, fit.values(), self.config, &of_unseen)?;
             let frozen = fit_problem(&test, &start, &|p| p.free && of_unseen(p), self.config)?;
             adopt(&mut fit, &frozen, &of_unseen);
             warnings.push(fitted_on_held_out(&unseen));
@@ -179,9 +193,9 @@ impl Judged for Judge<'_> {
 
     fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
         let o = &self.observations[i];
-        let values = turn.fit.values();
-        let covariance = position_covariance_m2(self.model, &values, o);
-        let fitted_m = self.model.residual(&values, o).position_m;
+        let (model, values) = self.scene.seen(o, &turn.values);
+        let covariance = position_covariance_m2(model, &values, o);
+        let fitted_m = model.residual(&values, o).position_m;
         let whitened = covariance
             .cholesky()
             .and_then(|c| c.l().solve_lower_triangular(&fitted_m))
@@ -189,7 +203,7 @@ impl Judged for Judge<'_> {
         Ok(Residual {
             dwell: o.dwell,
             held_out,
-            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
+            nominal_m: model.residual(&self.scene.seen(o, &turn.nominal_values).1, o).position_m,
             fitted_m,
             whitened,
             weight: if held_out { 1.0 } else { turn.weight(i) },
@@ -206,16 +220,16 @@ impl Judge<'_> {
         Near { values, sigma_scale: fit.sigma_scale }
     }
 
-    /// Estimated frames that `test` says something about and `train` does not.
+    /// Estimated frames (and what else a recording of a pool has for itself, unless it was measured) that `test` says
+    /// something about and `train` does not.
     fn frames_only_in(&self, test: &ModelProblem<'_>, train: &ModelProblem<'_>) -> Vec<String> {
-        let known = frames::touched_frames(self.model, train.observations());
-        let estimated = |frame: &String| {
-            let free = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && is_of(p, frame);
-            self.model.parameters().iter().any(free)
-        };
-        frames::touched_frames(self.model, test.observations())
+        let known: BTreeSet<String> =
+            frames::touched_frames(self.scene, train.observations()).into_iter().collect();
+        let unknown = self.scene.parameters().iter().filter(|p| p.free && p.role != Role::KnownFrame);
+        let unknown: BTreeSet<&str> = unknown.map(frames::frame_of).collect();
+        frames::touched_frames(self.scene, test.observations())
             .into_iter()
-            .filter(|frame| !known.contains(frame) && estimated(frame))
+            .filter(|frame| !known.contains(frame) && unknown.contains(frame.as_str()))
             .collect()
     }
 }
@@ -226,10 +240,8 @@ fn adopt(fit: &mut Fit, frozen: &Fit, of_unseen: &dyn Fn(&Parameter) -> bool) {
         (0..fit.estimates.len()).filter(|&k| of_unseen(&fit.estimates[k].parameter)).collect();
     for &row in &taken {
         fit.estimates[row] = frozen.estimates[row].clone();
-        for &column in &taken {
-            fit.covariance[(row, column)] = frozen.covariance[(row, column)];
-        }
     }
+    fit.covariance.adopt(&frozen.covariance);
 }
 
 fn fitted_on_held_out(unseen: &[String]) -> Warning {

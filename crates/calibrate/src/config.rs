@@ -133,6 +133,11 @@ pub enum HoldoutConfig {
     },
     /// Each recording in turn; the residuals of all turns are pooled.
     EachRecording,
+    /// `k` groups of recordings, dealt out in their order, each group held out in turn.
+    RecordingFolds {
+        /// 2 or more.
+        k: usize,
+    },
     /// `k` groups of cavities, dealt out by hash, each held out in turn; a tracked dwell is dealt on its own.
     CavityFolds {
         /// 2 or more.

@@ -28,7 +28,7 @@ pub fn whitened_problem<'a>(
     config: &FitConfig,
 ) -> Result<WhitenedProblem<'a>, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
-    let start = frames::fit_on(&problem, model, config)?;
+    let start = frames::fit_on(&problem, config)?;
     let mut config = config.clone();
     if config.objective == Objective::Paper {
         config.objective = Objective::LeastSquares;

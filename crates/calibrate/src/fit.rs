@@ -1,5 +1,6 @@
 //! One fit: from start values to estimates with intervals.
 
+use crate::covariance::Covariance;
 use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
 use crate::problem::Problem;
@@ -10,7 +11,7 @@ use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, undetermined};
 use armcal_core::{Observation, Parameter, Role};
 use armcal_model::Model;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// A step of this many standard deviations of the estimate ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-5;
@@ -31,7 +32,7 @@ const PAPER_HUBER_C: f64 = 0.25;
 /// Fits all free parameters of a model: frames that nobody knew first (closed form, then alone), then everything.
 pub fn fit(model: &Model, observations: &[Observation], config: &FitConfig) -> Result<Fit, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
-    let start = frames::fit_on(&problem, model, config)?;
+    let start = frames::fit_on(&problem, config)?;
     fit_problem(&problem, &start, &|p| p.free, config)
 }
 
@@ -75,11 +76,11 @@ fn fit_from(
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
     let solved = solve(&white, sigma_scale, config)?;
-    let (residual, jacobian) = white.linearised(&solved.x)?;
+    let (residual, squares) = white.squares(&solved.x)?;
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
-    let uncertainty = statistics::uncertainty(&cost, &residual, &jacobian, &name)?;
-    let fitted = statistics::fitted_directions(&uncertainty.covariance, &white.axes);
+    let uncertainty = statistics::uncertainty(&cost, &residual, &squares, &name)?;
+    let fitted = statistics::fitted_directions(&uncertainty.variances, &white.axes);
     let weights = match solved.paper {
         Some(_) => vec![1.0; white.blocks()],
         None => cost.weights(&residual),
@@ -87,12 +88,12 @@ fn fit_from(
     let mut fit = Fit {
         objective: in_words(config).to_string(),
         estimates: estimates(&white, &solved.x, &uncertainty),
-        covariance: full_covariance(&white, &uncertainty),
+        covariance: full_covariance(&white, &uncertainty.covariance),
         weights,
         sigma_scale: proposal2_scale(&cost, &residual, fitted),
         rank: uncertainty.rank,
         undetermined: undetermined::directions(
-            &uncertainty,
+            &uncertainty.undetermined,
             &white.axes,
             problem.parameters(),
             &problem.symmetries(&white.parameters_at(&solved.x)),
@@ -239,7 +240,7 @@ fn estimates(white: &Whitened<'_>, x: &DVector<f64>, uncertainty: &Uncertainty) 
         .collect();
     for (k, axis) in white.axes.iter().enumerate() {
         let e = &mut estimates[axis.index];
-        e.sigma = axis.scale * uncertainty.covariance[(k, k)].sqrt();
+        e.sigma = axis.scale * uncertainty.variances[k].sqrt();
         let half = uncertainty.t95 * e.sigma;
         e.ci95 = [(e.value - half).max(e.parameter.lower), (e.value + half).min(e.parameter.upper)];
         e.determined = uncertainty.determined[k];
@@ -248,21 +249,17 @@ fn estimates(white: &Whitened<'_>, x: &DVector<f64>, uncertainty: &Uncertainty) 
     estimates
 }
 
-fn full_covariance(white: &Whitened<'_>, uncertainty: &Uncertainty) -> DMatrix<f64> {
-    let n = white.problem.parameters().len();
-    let mut covariance = DMatrix::zeros(n, n);
-    for (i, a) in white.axes.iter().enumerate() {
-        for (j, b) in white.axes.iter().enumerate() {
-            covariance[(a.index, b.index)] = a.scale * b.scale * uncertainty.covariance[(i, j)];
-        }
-    }
-    covariance
+/// From units of x to SI, over all parameters.
+fn full_covariance(white: &Whitened<'_>, in_x: &Covariance) -> Covariance {
+    let to = |axis: usize| (white.axes[axis].index, white.axes[axis].scale);
+    in_x.rescaled(white.problem.parameters().len(), &to)
 }
 
 impl solver::Solution {
     /// Directions fitted by the data, from the curvature of the last step.
     fn fitted_directions(&self, white: &Whitened<'_>) -> f64 {
-        let covariance = self.hessian.clone().cholesky().map(|c| c.inverse());
-        covariance.map_or(white.axes.len() as f64, |c| statistics::fitted_directions(&c, &white.axes))
+        let covariance = self.hessian.inverse(1.0, &DVector::zeros(white.axes.len()));
+        let of = |c: Covariance| statistics::fitted_directions(&c.variances(), &white.axes);
+        covariance.map_or(white.axes.len() as f64, of)
     }
 }

@@ -9,10 +9,11 @@ use crate::model_problem::ModelProblem;
 use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
-use crate::{CalibrateError, FitConfig, Objective, fit};
+use crate::{CalibrateError, FitConfig, Objective, Scene, fit};
 use armcal_core::{Observation, Parameter, Pose, Reference, Role};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rounds of the alternation, and the change [m, rad] below which it ends.
 const ROUNDS: usize = 200;
@@ -28,7 +29,7 @@ pub fn align_frames(
     config: &FitConfig,
 ) -> Result<Vec<f64>, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
-    Ok(Alignment::new(model, &problem, config).run(model.nominal(), &|_| true))
+    Ok(aligned(&problem, config, model.nominal(), &|_| true))
 }
 
 /// The parameter vector with only [`Role::EstimatedFrame`] parameters fitted: what the arm would do with nominal
@@ -38,7 +39,7 @@ pub fn fit_frames(
     observations: &[Observation],
     config: &FitConfig,
 ) -> Result<Vec<f64>, CalibrateError> {
-    fit_on(&ModelProblem::new(model, observations, config)?, model, config)
+    fit_on(&ModelProblem::new(model, observations, config)?, config)
 }
 
 /// The same from given values of all parameters, for those frames `which` accepts; the arm stays as `start` has it.
@@ -50,34 +51,33 @@ pub fn fit_frames_from(
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Result<Vec<f64>, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
-    let touched = touched_frames(model, problem.observations());
-    fit_some(&problem, model, start, config, &|p| which(p) && touched.iter().any(|t| is_of(p, t)))
+    let touched = touched(&problem);
+    fit_some(&problem, start, config, &|p| which(p) && touched.contains(frame_of(p)))
 }
 
 /// [`fit_frames`] on observations already checked.
-pub(crate) fn fit_on(
-    problem: &ModelProblem<'_>,
-    model: &Model,
-    config: &FitConfig,
-) -> Result<Vec<f64>, CalibrateError> {
-    let touched = touched_frames(model, problem.observations());
-    fit_some(problem, model, model.nominal(), config, &|p| touched.iter().any(|t| is_of(p, t)))
+pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<Vec<f64>, CalibrateError> {
+    let touched = touched(problem);
+    fit_some(problem, problem.scene().nominal(), config, &|p| touched.contains(frame_of(p)))
+}
+
+fn touched(problem: &ModelProblem<'_>) -> BTreeSet<String> {
+    touched_frames(problem.scene(), problem.observations()).into_iter().collect()
 }
 
 /// Fits only the estimated-frame parameters `which` accepts, the others at `start`.
 pub(crate) fn fit_some(
     problem: &ModelProblem<'_>,
-    model: &Model,
     start: Vec<f64>,
     config: &FitConfig,
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Result<Vec<f64>, CalibrateError> {
     config.check()?;
     let free = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && which(p);
-    if problem.blocks() == 0 || !model.parameters().iter().any(free) {
+    if problem.blocks() == 0 || !problem.parameters().iter().any(free) {
         return Ok(start);
     }
-    let start = Alignment::new(model, problem, config).run(start, &|p| free(p));
+    let start = aligned(problem, config, start, &free);
     let white = Whitened::new(Box::new(problem), &start, &free, config)?;
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
@@ -85,15 +85,41 @@ pub(crate) fn fit_some(
     Ok(white.parameters_at(&solved.x))
 }
 
-/// Names of the frames the observations say something about: the base, the tip, and the boards with seated dwells.
-pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Vec<String> {
-    let names = frame_names(model);
-    let mut touched: Vec<String> = names.iter().take(2).cloned().collect();
-    for (recording, name) in names.iter().skip(2).enumerate() {
-        if observations.iter().any(|o| o.cavity().is_some() && o.dwell.recording == recording) {
-            touched.push(name.clone());
-        }
+/// The alternation on all observations; what a recording of a pool has for itself then on its own ones.
+fn aligned(
+    problem: &ModelProblem<'_>,
+    config: &FitConfig,
+    start: Vec<f64>,
+    which: &dyn Fn(&Parameter) -> bool,
+) -> Vec<f64> {
+    let scene = problem.scene();
+    let all = Alignment::new(scene.model(), problem.observations(), config);
+    let Scene::Pooled(pool) = scene else { return all.run(start, which) };
+    let mut p = start;
+    let of_model = all.run(p[..scene.model().parameters().len()].to_vec(), which);
+    p[..of_model.len()].copy_from_slice(&of_model);
+    for run in problem.observations().chunk_by(|a, b| a.dwell.recording == b.dwell.recording) {
+        let Some(view) = run.first().and_then(|o| pool.views().get(o.dwell.recording)) else { continue };
+        let own = view.model.parameters().iter().zip(&view.index);
+        let own = own.filter(|(_, global)| pool.is_copy(**global) && which(&pool.parameters()[**global]));
+        let own: BTreeSet<&str> = own.map(|(local, _)| local.name.as_str()).collect();
+        let local: Vec<f64> = view.index.iter().map(|&index| p[index]).collect();
+        let placed = Alignment::new(&view.model, run, config).run(local, &|p| own.contains(p.name.as_str()));
+        view.index.iter().zip(placed).for_each(|(&index, value)| p[index] = value);
     }
+    p
+}
+
+/// Names of the frames the observations say something about: the base, the tip, and the boards with seated dwells;
+/// then what else the observed recordings of a pool have for themselves.
+pub(crate) fn touched_frames(scene: Scene<'_>, observations: &[&Observation]) -> Vec<String> {
+    let names = frame_names(scene.model());
+    let mut touched: Vec<String> = names.iter().take(2).cloned().collect();
+    let seated: BTreeSet<usize> =
+        observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
+    let boards = names.iter().skip(2).enumerate();
+    touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
+    touched.extend(scene.own_parts(observations));
     touched
 }
 
@@ -109,12 +135,8 @@ pub(crate) fn frame_names(model: &Model) -> Vec<String> {
     names
 }
 
-/// Whether a parameter places the frame of this name.
-pub(crate) fn is_of(parameter: &Parameter, frame: &str) -> bool {
-    frame_of(parameter) == frame
-}
-
-fn frame_of(parameter: &Parameter) -> &str {
+/// The part of the rig a parameter belongs to, such as the frame it places.
+pub(crate) fn frame_of(parameter: &Parameter) -> &str {
     parameter.name.rsplit_once('.').map_or(parameter.name.as_str(), |(frame, _)| frame)
 }
 
@@ -158,8 +180,7 @@ struct Alignment<'a> {
 }
 
 impl<'a> Alignment<'a> {
-    fn new(model: &'a Model, problem: &'a ModelProblem<'a>, config: &FitConfig) -> Alignment<'a> {
-        let observations = problem.observations();
+    fn new(model: &'a Model, observations: &'a [&'a Observation], config: &FitConfig) -> Alignment<'a> {
         Alignment { model, observations, use_orientation: config.use_orientation, names: frame_names(model) }
     }
 
@@ -181,10 +202,17 @@ impl<'a> Alignment<'a> {
             return p;
         }
         let links = self.last_links_in_base(&p);
+        let mut seated: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (at, o) in self.observations.iter().enumerate().filter(|(_, o)| o.cavity().is_some()) {
+            seated.entry(o.dwell.recording).or_default().push(at);
+        }
         for _ in 0..ROUNDS {
             let before = p.clone();
             self.place_base(&mut p, &base, &boards, &links);
-            boards.iter().for_each(|(recording, board)| self.place_board(&mut p, *recording, board, &links));
+            for (recording, board) in &boards {
+                let own = seated.get(recording).map_or(&[][..], Vec::as_slice);
+                self.place_board(&mut p, *recording, board, own, &links);
+            }
             self.place_tip(&mut p, &tip, &links);
             if p.iter().zip(&before).all(|(a, b)| (a - b).abs() < SETTLED) {
                 break;
@@ -206,9 +234,8 @@ impl<'a> Alignment<'a> {
             return;
         }
         let tip = self.model.tip_in_last_link(p);
-        let anchored = |o: &Observation| {
-            o.cavity().is_none() || boards.iter().all(|(recording, _)| *recording != o.dwell.recording)
-        };
+        let placed: BTreeSet<usize> = boards.iter().map(|(recording, _)| *recording).collect();
+        let anchored = |o: &Observation| o.cavity().is_none() || !placed.contains(&o.dwell.recording);
         let pairs: Vec<Pair> = self
             .observations
             .iter()
@@ -223,18 +250,16 @@ impl<'a> Alignment<'a> {
         base.put(p, &rigid_fit(&pairs, &current, base.rotation.is_some()));
     }
 
-    /// world_from_board of one recording from where the arm was while seated.
-    fn place_board(&self, p: &mut [f64], recording: usize, board: &Place, links: &[Pose]) {
+    /// world_from_board of one recording from where the arm was while seated in it.
+    fn place_board(&self, p: &mut [f64], recording: usize, board: &Place, seated: &[usize], links: &[Pose]) {
         let Some(current) = self.model.board_in_world(p, recording) else {
             return;
         };
         let (base, tip) = (self.model.base_in_world(p), self.model.tip_in_last_link(p));
         let mut pairs = Vec::new();
-        for (o, link) in self.observations.iter().zip(links) {
-            if let (Reference::Seated { in_board_m, .. }, true) =
-                (&o.reference, o.dwell.recording == recording)
-            {
-                pairs.push(Pair { from: *in_board_m, to: (base * link * tip).translation.vector });
+        for &at in seated {
+            if let Reference::Seated { in_board_m, .. } = &self.observations[at].reference {
+                pairs.push(Pair { from: *in_board_m, to: (base * links[at] * tip).translation.vector });
             }
         }
         board.put(p, &rigid_fit(&pairs, &current, board.rotation.is_some()));

@@ -37,12 +37,9 @@ pub(crate) fn resolve(
             once(chosen.flatten().copied().collect())
         }
         HoldoutConfig::Recordings { recordings } => once(by_recordings(recordings, observations, boards)?),
-        HoldoutConfig::EachRecording => {
-            let mut turns: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-            for (i, o) in observations.iter().enumerate() {
-                turns.entry(o.dwell.recording).or_default().push(i);
-            }
-            Holdout { turns: turns.into_values().collect(), in_turn: true }
+        HoldoutConfig::EachRecording => Holdout { turns: of_recordings(observations), in_turn: true },
+        HoldoutConfig::RecordingFolds { k } => {
+            Holdout { turns: recording_folds(*k, observations)?, in_turn: true }
         }
         HoldoutConfig::CavityFolds { k } => Holdout { turns: folds(*k, observations)?, in_turn: true },
         HoldoutConfig::Random { share, seed } => {
@@ -124,6 +121,28 @@ fn by_dwells(dwells: &[[usize; 2]], observations: &[Observation]) -> Result<BTre
         })?);
     }
     Ok(held)
+}
+
+/// Observations of each recording.
+fn of_recordings(observations: &[Observation]) -> Vec<Vec<usize>> {
+    let mut turns: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (i, o) in observations.iter().enumerate() {
+        turns.entry(o.dwell.recording).or_default().push(i);
+    }
+    turns.into_values().collect()
+}
+
+/// `k` groups of recordings, dealt out like cards, so that each group covers the whole time.
+fn recording_folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, CalibrateError> {
+    let recordings = of_recordings(observations);
+    if k < 2 || k > recordings.len() {
+        let why = format!("a number from 2 to {}, the number of recordings", recordings.len());
+        return Err(bad("holdout.k", k.to_string(), &why));
+    }
+    let mut turns = vec![Vec::new(); k];
+    recordings.into_iter().enumerate().for_each(|(r, own)| turns[r % k].extend(own));
+    turns.iter_mut().for_each(|turn| turn.sort_unstable());
+    Ok(turns)
 }
 
 /// `k` groups of cavities, dealt out like cards in natural order, so that each group covers the whole board.

@@ -13,11 +13,13 @@
 //! * covariance, intervals, rank, what the data cannot determine: `statistics`, `undetermined`, `words`;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
+//! * many recordings of one arm, each with parameters of its own: [`PooledModel`], [`calibrate_pooled`];
 //! * two arms whose tips are joined, each the other's reference: [`ClosedChain`], [`calibrate_closed_chain`].
 
 mod calibration;
 mod closed_chain;
 mod config;
+mod covariance;
 mod error;
 mod export;
 mod fit;
@@ -31,12 +33,15 @@ mod noise;
 mod outcome;
 mod paired;
 mod paper;
+mod pooled;
 pub mod problem;
 mod products;
 mod rigid_fit;
 mod robust;
+mod scene;
 mod solver;
 mod statistics;
+mod structure;
 mod undetermined;
 mod whitened;
 mod words;
@@ -51,6 +56,7 @@ pub use closed_chain::{
     calibrate_closed_chain, closed_chain_nominal,
 };
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
+pub use covariance::Covariance;
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
@@ -60,4 +66,6 @@ pub use model_problem::{ModelProblem, position_covariance_m2};
 pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
+pub use pooled::{PooledModel, PooledRecording, calibrate_pooled};
 pub use products::inner;
+pub use scene::Scene;

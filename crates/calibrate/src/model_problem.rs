@@ -4,8 +4,8 @@
 //! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading. Cross-covariance between
 //! position and orientation enters through the encoders only.
 
-use crate::problem::Problem;
-use crate::{CalibrateError, FitConfig};
+use crate::problem::{Known, Problem};
+use crate::{CalibrateError, FitConfig, Scene};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::Model;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
@@ -23,9 +23,9 @@ pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matr
     o.covariance_m2 + &jacobian * jacobian.transpose()
 }
 
-/// A model and the observations it should explain.
+/// A model (or a pool of them) and the observations it should explain.
 pub struct ModelProblem<'a> {
-    model: &'a Model,
+    scene: Scene<'a>,
     observations: Vec<&'a Observation>,
     use_orientation: bool,
 }
@@ -34,16 +34,16 @@ impl<'a> ModelProblem<'a> {
     /// Checks that every observation is complete and finite. Orientation rows are used where
     /// `config.use_orientation` is set and the observation has them with a standard error above zero.
     pub fn new(
-        model: &'a Model,
+        scene: impl Into<Scene<'a>>,
         observations: impl IntoIterator<Item = &'a Observation>,
         config: &FitConfig,
     ) -> Result<ModelProblem<'a>, CalibrateError> {
-        let observations: Vec<&Observation> = observations.into_iter().collect();
+        let (scene, observations) = (scene.into(), observations.into_iter().collect::<Vec<&Observation>>());
         for o in &observations {
-            model.check(std::slice::from_ref(*o))?;
+            scene.check(o)?;
             check_complete(o)?;
         }
-        Ok(ModelProblem { model, observations, use_orientation: config.use_orientation })
+        Ok(ModelProblem { scene, observations, use_orientation: config.use_orientation })
     }
 
     /// The observations, in the order of the blocks.
@@ -51,9 +51,14 @@ impl<'a> ModelProblem<'a> {
         &self.observations
     }
 
+    pub(crate) fn scene(&self) -> Scene<'a> {
+        self.scene
+    }
+
     /// Covariance of measured minus predicted position of a block at parameters `p` [m^2].
     pub fn position_covariance_m2(&self, block: usize, p: &[f64]) -> Matrix3<f64> {
-        position_covariance_m2(self.model, p, self.observations[block])
+        let (model, p) = self.scene.seen(self.observations[block], p);
+        position_covariance_m2(model, &p, self.observations[block])
     }
 
     fn rows(&self, block: usize) -> usize {
@@ -69,13 +74,14 @@ impl<'a> ModelProblem<'a> {
 
     /// d orientation of the tip in world axes / d joint reading, by central differences.
     fn turning_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
-        let base = self.model.base_in_world(p).rotation;
+        let (model, p) = self.scene.seen(o, p);
+        let base = model.base_in_world(&p).rotation;
         let mut jacobian = Matrix3xX::zeros(o.joint_rad.len());
         for joint in 0..o.joint_rad.len() {
             let at = |step: f64| {
                 let mut q = o.joint_rad.clone();
                 q[joint] += step;
-                base * self.model.tip_in_base(p, &q).rotation
+                base * model.tip_in_base(&p, &q).rotation
             };
             let turn = (at(JOINT_STEP_RAD) * at(-JOINT_STEP_RAD).inverse()).scaled_axis();
             jacobian.set_column(joint, &(turn / (2.0 * JOINT_STEP_RAD)));
@@ -86,7 +92,7 @@ impl<'a> ModelProblem<'a> {
 
 impl Problem for ModelProblem<'_> {
     fn parameters(&self) -> &[Parameter] {
-        self.model.parameters()
+        self.scene.parameters()
     }
 
     fn blocks(&self) -> usize {
@@ -102,12 +108,14 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        let residual = self.model.residual(p, self.observations[block]);
+        let (model, p) = self.scene.seen(self.observations[block], p);
+        let residual = model.residual(&p, self.observations[block]);
         DVector::from_iterator(self.rows(block), residual.rows().take(self.rows(block)))
     }
 
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
-        let (residual, jacobian) = self.model.residual_with_jacobian(p, self.observations[block]);
+        let (model, p) = self.scene.seen(self.observations[block], p);
+        let (residual, jacobian) = model.residual_with_jacobian(&p, self.observations[block]);
         let rows = self.rows(block);
         let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
         (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
@@ -122,7 +130,8 @@ impl Problem for ModelProblem<'_> {
             return covariance;
         };
         let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
-        spread.rows_mut(0, 3).copy_from(&self.model.joint_jacobian(p, o));
+        let (model, own) = self.scene.seen(o, p);
+        spread.rows_mut(0, 3).copy_from(&model.joint_jacobian(&own, o));
         covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
         if rows == 6 {
             spread.rows_mut(3, 3).copy_from(&self.turning_jacobian(p, o));
@@ -132,6 +141,10 @@ impl Problem for ModelProblem<'_> {
             column *= *sigma;
         }
         covariance + &spread * spread.transpose()
+    }
+
+    fn known(&self) -> Vec<Known> {
+        self.scene.known(&self.observations)
     }
 }
 

@@ -1,7 +1,8 @@
 //! What a calibration returns.
 
+use crate::covariance::Covariance;
 use armcal_core::{DwellId, ErrorStats, Parameter, Warning};
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 
 /// One parameter after the fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +58,7 @@ pub struct Fit {
     /// All parameters, free and fixed, in the model's order.
     pub estimates: Vec<Estimate>,
     /// Posterior covariance of all parameters (fixed rows zero), model order, SI.
-    pub covariance: DMatrix<f64>,
+    pub covariance: Covariance,
     /// Robust weight of each observation, 1 = fully trusted.
     pub weights: Vec<f64>,
     /// Square root of the reduced chi-square: 1 when the declared noise is right.

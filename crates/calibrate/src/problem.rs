@@ -3,6 +3,7 @@
 
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// A motion of the parameters that no observation of a problem can ever see.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,10 +14,19 @@ pub struct Symmetry {
     pub text: String,
 }
 
+/// Neighbouring blocks that know the same parameters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Known {
+    /// The blocks.
+    pub blocks: Range<usize>,
+    /// The parameters, one for each column of [`Problem::linearised`], by their indices.
+    pub parameters: Vec<usize>,
+}
+
 /// A weighted nonlinear least-squares problem in blocks.
 ///
 /// Row order within a block: three position rows [m], then, where used, three orientation rows [rad].
-pub trait Problem {
+pub trait Problem: Sync {
     /// All parameters, fixed ones included, in the order of every parameter vector.
     fn parameters(&self) -> &[Parameter];
     /// Number of observations.
@@ -29,10 +39,16 @@ pub trait Problem {
     }
     /// Measured minus predicted at parameters `p`.
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64>;
-    /// The same with its derivative, one column per parameter (fixed ones may be zero).
+    /// The same with its derivative, one column for each parameter that the block knows ([`Problem::known`]);
+    /// fixed ones may be zero.
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>);
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
+    /// Which blocks know which parameters, in the order of the blocks; all of them know all where nothing is said. What
+    /// only one group knows is solved for within it, so that work and memory grow with the number of groups.
+    fn known(&self) -> Vec<Known> {
+        Vec::new()
+    }
     /// What the problem is known to leave open at parameters `p`. One that the data do see after all (because a parameter
     /// in it is fixed) is dropped when what is undetermined is put into words.
     fn symmetries(&self, _p: &[f64]) -> Vec<Symmetry> {
@@ -67,6 +83,10 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         (**self).covariance(block, p)
+    }
+
+    fn known(&self) -> Vec<Known> {
+        (**self).known()
     }
 
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {

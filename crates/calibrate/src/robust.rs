@@ -5,7 +5,7 @@
 
 use crate::loss::{Loss, chi_median};
 use crate::products::inner;
-use crate::solver::{Cost, Quadratic};
+use crate::solver::{Arrow, Cost, Curvature, Quadratic, triangle};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::robust::median;
@@ -60,29 +60,33 @@ impl Cost for RobustCost<'_, '_> {
     /// Gauss-Newton in the model, exact in the loss: for an outlier `w (I - u u')` instead of `w I`, because Huber's
     /// loss has no curvature along the residual (Triggs et al. 2000, section 4.3, with rho'' from the table).
     fn model(&self, x: &DVector<f64>) -> Result<Quadratic, CalibrateError> {
-        let (residual, mut jacobian) = self.white.linearised(x)?;
-        let n = self.white.axes.len();
-        let precision = DVector::from_iterator(n, self.white.axes.iter().map(|a| a.precision));
-        let mut weighted = residual.clone();
-        let mut removed = DMatrix::zeros(self.white.blocks(), n);
-        for (j, u) in self.norms(&residual).into_iter().enumerate() {
-            let (at, rows, weight) = (self.white.offsets[j], self.white.dimension(j), self.loss(j).weight(u));
-            let scaled = weight.sqrt() / self.sigma_scale;
-            jacobian.rows_mut(at, rows).scale_mut(scaled);
-            weighted.rows_mut(at, rows).scale_mut(scaled);
-            if weight < 1.0 && self.exact_curvature {
-                let along = residual.rows(at, rows).normalize();
-                removed.row_mut(j).copy_from(&(along.transpose() * jacobian.rows(at, rows)));
+        let (p, structure) = (self.white.parameters_at(x), &self.white.structure);
+        let precision =
+            DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.precision));
+        let parts = self.white.of_groups(|group| self.part(&p, group))?;
+        let residual = self.white.stacked(parts.iter().map(|part| &part.residual));
+        let (mut gradient, mut damping) = (DVector::zeros(x.len()), DVector::zeros(x.len()));
+        for (group, part) in parts.iter().enumerate() {
+            for (k, axis) in structure.axes(group).enumerate() {
+                gradient[axis] += part.gradient[k];
+                damping[axis] += part.squares[k];
             }
         }
-        let gradient = jacobian.tr_mul(&weighted) + precision.component_mul(x);
-        let mut hessian = inner(&jacobian, &jacobian);
-        let damping = hessian.diagonal() + &precision;
-        hessian -= inner(&removed, &removed);
-        for k in 0..n {
-            hessian[(k, k)] += precision[k];
-        }
-        Ok(Quadratic { value: self.of_residual(x, &residual), gradient, hessian, damping })
+        gradient += precision.component_mul(x);
+        damping += &precision;
+        let value = self.of_residual(x, &residual);
+        let mut of_data: Vec<DMatrix<f64>> = parts.into_iter().map(|part| part.curvature).collect();
+        let hessian = match of_data.pop() {
+            Some(mut hessian) if structure.is_dense() => {
+                (0..x.len()).for_each(|k| hessian[(k, k)] += precision[k]);
+                Curvature::Dense(hessian)
+            }
+            last => {
+                of_data.extend(last);
+                Curvature::Arrow(Arrow::new(structure.clone(), of_data, precision))
+            }
+        };
+        Ok(Quadratic { value, gradient, hessian, damping })
     }
 
     fn lower(&self) -> DVector<f64> {
@@ -91,6 +95,57 @@ impl Cost for RobustCost<'_, '_> {
 
     fn upper(&self) -> DVector<f64> {
         DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.upper))
+    }
+}
+
+/// What the blocks of one group add to the model, over the group's columns.
+struct Part {
+    /// Whitened, not weighted.
+    residual: DVector<f64>,
+    gradient: DVector<f64>,
+    /// Diagonal of the curvature, without what outliers take from it.
+    squares: DVector<f64>,
+    /// The matrix itself where the structure is dense, otherwise the triangle that has it as its square.
+    curvature: DMatrix<f64>,
+}
+
+impl RobustCost<'_, '_> {
+    fn part(&self, p: &[f64], group: usize) -> Result<Part, CalibrateError> {
+        let (residual, mut jacobian) = self.white.linearised_group(p, group)?;
+        let blocks = self.white.structure.groups[group].blocks.clone();
+        let (first, count) = (self.white.offsets[blocks.start], blocks.len());
+        let mut weighted = residual.clone();
+        let mut removed = DMatrix::zeros(count, jacobian.ncols());
+        let mut along = vec![None; count];
+        for (k, j) in blocks.enumerate() {
+            let (at, rows) = (self.white.offsets[j] - first, self.white.dimension(j));
+            let own = residual.rows(at, rows);
+            let weight = self.loss(j).weight(own.norm() / self.sigma_scale);
+            let scaled = weight.sqrt() / self.sigma_scale;
+            jacobian.rows_mut(at, rows).scale_mut(scaled);
+            weighted.rows_mut(at, rows).scale_mut(scaled);
+            if weight < 1.0 && self.exact_curvature {
+                let direction = own.normalize();
+                removed.row_mut(k).copy_from(&(direction.transpose() * jacobian.rows(at, rows)));
+                along[k] = Some((at, direction));
+            }
+        }
+        let gradient = jacobian.tr_mul(&weighted);
+        if self.white.structure.is_dense() {
+            let squares = inner(&jacobian, &jacobian);
+            let curvature = &squares - inner(&removed, &removed);
+            return Ok(Part { residual, gradient, squares: squares.diagonal(), curvature });
+        }
+        let squares = DVector::from_iterator(
+            jacobian.ncols(),
+            jacobian.column_iter().map(|column| column.norm_squared()),
+        );
+        // The rows without what lies along the residual: I - u u' is its own square root.
+        for (k, (at, direction)) in along.iter().enumerate().filter_map(|(k, a)| Some((k, a.as_ref()?))) {
+            let mut rows = jacobian.rows_mut(*at, direction.len());
+            rows -= direction * removed.row(k);
+        }
+        Ok(Part { residual, gradient, squares, curvature: triangle(jacobian) })
     }
 }
 

@@ -19,8 +19,9 @@
 //! same: the zero of joint 1 is as wide as the yaw of a measured base leaves it.
 
 use crate::CalibrateError;
-use crate::products::inner;
+use crate::covariance::Covariance;
 use crate::robust::RobustCost;
+use crate::solver::{Arrow, Curvature};
 use crate::whitened::Axis;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -28,45 +29,60 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Posterior standard deviation, in units of the prior's, from which on the prior decides.
 const PRIOR_DECIDES: f64 = 0.25;
 
+/// More parameters than this are taken apart group by group.
+const MOST_DENSE: usize = 300;
+
 /// Uncertainty of the free parameters, in units of x.
 #[derive(Debug, Clone)]
 pub(crate) struct Uncertainty {
     /// Posterior covariance.
-    pub covariance: DMatrix<f64>,
-    /// Information of the data.
-    pub information: DMatrix<f64>,
+    pub covariance: Covariance,
+    /// Its diagonal.
+    pub variances: DVector<f64>,
     /// Half width of a 95 % interval in standard deviations.
     pub t95: f64,
     pub determined: Vec<bool>,
     /// Directions in which the data know more than the prior.
     pub rank: usize,
-    /// Orthonormal basis of the others, one column each.
-    pub undetermined: DMatrix<f64>,
+    /// The others.
+    pub undetermined: Vec<Weak>,
 }
 
-/// Uncertainty at a solution with whitened residual and Jacobian.
+/// Directions over some of the axes that the data do not determine.
+#[derive(Debug, Clone)]
+pub(crate) struct Weak {
+    pub axes: Vec<usize>,
+    /// Information of the data over these axes.
+    pub information: DMatrix<f64>,
+    /// Orthonormal, one column each.
+    pub basis: DMatrix<f64>,
+    /// Whether parameters of single recordings may move along.
+    pub followed: bool,
+}
+
+/// Uncertainty at a solution with this whitened residual; `squares` is J'J of the whitened Jacobian.
 pub(crate) fn uncertainty(
     cost: &RobustCost<'_, '_>,
     residual: &DVector<f64>,
-    jacobian: &DMatrix<f64>,
+    squares: &Curvature,
     name: &dyn Fn(usize) -> String,
 ) -> Result<Uncertainty, CalibrateError> {
     let axes = &cost.white.axes;
-    let gram = inner(jacobian, jacobian);
-    let declared = posterior(&gram, axes, cost.sigma_scale.powi(2).recip(), name)?;
-    let fitted = fitted_directions(&declared, axes);
+    let declared = posterior(squares, axes, cost.sigma_scale.powi(2).recip(), name)?;
+    let fitted = fitted_directions(&declared.variances(), axes);
     let freedom = (cost.white.rows() as f64 - fitted).max(1.0);
     let variance = residual_variance(cost, residual, freedom);
-    let covariance = posterior(&gram, axes, variance.recip(), name)?;
-    let determined = (0..axes.len()).map(|k| covariance[(k, k)].sqrt() < PRIOR_DECIDES).collect();
-    let information = gram / variance;
-    let (rank, undetermined) = split(&information);
-    Ok(Uncertainty { covariance, information, t95: t95(freedom), determined, rank, undetermined })
+    let covariance = posterior(squares, axes, variance.recip(), name)?;
+    let variances = covariance.variances();
+    let determined = variances.iter().map(|variance| variance.sqrt() < PRIOR_DECIDES).collect();
+    let undetermined = weak(squares, variance);
+    let rank = axes.len() - undetermined.iter().map(|weak| weak.basis.ncols()).sum::<usize>();
+    Ok(Uncertainty { covariance, variances, t95: t95(freedom), determined, rank, undetermined })
 }
 
 /// `p = tr(D C) = n - tr(P C)`.
-pub(crate) fn fitted_directions(covariance: &DMatrix<f64>, axes: &[Axis]) -> f64 {
-    let prior: f64 = axes.iter().enumerate().map(|(k, a)| a.precision * covariance[(k, k)]).sum();
+pub(crate) fn fitted_directions(variances: &DVector<f64>, axes: &[Axis]) -> f64 {
+    let prior: f64 = axes.iter().zip(variances.iter()).map(|(a, variance)| a.precision * variance).sum();
     axes.len() as f64 - prior
 }
 
@@ -86,22 +102,70 @@ fn residual_variance(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, freedom
     (cost.sigma_scale.powi(2) * psi_square / freedom / mean_curvature.powi(2)).max(1.0)
 }
 
-/// `(gram * data + P)^-1`.
+/// `(squares * data + P)^-1`.
 fn posterior(
-    gram: &DMatrix<f64>,
+    squares: &Curvature,
     axes: &[Axis],
     data: f64,
     name: &dyn Fn(usize) -> String,
-) -> Result<DMatrix<f64>, CalibrateError> {
-    let mut hessian = gram * data;
-    for (k, a) in axes.iter().enumerate() {
-        hessian[(k, k)] += a.precision;
-    }
-    let diagonal = hessian.diagonal();
-    hessian.cholesky().map(|c| c.inverse()).ok_or_else(|| CalibrateError::Singular {
+) -> Result<Covariance, CalibrateError> {
+    let precision = DVector::from_iterator(axes.len(), axes.iter().map(|a| a.precision));
+    squares.inverse(data, &precision).ok_or_else(|| CalibrateError::Singular {
         doing: "posterior covariance",
-        worst: name(axes[diagonal.imin()].index),
+        worst: name(axes[(squares.diagonal() * data + precision).imin()].index),
     })
+}
+
+/// The directions that the data do not determine.
+fn weak(squares: &Curvature, variance: f64) -> Vec<Weak> {
+    let information = match squares {
+        Curvature::Dense(gram) => gram / variance,
+        Curvature::Arrow(arrow) if arrow.structure().axis_count() <= MOST_DENSE => {
+            arrow.dense_squares() / variance
+        }
+        Curvature::Arrow(arrow) => return weak_by_group(arrow, variance),
+    };
+    let axes = (0..information.nrows()).collect();
+    let basis = split(&information).1;
+    vec![Weak { axes, information, basis, followed: false }]
+}
+
+/// The same where the matrix is too large to be taken apart as a whole: what single groups leave open of their own
+/// parameters, then what all leave open of the shared ones.
+///
+/// The count of eigenvalues of D up to 1 is that of D - 1 up to 0, and that is the sum of the counts of its diagonal
+/// blocks and of the Schur complement of these (Haynsworth 1968): the number of directions is that of the dense
+/// matrix. The directions themselves are those of the blocks, and over the shared parameters those that become weak once
+/// every group's own ones may follow.
+fn weak_by_group(arrow: &Arrow, variance: f64) -> Vec<Weak> {
+    let structure = arrow.structure();
+    let count = structure.shared.len();
+    let mut schur = -DMatrix::identity(count, count);
+    let mut found = Vec::new();
+    for (group, own_axes) in structure.groups.iter().map(|g| &g.own).enumerate() {
+        let [own, mixed, shared] = arrow.squares(group).map(|squares| squares / variance);
+        schur += shared;
+        if own_axes.is_empty() {
+            continue;
+        }
+        let eigen = own.clone().symmetric_eigen();
+        let turned = eigen.eigenvectors.tr_mul(&mixed);
+        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+            let above = value - 1.0;
+            let away = if above.abs() < f64::EPSILON { -f64::EPSILON } else { above };
+            schur -= turned.row(k).tr_mul(&turned.row(k)) / away;
+        }
+        let basis = split(&own).1;
+        if basis.ncols() > 0 {
+            found.push(Weak { axes: own_axes.clone(), information: own, basis, followed: false });
+        }
+    }
+    let information = schur + DMatrix::identity(count, count);
+    let basis = split(&information).1;
+    if basis.ncols() > 0 {
+        found.push(Weak { axes: structure.shared.clone(), information, basis, followed: true });
+    }
+    found
 }
 
 /// Splits parameter space into the directions the data determine (counted) and the others (spanned).
@@ -123,6 +187,30 @@ mod tests {
         // scipy.stats.t.ppf(0.975, [1, 10, 500]) = 12.7062047, 2.2281389, 1.9647198
         for (freedom, expected) in [(1.0, 12.706_204_7), (10.0, 2.228_138_9), (500.0, 1.964_719_8)] {
             assert!((t95(freedom) - expected).abs() < 1e-6, "{freedom}: {}", t95(freedom));
+        }
+    }
+
+    #[test]
+    fn groups_count_the_weak_directions_of_the_whole() {
+        use crate::solver::triangle;
+        use crate::structure::{Group, Structure};
+        use rand::RngExt as _;
+        for seed in 0..40 {
+            let mut rng = crate::tests::rig::rng(seed);
+            // Four shared axes, then three groups of two, of which some directions are barely seen.
+            let own = |k: usize| vec![4 + 2 * k, 5 + 2 * k];
+            let group = |k: usize| Group { blocks: k..k + 1, own: own(k), columns: vec![None; 6] };
+            let structure = Structure { groups: (0..3).map(group).collect(), shared: (0..4).collect() };
+            let triangles = (0..3).map(|_| {
+                let sizes = DVector::from_fn(6, |_, _| 10_f64.powf(rng.random_range(-2.0..2.0)));
+                let rows = DMatrix::from_fn(rng.random_range(1..9), 6, |_, _| rng.random_range(-1.0..1.0));
+                triangle(rows * DMatrix::from_diagonal(&sizes))
+            });
+            let arrow = Arrow::new(structure.into(), triangles.collect(), DVector::zeros(10));
+            let whole = split(&arrow.dense_squares()).1.ncols();
+            let by_group: usize = weak_by_group(&arrow, 1.0).iter().map(|weak| weak.basis.ncols()).sum();
+            assert_eq!(by_group, whole, "seed {seed}");
+            assert!((1..10).contains(&whole));
         }
     }
 

@@ -6,7 +6,8 @@ mod frames; // are frames metres and half turns off found?
 mod holdout; // does the fit never see what is held out?
 mod linear; // is the answer of a linear problem the textbook's?
 mod paper; // is eq. 4 solved to its optimality conditions?
+mod pooled; // has a pool solved recording by recording the optimum of one dense fit?
 mod refusals; // does impossible input get an error that names it?
-mod rig; // the planted arm of these tests
+pub mod rig; // the planted arm of these tests
 mod robust; // do outliers leave the answer alone?
 mod solvers; // do SciPy and basin find the same optimum, and how fast?

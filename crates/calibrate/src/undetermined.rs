@@ -8,7 +8,7 @@
 
 use crate::outcome::UndeterminedDirection;
 use crate::problem::Symmetry;
-use crate::statistics::Uncertainty;
+use crate::statistics::Weak;
 use crate::whitened::Axis;
 use crate::words::{self, Simplicity};
 use armcal_core::Parameter;
@@ -26,31 +26,47 @@ const NEW: f64 = 0.1;
 
 /// Undetermined directions in words, in the order of their leading parameters.
 pub(crate) fn directions(
-    uncertainty: &Uncertainty,
+    undetermined: &[Weak],
     axes: &[Axis],
     parameters: &[Parameter],
     symmetries: &[Symmetry],
 ) -> Vec<UndeterminedDirection> {
+    let of = |weak: &Weak| directions_of(weak, axes, parameters, symmetries);
+    let mut found: Vec<(usize, UndeterminedDirection)> = undetermined.iter().flat_map(of).collect();
+    found.sort_by_key(|(lead, _)| *lead);
+    found.into_iter().map(|(_, direction)| direction).collect()
+}
+
+/// The directions among some of the axes, each with the first axis in it.
+fn directions_of(
+    over: &Weak,
+    all_axes: &[Axis],
+    parameters: &[Parameter],
+    symmetries: &[Symmetry],
+) -> Vec<(usize, UndeterminedDirection)> {
+    let axes: Vec<Axis> = over.axes.iter().map(|&axis| all_axes[axis]).collect();
+    let axes = axes.as_slice();
     let simplicity =
         |i: usize, j: usize| words::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
-    let weak = &uncertainty.undetermined;
+    let weak = &over.basis;
     let (named, texts): (Vec<DVector<f64>>, Vec<&str>) = unseen(weak, axes, symmetries).into_iter().unzip();
     let texts = texts.into_iter().map(Some).chain(std::iter::repeat(None));
-    let mut found: Vec<(usize, UndeterminedDirection)> = simple_basis(weak, named, &simplicity)
+    simple_basis(weak, named, &simplicity)
         .into_iter()
         .zip(texts)
         .map(|(direction, text)| {
-            let shares = shares_of(&direction, &uncertainty.information);
-            let lead = shares.iter().map(|s| s.0).min().unwrap_or(usize::MAX);
-            let in_words = || words::describe(&shares, axes, parameters, &uncertainty.information);
-            let text = text.map_or_else(in_words, str::to_owned);
+            let shares = shares_of(&direction, &over.information);
+            let lead = shares.iter().map(|s| over.axes[s.0]).min().unwrap_or(usize::MAX);
+            let in_words = || words::describe(&shares, axes, parameters, &over.information);
+            let mut text = text.map_or_else(in_words, str::to_owned);
+            if over.followed {
+                text += ", once what each recording has for itself may follow";
+            }
             let name = |k: usize| parameters[axes[k].index].name.clone();
             let shares = shares.iter().map(|&(k, v)| (name(k), v)).collect();
             (lead, UndeterminedDirection { shares, text })
         })
-        .collect();
-    found.sort_by_key(|(lead, _)| *lead);
-    found.into_iter().map(|(_, direction)| direction).collect()
+        .collect()
 }
 
 /// The symmetries that lie in the weak subspace, as unit vectors in units of the prior, independent of each other.

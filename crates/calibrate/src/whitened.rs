@@ -7,9 +7,14 @@
 //! nothing determines where they started.
 
 use crate::problem::Problem;
+use crate::products::inner;
+use crate::solver::{Arrow, Curvature, triangle};
+use crate::structure::Structure;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Standard deviation [m, rad, ...] of the ridge on a free parameter about which nothing is known: it moves a length
 /// that the data know to 1 mm by one part in a million of what it was off.
@@ -48,6 +53,8 @@ pub(crate) struct Whitened<'a> {
     whitener: Vec<DMatrix<f64>>,
     /// First row of each block in the stacked residual, and one past the last.
     pub offsets: Vec<usize>,
+    /// Which parameters single groups of blocks have for themselves.
+    pub structure: Arc<Structure>,
 }
 
 impl<'a> Whitened<'a> {
@@ -79,7 +86,8 @@ impl<'a> Whitened<'a> {
             offsets.push(offsets[block] + inverse.nrows());
             whitener.push(inverse);
         }
-        Ok(Whitened { problem, axes, start, whitener, offsets })
+        let structure = Structure::of(problem.as_ref(), &axes).into();
+        Ok(Whitened { problem, axes, start, whitener, offsets, structure })
     }
 
     /// Inverse Cholesky factor of each block's covariance.
@@ -128,13 +136,37 @@ impl<'a> Whitened<'a> {
     /// Whitened residuals of all blocks, stacked.
     pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
         let p = self.parameters_at(x);
-        let mut stacked = DVector::zeros(self.rows());
-        for block in 0..self.blocks() {
-            let raw = self.problem.residual(block, &p);
-            self.finite(block, raw.iter(), "the residual")?;
-            stacked.rows_mut(self.offsets[block], raw.len()).copy_from(&(&self.whitener[block] * raw));
+        let parts = self.of_groups(|group| {
+            let blocks = self.structure.groups[group].blocks.clone();
+            let first = self.offsets[blocks.start];
+            let mut stacked = DVector::zeros(self.offsets[blocks.end] - first);
+            for block in blocks {
+                let raw = self.problem.residual(block, &p);
+                self.finite(block, raw.iter(), "the residual")?;
+                let at = self.offsets[block] - first;
+                stacked.rows_mut(at, raw.len()).copy_from(&(&self.whitener[block] * raw));
+            }
+            Ok(stacked)
+        })?;
+        Ok(self.stacked(parts.iter()))
+    }
+
+    /// Something of every group of blocks, in their order; of several errors the first group's.
+    pub fn of_groups<T: Send>(
+        &self,
+        of: impl Fn(usize) -> Result<T, CalibrateError> + Send + Sync,
+    ) -> Result<Vec<T>, CalibrateError> {
+        let count = self.structure.groups.len();
+        if count == 1 {
+            return Ok(vec![of(0)?]);
         }
-        Ok(stacked)
+        let found: Vec<Result<T, CalibrateError>> = (0..count).into_par_iter().map(of).collect();
+        found.into_iter().collect()
+    }
+
+    /// Rows of the groups, one under the other.
+    pub fn stacked<'v>(&self, parts: impl Iterator<Item = &'v DVector<f64>>) -> DVector<f64> {
+        DVector::from_iterator(self.rows(), parts.flat_map(|part| part.iter().copied()))
     }
 
     /// Position residuals [m] of all blocks and their derivative by x, neither whitened.
@@ -166,18 +198,55 @@ impl<'a> Whitened<'a> {
     }
 
     /// Whitened residuals and their derivative by x, stacked.
-    pub fn linearised(&self, x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>), CalibrateError> {
+    pub fn linearised(&self, x: &DVector<f64>) -> Result<Linearised, CalibrateError> {
         let p = self.parameters_at(x);
+        if self.structure.is_dense() {
+            return self.linearised_group(&p, 0);
+        }
+        let parts = self.of_groups(|group| self.linearised_group(&p, group))?;
+        let mut jacobian = DMatrix::zeros(self.rows(), self.axes.len());
+        for (group, (_, part)) in parts.iter().enumerate() {
+            let first = self.offsets[self.structure.groups[group].blocks.start];
+            for (axis, column) in self.structure.axes(group).zip(part.column_iter()) {
+                jacobian.view_mut((first, axis), (part.nrows(), 1)).copy_from(&column);
+            }
+        }
+        Ok((self.stacked(parts.iter().map(|(residual, _)| residual)), jacobian))
+    }
+
+    /// Whitened residuals, stacked, and `J'J` of their derivative.
+    pub fn squares(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Curvature), CalibrateError> {
+        let p = self.parameters_at(x);
+        if self.structure.is_dense() {
+            let (residual, jacobian) = self.linearised_group(&p, 0)?;
+            return Ok((residual, Curvature::Dense(inner(&jacobian, &jacobian))));
+        }
+        let parts = self.of_groups(|group| {
+            let (residual, jacobian) = self.linearised_group(&p, group)?;
+            Ok((residual, triangle(jacobian)))
+        })?;
+        let (residuals, triangles): (Vec<DVector<f64>>, Vec<DMatrix<f64>>) = parts.into_iter().unzip();
+        let nothing = DVector::zeros(self.axes.len());
+        let arrow = Arrow::new(self.structure.clone(), triangles, nothing);
+        Ok((self.stacked(residuals.iter()), Curvature::Arrow(arrow)))
+    }
+
+    /// The rows of one group at parameters `p`, with the columns of its own axes, then those of the shared ones.
+    pub fn linearised_group(&self, p: &[f64], group: usize) -> Result<Linearised, CalibrateError> {
+        let at_group = &self.structure.groups[group];
+        let first = self.offsets[at_group.blocks.start];
+        let rows = self.offsets[at_group.blocks.end] - first;
         let (mut stacked, mut jacobian) =
-            (DVector::zeros(self.rows()), DMatrix::zeros(self.rows(), self.axes.len()));
-        for block in 0..self.blocks() {
-            let (raw, full) = self.problem.linearised(block, &p);
+            (DVector::zeros(rows), DMatrix::zeros(rows, at_group.columns.len()));
+        for block in at_group.blocks.clone() {
+            let (raw, full) = self.problem.linearised(block, p);
             self.finite(block, raw.iter(), "the residual")?;
-            let (at, rows) = (self.offsets[block], raw.len());
+            let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
             stacked.rows_mut(at, rows).copy_from(&(white * raw));
-            for (column, a) in self.axes.iter().enumerate() {
-                let raw = full.column(a.index);
+            for (column, (axis, known)) in self.structure.axes(group).zip(&at_group.columns).enumerate() {
+                let (Some(known), a) = (known, &self.axes[axis]) else { continue };
+                let raw = full.column(*known);
                 // An observation sees few frames: most columns of a many-board model are zero.
                 if raw.iter().all(|v| *v == 0.0) {
                     continue;

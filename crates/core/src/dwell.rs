@@ -1,10 +1,10 @@
 //! A dwell: an interval in which the arm stands still, summarised.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Names a dwell for ever: recording in the order of the pipeline, dwell in the order of time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct DwellId {
     /// Index of the recording in the pipeline.
     pub recording: usize,
@@ -19,7 +19,7 @@ impl std::fmt::Display for DwellId {
 }
 
 /// Direction in which a joint moved last before it came to rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Arrival {
     /// The joint arrived moving towards +q.

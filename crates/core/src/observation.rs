@@ -2,9 +2,11 @@
 
 use crate::{Arrival, DwellId};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// How the true position of the tip is known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Reference {
     /// The tip is seated in a cavity of the board; the board's pose is a frame of the model.
     Seated {
@@ -19,13 +21,14 @@ pub enum Reference {
         position_m: Vector3<f64>,
         /// Orientation of the tracked body, where it is used.
         orientation: Option<UnitQuaternion<f64>>,
-        /// Standard error of the orientation per axis [rad].
+        /// Standard error of the orientation per axis [rad]; infinite, in JSON `null`, where there is none.
+        #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
         orientation_sigma_rad: f64,
     },
 }
 
 /// One row of the calibration: `measured - predicted` [m] with its covariance and provenance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// The dwell it comes from.
     pub dwell: DwellId,
@@ -92,6 +95,15 @@ impl Observation {
             Reference::Tracked { .. } => None,
         }
     }
+}
+
+/// A number, or nothing for infinity, which JSON does not have.
+fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    value.is_finite().then_some(*value).serialize(serializer)
+}
+
+fn finite_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
 
 /// A dwell that does not take part in the fit. It stays visible in every output.

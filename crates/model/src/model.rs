@@ -9,7 +9,7 @@ use crate::segment::{Geometry, Segment};
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A robot in its surroundings.
 ///
@@ -24,7 +24,7 @@ pub struct Model {
     /// World to tip: base, the rows of the chain, tip.
     path: Vec<Segment>,
     /// World to board, by recording.
-    boards: Vec<Segment>,
+    boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
     effects: Option<Effects>,
 }
@@ -48,7 +48,8 @@ impl Model {
         };
         let base = place(&frames.base)?;
         let tip = place(&frames.tip)?;
-        let boards = frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let boards =
+            frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         check_names(&parameters)?;
         let path = [base].into_iter().chain(chain.segments.iter().cloned()).chain([tip]).collect();
         Ok(Model { chain, parameters, path, boards, effects: None })
@@ -102,7 +103,7 @@ impl Model {
     /// Moves the start of a recording's board frame (nominal value and centre of the prior) to another
     /// world_from_board, such as the one the association found. Returns whether the recording has a board.
     pub fn set_board_start(&mut self, recording: usize, board_in_world: Pose) -> bool {
-        let Some(board) = self.boards.get_mut(recording) else { return false };
+        let Some(board) = self.boards.get_mut(&recording) else { return false };
         restart(board, &mut self.parameters, board_in_world);
         true
     }
@@ -113,6 +114,30 @@ impl Model {
         restart(&mut self.path[0], &mut self.parameters, base_in_world);
     }
 
+    /// The same model for the observations of one recording, without the boards of the others; and the index that each
+    /// of its parameters has in this model. With many boards it is evaluated in the time that one takes.
+    pub fn in_recording(&self, recording: usize) -> (Model, Vec<usize>) {
+        let first = self.path.iter().map(|segment| segment.parameters.end).max().unwrap_or(0);
+        let own = self.boards.get(&recording).map_or(first..first, |board| board.parameters.clone());
+        let behind = first + self.boards.values().map(|board| board.parameters.len()).sum::<usize>();
+        let index: Vec<usize> = (0..first).chain(own.clone()).chain(behind..self.parameters.len()).collect();
+        let end = first + own.len();
+        let board = |board: &Segment| Segment { parameters: first..end, ..board.clone() };
+        let model = Model {
+            chain: self.chain.clone(),
+            parameters: index.iter().map(|&i| self.parameters[i].clone()).collect(),
+            path: self.path.clone(),
+            boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
+            effects: self.effects.as_ref().map(|e| e.moved(behind - end, &self.path, index.len())),
+        };
+        (model, index)
+    }
+
+    /// Indices of the parameters of a recording's board; none where it has no board.
+    pub fn board_parameters(&self, recording: usize) -> std::ops::Range<usize> {
+        self.boards.get(&recording).map_or(0..0, |board| board.parameters.clone())
+    }
+
     /// Checks that every observation has a reading for each joint, and a board where it needs one.
     pub fn check(&self, observations: &[Observation]) -> Result<(), ModelError> {
         for o in observations {
@@ -120,7 +145,7 @@ impl Model {
             if actual != expected {
                 return Err(ModelError::JointCount { dwell: o.dwell, actual, expected });
             }
-            if o.cavity().is_some() && o.dwell.recording >= self.boards.len() {
+            if o.cavity().is_some() && !self.boards.contains_key(&o.dwell.recording) {
                 return Err(ModelError::NoBoard { dwell: o.dwell });
             }
         }
@@ -158,7 +183,7 @@ impl Model {
 
     /// world_from_board of a recording, if it has a board.
     pub fn board_in_world(&self, p: &[f64], recording: usize) -> Option<Pose> {
-        self.boards.get(recording).map(|board| Pose::from(&board.transform(p, &[])))
+        self.boards.get(&recording).map(|board| Pose::from(&board.transform(p, &[])))
     }
 
     /// Where the tip was, in the world: as the sensor saw it, or the cavity of the board [m].
@@ -199,7 +224,7 @@ impl Model {
                 add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
             }
         }
-        if let (Reference::Seated { .. }, Some(board)) = (&o.reference, self.boards.get(o.dwell.recording)) {
+        if let (Reference::Seated { .. }, Some(board)) = (&o.reference, self.boards.get(&o.dwell.recording)) {
             let derivatives = board.derivatives(p, &[]);
             for (column, change) in board.parameters.clone().zip(&derivatives.parameters) {
                 add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
@@ -293,7 +318,7 @@ impl Model {
         parameters: Vec<Parameter>,
     ) -> Result<Model, ModelError> {
         check_names(&parameters)?;
-        let effects = Some(Effects::new(placed, session, &self.path, parameters.len()));
+        let effects = Some(Effects::new(placed, session.into(), &self.path, parameters.len()));
         Ok(Model { parameters, effects, ..self.clone() })
     }
 
@@ -311,14 +336,17 @@ impl Model {
     fn measured_m(&self, p: &[f64], o: &Observation, in_board_m: &Vector3<f64>) -> Vector3<f64> {
         match &o.reference {
             Reference::Tracked { position_m, .. } => *position_m,
-            Reference::Seated { .. } => match self.boards.get(o.dwell.recording) {
+            Reference::Seated { .. } => match self.boards.get(&o.dwell.recording) {
                 Some(board) => board.transform(p, &[]).point(in_board_m),
                 None => Vector3::repeat(f64::NAN),
             },
         }
     }
 
-    fn matching(&self, name: &str) -> Result<Vec<usize>, ModelError> {
+    /// Indices of the parameters that an exact name or a glob means (`joint*.alpha`); never none.
+    ///
+    /// Errors when nothing matches, naming the nearest parameter.
+    pub fn matching(&self, name: &str) -> Result<Vec<usize>, ModelError> {
         if let Some(index) = self.index(name) {
             return Ok(vec![index]);
         }

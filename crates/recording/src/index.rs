@@ -174,9 +174,8 @@ impl Summary {
             known.push((range(*offset, *length).ok_or(OUTSIDE)?, None));
         }
         for chunk in &self.chunks {
-            let record = range(chunk.chunk_start, chunk.chunk_length)
-                .filter(|r| r.len() > ENVELOPE)
-                .ok_or(OUTSIDE)?;
+            let record =
+                range(chunk.chunk_start, chunk.chunk_length).filter(|r| r.len() > ENVELOPE).ok_or(OUTSIDE)?;
             let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
             let indexed = !chunk.message_indexes.is_empty();
             let block = Block {

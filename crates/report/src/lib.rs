@@ -26,8 +26,10 @@ mod model_file;
 mod page;
 mod parameters;
 mod past_model;
+mod past_observations;
 mod past_run;
 mod points;
+mod pooled;
 mod proto;
 mod run;
 mod summary;
@@ -46,7 +48,12 @@ pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as ampli
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use past_model::{PastArms, PastModel, RecordingFacts, Value};
+pub use past_observations::{
+    BoardFacts, OBSERVATIONS_FILE, ObservedFile, ObservedRecording, PastObservations, StartFrame,
+    observations_json, sha256,
+};
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
+pub use pooled::{POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_json, pooled_terminal, write_pooled};
 pub use run::{RecordingRun, Refit, Run, Status, VERSION};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};

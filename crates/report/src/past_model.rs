@@ -6,13 +6,12 @@
 
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{PastRunError, ReportError};
-use armcal_calibrate::Estimate;
+use armcal_calibrate::{Calibration, Estimate};
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
-use armcal_recording::{FileReport, Recording, RecordingError};
+use armcal_recording::{Recording, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Format of the file.
@@ -34,7 +33,7 @@ pub struct PastModel {
     tip: FrameFacts,
     boards: Vec<FrameFacts>,
     effects: Vec<EffectTable>,
-    session: SessionFacts,
+    session: Session,
     /// Every parameter, in the order of the model.
     pub parameters: Vec<Value>,
     /// The recordings, in the order of the pipeline.
@@ -81,7 +80,7 @@ pub struct RecordingFacts {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "form", rename_all = "lowercase")]
-enum ChainText {
+pub(crate) enum ChainText {
     Dh { text: String },
     Urdf { text: String, base_link: String, tip_link: String },
 }
@@ -94,23 +93,21 @@ struct FrameFacts {
     free_rotation: bool,
 }
 
-/// [`Session`], field by field.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct SessionFacts {
-    start_ns: i64,
-    end_ns: i64,
-    recordings: usize,
-    reference_temperature_c: Option<f64>,
-    gravity_in_world_mps2: [f64; 3],
-    gravity_in_base_mps2: Option<[f64; 3]>,
-    volume_centre_m: Option<[f64; 3]>,
-    volume_half_extent_m: f64,
-    board_centres_m: BTreeMap<usize, [f64; 3]>,
-    largest_effort_nm: Option<Vec<f64>>,
-    temperature: bool,
-    load: bool,
-    moving: bool,
-    cavities: Vec<String>,
+/// What a model is written from.
+pub(crate) struct Calibrated<'a> {
+    pub pipeline: &'a str,
+    pub chain: ChainText,
+    pub model: &'a Model,
+    /// Where the base starts (world_from_base).
+    pub base: Pose,
+    /// One for each parameter of the model.
+    pub estimates: &'a [Estimate],
+    pub calibration: &'a Calibration,
+    /// Name and hashes of the files of every recording.
+    pub recordings: Vec<(&'a str, Vec<String>)>,
+    pub observations: &'a [Observation],
+    pub session: &'a Session,
+    pub missing: &'a [EffectSpec],
 }
 
 /// The model without effects and with them, and their parameters.
@@ -129,10 +126,30 @@ pub struct PastArms {
 impl PastModel {
     /// What a run leaves for later.
     pub(crate) fn of(run: &Run) -> Result<PastModel, ReportError> {
-        let model = &run.model;
+        let missing = match &run.diagnosis {
+            Some(diagnosis) => diagnosis.suggested(run.model.chain().joint_names())?,
+            None => Vec::new(),
+        };
+        Ok(PastModel::of_calibrated(&Calibrated {
+            pipeline: &run.pipeline_name,
+            chain: chain_text(&run.model, &run.model_text, &run.pipeline_text),
+            model: &run.model,
+            base: run.model.base_in_world(&run.model.nominal()),
+            estimates: &run.calibration.fit.estimates,
+            calibration: &run.calibration,
+            recordings: run.recordings.iter().map(|r| (r.name.as_str(), hashes(r))).collect(),
+            observations: &run.observations,
+            session: &run.session,
+            missing: &missing,
+        }))
+    }
+
+    /// What any calibration leaves for later.
+    pub(crate) fn of_calibrated(of: &Calibrated<'_>) -> PastModel {
+        let model = of.model;
         let start = model.nominal();
-        let calibration = &run.calibration;
-        let values = calibration.fit.estimates.iter().zip(&calibration.nominal_values);
+        let calibration = of.calibration;
+        let values = of.estimates.iter().zip(&calibration.nominal_values);
         let value = |(e, nominal): (&Estimate, &f64)| Value {
             name: e.parameter.name.clone(),
             nominal: *nominal,
@@ -140,32 +157,29 @@ impl PastModel {
             sigma: e.sigma,
         };
         let facts = |name: &str, pose: &Pose| FrameFacts::of(model, name, pose);
-        let boards = run.recordings.iter().enumerate().filter_map(|(index, recording)| {
+        let boards = of.recordings.iter().enumerate().filter_map(|(index, (name, _))| {
             let pose = model.board_in_world(&start, index)?;
-            Some(facts(&format!("board.{}", recording.name), &pose))
+            Some(facts(&format!("board.{name}"), &pose))
         });
+        let recordings = of.recordings.iter().enumerate();
         let judged = if calibration.holdout.fitted.n > 0 { &calibration.holdout } else { &calibration.train };
-        let missing = match &run.diagnosis {
-            Some(diagnosis) => diagnosis.suggested(model.chain().joint_names())?,
-            None => Vec::new(),
-        };
-        Ok(PastModel {
+        PastModel {
             schema: SCHEMA.into(),
             version: VERSION.into(),
-            pipeline: run.pipeline_name.clone(),
-            chain: chain_text(run),
-            base: facts("base", &model.base_in_world(&start)),
+            pipeline: of.pipeline.to_owned(),
+            chain: of.chain.clone(),
+            base: facts("base", &of.base),
             tip: facts("tip", &model.tip_in_last_link(&start)),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
-            session: SessionFacts::from(&run.session),
+            session: of.session.clone(),
             parameters: values.map(value).collect(),
-            recordings: run.recordings.iter().enumerate().map(|(i, r)| recording(r, i, run)).collect(),
-            postures_rad: thinned(&run.observations),
-            range_rad: (0..model.joint_count()).map(|j| range(&run.observations, j)).collect(),
+            recordings: recordings.map(|(i, (name, sha256))| recording(name, sha256, i, of)).collect(),
+            postures_rad: thinned(of.observations),
+            range_rad: (0..model.joint_count()).map(|j| range(of.observations, j)).collect(),
             mean_error_m: Some(judged.fitted.mean_m).filter(|mean| mean.is_finite()),
-            missing: missing.iter().map(EffectSpec::to_string).collect(),
-        })
+            missing: of.missing.iter().map(EffectSpec::to_string).collect(),
+        }
     }
 
     /// Its JSON.
@@ -190,8 +204,8 @@ impl PastModel {
     }
 
     /// What the effects refer to.
-    pub fn session(&self) -> Session {
-        Session::from(&self.session)
+    pub fn session(&self) -> &Session {
+        &self.session
     }
 
     /// The models, made again.
@@ -214,7 +228,7 @@ impl PastModel {
         let geometry = Model::new(chain, frames)?;
         let joints = geometry.chain().joint_names();
         let specs = self.effects.iter().map(|e| e.spec(joints)).collect::<Result<Vec<_>, _>>()?;
-        let model = geometry.with_effects(&specs, &self.session())?;
+        let model = geometry.with_effects(&specs, &self.session)?;
         let expected: Vec<&str> = model.parameters().iter().map(|p| p.name.as_str()).collect();
         let wrong = (0..expected.len().max(self.parameters.len()))
             .find(|i| self.parameters.get(*i).map(|v| v.name.as_str()) != expected.get(*i).copied());
@@ -258,12 +272,12 @@ fn attached(path: &Path) -> Result<String, PastRunError> {
 }
 
 /// The nominal arm's file; the ends of a URDF chain are what the pipeline says.
-fn chain_text(run: &Run) -> ChainText {
-    let text = run.model_text.clone();
-    if !run.model.chain().is_urdf() {
+pub(crate) fn chain_text(model: &Model, model_text: &str, pipeline_text: &str) -> ChainText {
+    let text = model_text.to_owned();
+    if !model.chain().is_urdf() {
         return ChainText::Dh { text };
     }
-    let pipeline = run.pipeline_text.parse::<toml::Table>().unwrap_or_default();
+    let pipeline = pipeline_text.parse::<toml::Table>().unwrap_or_default();
     let link = |key| {
         let found = pipeline.get("model").and_then(|model| model.get(key)).and_then(toml::Value::as_str);
         found.unwrap_or_default().to_owned()
@@ -271,15 +285,19 @@ fn chain_text(run: &Run) -> ChainText {
     ChainText::Urdf { text, base_link: link("base_link"), tip_link: link("tip_link") }
 }
 
-fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFacts {
-    let own: Vec<&Observation> = run.observations.iter().filter(|o| o.dwell.recording == index).collect();
+fn hashes(recording: &RecordingRun) -> Vec<String> {
+    recording.report.files.iter().map(|f| f.identity()).collect()
+}
+
+fn recording(name: &str, sha256: &[String], index: usize, of: &Calibrated<'_>) -> RecordingFacts {
+    let own: Vec<&Observation> = of.observations.iter().filter(|o| o.dwell.recording == index).collect();
     let temperatures: Vec<f64> = own.iter().filter_map(|o| o.temperature_c).collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     RecordingFacts {
-        name: recording.name.clone(),
-        sha256: recording.report.files.iter().map(FileReport::identity).collect(),
+        name: name.to_owned(),
+        sha256: sha256.to_vec(),
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
-        last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),
+        last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(of.session.end_ns),
         load_kg: own.last().map_or(0.0, |o| o.load_kg),
         temperature_c: (!temperatures.is_empty()).then(|| mean(&temperatures)),
     }
@@ -312,47 +330,5 @@ impl FrameFacts {
         let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Vector3::from(self.xyz_m).into(), rotation);
         Frame { free_rotation: self.free_rotation, ..Frame::given(self.name.clone(), pose) }
-    }
-}
-
-impl From<&Session> for SessionFacts {
-    fn from(s: &Session) -> SessionFacts {
-        SessionFacts {
-            start_ns: s.start_ns,
-            end_ns: s.end_ns,
-            recordings: s.recordings,
-            reference_temperature_c: s.reference_temperature_c,
-            gravity_in_world_mps2: s.gravity_in_world_mps2.into(),
-            gravity_in_base_mps2: s.gravity_in_base_mps2.map(Into::into),
-            volume_centre_m: s.volume_centre_m.map(Into::into),
-            volume_half_extent_m: s.volume_half_extent_m,
-            board_centres_m: s.board_centres_m.iter().map(|(k, v)| (*k, (*v).into())).collect(),
-            largest_effort_nm: s.largest_effort_nm.clone(),
-            temperature: s.temperature,
-            load: s.load,
-            moving: s.moving,
-            cavities: s.cavities.clone(),
-        }
-    }
-}
-
-impl From<&SessionFacts> for Session {
-    fn from(s: &SessionFacts) -> Session {
-        Session {
-            start_ns: s.start_ns,
-            end_ns: s.end_ns,
-            recordings: s.recordings,
-            reference_temperature_c: s.reference_temperature_c,
-            gravity_in_world_mps2: s.gravity_in_world_mps2.into(),
-            gravity_in_base_mps2: s.gravity_in_base_mps2.map(Into::into),
-            volume_centre_m: s.volume_centre_m.map(Into::into),
-            volume_half_extent_m: s.volume_half_extent_m,
-            board_centres_m: s.board_centres_m.iter().map(|(k, v)| (*k, (*v).into())).collect(),
-            largest_effort_nm: s.largest_effort_nm.clone(),
-            temperature: s.temperature,
-            load: s.load,
-            moving: s.moving,
-            cavities: s.cavities.clone(),
-        }
     }
 }

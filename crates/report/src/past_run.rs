@@ -91,6 +91,14 @@ pub enum PastRunError {
         /// Why.
         why: String,
     },
+    /// The observations of the result are not what they should be.
+    #[error("the observations in {}: {why}; run the pipeline again", path.display())]
+    BadObservations {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
     /// The model of the result is not what it should be.
     #[error("the calibrated model in {}: {why}; run the pipeline again", path.display())]
     BadModel {

@@ -102,13 +102,13 @@ pub(crate) struct FitSummary<'a> {
     rank: usize,
     train: SideSummary,
     holdout: SideSummary,
-    parameters: Vec<ParameterSummary<'a>>,
+    pub(crate) parameters: Vec<ParameterSummary<'a>>,
     undetermined: Vec<&'a str>,
     paper: Option<PaperSummary>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct SideSummary {
+pub(crate) struct SideSummary {
     n: usize,
     nominal_mm: ErrorSummary,
     fitted_mm: ErrorSummary,
@@ -116,7 +116,7 @@ struct SideSummary {
 
 /// `null` throughout when there is nothing to summarise: zero would read as a perfect result.
 #[derive(Debug, Clone, Serialize)]
-struct ErrorSummary {
+pub(crate) struct ErrorSummary {
     mean: Option<f64>,
     rms: Option<f64>,
     p95: Option<f64>,
@@ -124,7 +124,7 @@ struct ErrorSummary {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct ParameterSummary<'a> {
+pub(crate) struct ParameterSummary<'a> {
     name: &'a str,
     unit: Unit,
     nominal: f64,
@@ -248,7 +248,8 @@ pub(crate) fn fit(c: &Calibration) -> FitSummary<'_> {
     }
 }
 
-fn side(errors: &SideErrors) -> SideSummary {
+/// Errors of one side of a hold-out.
+pub(crate) fn side(errors: &SideErrors) -> SideSummary {
     SideSummary {
         n: errors.fitted.n,
         nominal_mm: error_summary(&errors.nominal),
@@ -256,12 +257,14 @@ fn side(errors: &SideErrors) -> SideSummary {
     }
 }
 
-fn error_summary(stats: &ErrorStats) -> ErrorSummary {
+/// Errors in millimetres.
+pub(crate) fn error_summary(stats: &ErrorStats) -> ErrorSummary {
     let mm = |value_m: f64| (stats.n > 0).then_some(value_m * 1e3);
     ErrorSummary { mean: mm(stats.mean_m), rms: mm(stats.rms_m), p95: mm(stats.p95_m), max: mm(stats.max_m) }
 }
 
-fn parameter(e: &Estimate) -> ParameterSummary<'_> {
+/// One parameter.
+pub(crate) fn parameter(e: &Estimate) -> ParameterSummary<'_> {
     ParameterSummary {
         name: &e.parameter.name,
         unit: e.parameter.unit,

@@ -90,9 +90,14 @@ fn error_row(label: &str, n: String, parameters: &str, stats: &ErrorStats) -> Ve
 
 /// Free parameters only; the fixed ones are counted below the table and listed in `parameters.toml`.
 pub(crate) fn parameters(pen: &Pen, calibration: &Calibration) -> String {
+    parameters_of(pen, &calibration.fit.estimates.iter().collect::<Vec<_>>())
+}
+
+/// The same of some parameters.
+pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
     let mut table = pen.table(&["parameter", "unit", "nominal", "value", "change", "± 95 %", ""]);
     let (free, fixed): (Vec<&Estimate>, Vec<&Estimate>) =
-        calibration.fit.estimates.iter().partition(|e| e.parameter.free);
+        estimates.iter().copied().partition(|e| e.parameter.free);
     for e in free {
         let unit = e.parameter.unit;
         let half = (e.ci95[1] - e.ci95[0]) / 2.0;

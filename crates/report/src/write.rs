@@ -7,6 +7,7 @@ use crate::model_file::model_file;
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
+use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
 use crate::points::points;
 use crate::tables::parquet_files;
 use crate::{ReportError, Run, summary_json};
@@ -41,7 +42,7 @@ pub enum InputMessages {
 }
 
 /// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model (for its own
-/// tools, and as `model.json` with its effects), Foxglove layouts and the
+/// tools, and as `model.json` with its effects), `observations.json` for `armcal pool`, Foxglove layouts and the
 /// Parquet tables into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
@@ -64,6 +65,7 @@ pub fn write_all(
     let model = model_file(run)?;
     let parameters = parameters_toml(run)?;
     let past_model = PastModel::of(run)?.json()?;
+    let observations = observations_json(run)?;
     let summary = summary_json(run);
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
@@ -79,6 +81,7 @@ pub fn write_all(
         ("parameters.toml", &parameters),
         (model.name, &model.text),
         (past_model::FILE, &past_model),
+        (OBSERVATIONS_FILE, &observations),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
     ];
@@ -115,8 +118,8 @@ pub fn write_all(
     Ok(written)
 }
 
-/// Writes what a campaign keeps of each recording: `summary.json`, `parameters.toml` and `model.json`, into a folder that
-/// is there.
+/// Writes what a campaign keeps of each recording: `summary.json`, `parameters.toml`, `model.json` and
+/// `observations.json`, into a folder that is there.
 ///
 /// # Errors
 /// A file that cannot be written, or a run whose parts do not belong together.
@@ -125,6 +128,7 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
         ("summary.json", summary_json(run)),
         ("parameters.toml", parameters_toml(run)?),
         (past_model::FILE, PastModel::of(run)?.json()?),
+        (OBSERVATIONS_FILE, observations_json(run)?),
     ];
     for (name, text) in texts {
         let path = out_dir.join(name);

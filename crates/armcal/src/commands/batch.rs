@@ -70,7 +70,7 @@ fn show(campaign: &Campaign, out: &Path, written: &[PathBuf], json: bool) -> Res
         print(&campaign_json(campaign));
     } else {
         print(&campaign_text(campaign, style()));
-        super::run::print_written(out, written);
+        super::print_written(out, written);
     }
     Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
 }

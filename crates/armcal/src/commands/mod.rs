@@ -11,6 +11,7 @@ mod export;
 mod extract;
 mod inspect;
 mod plan;
+mod pool;
 mod run;
 mod score;
 mod simulate;
@@ -25,6 +26,7 @@ use crate::error::Error;
 use armcal_report::TerminalStyle;
 use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
 
 /// How a command ended when it did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +74,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             let (dwells, margin_deg, json) = (*dwells, *margin, *json);
             plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
         }
+        Command::Pool { pipeline, results, out, json } => pool::run(pipeline, results, out, *json),
         Command::Run { pipeline, out, json } => run::run(pipeline, out, *json),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
@@ -134,6 +137,13 @@ fn colour_code(text: &str) -> Option<&str> {
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
     numbers[end..].starts_with('m').then(|| &text[..end + "\u{1b}[m".len()])
+}
+
+/// Says which files were written where.
+fn print_written(out: &Path, written: &[PathBuf]) {
+    let names: Vec<String> =
+        written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
+    print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));
 }
 
 /// Colours on a terminal, unless the user asked for none.

@@ -1,6 +1,6 @@
 //! `armcal run`: the main job.
 
-use super::{Outcome, print, style};
+use super::{Outcome, print, print_written, style};
 use crate::closed_chain::{self, ClosedPipeline};
 use crate::error::Error;
 use crate::pipeline::Job;
@@ -9,7 +9,7 @@ use crate::{story, view};
 use armcal_report::{
     Status, closed_summary_json, closed_terminal, summary_json, terminal, write_all, write_closed,
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Runs a pipeline, writes all results to `out`, prints the table (or the summary as JSON).
 pub fn run(path: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
@@ -47,13 +47,6 @@ fn two_arms(pipeline: &ClosedPipeline, out: &Path, json: bool) -> Result<Outcome
         print_written(out, &written);
     }
     Ok(outcome(run.status()))
-}
-
-/// Which files a command left where.
-pub(super) fn print_written(out: &Path, written: &[PathBuf]) {
-    let names: Vec<String> =
-        written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
-    print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));
 }
 
 fn outcome(status: Status) -> Outcome {

@@ -132,7 +132,7 @@ fn base_frame(section: &FrameSection, seen: &[Seen]) -> Frame {
 }
 
 /// Mean of poses that differ by little: rotations are averaged in the tangent space of the first.
-fn mean_of(poses: &[Pose]) -> Option<Pose> {
+pub fn mean_of(poses: &[Pose]) -> Option<Pose> {
     let first = poses.first()?.rotation;
     let n = poses.len() as f64;
     let position_m = poses.iter().map(|p| p.translation.vector).sum::<Vector3<f64>>() / n;
@@ -162,7 +162,7 @@ fn board_frame(table: &TableSection, board: &Board, tilt: Tilt, seen: &Seen) -> 
 }
 
 /// Zero standard error means that the pose is taken as exact.
-fn measured(sigma_mm: f64, sigma_deg: f64) -> Knowledge {
+pub fn measured(sigma_mm: f64, sigma_deg: f64) -> Knowledge {
     if sigma_mm == 0.0 && sigma_deg == 0.0 {
         return Knowledge::Given;
     }

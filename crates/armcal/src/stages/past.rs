@@ -66,7 +66,7 @@ pub fn place(
     let model = if lasting.is_empty() {
         surroundings.clone()
     } else {
-        surroundings.with_effects(&lasting, &past.session())?
+        surroundings.with_effects(&lasting, past.session())?
     };
     let nominal = model.nominal();
     let mut calibrated = nominal.clone();

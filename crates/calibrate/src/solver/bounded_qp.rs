@@ -1,6 +1,7 @@
 //! A small strictly convex quadratic programme with bounds, solved exactly.
 
-use nalgebra::{DMatrix, DVector};
+use super::Curvature;
+use nalgebra::DVector;
 
 /// Minimises `d'Hd/2 + g'd` over `lower <= d <= upper`, where `lower <= 0 <= upper`.
 ///
@@ -8,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 /// bounds): solve on the free variables, stop at the first bound met, release the bound with the most wrong
 /// multiplier; finite because the objective falls between releases. `None` when H is not positive definite.
 pub(crate) fn minimise(
-    hessian: &DMatrix<f64>,
+    hessian: &Curvature,
     gradient: &DVector<f64>,
     lower: &DVector<f64>,
     upper: &DVector<f64>,
@@ -28,7 +29,7 @@ pub(crate) fn minimise(
             }
             None => {
                 d = target;
-                match most_wrong(&(hessian * &d + gradient), &d, lower, &held) {
+                match most_wrong(&(hessian.times(&d) + gradient), &d, lower, &held) {
                     Some(i) => held[i] = false,
                     None => return Some(d),
                 }
@@ -40,24 +41,18 @@ pub(crate) fn minimise(
 
 /// The minimiser over the variables not held, the others where they are.
 fn solve_free(
-    hessian: &DMatrix<f64>,
+    hessian: &Curvature,
     gradient: &DVector<f64>,
     d: &DVector<f64>,
     held: &[bool],
 ) -> Option<DVector<f64>> {
-    let free: Vec<usize> = (0..d.len()).filter(|&i| !held[i]).collect();
-    if free.is_empty() {
+    if held.iter().all(|held| *held) {
         return Some(d.clone());
     }
     let fixed = DVector::from_fn(d.len(), |i, _| if held[i] { d[i] } else { 0.0 });
-    let right = -(gradient + hessian * &fixed);
-    let block = DMatrix::from_fn(free.len(), free.len(), |r, c| hessian[(free[r], free[c])]);
-    let solution = block.cholesky()?.solve(&DVector::from_fn(free.len(), |r, _| right[free[r]]));
-    let mut target = fixed;
-    for (r, &i) in free.iter().enumerate() {
-        target[i] = solution[r];
-    }
-    Some(target)
+    let right = -(gradient + hessian.times(&fixed));
+    let solution = hessian.solve_free(&right, held)?;
+    Some(DVector::from_fn(d.len(), |i, _| if held[i] { d[i] } else { solution[i] }))
 }
 
 /// The first bound met on the way to the target, and the share of the way that leads to it.
@@ -101,6 +96,7 @@ fn most_wrong(slope: &DVector<f64>, d: &DVector<f64>, lower: &DVector<f64>, held
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DMatrix;
     use proptest::prelude::*;
 
     proptest! {
@@ -115,7 +111,8 @@ mod tests {
             let gradient = DVector::from_vec(gradient);
             let lower = DVector::from_iterator(6, room.iter().map(|r| if r.2 { -r.0 } else { f64::NEG_INFINITY }));
             let upper = DVector::from_iterator(6, room.iter().map(|r| if r.2 { r.1 } else { f64::INFINITY }));
-            let d = minimise(&hessian, &gradient, &lower, &upper).expect("H is positive definite");
+            let curvature = Curvature::Dense(hessian.clone());
+            let d = minimise(&curvature, &gradient, &lower, &upper).expect("H is positive definite");
             let slope = &hessian * &d + &gradient;
             let tolerance = 1e-8 * (1.0 + hessian.amax() * d.amax());
             for i in 0..6 {

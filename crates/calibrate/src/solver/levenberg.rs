@@ -1,8 +1,8 @@
 //! Levenberg-Marquardt with bounds: every step is the exact minimiser of the damped quadratic model within the box.
 
-use super::{Cost, Quadratic, bounded_qp};
+use super::{Cost, Curvature, Quadratic, bounded_qp};
 use crate::{CalibrateError, Status};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +18,7 @@ pub(crate) struct Settings {
 pub(crate) struct Solution {
     pub x: DVector<f64>,
     /// Curvature at the last point it was computed at: the solution or one step before it.
-    pub hessian: DMatrix<f64>,
+    pub hessian: Curvature,
     pub status: Status,
     pub iterations: usize,
 }
@@ -42,7 +42,7 @@ pub(crate) fn minimise(
     for iterations in 0..settings.max_iterations {
         damping.zip_apply(&model.damping, |d, new| *d = d.max(new));
         loop {
-            let damped = &model.hessian + DMatrix::from_diagonal(&(&damping * mu));
+            let damped = model.hessian.damped(&(&damping * mu));
             let step = bounded_qp::minimise(&damped, &model.gradient, &(&lower - &x), &(&upper - &x));
             let Some(step) = step.filter(|d| d.iter().all(|v| v.is_finite())) else {
                 mu *= growth;
@@ -51,7 +51,7 @@ pub(crate) fn minimise(
                 }
                 continue;
             };
-            let curvature = step.dot(&(&model.hessian * &step));
+            let curvature = step.dot(&model.hessian.times(&step));
             let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
             let rounding = 16.0 * f64::EPSILON * model.value.abs();
             let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;

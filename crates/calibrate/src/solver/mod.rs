@@ -1,4 +1,5 @@
-//! Minimisation of a smooth cost within bounds.
+//! Minimisation of a smooth cost within bounds. One solver for both shapes of problem: `curvature` is a dense matrix,
+//! or an arrow (`arrow`) where recordings have parameters of their own.
 //!
 //! **Why not `basin` (3.2.0), which notes/dependencies.md chose.** It was tried as planned and stays as the oracle of
 //! this crate's tests (`tests/solvers.rs`), but is not the product's solver, for three reasons. (1) Its loss is per
@@ -9,13 +10,17 @@
 //! trust-region-reflective method (a Jacobi SVD of the tall Jacobian at every iteration; same minimum to 1e-9) and 42
 //! ms by the bounded LM, which stopped 2.6e-3 above the minimum.
 
+mod arrow;
 mod bounded_qp;
+mod curvature;
 mod levenberg;
 
+pub(crate) use arrow::{Arrow, triangle};
+pub(crate) use curvature::Curvature;
 pub(crate) use levenberg::{Settings, Solution, minimise};
 
 use crate::CalibrateError;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// A cost with its second-order model.
 pub(crate) trait Cost {
@@ -34,7 +39,7 @@ pub(crate) trait Cost {
 pub(crate) struct Quadratic {
     pub value: f64,
     pub gradient: DVector<f64>,
-    pub hessian: DMatrix<f64>,
+    pub hessian: Curvature,
     /// Positive diagonal by which Levenberg's damping is scaled.
     pub damping: DVector<f64>,
 }

@@ -101,7 +101,7 @@ fn least_squares_with_prior_is_the_normal_equations() {
     );
     let variance = (chi / freedom).max(1.0);
     let covariance = (&information / variance + &prior).try_inverse().unwrap();
-    assert!((&fit.covariance - &covariance).amax() < 1e-9 * covariance.amax());
+    assert!((fit.covariance.dense() - &covariance).amax() < 1e-9 * covariance.amax());
     assert_eq!((fit.status, fit.rank), (Status::Converged, 4));
     assert!(fit.estimates.iter().all(|e| e.determined && !e.at_bound));
 }

@@ -50,7 +50,7 @@ impl PlacedEffect {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Effects {
     pub placed: Vec<PlacedEffect>,
-    pub session: Session,
+    pub session: Arc<Session>,
     /// World to tip with a twist, the identity at rest, at every slot in use.
     path: Vec<Segment>,
     /// The slots in use, ascending.
@@ -155,7 +155,7 @@ fn check_words(placing: &Placing<'_>) -> Result<(), String> {
 
 impl Effects {
     /// Puts placed effects on the path of a model whose parameter vector then has `count` entries.
-    pub fn new(placed: Vec<PlacedEffect>, session: Session, rigid: &[Segment], count: usize) -> Effects {
+    pub fn new(placed: Vec<PlacedEffect>, session: Arc<Session>, rigid: &[Segment], count: usize) -> Effects {
         let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
         slots.sort_unstable();
         slots.dedup();
@@ -173,6 +173,15 @@ impl Effects {
             path.extend(rigid.get(slot).cloned());
         }
         Effects { placed, session, path, slots }
+    }
+
+    /// The same effects on a path whose model lacks `fewer` parameters before theirs and has `count` in all.
+    pub fn moved(&self, fewer: usize, rigid: &[Segment], count: usize) -> Effects {
+        let mut placed = self.placed.clone();
+        for effect in &mut placed {
+            effect.parameters = effect.parameters.start - fewer..effect.parameters.end - fewer;
+        }
+        Effects::new(placed, self.session.clone(), rigid, count)
     }
 
     /// The deformed arm, predicted.

@@ -2,13 +2,14 @@
 
 use armcal_core::{Observation, Reference};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Standard gravity [m/s^2].
 pub(crate) const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 
 /// Summary of a set of observations, built once from them and then adjusted where more is known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// Earliest observation [ns].
     pub start_ns: i64,

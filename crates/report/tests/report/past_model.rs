@@ -57,7 +57,7 @@ fn the_calibrated_model_predicts_from_its_file_as_it_did() {
         s.run.calibration.nominal_values.push(0.0);
     }
     let count = model.parameters().len();
-    s.run.calibration.fit.covariance = nalgebra::DMatrix::zeros(count, count);
+    s.run.calibration.fit.covariance = nalgebra::DMatrix::zeros(count, count).into();
     let rigid = predictions_m(&s.run.model, &s.run.calibration.fit.values(), &s.run);
     s.run.model = model;
     let with = predictions_m(&s.run.model, &s.run.calibration.fit.values(), &s.run);

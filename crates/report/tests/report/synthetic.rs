@@ -336,7 +336,7 @@ fn fit(model: &Model, observations: usize, fitted: &[f64]) -> Fit {
     Fit {
         objective: "robust least squares (Huber)".into(),
         estimates: estimates.collect(),
-        covariance: nalgebra::DMatrix::zeros(fitted.len(), fitted.len()),
+        covariance: nalgebra::DMatrix::zeros(fitted.len(), fitted.len()).into(),
         weights: vec![1.0; observations],
         sigma_scale: 1.04,
         rank: 12,

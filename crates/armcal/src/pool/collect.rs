@@ -1,0 +1,235 @@
+//! Finding the results of earlier runs, and checking that they belong together.
+
+use crate::error::Error;
+use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
+use armcal_core::{Observation, Pose, Severity, Stage, Warning};
+use armcal_report::{
+    BoardFacts, OBSERVATIONS_FILE, ObservedRecording, PastObservations, PooledRecordingRun, StartFrame,
+    sha256,
+};
+use armcal_table::Board;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What the results hold together.
+#[derive(Debug, Clone)]
+pub struct Collected {
+    /// The recordings in the order of time.
+    pub recordings: Vec<CollectedRecording>,
+    /// Their observations, in the same order and with the index of the recording in it.
+    pub observations: Vec<Observation>,
+    /// What was left out.
+    pub warnings: Vec<Warning>,
+}
+
+/// One recording.
+#[derive(Debug, Clone)]
+pub struct CollectedRecording {
+    /// For the report.
+    pub run: PooledRecordingRun,
+    /// Where the base started (world_from_base).
+    pub base: Pose,
+    /// Where its board started (world_from_board).
+    pub board: Option<Pose>,
+}
+
+/// A recording, and the file it was found in.
+struct Found {
+    result: PathBuf,
+    recording: ObservedRecording,
+}
+
+/// Reads every `observations.json` in `folders` and below.
+///
+/// # Errors
+/// A folder without any, a result of another arm, board or setting than the pipeline's, a recording that is there twice.
+pub fn collect(
+    pipeline: &Pipeline,
+    model_text: &str,
+    board: Option<&Board>,
+    folders: &[PathBuf],
+) -> Result<Collected, Error> {
+    let facts = board.map(BoardFacts::of);
+    let mut found = Vec::new();
+    for result in results(folders)? {
+        let past = PastObservations::open(&result)?;
+        if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
+            return Err(Error::Unpoolable { result, problem });
+        }
+        found.extend(past.recordings.into_iter().map(|r| Found { result: result.clone(), recording: r }));
+    }
+    refuse_doubles(&found)?;
+    let mut warnings = Vec::new();
+    found.retain(|f| {
+        let empty = f.recording.observations.is_empty();
+        if empty {
+            warnings.push(left_out(f));
+        }
+        !empty
+    });
+    if found.is_empty() {
+        let dwells = 0;
+        let hint = "no result has an observation: look at what their runs rejected".to_owned();
+        return Err(Error::NoObservations { dwells, hint });
+    }
+    let begins_ns = |f: &Found| f.recording.observations.iter().map(|o| o.time_ns).min();
+    found.sort_by_cached_key(|f| (begins_ns(f), f.recording.name.clone(), f.result.clone()));
+    Ok(joined(found, warnings))
+}
+
+/// Gives every recording its name and its place.
+fn joined(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
+    let names = unique_names(&found);
+    let mut collected = Collected { recordings: Vec::new(), observations: Vec::new(), warnings };
+    for (index, (f, name)) in found.into_iter().zip(names).enumerate() {
+        let ObservedRecording { files, dwells, rejected, base, board, observations, .. } = f.recording;
+        collected.recordings.push(CollectedRecording {
+            run: PooledRecordingRun { name, result: f.result, files, dwells, rejected },
+            base: base.pose(),
+            board: board.as_ref().map(StartFrame::pose),
+        });
+        collected.observations.extend(observations.into_iter().map(|mut o| {
+            o.dwell.recording = index;
+            o
+        }));
+    }
+    collected
+}
+
+/// Every file of observations in the folders and below, each once, in the order of the paths.
+fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
+    let mut all = BTreeSet::new();
+    for folder in folders {
+        let mut here = BTreeSet::new();
+        search(folder, &mut here)?;
+        if here.is_empty() {
+            return Err(Error::NoResults { folder: folder.clone() });
+        }
+        all.extend(here);
+    }
+    // One file by two paths is one result; the first path names it.
+    let mut seen = BTreeSet::new();
+    all.retain(|path| seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
+    Ok(all)
+}
+
+fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+    if path.is_file() {
+        found.insert(path.to_owned());
+        return Ok(());
+    }
+    let failed = |source| Error::ReadFile { what: "folder of results", path: path.to_owned(), source };
+    for entry in std::fs::read_dir(path).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        // A link to a folder may lead in circles.
+        if entry.file_type().map_err(failed)?.is_dir() {
+            search(&entry.path(), found)?;
+        } else if entry.file_name() == OBSERVATIONS_FILE {
+            found.insert(entry.path());
+        }
+    }
+    Ok(())
+}
+
+/// What of a result contradicts the pipeline, if anything.
+fn contradiction(
+    pipeline: &Pipeline,
+    model_sha256: &str,
+    board: Option<&BoardFacts>,
+    past: &PastObservations,
+) -> Option<String> {
+    if past.model_sha256 != model_sha256 {
+        return Some("it calibrated another nominal arm (the model file differs); name its [model]".into());
+    }
+    match (&past.board, board) {
+        (Some(then), Some(now)) => {
+            if let Some(difference) = then.difference(now) {
+                return Some(format!("its board differs from the pipeline's: {difference}"));
+            }
+        }
+        (None, None) => {}
+        (Some(_), None) => return Some("it has a board and the pipeline has no [table]".into()),
+        (None, Some(_)) => return Some("it has no board and the pipeline has a [table]".into()),
+    }
+    let then: ObservationsSection = match past.settings.clone().try_into() {
+        Ok(settings) => settings,
+        Err(e) => return Some(format!("its [observations] are not understood: {e}")),
+    };
+    if then != pipeline.observations {
+        let now = &pipeline.observations;
+        return Some(format!("its [observations] were {then:?}, the pipeline's are {now:?}"));
+    }
+    let boards_estimated = pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated);
+    let base_estimated = pipeline.frames.base.pose == FramePose::Estimated;
+    let differs = |frame: &StartFrame, estimated| frame.estimated != estimated;
+    for recording in &past.recordings {
+        let what = if recording.board.as_ref().is_some_and(|board| differs(board, boards_estimated)) {
+            "board (table.pose)"
+        } else if differs(&recording.base, base_estimated) {
+            "base (frames.base.pose)"
+        } else {
+            continue;
+        };
+        return Some(format!(
+            "the {what} of `{}` is estimated in one of result and pipeline and known in the other",
+            recording.name
+        ));
+    }
+    None
+}
+
+/// A recording counts once.
+fn refuse_doubles(found: &[Found]) -> Result<(), Error> {
+    let mut first_with: BTreeMap<&str, &Found> = BTreeMap::new();
+    for f in found {
+        for file in &f.recording.files {
+            if let Some(first) = first_with.insert(&file.sha256, f) {
+                return Err(Error::PooledTwice {
+                    file: file.path.clone(),
+                    first: first.result.clone(),
+                    second: f.result.clone(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn left_out(f: &Found) -> Warning {
+    let (dwells, rejected) = (f.recording.dwells, f.recording.rejected);
+    let message = format!(
+        "left out: none of its {dwells} dwells became an observation ({rejected} rejected); see the warnings of its run in {}",
+        f.result.display()
+    );
+    Warning::new(
+        Severity::DataLost,
+        Stage::Calibrate,
+        "recording-left-out",
+        f.recording.name.clone(),
+        message,
+    )
+}
+
+/// The names of the recordings; those of one name are told apart by the folders of their results, then by a number.
+fn unique_names(found: &[Found]) -> Vec<String> {
+    let count = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count();
+    let own: Vec<String> = found.iter().map(|f| f.recording.name.clone()).collect();
+    let mut counts: BTreeMap<&String, usize> = BTreeMap::new();
+    own.iter().for_each(|name| *counts.entry(name).or_default() += 1);
+    let folder = |f: &Found| {
+        let folder = f.result.parent().and_then(Path::file_name).unwrap_or_default();
+        folder.to_string_lossy().into_owned()
+    };
+    let mut names: Vec<String> = Vec::with_capacity(own.len());
+    for (f, name) in found.iter().zip(&own) {
+        let wanted = if counts[name] > 1 { format!("{}-{name}", folder(f)) } else { name.clone() };
+        let mut unique = wanted.clone();
+        let mut number = 2;
+        while count(&names, &unique) > 0 {
+            unique = format!("{wanted}-{number}");
+            number += 1;
+        }
+        names.push(unique);
+    }
+    names
+}
