@@ -58,5 +58,8 @@ mod verify;
 /// Does the calibration table do without a camera?
 mod camera_free;
 
+/// Are results of many days pooled into what one fit of all their recordings gives, and strangers refused by name?
+mod pool;
+
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
