@@ -17,6 +17,7 @@ fn the_reference_lists_every_key_with_a_default() {
         keys(&armcal_calibrate::FitConfig::default()),
         keys(&armcal_model::Deviation::default()),
         keys(&armcal_diagnose::DiagnosisConfig::default()),
+        keys(&armcal::pool::PoolSection::default()),
         keys(&armcal::check::CheckSection::default()),
         keys(&armcal::check::MaxWarnings::default()),
     ];

@@ -73,6 +73,9 @@ mod camera_free;
 /// Does an archive survive kills, does sharing it out change a byte, and are changes over months seen?
 mod batch;
 
+/// Are results of many days pooled into what one fit of all their recordings gives, and strangers refused by name?
+mod pool;
+
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
 

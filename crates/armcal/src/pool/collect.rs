@@ -163,6 +163,9 @@ fn contradiction(
     let base_estimated = pipeline.frames.base.pose == FramePose::Estimated;
     let differs = |frame: &StartFrame, estimated| frame.estimated != estimated;
     for recording in &past.recordings {
+        if recording.board.is_some() != board.is_some() {
+            return Some(format!("it does not say where the board of `{}` started", recording.name));
+        }
         let what = if recording.board.as_ref().is_some_and(|board| differs(board, boards_estimated)) {
             "board (table.pose)"
         } else if differs(&recording.base, base_estimated) {

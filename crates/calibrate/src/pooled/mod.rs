@@ -71,6 +71,11 @@ impl PooledModel {
             }
             views.push(View { model: local, index });
         }
+        let mut names = BTreeSet::new();
+        if let Some(twice) = parameters.iter().find(|p| !names.insert(p.name.as_str())) {
+            let why = "names two parameters of the pool: give one of the recordings another name".into();
+            return Err(CalibrateError::BadParameter { name: twice.name.clone(), why });
+        }
         for &index in &own {
             parameters[index].free = false;
             parameters[index].meaning += " (each recording has its own)";

@@ -73,11 +73,11 @@ impl PooledRun {
         status_of(self.all_warnings().into_iter())
     }
 
-    /// Warnings of the pool and of both calibrations, each once.
+    /// Warnings of the pool and of its calibration, each once. (Those of the transfer say of every recording that its own
+    /// parameters were fitted to its own dwells, which is what a transfer is.)
     pub fn all_warnings(&self) -> Vec<&Warning> {
-        let calibrations = std::iter::once(&self.calibration).chain(&self.transfer);
-        let of_calibrations = calibrations.flat_map(|c| c.warnings.iter().chain(&c.fit.warnings));
-        without_repeats(self.warnings.iter().chain(of_calibrations))
+        let of_calibration = self.calibration.warnings.iter().chain(&self.calibration.fit.warnings);
+        without_repeats(self.warnings.iter().chain(of_calibration))
     }
 
     /// Errors of every recording.

@@ -23,6 +23,9 @@ mod page;
 /// Parquet tables, parameters, the calibrated model.
 mod tables;
 
+/// `observations.json`: what the fit saw comes back to the last bit.
+mod past_observations;
+
 /// `model.json`: the calibrated model comes back as it was.
 mod past_model;
 

@@ -66,6 +66,34 @@ fn the_calibrated_model_predicts_from_its_file_as_it_did() {
     agree(&s.run, &out);
 }
 
+/// Files written before the session was written as it is say the same.
+#[test]
+fn the_session_is_written_in_the_words_of_the_format() {
+    let session = armcal_model::Session {
+        start_ns: 1,
+        end_ns: 2,
+        recordings: 3,
+        reference_temperature_c: None,
+        gravity_in_world_mps2: nalgebra::Vector3::new(0.0, 0.0, -9.80665),
+        gravity_in_base_mps2: Some(nalgebra::Vector3::new(1.0, 2.0, 3.0)),
+        volume_centre_m: None,
+        volume_half_extent_m: 0.3,
+        board_centres_m: [(1, nalgebra::Vector3::new(0.1, 0.2, 0.3))].into(),
+        largest_effort_nm: Some(vec![4.0, 5.0]),
+        temperature: true,
+        load: false,
+        moving: false,
+        cavities: vec!["c1".into()],
+    };
+    let text = "{\"start_ns\":1,\"end_ns\":2,\"recordings\":3,\"reference_temperature_c\":null,\
+                \"gravity_in_world_mps2\":[0.0,0.0,-9.80665],\"gravity_in_base_mps2\":[1.0,2.0,3.0],\
+                \"volume_centre_m\":null,\"volume_half_extent_m\":0.3,\"board_centres_m\":{\"1\":[0.1,0.2,0.3]},\
+                \"largest_effort_nm\":[4.0,5.0],\"temperature\":true,\"load\":false,\"moving\":false,\
+                \"cavities\":[\"c1\"]}";
+    assert_eq!(serde_json::to_string(&session).unwrap(), text);
+    assert_eq!(serde_json::from_str::<armcal_model::Session>(text).unwrap(), session);
+}
+
 #[test]
 fn a_file_that_is_not_a_model_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
