@@ -58,6 +58,37 @@ impl Archive {
         armcal([arg("map"), arg("--manifest"), &manifest, arg("--shard"), arg(shard), arg("--out"), &out])
     }
 
+    /// Starts batches and kills each (SIGKILL) after so long; whatever is there then must be as in the `whole`. Returns
+    /// how many results there are in the end.
+    fn kill_at(
+        &self,
+        moments: impl Iterator<Item = Duration>,
+        out: &str,
+        whole: &BTreeMap<String, Vec<u8>>,
+    ) -> usize {
+        let mut survived = 0;
+        for moment in moments {
+            let mut batch = Command::new(env!("CARGO_BIN_EXE_armcal"))
+                .arg("batch")
+                .args([&self.path("manifest.toml"), Path::new("--out"), &self.path(out)])
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("starting armcal");
+            std::thread::sleep(moment);
+            batch.kill().expect("SIGKILL");
+            batch.wait().expect("its end");
+            let mut partial = if self.path(out).is_dir() { self.results(out) } else { BTreeMap::new() };
+            // Unfinished folders are named as such; everything else must be whole.
+            partial.retain(|name, _| !name.contains(".part"));
+            survived = partial.keys().filter(|name| name.ends_with("row.json")).count();
+            for (name, bytes) in &partial {
+                assert!(bytes == &whole[name], "{name} is half or wrong after a kill");
+            }
+        }
+        survived
+    }
+
     fn reduce(&self, out: &str) -> Output {
         armcal([Path::new("reduce"), &self.path(out)])
     }
@@ -107,34 +138,47 @@ fn killed_at_any_moment_it_goes_on_and_ends_in_the_same_bytes() {
     assert!(said.contains("broken: "), "{said}");
     let whole = archive.results("undisturbed");
     assert_eq!(whole.len(), 3 + 12 * 5, "{:?}", whole.keys());
-    let mut finished = 0;
-    for kill in 0..8u64 {
-        let mut batch = Command::new(env!("CARGO_BIN_EXE_armcal"))
-            .arg("batch")
-            .args([&archive.path("manifest.toml"), Path::new("--out"), &archive.path("killed")])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("starting armcal");
-        // Odd moments from the first file on; slow machines are killed early, fast ones late.
-        std::thread::sleep(Duration::from_millis(40 + 173 * kill));
-        batch.kill().expect("SIGKILL");
-        batch.wait().expect("its end");
-        let partial =
-            if archive.path("killed").is_dir() { archive.results("killed") } else { BTreeMap::new() };
-        finished =
-            partial.keys().filter(|name| name.ends_with("row.json") && !name.contains(".part/")).count();
-        for (name, bytes) in partial.iter().filter(|(name, _)| !name.contains(".part/")) {
-            // A campaign of an earlier turn could only be there if that turn had ended.
-            assert!(bytes == &whole[name], "{name} is half or wrong after a kill");
-        }
-    }
-    println!("{finished} of 12 results survived the kills");
+    // Odd moments from the first file on; slow machines are killed early, fast ones late.
+    let moments = (0..8).map(|kill| Duration::from_millis(40 + 173 * kill));
+    let survived = archive.kill_at(moments, "killed", &whole);
+    println!("{survived} of 12 results survived the kills");
     let said = expect(&archive.batch("killed"), 3);
-    assert!(finished == 0 || said.contains(&format!("{finished} results were there already")), "{said}");
+    assert!(survived == 0 || said.contains(&format!("{survived} results were there already")), "{said}");
     assert_same(&whole, &archive.results("killed"));
     let again = expect(&archive.batch("killed"), 3);
     assert!(again.contains("12 results were there already"), "{again}");
+}
+
+#[test]
+#[ignore = "a thousand recordings: minutes with --release, an hour without"]
+fn a_thousand_recordings_killed_ten_times() {
+    let archive = Archive { folder: tempfile::tempdir().expect("temporary folder") };
+    archive.write_pipeline();
+    let lab = archive.path("lab");
+    std::fs::create_dir(&lab).expect("a folder");
+    weeks(&lab, 1000, "");
+    let recordings = (0..1000).map(|week| format!("lab/week{week:02}.mcap\n"));
+    let manifest = format!(
+        "pipeline = \"rig.toml\"\n{}",
+        recordings.map(|r| format!("[[recordings]]\npaths = [\"{}\"]\n", r.trim())).collect::<String>()
+    );
+    std::fs::write(archive.path("manifest.toml"), manifest).expect("written");
+    let start = std::time::Instant::now();
+    expect(&archive.batch("undisturbed"), 0);
+    let undisturbed = start.elapsed();
+    let whole = archive.results("undisturbed");
+    // At random within a tenth of the whole, so that the ten turns together do not finish.
+    let mut draw = 0x9e37_79b9_7f4a_7c15u64;
+    let moments = (0..10).map(|_| {
+        draw = draw.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        undisturbed.mul_f64(0.1 * (draw >> 11) as f64 / (1u64 << 53) as f64)
+    });
+    let survived = archive.kill_at(moments, "killed", &whole);
+    println!("undisturbed in {undisturbed:.1?}; {survived} of 1000 results survived ten kills");
+    assert!(survived > 0);
+    let said = expect(&archive.batch("killed"), 0);
+    assert!(said.contains(&format!("{survived} results were there already")), "{said}");
+    assert_same(&whole, &archive.results("killed"));
 }
 
 #[test]
