@@ -64,3 +64,39 @@ fn shipped_files_with_bytes_gone_bad_end_in_words() {
         }
     }
 }
+
+/// A stack that overflows kills the program without a word.
+#[test]
+fn nesting_without_end_ends_in_words() {
+    const LEVELS: usize = 100_000;
+    let formula = |text: &str| {
+        let effect = format!(
+            "[[effects]]\nkind = 'expression'\nname = 'x'\nacts_on = 'joint1'\nformula = '{text}'\n\
+             parameters = {{ k = {{ prior = 1.0, unit = 'deg' }} }}\n"
+        );
+        files::results(&[&[3], effect.as_bytes()].concat());
+    };
+    let around = |open: &str, inside: &str, close: &str| open.repeat(LEVELS) + inside + &close.repeat(LEVELS);
+    for (open, close) in
+        [("(", ")"), ("-(", ")"), ("sin(", ")"), ("(k*", ")"), ("sin ", ""), ("k^", ""), ("k+", "")]
+    {
+        formula(&around(open, "k", close));
+        // As deep as a formula may be.
+        let levels = 9_990 / (open.len() + close.len());
+        formula(&(open.repeat(levels) + "k" + &close.repeat(levels)));
+    }
+    let urdf = format!("<robot>{}</robot>", around("<a>", "", "</a>"));
+    files::geometry(&[&[2], urdf.as_bytes()].concat());
+    let toml = format!("name = {}", around("[", "", "]"));
+    let tables = format!("[{}a]\n", "a.".repeat(LEVELS));
+    for kind in 0..4 {
+        files::pipeline(&[&[kind], toml.as_bytes()].concat());
+        files::pipeline(&[&[kind], tables.as_bytes()].concat());
+    }
+    let json = around("[", "", "]");
+    let object = around("{\"a\":", "1", "}");
+    for kind in 0..2 {
+        files::results(&[&[kind], json.as_bytes()].concat());
+        files::results(&[&[kind], object.as_bytes()].concat());
+    }
+}

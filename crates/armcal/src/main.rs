@@ -2,6 +2,7 @@
 
 use armcal::cli::Cli;
 use armcal::commands::{self, Outcome};
+use armcal_report::TerminalStyle;
 use clap::Parser as _;
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -15,7 +16,11 @@ fn main() -> ExitCode {
         Ok(Outcome::Broken) => ExitCode::FAILURE,
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
-            let _ = writeln!(std::io::stderr(), "error: {}", commands::harmless(&error.to_string()));
+            let _ = writeln!(
+                std::io::stderr(),
+                "error: {}",
+                commands::harmless(&error.to_string(), TerminalStyle::Plain)
+            );
             ExitCode::from(error.exit_code())
         }
     }

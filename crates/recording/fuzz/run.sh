@@ -12,7 +12,7 @@ targets=("${@:2}")
 build=(--sanitizer none --features files)
 triple="$(rustc -vV | sed -n 's/^host: //p')"
 cargo fuzz build "${build[@]}"
-"target/$triple/release/seeds"
+"target/$triple/release/seeds" -runs=0
 
 for target in "${targets[@]}"; do
     echo "== $target, $seconds s"

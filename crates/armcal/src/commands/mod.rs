@@ -107,12 +107,12 @@ fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
 /// Prints a result; a reader that closed the pipe is not an error.
 fn print(text: &str) {
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(harmless(text).as_bytes()).and_then(|()| stdout.flush());
+    let _ = stdout.write_all(harmless(text, style()).as_bytes()).and_then(|()| stdout.flush());
 }
 
-/// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and our
-/// own colours stay; the others become `\u001b`, which also leaves JSON what it is.
-pub fn harmless(text: &str) -> Cow<'_, str> {
+/// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and, where
+/// we use them, colours stay; the others become `\u001b`, which also leaves JSON what it is.
+pub fn harmless(text: &str, style: TerminalStyle) -> Cow<'_, str> {
     // Overrides of the writing direction would let a name rewrite the rest of its line.
     let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let is_harmless = |c: char| matches!(c, '\n' | '\t') || !c.is_control() && !turns(c);
@@ -122,8 +122,9 @@ pub fn harmless(text: &str) -> Cow<'_, str> {
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let taken = colour_code(rest).unwrap_or(&rest[..c.len_utf8()]);
-        match is_harmless(c) || taken.len() > 1 && c == '\u{1b}' {
+        let colour = colour_code(rest).filter(|_| style == TerminalStyle::Colour);
+        let taken = colour.unwrap_or(&rest[..c.len_utf8()]);
+        match is_harmless(c) || colour.is_some() {
             true => shown.push_str(taken),
             false => shown.push_str(&format!("\\u{:04x}", u32::from(c))),
         }
@@ -160,11 +161,13 @@ fn json_text(value: &impl serde::Serialize) -> Result<String, Error> {
 #[cfg(test)]
 mod tests {
     use super::harmless;
+    use armcal_report::TerminalStyle::{Colour, Plain};
 
     #[test]
     fn only_colours_and_lines_reach_the_terminal_as_they_are() {
         let ours = "\u{1b}[1mtitle\u{1b}[0m\n\tcell \u{1b}[38;5;11mü\u{1b}[39m";
-        assert_eq!(harmless(ours), ours);
+        assert_eq!(harmless(ours, Colour), ours);
+        assert_eq!(harmless("\u{1b}[1mtitle\n", Plain), "\\u001b[1mtitle\n");
         // Title, clipboard, screen, cursor, a C1 introducer, backspaces, carriage return.
         for (evil, shown) in [
             ("\u{1b}]0;pwned\u{7}", "\\u001b]0;pwned\\u0007"),
@@ -175,10 +178,10 @@ mod tests {
             ("a\u{202e}b", "a\\u202eb"),
             ("\u{1b}[31", "\\u001b[31"),
         ] {
-            assert_eq!(harmless(evil), shown);
+            assert_eq!(harmless(evil, Colour), shown);
         }
         let json = serde_json::json!({ "name": "a\u{9b}b\u{7f}" });
-        let printed = serde_json::from_str::<serde_json::Value>(&harmless(&json.to_string()));
+        let printed = serde_json::from_str::<serde_json::Value>(&harmless(&json.to_string(), Plain));
         assert_eq!(printed.ok(), Some(json));
     }
 }

@@ -7,6 +7,9 @@ use num_dual::{Dual64, DualNum};
 use std::marker::PhantomData;
 use std::str::FromStr;
 
+/// Longest formula; reading one takes the square of its length.
+const LONGEST: usize = 10_000;
+
 /// The functions of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Function {
@@ -132,6 +135,9 @@ fn check_characters(text: &str) -> Result<(), String> {
     let belongs = |c: char| c.is_ascii_alphanumeric() || "_.+-*/^() ".contains(c);
     if text.trim().is_empty() {
         return Err("the formula is empty".to_owned());
+    }
+    if text.len() > LONGEST {
+        return Err(format!("the formula has {} characters; at most {LONGEST} are read", text.len()));
     }
     match text.chars().find(|c| !belongs(*c)) {
         Some(other) => {
@@ -288,6 +294,7 @@ mod tests {
         assert_eq!(value("2 * -3", &[]), -6.0);
         assert_eq!(value("1.5e-3 * 2 + .5E1 - 1e2 + 3.", &[]), 3e-3 + 5.0 - 100.0 + 3.0);
         assert!(Formula::read("2e * 3").is_err());
+        assert!(Formula::read(&"1+".repeat(5001)).is_err_and(|why| why.contains("10002 characters")));
         assert_eq!(value("b - a", &[1.0, 5.0]), 4.0);
         assert!((value("sin(pi / 2) + cos(0)", &[]) - 2.0).abs() < 1e-15);
         assert_eq!(value("abs(-3) * sign(-2)", &[]), -3.0);

@@ -114,10 +114,8 @@ pub fn results(bytes: &[u8]) {
         2 => {
             let joints = ["joint1", "joint2", "joint3"].map(str::to_owned);
             if let Ok(spec) = EffectSpec::parse(text, &joints) {
-                assert_eq!(
-                    EffectSpec::parse(&spec.to_string(), &joints).ok().map(|s| s.to_string()),
-                    Some(spec.to_string())
-                );
+                let again = EffectSpec::parse(&spec.to_string(), &joints).map(|s| s.to_string());
+                assert_eq!(again.ok(), Some(spec.to_string()), "what is written is read back");
                 let _ = place(&[EffectTable::from(&spec)]);
             }
         }

@@ -1,4 +1,6 @@
-//! Writes what fuzzing starts from into `corpus/`: small recordings made here, and the files that the repository ships.
+//! No target: writes what fuzzing starts from into `corpus/` when it is run with `-runs=0`. Small recordings made here, and
+//! the files that the repository ships. It is built like a target because instrumented crates link only so.
+#![no_main]
 
 use armcal_fuzz::structured;
 use armcal_recording::output::McapOutput;
@@ -8,7 +10,9 @@ use std::path::Path;
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
-fn main() -> Any<()> {
+libfuzzer_sys::fuzz_target!(init: write().expect("writing the seeds"), |_bytes: &[u8]| {});
+
+fn write() -> Any<()> {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR"));
     recordings(fuzz)?;
     messages(fuzz)?;
