@@ -58,5 +58,8 @@ mod verify;
 /// Does the calibration table do without a camera?
 mod camera_free;
 
+/// Does an archive survive kills, does sharing it out change a byte, and are changes over months seen?
+mod batch;
+
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;

@@ -2,6 +2,7 @@
 
 pub mod browser;
 pub mod conformance;
+pub mod slurm;
 
 use serde_json::Value;
 use std::collections::BTreeMap;

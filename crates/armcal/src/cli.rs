@@ -116,6 +116,61 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Calibrates every recording of an archive by itself, and shows what changed over months.
+    ///
+    /// Results that are there already, made from the same file, pipeline and version, are kept: after a kill at any moment
+    /// the same command goes on. Exit codes: 0 done, 1 failed, 2 usage, 3 some recordings failed or are doubtful.
+    Batch {
+        /// Patterns such as 'lab/**/*.mcap', MCAP files, folders of split bags; or one manifest (TOML with [[recordings]], or
+        /// a path a line).
+        #[arg(required = true)]
+        inputs: Vec<String>,
+        /// Pipeline file, whose own recordings do not count; the manifest's when absent.
+        #[arg(long, value_name = "FILE")]
+        pipeline: Option<PathBuf>,
+        /// Folder of the campaign; created if missing.
+        #[arg(long, default_value = "campaign", value_name = "DIR")]
+        out: PathBuf,
+        /// Write everything for each recording that `armcal run` does, page and MCAP included.
+        #[arg(long)]
+        full: bool,
+        /// Recordings worked on at a time; all cores when absent.
+        #[arg(long, value_name = "N")]
+        jobs: Option<usize>,
+        /// Print campaign.json instead of the tables.
+        #[arg(long)]
+        json: bool,
+    },
+    /// One share of a batch, for a cluster: any number of them, on any machines that see the folder; then `armcal reduce`.
+    Map {
+        /// Manifest file: TOML with [[recordings]], or a path a line.
+        #[arg(long, value_name = "FILE")]
+        manifest: PathBuf,
+        /// Which share, such as 2/17; from the environment of a Slurm job array when absent.
+        #[arg(long, value_name = "I/N")]
+        shard: Option<String>,
+        /// Pipeline file; the manifest's when absent.
+        #[arg(long, value_name = "FILE")]
+        pipeline: Option<PathBuf>,
+        /// Folder of the campaign, the same for all shares.
+        #[arg(long, default_value = "campaign", value_name = "DIR")]
+        out: PathBuf,
+        /// Write everything for each recording that `armcal run` does.
+        #[arg(long)]
+        full: bool,
+        /// Recordings worked on at a time; all cores when absent.
+        #[arg(long, value_name = "N")]
+        jobs: Option<usize>,
+    },
+    /// Puts the shares of `armcal map` together, to the bytes that `armcal batch` writes; missing shares fail by name.
+    Reduce {
+        /// Folder of the campaign.
+        #[arg(default_value = "campaign")]
+        out: PathBuf,
+        /// Print campaign.json instead of the tables.
+        #[arg(long)]
+        json: bool,
+    },
     /// Two results on the same dwells, paired: what got better, what got worse, what moved.
     Compare {
         /// Result before: a run.mcap or the folder it is in.

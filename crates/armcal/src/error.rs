@@ -55,6 +55,42 @@ pub enum Error {
         /// `table`, `base`.
         role: &'static str,
     },
+    /// What a batch should work on.
+    #[error("recordings `{what}`: {why}")]
+    Manifest {
+        /// The pattern or file.
+        what: String,
+        /// What is wrong, and what to do.
+        why: String,
+    },
+    /// A file in a campaign's folder that is not what it should be.
+    #[error("campaign {}: {why}", path.display())]
+    Campaign {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        why: String,
+    },
+    /// A share that is none.
+    #[error("--shard: {0}")]
+    Shard(String),
+    /// No pipeline was named.
+    #[error("no pipeline: give --pipeline FILE, or a manifest that begins with pipeline = \"FILE\"")]
+    NoPipeline,
+    /// The system gives no threads.
+    #[error("starting worker threads: {why}")]
+    Threads {
+        /// What the system said.
+        why: String,
+    },
+    /// A defect of armcal itself.
+    #[error("recording `{recording}`: armcal itself failed ({why}); please report it with the recording")]
+    Internal {
+        /// Name of the recording.
+        recording: String,
+        /// The message.
+        why: String,
+    },
     /// No dwell became an observation.
     #[error("none of the {dwells} dwells became an observation; {hint}")]
     NoObservations {

@@ -3,6 +3,7 @@
 //! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
 //! are what a user types. Two arms have a pipeline and a story of their own in [`closed_chain`].
 
+pub mod batch;
 pub mod check;
 pub mod cli;
 pub mod closed_chain;

@@ -23,7 +23,8 @@ use std::path::{Path, PathBuf};
 pub struct Pipeline {
     /// Name shown in every output.
     pub name: String,
-    /// The recordings, in order; a recording may consist of several split files.
+    /// The recordings, in order; a recording may consist of several split files. `armcal batch` brings its own.
+    #[serde(default)]
     pub recordings: Vec<RecordingEntry>,
     /// Which channels to read, and as what.
     pub streams: Streams,
@@ -94,10 +95,14 @@ pub struct RecordingEntry {
 impl RecordingEntry {
     /// The recording's name.
     pub fn name(&self) -> String {
-        let stem =
-            || self.paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
-        self.name.clone().or_else(stem).unwrap_or_default()
+        recording_name(self.name.as_ref(), &self.paths)
     }
+}
+
+/// The given name, or the stem of the first file.
+pub(crate) fn recording_name(given: Option<&String>, paths: &[PathBuf]) -> String {
+    let stem = || paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
+    given.cloned().or_else(stem).unwrap_or_default()
 }
 
 /// The calibration table.
@@ -298,8 +303,29 @@ impl Pipeline {
         Pipeline::parse(path, text, path.parent().unwrap_or(Path::new("")))
     }
 
+    /// The same for recordings that are named elsewhere; the pipeline's own are left out.
+    pub fn load_for_others(path: &Path) -> Result<Pipeline, Error> {
+        let text = read(path)?;
+        let mut pipeline = Pipeline::parse_unchecked(path, text, path.parent().unwrap_or(Path::new("")))?;
+        pipeline.recordings.clear();
+        pipeline.check_sections(path)?;
+        Ok(pipeline)
+    }
+
+    /// This pipeline on one other recording.
+    pub fn of_recording(&self, entry: &RecordingEntry) -> Pipeline {
+        Pipeline { recordings: vec![entry.clone()], ..self.clone() }
+    }
+
     /// Reads and checks the text of a pipeline whose relative paths start in `folder`.
     pub fn parse(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
+        let pipeline = Pipeline::parse_unchecked(path, text, folder)?;
+        pipeline.check_recordings(path)?;
+        pipeline.check_sections(path)?;
+        Ok(pipeline)
+    }
+
+    fn parse_unchecked(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
         if is_of_two_arms(&text) {
             let problem = "is about two arms, which only `armcal run` reads".into();
             let key = "closed_chain".into();
@@ -309,7 +335,6 @@ impl Pipeline {
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
-        pipeline.check(path)?;
         Ok(pipeline)
     }
 
@@ -318,8 +343,8 @@ impl Pipeline {
         self.folder.join(path)
     }
 
-    /// Contradictions that serde cannot see.
-    fn check(&self, path: &Path) -> Result<(), Error> {
+    /// Recordings that contradict each other.
+    fn check_recordings(&self, path: &Path) -> Result<(), Error> {
         let fail = |key: &str, problem: String| {
             Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem })
         };
@@ -338,6 +363,14 @@ impl Pipeline {
                 );
             }
         }
+        Ok(())
+    }
+
+    /// Sections that contradict each other.
+    fn check_sections(&self, path: &Path) -> Result<(), Error> {
+        let fail = |key: &str, problem: String| {
+            Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem })
+        };
         if self.table.as_ref().is_some_and(|t| t.pose == BoardPose::Measured) && self.streams.table.is_none()
         {
             return fail("table.pose", "is \"measured\" but there is no [streams.table]".into());

@@ -1,6 +1,8 @@
 //! What is being done now, on stderr, when somebody watches.
 
+use armcal_report::printable;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write as _;
 use std::time::Duration;
 
 /// A one-line spinner; silent when stderr is not a terminal.
@@ -27,6 +29,27 @@ impl Progress {
     /// Says what begins now.
     pub fn step(&self, what: &str) {
         self.bar.set_message(what.to_owned());
+    }
+
+    /// From now on so many recordings are counted, with their rate and the time left.
+    pub fn count(&self, recordings: usize) {
+        self.bar.set_length(recordings as u64);
+        let shown = "{bar:30} {pos}/{len} recordings, {per_sec}, {eta} left  {msg}";
+        if let Ok(style) = ProgressStyle::with_template(shown) {
+            self.bar.set_style(style);
+        }
+    }
+
+    /// One of them is done.
+    pub fn advance(&self, name: &str) {
+        self.bar.set_message(name.to_owned());
+        self.bar.inc(1);
+    }
+
+    /// Tells something at once, above the line.
+    pub fn say(&self, text: &str) {
+        // A closed stderr leaves nowhere to tell it; results will.
+        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{}", printable(text))));
     }
 
     /// Removes the line.

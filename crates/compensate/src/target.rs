@@ -87,20 +87,14 @@ impl Conditions {
     /// A target as the model sees it, joints still at nothing.
     pub(crate) fn observation(&self, target: &Target, joints: usize) -> Observation {
         let after_ns = (target.time_s.unwrap_or(0.0) * 1e9).round() as i64;
+        let dwell = DwellId { recording: self.recording, dwell: self.dwell };
         Observation {
-            dwell: DwellId { recording: self.recording, dwell: self.dwell },
             time_ns: self.time_ns.saturating_add(after_ns),
-            joint_rad: vec![0.0; joints],
-            joint_sigma_rad: vec![0.0; joints],
             arrival: Vec::new(),
-            path_memory_rad: None,
-            pair_memory_rad: None,
-            joint_velocity_radps: None,
-            effort_nm: None,
             temperature_c: self.temperature_c,
             load_kg: self.load_kg,
-            reference: target.place.clone(),
             covariance_m2: Matrix3::identity(),
+            ..Observation::bare(dwell, vec![0.0; joints], target.place.clone())
         }
     }
 }

@@ -7,7 +7,7 @@ mod round_trip;
 use crate::{Arm, Compensator, Conditions, Limits, Past};
 use armcal_core::{Arrival, DwellId, Observation, Reference};
 use armcal_model::{Chain, Frames, Model, Session};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::path::Path;
 
 const RIGHT_ARM: &str = include_str!("../../../pipelines/models/right_arm.toml");
@@ -44,24 +44,12 @@ fn tip_after(model: &Model, values: &[f64], path: &[Vec<f64>]) -> Vector3<f64> {
         last.map_or(Arrival::Unknown, |t| if t > 0.0 { Arrival::Positive } else { Arrival::Negative })
     };
     let joints = rest.len();
+    let nowhere = Reference::position(Vector3::zeros());
     let o = Observation {
-        dwell: DwellId { recording: 0, dwell: 0 },
-        time_ns: 0,
-        joint_rad: rest.clone(),
-        joint_sigma_rad: vec![0.0; joints],
         arrival: (0..joints).map(arrival).collect(),
         path_memory_rad: Some((0..joints).map(column).collect()),
         pair_memory_rad: Some((1..joints).map(|k| [pair(k - 1, 1.0), pair(k - 1, -1.0)]).collect()),
-        joint_velocity_radps: None,
-        effort_nm: None,
-        temperature_c: None,
-        load_kg: 0.0,
-        reference: Reference::Tracked {
-            position_m: Vector3::zeros(),
-            orientation: None,
-            orientation_sigma_rad: 0.0,
-        },
-        covariance_m2: Matrix3::identity(),
+        ..Observation::bare(DwellId { recording: 0, dwell: 0 }, rest.clone(), nowhere)
     };
     model.predicted_tip_in_world(values, &o)
 }

@@ -58,7 +58,33 @@ pub struct Observation {
     pub covariance_m2: Matrix3<f64>,
 }
 
+impl Reference {
+    /// A position the sensor saw [m], its frame; no orientation.
+    pub fn position(position_m: Vector3<f64>) -> Reference {
+        Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 }
+    }
+}
+
 impl Observation {
+    /// A joint reading [rad] and where the tip was; both exact, and nothing else known about the dwell.
+    pub fn bare(dwell: DwellId, joint_rad: Vec<f64>, reference: Reference) -> Observation {
+        Observation {
+            dwell,
+            time_ns: 0,
+            joint_sigma_rad: vec![0.0; joint_rad.len()],
+            arrival: vec![Arrival::Unknown; joint_rad.len()],
+            joint_rad,
+            path_memory_rad: None,
+            pair_memory_rad: None,
+            joint_velocity_radps: None,
+            effort_nm: None,
+            temperature_c: None,
+            load_kg: 0.0,
+            reference,
+            covariance_m2: Matrix3::zeros(),
+        }
+    }
+
     /// The cavity, if the tip was seated.
     pub fn cavity(&self) -> Option<&str> {
         match &self.reference {

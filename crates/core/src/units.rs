@@ -1,9 +1,9 @@
 //! Physical units: one enum decides symbols and display scaling everywhere a number leaves armcal.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The SI unit of a number inside armcal, and how it is shown to people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Unit {
     /// Length; shown in millimetres.
     #[serde(rename = "m")]

@@ -60,7 +60,7 @@ pub fn implied_joint_errors(
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
 mod tests {
     use super::*;
-    use armcal_core::{Arrival, DwellId, Reference};
+    use armcal_core::{DwellId, Reference};
     use armcal_model::{Chain, Frames};
     use nalgebra::Matrix3;
 
@@ -88,20 +88,10 @@ mod tests {
     "#;
 
     fn seen(joint_rad: &[f64], position_m: Vector3<f64>) -> Observation {
+        let id = DwellId { recording: 0, dwell: 0 };
         Observation {
-            dwell: DwellId { recording: 0, dwell: 0 },
-            time_ns: 0,
-            joint_rad: joint_rad.to_vec(),
-            joint_sigma_rad: vec![0.0; joint_rad.len()],
-            arrival: vec![Arrival::Unknown; joint_rad.len()],
-            path_memory_rad: None,
-            pair_memory_rad: None,
-            joint_velocity_radps: None,
-            effort_nm: None,
-            temperature_c: None,
-            load_kg: 0.0,
-            reference: Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 },
             covariance_m2: Matrix3::from_diagonal_element(1e-8),
+            ..Observation::bare(id, joint_rad.to_vec(), Reference::position(position_m))
         }
     }
 

@@ -30,23 +30,14 @@ fn poses(n: usize, rng: &mut ChaCha8Rng) -> Vec<Observation> {
             .map(|_| if rng.random::<bool>() { Arrival::Positive } else { Arrival::Negative })
             .collect();
         Observation {
-            dwell: DwellId { recording: 0, dwell },
             time_ns: dwell as i64 * 10_000_000_000,
-            joint_sigma_rad: vec![0.0; 3],
             arrival,
-            joint_rad,
-            path_memory_rad: None,
-            pair_memory_rad: None,
-            joint_velocity_radps: None,
-            effort_nm: None,
-            temperature_c: None,
-            load_kg: 0.0,
-            reference: Reference::Tracked {
-                position_m: Vector3::zeros(),
-                orientation: None,
-                orientation_sigma_rad: 0.0,
-            },
             covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
+            ..Observation::bare(
+                DwellId { recording: 0, dwell },
+                joint_rad,
+                Reference::position(Vector3::zeros()),
+            )
         }
     };
     (0..n).map(|i| pose(i, rng)).collect()

@@ -7,6 +7,7 @@ use crate::summary::temperature;
 use crate::{ClockAlignment, DwellConfig, DwellError};
 use armcal_core::{Arrival, Dwell, JointSamples, Samples};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 const DOING: &str = "following the moving arm";
 
@@ -58,15 +59,19 @@ pub fn track(
     let encoders = Encoders::of(&samples.joints, config);
     let tip = Tip::of(tip, clock, &samples.joints.time_ns, config);
     let history = History::of(&encoders, config);
+    // Which motion a frame belongs to hangs on the frames before it; all else about it does not.
     let mut motions = Motions::new(dwells);
-    let mut moments = Vec::new();
+    let mut found = Vec::new();
     for (row, time_ns) in tip.robot_ns.iter().copied().enumerate() {
-        let position_m = tip.samples.position_m[row];
-        let reading = Reading::at(&encoders, time_ns).filter(|_| position_m.iter().all(|v| v.is_finite()));
-        let Some(motion) = motions.of(time_ns, reading.as_ref().map(|r| r.stretch)) else { continue };
-        let Some(reading) = reading else { continue };
+        let seen = tip.samples.position_m[row].iter().all(|v| v.is_finite());
+        let reading = Reading::at(&encoders, time_ns).filter(|_| seen);
+        let motion = motions.of(time_ns, reading.as_ref().map(|r| r.stretch));
+        found.extend(motion.zip(reading).map(|(motion, reading)| (row, motion, reading)));
+    }
+    let moment = |(row, motion, reading): (usize, usize, Reading)| {
+        let time_ns = tip.robot_ns[row];
         let joint_rad = reading.joint_rad(&samples.joints);
-        moments.push(Moment {
+        Moment {
             time_ns,
             motion,
             joint_velocity_radps: velocities_radps(&encoders, time_ns, joint_rad.len()),
@@ -79,10 +84,10 @@ pub fn track(
                 .as_ref()
                 .and_then(|t| temperature(t, time_ns, time_ns, config.temperature_max_age_s)),
             joint_rad,
-            position_m,
-        });
-    }
-    Ok(moments)
+            position_m: tip.samples.position_m[row],
+        }
+    };
+    Ok(found.into_par_iter().map(moment).collect())
 }
 
 /// Numbers the motions between dwells.

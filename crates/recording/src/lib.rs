@@ -36,6 +36,7 @@ mod streams;
 mod sweep;
 
 pub use error::RecordingError;
+pub use map::sha256_of_file;
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawSchema};
 pub use report::*;

@@ -26,6 +26,14 @@ pub(crate) fn map(path: &Path) -> Result<Mmap, RecordingError> {
     Ok(mapped)
 }
 
+/// SHA-256 of a file, hexadecimal.
+///
+/// # Errors
+/// A file that cannot be opened, is empty or a folder.
+pub fn sha256_of_file(path: &Path) -> Result<String, RecordingError> {
+    Ok(sha256_hex(&map(path)?))
+}
+
 /// SHA-256, hexadecimal.
 pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()

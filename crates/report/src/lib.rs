@@ -5,11 +5,14 @@
 //! `Run -> write_all -> files`. All outputs are views of the one [`Run`]; the same run gives the same bytes,
 //! and each file appears whole or not at all.
 //!
+//! Many recordings, each with a run of its own, make a [`Campaign`].
+//!
 //! Two arms in a closed chain have a run and files of their own: [`ClosedRun`], [`write_closed`].
 //!
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
 
+mod campaign;
 mod channels;
 mod closed_chain;
 mod comparison;
@@ -34,6 +37,7 @@ mod text;
 mod verification;
 mod write;
 
+pub use campaign::{Campaign, FailedRecording, campaign_files, campaign_json, campaign_row, campaign_text};
 pub use closed_chain::{
     CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_summary_json, closed_terminal, write_closed,
 };
@@ -51,4 +55,4 @@ pub use verification::{
     IsoReport, On, PathSample, Published, Verification, VerifiedRecording, VerifyConfig, verification_files,
     verification_json, verification_text,
 };
-pub use write::{InputMessages, OutputConfig, write_all};
+pub use write::{InputMessages, OutputConfig, write_all, write_brief};

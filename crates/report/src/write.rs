@@ -115,6 +115,24 @@ pub fn write_all(
     Ok(written)
 }
 
+/// Writes what a campaign keeps of each recording: `summary.json`, `parameters.toml` and `model.json`, into a folder that
+/// is there.
+///
+/// # Errors
+/// A file that cannot be written, or a run whose parts do not belong together.
+pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
+    let texts = [
+        ("summary.json", summary_json(run)),
+        ("parameters.toml", parameters_toml(run)?),
+        (past_model::FILE, PastModel::of(run)?.json()?),
+    ];
+    for (name, text) in texts {
+        let path = out_dir.join(name);
+        stage(&path, text.as_bytes())?.commit().map_err(at(&path))?;
+    }
+    Ok(())
+}
+
 /// A complete file that has no name yet.
 pub(crate) fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
     let mut file = AtomicFile::create(path).map_err(at(path))?;

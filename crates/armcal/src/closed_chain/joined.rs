@@ -6,7 +6,7 @@
 use crate::error::Error;
 use armcal_core::robust::median;
 use armcal_core::{Dwell, JointSamples, Observation, Reference};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// A reading older than this many periods of its own stream is missing, not old.
 const OLDEST_PERIODS: f64 = 3.5;
@@ -60,24 +60,15 @@ pub fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, 
 pub fn of_arm(dwell: &Dwell, first: usize, count: usize) -> Observation {
     let own = first..first + count;
     let pairs = first..(first + count).saturating_sub(1);
+    let joint_rad = dwell.joint_rad[own.clone()].to_vec();
     Observation {
-        dwell: dwell.id,
         time_ns: dwell.mid_ns(),
-        joint_rad: dwell.joint_rad[own.clone()].to_vec(),
         joint_sigma_rad: dwell.joint_sigma_rad[own.clone()].to_vec(),
         arrival: dwell.arrival[own.clone()].to_vec(),
         path_memory_rad: Some(dwell.path_memory_rad[own.clone()].to_vec()),
         pair_memory_rad: Some(dwell.pair_memory_rad[pairs].to_vec()),
-        joint_velocity_radps: None,
         effort_nm: dwell.effort_nm.as_ref().map(|e| e[own].to_vec()),
-        temperature_c: None,
-        load_kg: 0.0,
-        reference: Reference::Tracked {
-            position_m: Vector3::zeros(),
-            orientation: None,
-            orientation_sigma_rad: 0.0,
-        },
-        covariance_m2: Matrix3::zeros(),
+        ..Observation::bare(dwell.id, joint_rad, Reference::position(Vector3::zeros()))
     }
 }
 

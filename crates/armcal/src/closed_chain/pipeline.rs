@@ -1,7 +1,7 @@
 //! The pipeline file of two arms.
 
 use crate::error::Error;
-use crate::pipeline::{FramePose, FrameSection, ModelSection, ParameterOverride};
+use crate::pipeline::{FramePose, FrameSection, ModelSection, ParameterOverride, recording_name};
 use armcal_calibrate::{Closure, FitConfig, HoldoutConfig, LengthKnowledge};
 use armcal_dwell::DwellConfig;
 use armcal_model::EffectTable;
@@ -115,9 +115,7 @@ fn default_max_gap_mm() -> f64 {
 impl RecordingPaths {
     /// The recording's name.
     pub fn name(&self) -> String {
-        let stem =
-            || self.paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
-        self.name.clone().or_else(stem).unwrap_or_default()
+        recording_name(self.name.as_ref(), &self.paths)
     }
 }
 

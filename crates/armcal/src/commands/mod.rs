@@ -1,6 +1,7 @@
 //! One command, one file.
 
 pub mod add;
+mod batch;
 mod check;
 mod compare;
 mod compensate;
@@ -17,6 +18,7 @@ mod view;
 
 pub(crate) use compensate::Request as CompensateRequest;
 
+use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
 use crate::error::Error;
 use armcal_report::TerminalStyle;
@@ -40,6 +42,19 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             let (junit, markdown, out) = (junit.as_deref(), markdown.as_deref(), out.as_deref());
             check::run(&check::Request { pipeline, junit, markdown, out, json: *json })
         }
+        Command::Batch { inputs, pipeline, out, full, jobs, json } => {
+            let manifest = Manifest::of(inputs, out)?;
+            batch::run(
+                &batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs },
+                *json,
+            )
+        }
+        Command::Map { manifest, shard, pipeline, out, full, jobs } => {
+            let manifest = Manifest::read(manifest)?;
+            let job = batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs };
+            batch::map(&job, shard.as_deref())
+        }
+        Command::Reduce { out, json } => batch::reduce(out, *json),
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Compensate(asked) => compensate::run(&asked.request()),
         Command::Diagnose { input, json } => diagnose::run(input, *json),

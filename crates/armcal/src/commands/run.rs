@@ -49,7 +49,8 @@ fn two_arms(pipeline: &ClosedPipeline, out: &Path, json: bool) -> Result<Outcome
     Ok(outcome(run.status()))
 }
 
-fn print_written(out: &Path, written: &[PathBuf]) {
+/// Which files a command left where.
+pub(super) fn print_written(out: &Path, written: &[PathBuf]) {
     let names: Vec<String> =
         written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
     print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));

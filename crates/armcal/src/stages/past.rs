@@ -2,9 +2,10 @@
 
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
-use armcal_core::{Pose, Role, Severity, Stage, Warning};
+use armcal_core::{Observation, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, catalogue};
 use armcal_report::{PastArms, PastModel};
+use nalgebra::Vector3;
 use std::path::Path;
 
 /// The model of the past in new surroundings.
@@ -17,6 +18,31 @@ pub struct Placed {
     pub calibrated: Vec<f64>,
     /// What could not be carried over.
     pub warnings: Vec<Warning>,
+}
+
+impl Placed {
+    /// The calibrated base's own frame: where nominal and calibrated arm are compared.
+    pub fn base(&self) -> PlacedBase<'_> {
+        PlacedBase { model: &self.model, base_in_world: self.model.base_in_world(&self.calibrated) }
+    }
+}
+
+/// Positions in the calibrated base frame.
+pub struct PlacedBase<'a> {
+    model: &'a Model,
+    base_in_world: Pose,
+}
+
+impl PlacedBase<'_> {
+    /// A position of the sensor's frame [m] in the base frame [m].
+    pub fn from_world_m(&self, in_world_m: &Vector3<f64>) -> Vector3<f64> {
+        self.base_in_world.inverse_transform_point(&(*in_world_m).into()).coords
+    }
+
+    /// The tip as these parameters predict it, in the base frame [m].
+    pub fn predicted_tip_m(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        self.from_world_m(&self.model.predicted_tip_in_world(p, o))
+    }
 }
 
 /// Puts the calibrated arm and its effects into `surroundings`: the nominal arm without effects, base and boards where

@@ -7,14 +7,14 @@
 use super::motion::{Motion, set_point};
 use crate::error::Error;
 use crate::stages::observe;
-use crate::stages::past::Placed;
+use crate::stages::past::{Placed, PlacedBase};
 use crate::stages::perceive::Seen;
-use armcal_core::{Dwell, DwellId, Observation, Pose, Reference, Samples};
+use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_report::IsoReport;
 use armcal_verify::{PathError, Polyline};
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// Set-points closer than this, in every joint, are one command [rad]: rounding, not intention.
 const SAME_COMMAND_RAD: f64 = 1e-3;
@@ -32,6 +32,7 @@ const APPROACH_M: f64 = 2e-3;
 /// Everything the recordings show, in the calibrated base frame.
 pub struct Shown<'a> {
     pub placed: &'a Placed,
+    pub base: PlacedBase<'a>,
     pub seen: &'a [Seen],
     pub samples: &'a [Samples],
     pub motions: &'a [Motion],
@@ -55,10 +56,9 @@ impl Shown<'_> {
             }
         }
         // The standard's criteria are about repeats: what was commanded once tests nothing.
-        let times = |pose: &str| visits.iter().filter(|v: &&Visit| v.pose == pose).count();
-        let repeated: BTreeSet<String> =
-            visits.iter().map(|v| v.pose.clone()).filter(|pose| times(pose) > 1).collect();
-        visits.retain(|v| repeated.contains(&v.pose));
+        let mut times: BTreeMap<String, usize> = BTreeMap::new();
+        visits.iter().for_each(|v: &Visit| *times.entry(v.pose.clone()).or_default() += 1);
+        visits.retain(|v| times[&v.pose] > 1);
         Evidence { visits, paths: self.paths(side), loads: Vec::new() }
     }
 
@@ -72,8 +72,7 @@ impl Shown<'_> {
         before: Option<&Dwell>,
         commands: &mut Vec<Command>,
     ) -> Option<Visit> {
-        let tip_m =
-            self.world_from_base().inverse_transform_point(&dwell.tip.as_ref()?.position_m.into()).coords;
+        let tip_m = self.base.from_world_m(&dwell.tip.as_ref()?.position_m);
         let asked = samples.set_points.as_ref().and_then(|s| set_point(s, dwell.mid_ns()));
         let joint_rad = asked.unwrap_or_else(|| dwell.joint_rad.clone());
         let commanded_m = self.commanded_m(side, recording, dwell, joint_rad.clone());
@@ -118,24 +117,13 @@ impl Shown<'_> {
     }
 
     fn commanded_m(&self, side: Side, recording: usize, dwell: &Dwell, joint_rad: Vec<f64>) -> Vector3<f64> {
-        let reference = Reference::Tracked {
-            position_m: Vector3::zeros(),
-            orientation: None,
-            orientation_sigma_rad: f64::INFINITY,
-        };
-        let load_kg = self.seen[recording].load_kg;
-        let o =
-            Observation { joint_rad, ..observe::observation(dwell, load_kg, reference, Matrix3::zeros()) };
+        let (load_kg, nowhere) = (self.seen[recording].load_kg, Reference::position(Vector3::zeros()));
+        let o = Observation { joint_rad, ..observe::observation(dwell, load_kg, nowhere, Matrix3::zeros()) };
         let p = match side {
             Side::Nominal => &self.placed.nominal,
             Side::Calibrated => &self.placed.calibrated,
         };
-        let in_world_m = self.placed.model.predicted_tip_in_world(p, &o);
-        self.world_from_base().inverse_transform_point(&in_world_m.into()).coords
-    }
-
-    fn world_from_base(&self) -> Pose {
-        self.placed.model.base_in_world(&self.placed.calibrated)
+        self.base.predicted_tip_m(p, &o)
     }
 
     /// Commanded paths with their runs: motions that were commanded alike are cycles of one path.

@@ -44,7 +44,13 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let motions = seen.iter().zip(&samples).enumerate();
     let motions = motions.map(|(r, (seen, samples))| judge.follow(r, seen, samples));
     let motions = motions.collect::<Result<Vec<Motion>, Error>>()?;
-    let shown = iso::Shown { placed: &placed, seen: &seen, samples: &samples, motions: &motions };
+    let shown = iso::Shown {
+        placed: &placed,
+        base: placed.base(),
+        seen: &seen,
+        samples: &samples,
+        motions: &motions,
+    };
     let iso9283 = shown.assess()?;
     let recordings = seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect();
     warnings.extend(same_files(&past, &seen));

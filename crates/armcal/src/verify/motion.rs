@@ -3,9 +3,9 @@
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::stages::observe;
-use crate::stages::past::Placed;
+use crate::stages::past::{Placed, PlacedBase};
 use crate::stages::perceive::Seen;
-use armcal_core::{DwellId, JointSamples, Observation, Pose, Samples};
+use armcal_core::{DwellId, JointSamples, Observation, Samples};
 use armcal_dwell::{ClockAlignment, Moment, track};
 use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
 use nalgebra::{DVector, Vector3};
@@ -34,12 +34,12 @@ pub struct Motion {
 pub struct Judge<'a> {
     pipeline: &'a Pipeline,
     placed: &'a Placed,
-    world_from_base: Pose,
+    base: PlacedBase<'a>,
 }
 
 impl<'a> Judge<'a> {
     pub fn new(pipeline: &'a Pipeline, placed: &'a Placed) -> Judge<'a> {
-        Judge { pipeline, placed, world_from_base: placed.model.base_in_world(&placed.calibrated) }
+        Judge { pipeline, placed, base: placed.base() }
     }
 
     /// Compares what the sensor saw of one recording's motion with both models.
@@ -109,9 +109,9 @@ impl<'a> Judge<'a> {
             PathError {
                 motion: one.motion(m),
                 time_ns: m.time_ns,
-                measured_m: self.in_base(&m.position_m),
-                before_m: self.predicted_m(&self.placed.nominal, &o),
-                after_m: self.predicted_m(&self.placed.calibrated, &o),
+                measured_m: self.base.from_world_m(&m.position_m),
+                before_m: self.base.predicted_tip_m(&self.placed.nominal, &o),
+                after_m: self.base.predicted_tip_m(&self.placed.calibrated, &o),
             }
         };
         moments.par_iter().enumerate().map(error).collect()
@@ -125,21 +125,13 @@ impl<'a> Judge<'a> {
             let Some(joint_rad) = set_point(asked, m.time_ns) else { continue };
             let o = Observation { joint_rad, ..one.observation(self.pipeline, index, m) };
             let [before, after] = ways.entry(one.motion(m)).or_default();
-            before.push(self.predicted_m(&self.placed.nominal, &o));
-            after.push(self.predicted_m(&self.placed.calibrated, &o));
+            before.push(self.base.predicted_tip_m(&self.placed.nominal, &o));
+            after.push(self.base.predicted_tip_m(&self.placed.calibrated, &o));
         }
         let planned = |(motion, [before, after]): (DwellId, [Vec<Vector3<f64>>; 2])| {
             Some((motion, Planned { before: Polyline::through(before)?, after: Polyline::through(after)? }))
         };
         ways.into_iter().filter_map(planned).collect()
-    }
-
-    fn predicted_m(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
-        self.in_base(&self.placed.model.predicted_tip_in_world(p, o))
-    }
-
-    fn in_base(&self, in_world_m: &Vector3<f64>) -> Vector3<f64> {
-        self.world_from_base.inverse_transform_point(&(*in_world_m).into()).coords
     }
 }
 

@@ -1,6 +1,6 @@
 //! The paper's arm with planted deviations, seen by a sensor or seated on a board.
 
-use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
+use armcal_core::{DwellId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -65,19 +65,9 @@ pub fn gauss3(rng: &mut ChaCha8Rng, sigma: f64) -> Vector3<f64> {
 
 pub fn observation(dwell: DwellId, joint_rad: Vec<f64>, reference: Reference) -> Observation {
     Observation {
-        dwell,
         time_ns: dwell.dwell as i64 * 1_000_000_000,
-        joint_sigma_rad: vec![0.0; joint_rad.len()],
-        arrival: vec![Arrival::Unknown; joint_rad.len()],
-        joint_rad,
-        path_memory_rad: None,
-        pair_memory_rad: None,
-        joint_velocity_radps: None,
-        effort_nm: None,
-        temperature_c: None,
-        load_kg: 0.0,
-        reference,
         covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
+        ..Observation::bare(dwell, joint_rad, reference)
     }
 }
 

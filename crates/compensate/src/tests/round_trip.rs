@@ -11,6 +11,13 @@ fn posture() -> impl Strategy<Value = Vec<f64>> {
     (-1.0..1.0f64, -1.2..0.3f64, -0.9..0.8f64).prop_map(|(a, b, c)| vec![a, b, c])
 }
 
+/// Targets at the tips of the nominal arm in these postures.
+fn where_nominal_goes(nominal: &Model, postures: &[Vec<f64>]) -> Vec<Target> {
+    let tip_m = |q: &Vec<f64>| tip_after(nominal, &nominal.nominal(), std::slice::from_ref(q));
+    let target = |(i, q): (usize, &Vec<f64>)| Target::in_world(format!("t{i}"), tip_m(q), None);
+    postures.iter().enumerate().map(target).collect()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
@@ -26,9 +33,7 @@ proptest! {
             ("compliance:2", &[1.5e-3]), ("eccentricity:3", &[3e-3, -2e-3]),
         ]);
         let nominal = bare(RIGHT_ARM);
-        let targets: Vec<Target> = path.iter().enumerate().map(|(i, q)| {
-            Target::in_world(format!("t{i}"), tip_after(&nominal, &nominal.nominal(), std::slice::from_ref(q)), None)
-        }).collect();
+        let targets = where_nominal_goes(&nominal, &path);
         let points = compensator(&nominal, (&model, &values)).set_points(&targets, Some(&start)).unwrap();
         let mut commanded = vec![start];
         for (target, point) in targets.iter().zip(&points) {
@@ -47,9 +52,7 @@ proptest! {
             ("belt_backlash:3", &[0.012]), ("friction_windup:2", &[4e-3]), ("gravity_backlash:2", &[0.01]),
         ]);
         let nominal = bare(RIGHT_ARM);
-        let targets: Vec<Target> = path.iter().enumerate().map(|(i, q)| {
-            Target::in_world(format!("t{i}"), tip_after(&nominal, &nominal.nominal(), std::slice::from_ref(q)), None)
-        }).collect();
+        let targets = where_nominal_goes(&nominal, &path);
         let points = compensator(&nominal, (&model, &values)).set_points(&targets, Some(&start)).unwrap();
         let mut commanded = vec![start];
         for (target, point) in targets.iter().zip(&points) {

@@ -18,9 +18,9 @@ use crate::arm::AxisArm;
 use crate::config::DhRow;
 use crate::random::{Purpose, Stream};
 use crate::rig::{build_rows, small_motion};
-use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
+use armcal_core::{DwellId, Observation, Pose, Reference};
 use motion::{Motion, Phase};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 
 /// The pair of one seed, as built.
@@ -159,25 +159,8 @@ fn reading(
 }
 
 fn observation(dwell: DwellId, time_ns: i64, [joint_rad, joint_sigma_rad]: [Vec<f64>; 2]) -> Observation {
-    Observation {
-        dwell,
-        time_ns,
-        arrival: vec![Arrival::Unknown; joint_rad.len()],
-        joint_rad,
-        joint_sigma_rad,
-        path_memory_rad: None,
-        pair_memory_rad: None,
-        joint_velocity_radps: None,
-        effort_nm: None,
-        temperature_c: None,
-        load_kg: 0.0,
-        reference: Reference::Tracked {
-            position_m: Vector3::zeros(),
-            orientation: None,
-            orientation_sigma_rad: 0.0,
-        },
-        covariance_m2: Matrix3::zeros(),
-    }
+    let bare = Observation::bare(dwell, joint_rad, Reference::position(Vector3::zeros()));
+    Observation { time_ns, joint_sigma_rad, ..bare }
 }
 
 #[cfg(test)]

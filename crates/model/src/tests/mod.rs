@@ -8,7 +8,7 @@ mod surroundings;
 mod urdf_edit;
 
 use crate::{Chain, Frames, Model};
-use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
+use armcal_core::{DwellId, Observation, Pose, Reference};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use std::path::Path;
 
@@ -43,21 +43,8 @@ pub(crate) fn assert_pose(actual: &Matrix4<f64>, expected_rows: [f64; 12], what:
 }
 
 pub(crate) fn observation(joints: &[f64], reference: Reference) -> Observation {
-    Observation {
-        dwell: DwellId { recording: 0, dwell: 0 },
-        time_ns: 0,
-        joint_rad: joints.to_vec(),
-        joint_sigma_rad: vec![0.0; joints.len()],
-        arrival: vec![Arrival::Unknown; joints.len()],
-        path_memory_rad: None,
-        pair_memory_rad: None,
-        joint_velocity_radps: None,
-        effort_nm: None,
-        temperature_c: None,
-        load_kg: 0.0,
-        reference,
-        covariance_m2: Matrix3::identity(),
-    }
+    let bare = Observation::bare(DwellId { recording: 0, dwell: 0 }, joints.to_vec(), reference);
+    Observation { covariance_m2: Matrix3::identity(), ..bare }
 }
 
 pub(crate) fn tracked(joints: &[f64], pose: &Pose) -> Observation {

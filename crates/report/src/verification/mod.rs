@@ -3,6 +3,7 @@
 mod files;
 mod iso;
 mod page;
+mod row;
 mod terminal;
 
 pub use files::{verification_files, verification_json};

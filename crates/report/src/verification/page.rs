@@ -1,12 +1,12 @@
 //! The page of `armcal verify`: the tables, and the source paper's figures 6, 7 and 10 for the longest motions.
 
+use super::row::Row;
 use super::terminal::conclusion;
 use super::{PathSample, Verification};
 use crate::ReportError;
 use crate::page::embed;
 use crate::run::VERSION;
-use crate::text::millimetres;
-use armcal_verify::{Against, By, Compared, PathRow, Plane, PointsRow};
+use armcal_verify::{Against, PathRow, PointsRow};
 use askama::Template;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -52,11 +52,12 @@ struct VerificationPage<'a> {
     pipeline: &'a str,
     effects: String,
     sentence: String,
-    tables: Vec<(&'static str, Vec<Row>)>,
+    tables: Vec<(&'static str, Vec<Shown>)>,
     warnings: Vec<String>,
 }
 
-struct Row {
+/// A row as the page shows it: a mean and its interval in one cell.
+struct Shown {
     subject: String,
     n: usize,
     before: String,
@@ -65,39 +66,33 @@ struct Row {
     better: String,
 }
 
-fn point_row(r: &PointsRow) -> Row {
-    let subject = match r.by {
-        By::Axis => format!("along {} (signed)", r.subject),
-        By::Arrival => format!("arriving {}", r.subject),
-        _ => r.subject.clone(),
-    };
-    row(subject, &r.errors, r.by != By::Axis)
+fn point_row(r: &PointsRow) -> Shown {
+    Shown::from(Row::of_points(r))
 }
 
-fn path_row(r: &PathRow) -> Row {
+fn path_row(r: &PathRow) -> Shown {
     let against = match r.against {
         Against::Encoders => "at each moment",
         Against::Planned => "from the planned path",
     };
-    let seen = if r.plane == Plane::Space { "in space".into() } else { format!("in {}", r.plane.word()) };
-    row(format!("{}, {against}, {seen}", r.subject), &r.errors, true)
+    let row = Row::of_path(r);
+    Shown::from(Row { subject: format!("{}, {against}", row.subject), ..row })
 }
 
-fn row(subject: String, c: &Compared, sizes: bool) -> Row {
-    let with_interval = |mean_m: f64, interval: Option<[f64; 2]>| {
-        let half =
-            interval.map_or(String::new(), |[low, high]| format!(" ± {}", millimetres(0.5 * (high - low))));
-        format!("{}{half}", millimetres(mean_m))
-    };
-    Row {
-        subject,
-        n: c.n,
-        before: with_interval(c.before.mean_m, c.before.ci95_m),
-        after: with_interval(c.after.mean_m, c.after.ci95_m),
-        difference: c
-            .difference_ci95_m
-            .map_or("–".into(), |[low, high]| format!("{} to {}", millimetres(low), millimetres(high))),
-        better: if sizes { format!("{:.1} %", 100.0 * c.improvement) } else { String::new() },
+impl From<Row> for Shown {
+    fn from(row: Row) -> Shown {
+        let with_half = |[mean, half]: [String; 2]| {
+            if half.is_empty() { mean } else { format!("{mean} ± {half}") }
+        };
+        let [low, high] = row.difference;
+        Shown {
+            subject: row.subject,
+            n: row.n,
+            before: with_half(row.before),
+            after: with_half(row.after),
+            difference: if low.is_empty() { "–".into() } else { format!("{low} to {high}") },
+            better: row.better,
+        }
     }
 }
 

@@ -1,10 +1,11 @@
 //! A verification for people, at most 100 columns wide.
 
+use super::row::{Row, or_dash};
 use super::{On, Published, Verification, VerifiedRecording};
 use crate::run::VERSION;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
-use armcal_verify::{Against, By, Compared, Estimate, PathRow, Plane, PointsRow};
+use armcal_verify::{Against, By, Compared, PathRow, Plane, PointsRow};
 use comfy_table::Cell;
 
 const HEADER: [&str; 7] = ["n", "before", "± 95 %", "after", "± 95 %", "difference 95 %", "better by"];
@@ -80,25 +81,7 @@ fn recordings(pen: &Pen, all: &[VerifiedRecording]) -> String {
 }
 
 fn points<'a>(pen: &Pen, rows: &[PointsRow], published: impl Iterator<Item = &'a Published>) -> String {
-    let mut table = pen.table(&[&["points"][..], &HEADER].concat());
-    for row in rows {
-        let subject = match row.by {
-            By::All | By::Recording | By::Reference => printable(&row.subject),
-            By::Arrival => {
-                format!("{} {}", row.subject.trim_end_matches([' ', '+', '-']), side(row))
-            }
-            By::Axis => format!("along {} (signed)", row.subject),
-        };
-        table.add_row(cells(subject, &row.errors, row.by != By::Axis));
-    }
-    for p in published {
-        table.add_row(published_cells(p));
-    }
-    pen.render(&table)
-}
-
-fn side(row: &PointsRow) -> &'static str {
-    if row.subject.ends_with('+') { "from below" } else { "from above" }
+    table(pen, "points", rows.iter().map(Row::of_points), published)
 }
 
 fn paths<'a>(
@@ -106,13 +89,18 @@ fn paths<'a>(
     rows: impl Iterator<Item = &'a PathRow>,
     published: impl Iterator<Item = &'a Published>,
 ) -> String {
-    let mut table = pen.table(&[&["path"][..], &HEADER].concat());
+    table(pen, "path", rows.map(Row::of_path), published)
+}
+
+fn table<'a>(
+    pen: &Pen,
+    what: &str,
+    rows: impl Iterator<Item = Row>,
+    published: impl Iterator<Item = &'a Published>,
+) -> String {
+    let mut table = pen.table(&[&[what][..], &HEADER].concat());
     for row in rows {
-        let subject = match row.plane {
-            Plane::Space => printable(&row.subject),
-            plane => format!("  in {}", plane.word()),
-        };
-        table.add_row(cells(subject, &row.errors, true));
+        table.add_row(cells(row));
     }
     for p in published {
         table.add_row(published_cells(p));
@@ -133,21 +121,19 @@ fn published_cells(p: &Published) -> Vec<Cell> {
     vec![label, empty(), mm(p.before_mm), empty(), mm(p.after_mm), empty(), empty(), number(better)]
 }
 
-fn cells(subject: String, c: &Compared, sizes: bool) -> Vec<Cell> {
-    let half = |e: &Estimate| e.ci95_m.map_or("-".into(), |[low, high]| millimetres(0.5 * (high - low)));
-    let interval = c.difference_ci95_m;
-    let difference =
-        interval.map_or("-".into(), |[low, high]| format!("{} .. {}", millimetres(low), millimetres(high)));
-    // A signed mean that falls in size may do so by turning its sign: a share says nothing there.
-    let better = if sizes { format!("{:.1} %", 100.0 * c.improvement) } else { String::new() };
+fn cells(row: Row) -> Vec<Cell> {
+    let [before, before_half] = row.before;
+    let [after, after_half] = row.after;
+    let [low, high] = row.difference;
+    let difference = if low.is_empty() { "-".into() } else { format!("{low} .. {high}") };
     vec![
-        Cell::new(subject),
-        number(c.n),
-        number(millimetres(c.before.mean_m)),
-        number(half(&c.before)),
-        number(millimetres(c.after.mean_m)),
-        number(half(&c.after)),
+        Cell::new(printable(&row.subject)),
+        number(row.n),
+        number(before),
+        number(or_dash(before_half)),
+        number(after),
+        number(or_dash(after_half)),
         number(difference),
-        number(better),
+        number(row.better),
     ]
 }

@@ -209,20 +209,14 @@ fn seated(
     model: &Model,
     planted: &[f64],
 ) -> Observation {
+    let seated = Reference::Seated { cavity, in_board_m };
     let mut o = Observation {
-        dwell: DwellId { recording, dwell },
         time_ns: time_ns(recording, dwell) + 500_000_000,
-        joint_rad: START_RAD.to_vec(),
         joint_sigma_rad: vec![1e-5; 3],
         arrival: vec![Arrival::Positive, Arrival::Negative, Arrival::Unknown],
-        path_memory_rad: None,
-        pair_memory_rad: None,
-        joint_velocity_radps: None,
-        effort_nm: None,
-        temperature_c: None,
         load_kg: 0.2,
-        reference: Reference::Seated { cavity, in_board_m },
         covariance_m2: Matrix3::from_diagonal_element(1.25e-8),
+        ..Observation::bare(DwellId { recording, dwell }, START_RAD.to_vec(), seated)
     };
     // Inverse kinematics of the planted arm by Newton's method.
     for _ in 0..50 {
@@ -247,24 +241,16 @@ fn tracked(dwell: &Dwell, model: &Model, planted: &[f64]) -> Observation {
     let tip = dwell.tip.as_ref().unwrap();
     let position_m =
         model.tip_in_base(planted, &dwell.joint_rad).translation.vector + Vector3::new(0.0, 1e-4, 0.0);
+    let (orientation, orientation_sigma_rad) = (tip.orientation, tip.orientation_sigma_rad);
+    let seen = Reference::Tracked { position_m, orientation, orientation_sigma_rad };
     Observation {
-        dwell: dwell.id,
         time_ns: dwell.mid_ns(),
-        joint_rad: dwell.joint_rad.clone(),
         joint_sigma_rad: dwell.joint_sigma_rad.clone(),
         arrival: dwell.arrival.clone(),
-        path_memory_rad: None,
-        pair_memory_rad: None,
-        joint_velocity_radps: None,
-        effort_nm: None,
         temperature_c: dwell.temperature_c,
         load_kg: 0.2,
-        reference: Reference::Tracked {
-            position_m,
-            orientation: tip.orientation,
-            orientation_sigma_rad: tip.orientation_sigma_rad,
-        },
         covariance_m2: tip.covariance_m2,
+        ..Observation::bare(dwell.id, dwell.joint_rad.clone(), seen)
     }
 }
 

@@ -1,0 +1,124 @@
+//! What a result is made from: the files, what is declared about them, the pipeline, the version.
+
+use super::Manifest;
+use crate::error::Error;
+use crate::pipeline::{Pipeline, RecordingEntry};
+use armcal_recording::{atomic, sha256_of_file};
+use armcal_report::VERSION;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+/// Raised when results made from the same would be written differently.
+const FORMAT: &str = "armcal.batch/1";
+/// Where the hashes of files are remembered, below the campaign's folder.
+const SEEN: &str = ".inputs";
+
+/// Makes the keys of a campaign's recordings.
+pub(super) struct Keys {
+    /// Hash of everything that is the same for all recordings.
+    common: String,
+    seen: PathBuf,
+}
+
+/// A file as it was when its hash was taken.
+#[derive(PartialEq, Serialize, Deserialize)]
+struct Seen {
+    path: String,
+    bytes: u64,
+    modified_ns: u128,
+    sha256: String,
+}
+
+impl Keys {
+    /// # Errors
+    /// A model or board file of the pipeline that cannot be read.
+    pub fn new(pipeline: &Pipeline, full: bool, out: &Path) -> Result<Keys, Error> {
+        let mut parts =
+            vec![FORMAT.to_owned(), VERSION.to_owned(), full.to_string(), settings(&pipeline.text)];
+        let model = [&pipeline.model.dh, &pipeline.model.urdf].into_iter().flatten();
+        let board = pipeline.table.iter().map(|t| &t.board);
+        for (what, path) in model.map(|p| ("model", p)).chain(board.map(|p| ("board", p))) {
+            let path = pipeline.resolve(path);
+            parts.push(std::fs::read_to_string(&path).map_err(|source| Error::ReadFile {
+                what,
+                path,
+                source,
+            })?);
+        }
+        Ok(Keys { common: hash(parts), seen: out.join(SEEN) })
+    }
+
+    /// The key of one recording.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn of(&self, entry: &RecordingEntry) -> Result<String, Error> {
+        let in_recording = |source| Error::Recording { recording: entry.name(), source };
+        let mut parts = vec![self.common.clone(), declared(entry)];
+        for path in &entry.paths {
+            parts.push(self.sha256(path).map_err(in_recording)?);
+        }
+        Ok(hash(parts))
+    }
+
+    /// What all shares of one campaign have in common: settings and manifest.
+    pub fn of_campaign(&self, manifest: &Manifest) -> String {
+        let path = |p: &PathBuf| p.to_string_lossy().into_owned();
+        let entry = |e: &RecordingEntry| hash(std::iter::once(declared(e)).chain(e.paths.iter().map(path)));
+        hash(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
+    }
+
+    /// Hash of a file; remembered as long as size and modification time stay.
+    fn sha256(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
+        let name = path.to_string_lossy().into_owned();
+        let memory = self.seen.join(format!("{}.json", &hash([name.clone()])[..32]));
+        let now = std::fs::metadata(path).ok().map(|about| {
+            let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
+            (about.len(), modified.map_or(0, |t| t.as_nanos()))
+        });
+        let known = std::fs::read(&memory).ok().and_then(|text| serde_json::from_slice::<Seen>(&text).ok());
+        if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
+            let same = known.path == name && known.bytes == bytes && known.modified_ns == modified_ns;
+            // A file system without modification times cannot tell.
+            if same && modified_ns != 0 {
+                return Ok(known.sha256);
+            }
+        }
+        let sha256 = sha256_of_file(path)?;
+        if let Some((bytes, modified_ns)) = now {
+            let seen = Seen { path: name, bytes, modified_ns, sha256: sha256.clone() };
+            // A memory that cannot be written costs time only.
+            if let Ok(text) = serde_json::to_vec(&seen) {
+                let _ = std::fs::create_dir_all(&self.seen);
+                let _ = atomic::write(&memory, &text);
+            }
+        }
+        Ok(sha256)
+    }
+}
+
+/// The pipeline without what says nothing about how a recording is worked on; a text that is no TOML as it is.
+fn settings(text: &str) -> String {
+    let Ok(mut table) = text.parse::<toml::Table>() else { return text.to_owned() };
+    for section in ["recordings", "check", "verify"] {
+        table.remove(section);
+    }
+    table.to_string()
+}
+
+fn declared(entry: &RecordingEntry) -> String {
+    let RecordingEntry { tilt, load_kg, .. } = entry;
+    hash([entry.name(), format!("{:e} {:e} {load_kg:e}", tilt.roll_rad, tilt.pitch_rad)])
+}
+
+/// SHA-256 of parts that cannot run into each other.
+fn hash(parts: impl IntoIterator<Item = String>) -> String {
+    let mut hasher = Sha256::new();
+    for part in parts {
+        hasher.update((part.len() as u64).to_le_bytes());
+        hasher.update(part.as_bytes());
+    }
+    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}

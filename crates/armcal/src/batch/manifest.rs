@@ -1,0 +1,173 @@
+//! Which recordings: from globs, files and bag folders, or from a manifest file.
+
+use crate::error::Error;
+use crate::pipeline::RecordingEntry;
+use armcal_table::Tilt;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Recordings in a fixed order, with unique names and absolute paths.
+#[derive(Debug, Clone)]
+pub struct Manifest {
+    /// The recordings.
+    pub entries: Vec<RecordingEntry>,
+    /// The pipeline that the manifest file names.
+    pub pipeline: Option<PathBuf>,
+}
+
+/// A manifest in TOML.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ManifestFile {
+    pipeline: Option<PathBuf>,
+    recordings: Vec<RecordingEntry>,
+}
+
+impl Manifest {
+    /// From what a user types: one manifest file, or any number of globs, MCAP files and folders of split bags. Files
+    /// below `out` are results and not taken.
+    ///
+    /// # Errors
+    /// Nothing found, a pattern that is none, a manifest among other inputs, a name given twice.
+    pub fn of(inputs: &[String], out: &Path) -> Result<Manifest, Error> {
+        match inputs {
+            [one] if is_manifest(Path::new(one)) => Manifest::read(Path::new(one)),
+            _ => Manifest::found(inputs, out),
+        }
+    }
+
+    /// Reads a manifest file: TOML with `[[recordings]]` as in a pipeline, or one path a line. Paths are relative to it.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
+    pub fn read(path: &Path) -> Result<Manifest, Error> {
+        let at = |source| Error::ReadFile { what: "manifest", path: path.to_owned(), source };
+        let text = std::fs::read_to_string(path).map_err(at)?;
+        let folder = std::path::absolute(path).map_err(at)?;
+        let folder = folder.parent().unwrap_or(Path::new("")).to_owned();
+        let file = if path.extension().is_some_and(|e| e == "toml") {
+            toml::from_str(&text)
+                .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?
+        } else {
+            let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+            ManifestFile {
+                pipeline: None,
+                recordings: lines.map(|line| unnamed(vec![line.into()])).collect(),
+            }
+        };
+        let mut entries = file.recordings;
+        for entry in &mut entries {
+            entry.paths = entry.paths.iter().flat_map(|p| parts(&folder.join(p))).collect();
+        }
+        let pipeline = file.pipeline.map(|p| folder.join(p));
+        Manifest { entries, pipeline }.checked(&path.display().to_string())
+    }
+
+    fn found(inputs: &[String], out: &Path) -> Result<Manifest, Error> {
+        let out = std::path::absolute(out).unwrap_or_else(|_| out.to_owned());
+        let mut files = Vec::new();
+        for input in inputs {
+            let bad = |why: String| Error::Manifest { what: input.clone(), why };
+            if is_manifest(Path::new(input)) {
+                return Err(bad("a manifest file must be the only input".into()));
+            }
+            let matches = glob::glob(input).map_err(|e| bad(e.to_string()))?;
+            let before = files.len();
+            for found in matches {
+                let found = found.map_err(|e| bad(e.to_string()))?;
+                let found = std::path::absolute(&found).unwrap_or(found);
+                files.extend(parts(&found).into_iter().filter(|p| !p.starts_with(&out)));
+            }
+            if files.len() == before {
+                return Err(bad("matches no recording; quote a pattern such as 'lab/**/*.mcap'".into()));
+            }
+        }
+        files.sort();
+        files.dedup();
+        Manifest { entries: as_bags(files), pipeline: None }.checked(&inputs.join(" "))
+    }
+
+    /// Gives every recording a name of its own.
+    fn checked(mut self, what: &str) -> Result<Manifest, Error> {
+        let bad = |why: String| Err(Error::Manifest { what: what.to_owned(), why });
+        if let Some(i) = self.entries.iter().position(|e| e.paths.is_empty()) {
+            return bad(format!("recording {} has no paths", i + 1));
+        }
+        if self.entries.is_empty() {
+            return bad("names no recording".into());
+        }
+        name_all(&mut self.entries);
+        let mut known = BTreeMap::new();
+        for (i, entry) in self.entries.iter().enumerate() {
+            if let Some(first) = known.insert(entry.name(), i) {
+                let (name, first, second) = (entry.name(), first + 1, i + 1);
+                return bad(format!(
+                    "recordings {first} and {second} are both called `{name}`; give one of them another name"
+                ));
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Anything but a recording, a folder or a pattern.
+fn is_manifest(path: &Path) -> bool {
+    path.is_file() && path.extension().is_none_or(|e| e != "mcap")
+}
+
+/// A folder stands for the MCAP files in it: the parts of a split bag.
+fn parts(path: &Path) -> Vec<PathBuf> {
+    if !path.is_dir() {
+        return vec![path.to_owned()];
+    }
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|e| e.path());
+    let mut files: Vec<PathBuf> = entries.filter(|p| p.extension().is_some_and(|e| e == "mcap")).collect();
+    files.sort();
+    files
+}
+
+/// Files beside a rosbag2 `metadata.yaml` are one recording; every other file is one by itself.
+fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
+    let mut bags: Vec<(PathBuf, Vec<PathBuf>)> = Vec::new();
+    for file in files {
+        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
+        let of_bag = folder.join("metadata.yaml").is_file();
+        match bags.last_mut() {
+            Some((bag, parts)) if of_bag && *bag == folder => parts.push(file),
+            _ => bags.push((if of_bag { folder } else { file.clone() }, vec![file])),
+        }
+    }
+    bags.into_iter().map(|(_, parts)| unnamed(parts)).collect()
+}
+
+fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
+    RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0 }
+}
+
+/// Names without a name after as many of their last folders as it takes to tell them apart.
+fn name_all(entries: &mut [RecordingEntry]) {
+    let stem = |entry: &RecordingEntry, depth: usize| -> String {
+        let path = entry.paths[0].with_extension("");
+        let parts: Vec<String> =
+            path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+        parts[parts.len().saturating_sub(depth)..].join("/")
+    };
+    let deepest = entries.iter().map(|e| e.paths[0].components().count()).max().unwrap_or(1);
+    for depth in 1..=deepest {
+        let mut times: BTreeMap<String, usize> = BTreeMap::new();
+        for entry in entries.iter() {
+            *times.entry(entry.name.clone().unwrap_or_else(|| stem(entry, depth))).or_default() += 1;
+        }
+        for entry in entries.iter_mut().filter(|e| e.name.is_none()) {
+            let name = stem(entry, depth);
+            if times[&name] == 1 {
+                entry.name = Some(name);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "manifest_tests.rs"]
+mod tests;

@@ -1,0 +1,107 @@
+//! A lab's whole archive: every recording calibrated by itself, and what they say together.
+//!
+//! `Manifest -> Key of each recording -> Store (skip what is there) -> Work -> Row -> Campaign`
+//!
+//! Results are named by what they were made from, and appear whole or not at all: a batch that is killed goes on where it
+//! was. [`map`] does a share of a manifest, on any machine that sees the folder, [`reduce`] puts the shares together; a
+//! batch is one share and its reduction, so all three ways give the same bytes.
+
+mod key;
+mod manifest;
+mod shard;
+mod store;
+mod work;
+mod workers;
+
+pub use manifest::Manifest;
+pub use shard::Shard;
+
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use armcal_report::{Campaign, FailedRecording, campaign_files};
+use key::Keys;
+use shard::{Done, Receipt};
+use std::path::{Path, PathBuf};
+use store::Store;
+
+/// What to work on, and how.
+pub struct Request<'a> {
+    /// The recordings.
+    pub manifest: &'a Manifest,
+    /// What is done to each; its own recordings do not count.
+    pub pipeline: &'a Pipeline,
+    /// Folder of the campaign.
+    pub out: &'a Path,
+    /// Whether each recording gets everything that `armcal run` writes.
+    pub full: bool,
+    /// Recordings worked on at a time; all cores when absent.
+    pub jobs: Option<usize>,
+}
+
+/// Works on every recording and puts them together. Returns what they say, the written files, and how many results were
+/// there already.
+pub fn batch(request: &Request<'_>, progress: &Progress) -> Result<(Campaign, Vec<PathBuf>, usize), Error> {
+    let receipt = work_on(request, Shard::WHOLE, progress)?;
+    let skipped = receipt.skipped;
+    let (campaign, written) = put_together(vec![receipt], request.out)?;
+    Ok((campaign, written, skipped))
+}
+
+/// Works on one share of the manifest, and leaves a receipt for [`reduce`].
+pub fn map(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<Receipt, Error> {
+    let receipt = work_on(request, shard, progress)?;
+    receipt.write(request.out)?;
+    Ok(receipt)
+}
+
+/// Puts the shares of a folder together.
+///
+/// # Errors
+/// Shares that are missing, doubled, or not of one manifest and pipeline; each by its name.
+pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
+    put_together(shard::receipts(out)?, out)
+}
+
+fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<Receipt, Error> {
+    let Request { manifest, pipeline, out, .. } = request;
+    let store = Store::open(out)?;
+    let keys = Keys::new(pipeline, request.full, out)?;
+    let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
+    progress.count(own.len());
+    let jobs = request.jobs.unwrap_or_else(workers::cores);
+    let done = workers::each(own.len(), jobs, |i| {
+        let index = own[i];
+        let entry = &manifest.entries[index];
+        let (done, skipped) = match work::one(pipeline, entry, &keys, &store, request.full) {
+            Ok((folder, skipped)) => (Done::Calibrated { index, folder }, skipped),
+            Err(e) => {
+                let failed = FailedRecording { why: e.to_string(), ..work::named(entry) };
+                progress.say(&format!("failed: {}: {}", failed.recording, failed.why));
+                (Done::Failed { index, failed }, false)
+            }
+        };
+        progress.advance(&entry.name());
+        (done, skipped)
+    })?;
+    let skipped = done.iter().filter(|(_, skipped)| *skipped).count();
+    let done = done.into_iter().map(|(done, _)| done).collect();
+    let campaign = keys.of_campaign(manifest);
+    Ok(Receipt::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
+}
+
+fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
+    let (pipeline, done) = shard::together(receipts, out)?;
+    let store = Store::open(out)?;
+    let (mut rows, mut failed) = (Vec::new(), Vec::new());
+    for one in done {
+        match one {
+            Done::Calibrated { folder, .. } => rows.push((store.row(&folder)?, store::relative(&folder))),
+            Done::Failed { failed: one, .. } => failed.push(one),
+        }
+    }
+    let campaign = Campaign::of(&pipeline, rows, failed);
+    let files = campaign_files(&campaign)?;
+    let written = store::write(out, &files)?;
+    Ok((campaign, written))
+}

@@ -1,0 +1,183 @@
+//! The folder of a campaign: one folder a result, which is there whole or not at all.
+
+use crate::error::Error;
+use armcal_campaign::Row;
+use armcal_recording::atomic;
+use armcal_report::ReportError;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Where results are, below the campaign's folder.
+const RESULTS: &str = "recordings";
+const ROW: &str = "row.json";
+/// Marks a folder under construction; locked by whoever works on it.
+const LOCK: &str = ".lock";
+/// Held while a folder under construction is made or taken away.
+const GATE: &str = ".gate";
+const UNFINISHED: &str = ".part";
+
+/// The results of a campaign.
+pub(super) struct Store {
+    results: PathBuf,
+}
+
+/// A result under construction: dropped, it disappears.
+pub(super) struct Unfinished {
+    folder: TempDir,
+    _lock: File,
+}
+
+impl Store {
+    /// Opens the folder, made if need be, and takes away what killed processes left unfinished.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn open(out: &Path) -> Result<Store, Error> {
+        let results = out.join(RESULTS);
+        std::fs::create_dir_all(&results)
+            .map_err(|source| Error::Folder { path: results.clone(), source })?;
+        let store = Store { results };
+        store.sweep();
+        Ok(store)
+    }
+
+    /// Name of a result's folder: readable, and unique by its key.
+    pub fn name(recording: &str, key: &str) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let readable: String = recording.chars().map(plain).take(80).collect();
+        format!("{}-{}", readable.trim_start_matches('.'), &key[..16])
+    }
+
+    /// Whether a result is there.
+    pub fn has(&self, folder: &str) -> bool {
+        self.results.join(folder).join(ROW).is_file()
+    }
+
+    /// The row of a result.
+    ///
+    /// # Errors
+    /// A row that is missing or not readable.
+    pub fn row(&self, folder: &str) -> Result<Row, Error> {
+        let path = self.results.join(folder).join(ROW);
+        let bad = |why: String| Error::Campaign { path: path.clone(), why };
+        let text = std::fs::read(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
+        serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))
+    }
+
+    /// A place to make a result in.
+    ///
+    /// # Errors
+    /// A folder that cannot be made or locked.
+    pub fn begin(&self) -> Result<Unfinished, Error> {
+        let at = |source| Error::Folder { path: self.results.clone(), source };
+        let _gate = self.gate().map_err(at)?;
+        let folder =
+            tempfile::Builder::new().prefix(".").suffix(UNFINISHED).tempdir_in(&self.results).map_err(at)?;
+        let lock = File::create(folder.path().join(LOCK)).map_err(at)?;
+        lock.lock().map_err(at)?;
+        Ok(Unfinished { folder, _lock: lock })
+    }
+
+    /// Finishes a result: its files are on disk, now it gets its name. Where another process was faster its result, made
+    /// from the same, stays.
+    ///
+    /// # Errors
+    /// A row that cannot be written, a folder that cannot be renamed.
+    pub fn finish(&self, made: Unfinished, row: &Row, folder: &str) -> Result<(), Error> {
+        let target = self.results.join(folder);
+        let at = |source| Error::Folder { path: target.clone(), source };
+        write(made.path(), &[(ROW, serde_json::to_vec_pretty(row).map_err(Error::Json)?)])?;
+        std::fs::remove_file(made.path().join(LOCK)).map_err(at)?;
+        readable_by_all(made.path()).map_err(at)?;
+        match std::fs::rename(made.path(), &target) {
+            Ok(()) => {
+                // It has another name now, under which it stays.
+                let _ = made.folder.keep();
+                if let Ok(results) = File::open(&self.results) {
+                    let _ = results.sync_all();
+                }
+                Ok(())
+            }
+            Err(_) if self.has(folder) => Ok(()),
+            Err(e) => Err(at(e)),
+        }
+    }
+
+    /// Nobody sees a folder before its lock is held.
+    fn gate(&self) -> std::io::Result<File> {
+        let gate = File::create(self.results.join(GATE))?;
+        gate.lock()?;
+        Ok(gate)
+    }
+
+    /// Takes away unfinished results whose makers are gone: a living one holds its lock.
+    fn sweep(&self) {
+        let Ok(_gate) = self.gate() else { return };
+        for entry in std::fs::read_dir(&self.results).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if !(name.starts_with('.') && name.ends_with(UNFINISHED)) {
+                continue;
+            }
+            let free = match File::open(entry.path().join(LOCK)) {
+                Ok(lock) => lock.try_lock().is_ok(),
+                // Between removing the lock and renaming.
+                Err(_) => old(&entry.path()),
+            };
+            if free {
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
+        }
+    }
+}
+
+impl Unfinished {
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// A result's folder as seen from the campaign's.
+pub(super) fn relative(folder: &str) -> String {
+    format!("{RESULTS}/{folder}")
+}
+
+/// Writes files into a folder, each whole or not at all.
+pub(super) fn write(folder: &Path, files: &[(&'static str, Vec<u8>)]) -> Result<Vec<PathBuf>, Error> {
+    let write = |(name, bytes): &(&'static str, Vec<u8>)| {
+        let path = folder.join(name);
+        write_one(&path, bytes)?;
+        Ok(path)
+    };
+    files.iter().map(write).collect()
+}
+
+/// Writes a file whole or not at all.
+pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let failed = |source| ReportError::Write { path: path.to_owned(), source: Box::new(source) };
+    Ok(atomic::write(path, bytes).map_err(failed)?)
+}
+
+/// Older than any such moment takes.
+fn old(path: &Path) -> bool {
+    let modified = std::fs::metadata(path).and_then(|about| about.modified());
+    modified.is_ok_and(|t| t.elapsed().is_ok_and(|age| age.as_secs() > 600))
+}
+
+/// Temporary folders are for their maker alone; results are for everybody the umask lets in.
+#[cfg(unix)]
+fn readable_by_all(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let like = folder.parent().map(std::fs::metadata).transpose()?;
+    let mode = like.map_or(0o755, |about| about.permissions().mode());
+    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn readable_by_all(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "store_tests.rs"]
+mod tests;

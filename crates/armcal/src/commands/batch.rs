@@ -1,0 +1,76 @@
+//! `armcal batch`, `armcal map`, `armcal reduce`: a whole archive, on one machine or many.
+
+use super::{Outcome, print, style};
+use crate::batch::{self, Manifest, Request, Shard};
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use armcal_report::{Campaign, Status, campaign_json, campaign_text};
+use std::path::{Path, PathBuf};
+
+/// What a user asked for.
+pub(super) struct Job<'a> {
+    pub manifest: Manifest,
+    pub pipeline: Option<&'a Path>,
+    pub out: &'a Path,
+    pub full: bool,
+    pub jobs: Option<usize>,
+}
+
+impl Job<'_> {
+    fn pipeline(&self) -> Result<Pipeline, Error> {
+        let path = self.pipeline.or(self.manifest.pipeline.as_deref()).ok_or(Error::NoPipeline)?;
+        Pipeline::load_for_others(path)
+    }
+
+    fn request<'a>(&'a self, pipeline: &'a Pipeline) -> Request<'a> {
+        let Job { manifest, out, full, jobs, .. } = self;
+        Request { manifest, pipeline, out, full: *full, jobs: *jobs }
+    }
+}
+
+/// All of it.
+pub(super) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
+    let pipeline = job.pipeline()?;
+    let progress = Progress::new();
+    let (campaign, written, skipped) = batch::batch(&job.request(&pipeline), &progress)?;
+    progress.finish();
+    if skipped > 0 {
+        progress.say(&format!("{skipped} results were there already"));
+    }
+    show(&campaign, job.out, &written, json)
+}
+
+/// One share.
+pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> {
+    let shard = match (shard, Shard::of_slurm()) {
+        (Some(text), _) => text.parse().map_err(Error::Shard)?,
+        (None, Some(of_slurm)) => of_slurm.map_err(Error::Shard)?,
+        (None, None) => {
+            return Err(Error::Shard("is missing; write 1/3, 2/3 and 3/3 for three shares".into()));
+        }
+    };
+    let pipeline = job.pipeline()?;
+    let progress = Progress::new();
+    let receipt = batch::map(&job.request(&pipeline), shard, &progress)?;
+    progress.finish();
+    let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
+    print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"));
+    Ok(if failed > 0 { Outcome::Doubtful } else { Outcome::Done })
+}
+
+/// The shares together.
+pub(super) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
+    let (campaign, written) = batch::reduce(out)?;
+    show(&campaign, out, &written, json)
+}
+
+fn show(campaign: &Campaign, out: &Path, written: &[PathBuf], json: bool) -> Result<Outcome, Error> {
+    if json {
+        print(&campaign_json(campaign));
+    } else {
+        print(&campaign_text(campaign, style()));
+        super::run::print_written(out, written);
+    }
+    Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+}

@@ -1,0 +1,158 @@
+//! Steps, outliers and trends of a campaign's quantities, with their sizes.
+
+use crate::line::{Line, Mean, Weighed, scale, t95, weighed};
+use crate::segment::{Shape, best};
+use crate::{Series, SeriesPoint};
+use armcal_core::Unit;
+use serde::Serialize;
+
+/// Probability that a campaign in which nothing changes shows any change at all.
+const FALSE_ALARMS: f64 = 0.01;
+
+/// A change of one quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Change {
+    /// Which quantity.
+    pub quantity: String,
+    /// Its unit (of a trend: a day of it).
+    pub unit: Unit,
+    /// What it does.
+    #[serde(flatten)]
+    pub kind: ChangeKind,
+    /// By how much: after minus before, outlier minus the others, or per day.
+    pub size: f64,
+    /// 95 % interval of the size; `null` where there are too few recordings beside it.
+    pub ci95: Option<[f64; 2]>,
+    /// Probability of such a change by chance, corrected for the points and quantities that were looked at.
+    pub p: f64,
+}
+
+/// How a quantity changes; recordings are named by their rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ChangeKind {
+    /// Between two recordings, and it stays.
+    Step {
+        /// The last recording before.
+        before: usize,
+        /// The first after.
+        after: usize,
+    },
+    /// In one recording alone.
+    Outlier {
+        /// Which.
+        at: usize,
+    },
+    /// Steadily.
+    Trend {
+        /// From this recording.
+        from: usize,
+        /// To this one.
+        to: usize,
+    },
+}
+
+/// Every change of these series that chance would give with less than one percent in all of them together.
+pub fn changes(all: &[Series]) -> Vec<Change> {
+    let alpha = FALSE_ALARMS / all.len().max(1) as f64;
+    all.iter().flat_map(|series| of_series(series, alpha, all.len() as f64)).collect()
+}
+
+fn of_series(series: &Series, alpha: f64, tries: f64) -> Vec<Change> {
+    let mut found = Found::default();
+    found.search(weighed(&series.points), true, alpha);
+    found.stretches.sort_by_key(|s| s.first().map(|p| p.at.time_ns));
+    let mut changes = found.changes(series, tries);
+    changes.sort_by_key(|c| match c.kind {
+        ChangeKind::Step { after, .. } => time_ns(series, after),
+        ChangeKind::Outlier { at } => time_ns(series, at),
+        ChangeKind::Trend { from, .. } => time_ns(series, from),
+    });
+    changes
+}
+
+fn time_ns(series: &Series, row: usize) -> i64 {
+    series.points.iter().find(|p| p.row == row).map_or(i64::MAX, |p| p.time_ns)
+}
+
+/// A series taken apart: stretches in which nothing happens, and what happens between and in them.
+#[derive(Default)]
+struct Found {
+    stretches: Vec<Vec<Weighed>>,
+    /// First point after each step, and its probability by chance.
+    steps: Vec<(SeriesPoint, f64)>,
+    outliers: Vec<(Weighed, f64)>,
+    trends: Vec<(Line, [SeriesPoint; 2], usize, f64)>,
+}
+
+impl Found {
+    /// Binary segmentation (Vostrikova 1981): the best change first, then what is left on both sides of it.
+    fn search(&mut self, mut points: Vec<Weighed>, trends: bool, alpha: f64) {
+        match best(&points, trends, alpha) {
+            None => self.stretches.push(points),
+            Some((Shape::Step(k), p)) => {
+                self.steps.push((points[k].at, p));
+                let after = points.split_off(k);
+                self.search(points, trends, alpha);
+                self.search(after, trends, alpha);
+            }
+            Some((Shape::Episode(i, j), p)) => {
+                self.steps.extend([(points[i].at, p), (points[j].at, p)]);
+                let after = points.split_off(j);
+                let during = points.split_off(i);
+                for stretch in [points, during, after] {
+                    self.search(stretch, trends, alpha);
+                }
+            }
+            Some((Shape::Outlier(k), p)) => {
+                self.outliers.push((points.remove(k), p));
+                self.search(points, trends, alpha);
+            }
+            Some((Shape::Trend, p)) => {
+                let ends = [points[0].at, points[points.len() - 1].at];
+                if let Some(line) = Line::through(&points) {
+                    self.trends.push((line, ends, points.len(), p));
+                    points.iter_mut().for_each(|point| point.value -= line.at(point.day));
+                }
+                self.search(points, false, alpha);
+            }
+        }
+    }
+
+    fn changes(&self, series: &Series, tries: f64) -> Vec<Change> {
+        let change = |kind, size: f64, sigma: f64, freedom: usize, p: f64| Change {
+            quantity: series.quantity.clone(),
+            unit: series.unit,
+            kind,
+            size,
+            ci95: (freedom > 0).then(|| [-1.0, 1.0].map(|side| size + side * sigma * t95(freedom))),
+            p: (p * tries).min(1.0),
+        };
+        let steps = self.steps.iter().filter_map(|(first, p)| {
+            let at = self.stretches.iter().position(|s| s.first().is_some_and(|w| w.at == *first))?;
+            let (before, after) = (self.stretches.get(at.checked_sub(1)?)?, &self.stretches[at]);
+            let (m, n) = (Mean::of(before), Mean::of(after));
+            let freedom = before.len() + after.len() - 2;
+            let sigma = (1.0 / m.weight + 1.0 / n.weight).sqrt() * scale(m.squares + n.squares, freedom);
+            let kind = ChangeKind::Step { before: before.last()?.at.row, after: first.row };
+            Some(change(kind, n.value - m.value, sigma, freedom, *p))
+        });
+        let outliers = self.outliers.iter().filter_map(|(point, p)| {
+            let around = |s: &&Vec<Weighed>| {
+                let ends = s.first().zip(s.last());
+                ends.is_some_and(|(a, b)| (a.at.time_ns..=b.at.time_ns).contains(&point.at.time_ns))
+            };
+            let others = self.stretches.iter().find(around)?;
+            let (mean, freedom) = (Mean::of(others), others.len() - 1);
+            let sigma = (1.0 / mean.weight + 1.0 / point.weight).sqrt() * scale(mean.squares, freedom);
+            let kind = ChangeKind::Outlier { at: point.at.row };
+            Some(change(kind, point.value - mean.value, sigma, freedom, *p))
+        });
+        let trends = self.trends.iter().map(|(line, [from, to], n, p)| {
+            let sigma = line.sigma_per_day * scale(line.squares, n - 2);
+            let kind = ChangeKind::Trend { from: from.row, to: to.row };
+            change(kind, line.per_day, sigma, n - 2, *p)
+        });
+        steps.chain(outliers).chain(trends).collect()
+    }
+}

@@ -1,0 +1,113 @@
+//! Planted changes are found where they are, and nothing is found where nothing is.
+
+use super::*;
+use armcal_core::Unit;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const DAY_NS: i64 = 86_400_000_000_000;
+
+/// `n` recordings a week apart, in rows that are not in the order of time; `sigma` is told, `scatter` is not.
+fn recorded(
+    n: usize,
+    [sigma, scatter]: [f64; 2],
+    truth: impl Fn(usize) -> f64,
+    rng: &mut ChaCha8Rng,
+) -> Series {
+    let total = sigma.hypot(scatter);
+    let point = |k: usize, rng: &mut ChaCha8Rng| SeriesPoint {
+        row: n - 1 - k,
+        time_ns: k as i64 * 7 * DAY_NS,
+        value: truth(k) + total * rng.sample::<f64, _>(StandardNormal),
+        sigma: (sigma > 0.0).then_some(sigma),
+    };
+    let points = (0..n).map(|k| point(k, rng)).collect();
+    Series { quantity: "joint1.theta".into(), unit: Unit::Radian, points }
+}
+
+#[test]
+fn campaigns_without_a_change_rarely_show_one() {
+    let mut alarms = 0;
+    for seed in 0..400 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let n = rng.random_range(4..60);
+        let noise = [[1e-4, 0.0], [1e-4, 3e-4], [0.0, 1e-4]][seed as usize % 3];
+        let all: Vec<Series> = (0..12).map(|_| recorded(n, noise, |_| 0.3, &mut rng)).collect();
+        alarms += usize::from(!changes(&all).is_empty());
+    }
+    // 1 % of 400 is promised; 12 or more would happen once in a thousand.
+    assert!(alarms <= 11, "{alarms} of 400 campaigns");
+}
+
+#[test]
+fn a_step_is_found_between_its_recordings_with_its_size() {
+    let (mut exact, mut inside) = (0, 0);
+    for seed in 0..100 {
+        let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
+        let at = rng.random_range(3..27);
+        let all = [recorded(30, [1e-4, 1e-4], |k| if k < at { 0.1 } else { 0.101 }, &mut rng)];
+        let found = changes(&all);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let ChangeKind::Step { before, after } = found[0].kind else { panic!("{found:?}") };
+        exact += usize::from((before, after) == (30 - at, 29 - at));
+        let [low, high] = found[0].ci95.expect("an interval");
+        inside += usize::from(low < 1e-3 && 1e-3 < high);
+    }
+    assert!(exact >= 95, "placed exactly in {exact} of 100");
+    assert!(inside >= 88, "inside its interval in {inside} of 100");
+}
+
+#[test]
+fn a_step_before_the_last_recording_is_seen_at_once() {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let all = [recorded(20, [1e-4, 0.0], |k| if k < 19 { 0.0 } else { 2e-3 }, &mut rng)];
+    assert_eq!(changes(&all)[0].kind, ChangeKind::Step { before: 1, after: 0 });
+}
+
+#[test]
+fn bumped_and_put_right_again() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let all = [recorded(40, [1e-4, 0.0], |k| if (12..25).contains(&k) { 1e-3 } else { 0.0 }, &mut rng)];
+    let found = changes(&all);
+    let sizes: Vec<bool> = found.iter().map(|c| c.size > 0.0).collect();
+    assert_eq!(sizes, [true, false], "{found:?}");
+    assert_eq!(found[0].kind, ChangeKind::Step { before: 28, after: 27 });
+    assert_eq!(found[1].kind, ChangeKind::Step { before: 15, after: 14 });
+}
+
+#[test]
+fn one_bad_recording_is_no_step() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let all = [recorded(25, [1e-4, 5e-5], |k| if k == 10 { 3e-3 } else { 0.0 }, &mut rng)];
+    let found = changes(&all);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].kind, ChangeKind::Outlier { at: 14 });
+    assert!((found[0].size - 3e-3).abs() < 5e-4);
+}
+
+#[test]
+fn wear_is_a_trend_with_its_rate() {
+    let mut inside = 0;
+    for seed in 0..100 {
+        let mut rng = ChaCha8Rng::seed_from_u64(3000 + seed);
+        let all = [recorded(30, [1e-4, 1e-4], |k| 5e-5 * k as f64, &mut rng)];
+        let found = changes(&all);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].kind, ChangeKind::Trend { from: 29, to: 0 });
+        let [low, high] = found[0].ci95.expect("an interval");
+        inside += usize::from(low < 5e-5 / 7.0 && 5e-5 / 7.0 < high);
+    }
+    assert!(inside >= 88, "inside its interval in {inside} of 100");
+}
+
+#[test]
+fn three_recordings_and_equal_values_say_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    assert!(changes(&[recorded(3, [1e-4, 0.0], |k| k as f64, &mut rng)]).is_empty());
+    assert!(changes(&[recorded(30, [0.0, 0.0], |_| 0.2, &mut rng)]).is_empty());
+    assert!(changes(&[recorded(30, [0.0, 1e-13], |_| 0.2, &mut rng)]).is_empty());
+    let at_once = (0..9).map(|row| SeriesPoint { row, time_ns: 5, value: row as f64, sigma: None }).collect();
+    let all = [Series { quantity: "x".into(), unit: Unit::Metre, points: at_once }];
+    assert!(changes(&all).iter().all(|c| !matches!(c.kind, ChangeKind::Trend { .. })));
+}

@@ -1,0 +1,66 @@
+//! What a campaign found: one value, shown as terminal text, page, JSON and Parquet.
+//!
+//! `Run -> campaign_row -> Campaign -> files`. Everything is in the order of the manifest; nothing depends on when or
+//! where a recording was worked on.
+
+mod date;
+mod files;
+mod page;
+mod row;
+mod terminal;
+mod words;
+
+pub use files::{campaign_files, campaign_json};
+pub use row::campaign_row;
+pub use terminal::campaign_text;
+
+use crate::run::Status;
+use armcal_campaign::{Change, Row, RowStatus, Series, changes, series};
+
+/// Many recordings of one rig, each calibrated by itself.
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    /// Name of the pipeline.
+    pub pipeline: String,
+    /// What was calibrated, in the order of the manifest.
+    pub rows: Vec<Row>,
+    /// Folder of the results of each row, relative to the campaign's.
+    pub folders: Vec<String>,
+    /// What could not be, in the same order.
+    pub failed: Vec<FailedRecording>,
+    /// Quantities over time; points name rows by index.
+    pub series: Vec<Series>,
+    /// What changes in them.
+    pub changes: Vec<Change>,
+}
+
+/// A recording without a result.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct FailedRecording {
+    /// Its name.
+    pub recording: String,
+    /// Its files as given.
+    pub paths: Vec<String>,
+    /// Why, as `armcal run` says it.
+    pub why: String,
+}
+
+impl Campaign {
+    /// Puts recordings together and looks for changes.
+    pub fn of(pipeline: &str, results: Vec<(Row, String)>, failed: Vec<FailedRecording>) -> Campaign {
+        let (rows, folders): (Vec<Row>, Vec<String>) = results.into_iter().unzip();
+        let series = series(&rows);
+        let changes = changes(&series);
+        Campaign { pipeline: pipeline.to_owned(), rows, folders, failed, series, changes }
+    }
+
+    /// The gravest thing about any recording; one that failed counts as data lost.
+    pub fn status(&self) -> Status {
+        let any = |status| self.rows.iter().any(|row| row.status == status);
+        match () {
+            () if !self.failed.is_empty() || any(RowStatus::DataLost) => Status::DataLost,
+            () if any(RowStatus::Inadequate) => Status::Inadequate,
+            () => Status::Ok,
+        }
+    }
+}

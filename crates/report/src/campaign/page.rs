@@ -1,0 +1,167 @@
+//! The page of a campaign: errors over time, every change with its series, every recording.
+
+use super::Campaign;
+use super::date::minute;
+use super::terminal::conclusion;
+use super::words::{meaning, sentence};
+use crate::ReportError;
+use crate::page::embed;
+use crate::run::VERSION;
+use crate::text::millimetres;
+use armcal_campaign::{Row, RowStatus, Series};
+use askama::Template;
+use serde::Serialize;
+
+/// Points of one curve; more are thinned out evenly.
+const MOST_POINTS: usize = 5000;
+
+#[derive(Template)]
+#[template(path = "campaign.html")]
+struct CampaignPage<'a> {
+    policy: String,
+    style: &'a str,
+    plotly: &'a str,
+    data: String,
+    script: &'a str,
+    version: &'a str,
+    pipeline: &'a str,
+    sentence: String,
+    changes: Vec<(String, &'static str)>,
+    rows: Vec<Shown<'a>>,
+    failed: &'a [super::FailedRecording],
+}
+
+struct Shown<'a> {
+    recording: &'a str,
+    summary: String,
+    start: String,
+    dwells: usize,
+    associated: usize,
+    before: String,
+    after: String,
+    verdict: &'a str,
+    flag: &'a str,
+    warnings: usize,
+}
+
+/// A campaign as one offline HTML page.
+pub(super) fn campaign_html(campaign: &Campaign) -> Result<String, ReportError> {
+    let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")]);
+    let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
+    let rows = campaign.rows.iter().zip(&campaign.folders);
+    let page = CampaignPage {
+        policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
+        style: embed::STYLE,
+        plotly: embed::PLOTLY,
+        data: embed::json_for_html(&Document::of(campaign))?,
+        script: &script,
+        version: VERSION,
+        pipeline: &campaign.pipeline,
+        sentence: conclusion(campaign),
+        changes: told.collect(),
+        rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
+        failed: &campaign.failed,
+    };
+    Ok(page.render()?)
+}
+
+fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {
+    let mean = |value_m: Option<f64>| value_m.map_or("–".into(), millimetres);
+    Shown {
+        recording: &row.recording,
+        summary: format!("{folder}/summary.json"),
+        start: minute(row.start_ns),
+        dwells: row.dwells,
+        associated: row.associated,
+        before: mean(row.nominal.mean_m),
+        after: mean(row.calibrated.mean_m),
+        verdict: &row.verdict,
+        flag: if row.status == RowStatus::Ok { "" } else { row.status.word() },
+        warnings: row.warnings.len(),
+    }
+}
+
+/// What the page's script draws.
+#[derive(Serialize)]
+struct Document<'a> {
+    recordings: Vec<&'a str>,
+    errors: Errors,
+    curves: Vec<Curve<'a>>,
+}
+
+/// Errors of every recording [mm], by time.
+#[derive(Serialize)]
+struct Errors {
+    row: Vec<usize>,
+    time_ms: Vec<i64>,
+    before: Vec<Option<f64>>,
+    after: Vec<Option<f64>>,
+    floor: Vec<Option<f64>>,
+}
+
+/// A quantity by time, in its display unit.
+#[derive(Serialize)]
+struct Curve<'a> {
+    name: &'a str,
+    unit: &'static str,
+    row: Vec<usize>,
+    time_ms: Vec<i64>,
+    value: Vec<f64>,
+    /// Half widths of the 95 % intervals.
+    half: Vec<Option<f64>>,
+    /// Rows at which something changes.
+    marks: Vec<usize>,
+}
+
+impl<'a> Document<'a> {
+    fn of(campaign: &'a Campaign) -> Document<'a> {
+        let rows = &campaign.rows;
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by_key(|i| (rows[*i].start_ns, *i));
+        let order = thinned(order);
+        let mm = |f: fn(&Row) -> Option<f64>| order.iter().map(|i| f(&rows[*i]).map(|m| m * 1e3)).collect();
+        let errors = Errors {
+            time_ms: order.iter().map(|i| rows[*i].start_ns / 1_000_000).collect(),
+            before: mm(|r| r.nominal.mean_m),
+            after: mm(|r| r.calibrated.mean_m),
+            floor: mm(|r| Some(r.noise_floor_m).filter(|m| m.is_finite())),
+            row: order.clone(),
+        };
+        // What changes is shown first; a quantity that no other recording has is no curve.
+        let mut series: Vec<&Series> = campaign.series.iter().filter(|s| s.points.len() > 1).collect();
+        let changed = |s: &Series| campaign.changes.iter().any(|c| c.quantity == s.quantity);
+        series.sort_by_key(|s| !changed(s));
+        Document {
+            recordings: rows.iter().map(|r| r.recording.as_str()).collect(),
+            errors,
+            curves: series.into_iter().map(|s| curve(campaign, s)).collect(),
+        }
+    }
+}
+
+fn curve<'a>(campaign: &Campaign, series: &'a Series) -> Curve<'a> {
+    use armcal_campaign::ChangeKind::{Outlier, Step, Trend};
+    let points = thinned(series.points.clone());
+    let own = campaign.changes.iter().filter(|c| c.quantity == series.quantity);
+    let unit = series.unit;
+    Curve {
+        name: &series.quantity,
+        unit: unit.display_symbol(),
+        row: points.iter().map(|p| p.row).collect(),
+        time_ms: points.iter().map(|p| p.time_ns / 1_000_000).collect(),
+        value: points.iter().map(|p| unit.to_display(p.value)).collect(),
+        half: points.iter().map(|p| p.sigma.map(|s| 1.96 * unit.to_display(s))).collect(),
+        marks: own
+            .filter_map(|c| match c.kind {
+                Step { after, .. } => Some(after),
+                Outlier { at } => Some(at),
+                Trend { .. } => None,
+            })
+            .collect(),
+    }
+}
+
+fn thinned<T>(all: Vec<T>) -> Vec<T> {
+    let stride = all.len().div_ceil(MOST_POINTS).max(1);
+    all.into_iter().step_by(stride).collect()
+}

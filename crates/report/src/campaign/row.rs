@@ -1,0 +1,108 @@
+//! The row of one recording, taken from its run.
+
+use crate::run::{Run, Status};
+use armcal_calibrate::Estimate;
+use armcal_campaign::{ErrorFigures, Quantity, Row, RowStatus};
+use armcal_core::{ErrorStats, RollPitchYaw, Unit};
+use armcal_table::Tilt;
+
+/// The row of a run on a single recording.
+///
+/// Errors are those on held-out points where there are any. The board's pose is taken in the robot's base: there a moved
+/// camera does not show, a bumped table or robot does.
+pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
+    let recording = run.recordings.first()?;
+    let calibration = &run.calibration;
+    let judged = if calibration.holdout.fitted.n > 0 { &calibration.holdout } else { &calibration.train };
+    let warnings = recording.all_warnings().into_iter().map(ToString::to_string);
+    let tilt = words(tilt);
+    Some(Row {
+        recording: recording.name.clone(),
+        paths: recording.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect(),
+        bytes: recording.report.files.iter().map(|f| f.bytes).sum(),
+        sha256: recording.report.files.iter().map(|f| f.sha256.clone()).collect(),
+        load_kg,
+        start_ns: recording.dwells.first().map_or(0, |d| d.mid_ns()),
+        end_ns: recording.dwells.last().map_or(0, |d| d.mid_ns()),
+        dwells: recording.dwells.len(),
+        associated: run.associated(recording),
+        rejected: recording.rejections.len(),
+        status: match run.status() {
+            Status::Ok => RowStatus::Ok,
+            Status::Inadequate => RowStatus::Inadequate,
+            Status::DataLost => RowStatus::DataLost,
+        },
+        nominal: figures(&judged.nominal),
+        calibrated: figures(&judged.fitted),
+        noise_floor_m: calibration.noise_floor_m,
+        verdict: run.diagnosis.as_ref().map(crate::headline).unwrap_or_default(),
+        missing: missing(run),
+        warnings: warnings.chain(run.overall_warnings().iter().map(ToString::to_string)).collect(),
+        quantities: quantities(run, &judged.fitted, &tilt),
+        tilt,
+    })
+}
+
+fn words(tilt: Tilt) -> String {
+    let parts = [("roll", tilt.roll_rad), ("pitch", tilt.pitch_rad)];
+    let tilted = parts.iter().filter(|(_, angle_rad)| *angle_rad != 0.0);
+    let words: Vec<String> =
+        tilted.map(|(axis, rad)| format!("{axis} {:.6}", rad.to_degrees())).map(without_zeros).collect();
+    if words.is_empty() { String::new() } else { words.join(" deg, ") + " deg" }
+}
+
+fn without_zeros(text: String) -> String {
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn figures(stats: &ErrorStats) -> ErrorFigures {
+    let some = |value_m: f64| Some(value_m).filter(|v| stats.n > 0 && v.is_finite());
+    ErrorFigures {
+        n: stats.n,
+        mean_m: some(stats.mean_m),
+        rms_m: some(stats.rms_m),
+        p95_m: some(stats.p95_m),
+        max_m: some(stats.max_m),
+    }
+}
+
+fn missing(run: &Run) -> Vec<String> {
+    let Some(diagnosis) = &run.diagnosis else { return Vec::new() };
+    let found = diagnosis.suggested(run.model.chain().joint_names()).unwrap_or_default();
+    found.iter().map(ToString::to_string).collect()
+}
+
+fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
+    let known = |name: String, unit, value| Quantity { name, unit, value, sigma: None, determined: true };
+    let calibration = &run.calibration;
+    let own = |e: &&Estimate| e.parameter.free && !e.parameter.name.starts_with("board.");
+    let mut all: Vec<Quantity> = calibration.fit.estimates.iter().filter(own).map(parameter).collect();
+    let p = calibration.fit.values();
+    if let Some(board) = run.model.board_in_world(&p, 0) {
+        let pose = RollPitchYaw::from(&(run.model.base_in_world(&p).inverse() * board));
+        let under = if tilt.is_empty() { String::new() } else { format!(" at {tilt}") };
+        let axis = |name, unit, value| known(format!("board_in_base.{name}{under}"), unit, value);
+        all.extend(["x", "y", "z"].iter().zip(pose.xyz_m).map(|(n, m)| axis(n, Unit::Metre, m)));
+        let turns = ["roll", "pitch", "yaw"].iter().zip(pose.rpy_deg);
+        all.extend(turns.map(|(n, deg)| axis(n, Unit::Radian, deg.to_radians())));
+    }
+    if errors.n > 0 {
+        all.push(known("error.mean".into(), Unit::Metre, errors.mean_m));
+    }
+    if let Some(clock) = run.recordings[0].clock.as_ref() {
+        let drift = known("clock.drift".into(), Unit::One, clock.drift);
+        all.push(Quantity { sigma: Some(clock.drift_sigma).filter(|s| s.is_finite()), ..drift });
+    }
+    all.retain(|q| q.value.is_finite());
+    all
+}
+
+fn parameter(e: &Estimate) -> Quantity {
+    Quantity {
+        name: e.parameter.name.clone(),
+        unit: e.parameter.unit,
+        value: e.value,
+        sigma: Some(e.sigma).filter(|s| s.is_finite()),
+        determined: e.determined && !e.at_bound,
+    }
+}

@@ -1,0 +1,60 @@
+//! A change in words.
+
+use super::Campaign;
+use super::date::minute;
+use crate::text::{in_display_unit, printable};
+use armcal_campaign::{Change, ChangeKind};
+use armcal_core::Unit;
+
+/// Days of a month, as rates are told.
+const MONTH_DAYS: f64 = 30.0;
+
+/// What, by how much, between which recordings.
+pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {
+    let row = |row: usize| {
+        let row = &campaign.rows[row];
+        format!("`{}` ({})", printable(&row.recording), minute(row.start_ns))
+    };
+    let name = printable(&change.quantity);
+    match change.kind {
+        ChangeKind::Step { before, after } => {
+            format!("{name} steps by {} between {} and {}", size(change, 1.0), row(before), row(after))
+        }
+        ChangeKind::Outlier { at } => {
+            format!("{name} is off by {} in {} alone", size(change, 1.0), row(at))
+        }
+        ChangeKind::Trend { from, to } => {
+            let month = size(change, MONTH_DAYS);
+            format!("{name} changes by {month} a month ({MONTH_DAYS} days) from {} to {}", row(from), row(to))
+        }
+    }
+}
+
+/// What a change of this quantity usually is.
+pub(super) fn meaning(change: &Change) -> Option<&'static str> {
+    let (name, step) = (change.quantity.as_str(), matches!(change.kind, ChangeKind::Step { .. }));
+    match () {
+        () if name.starts_with("board_in_base.") && step => Some("table or robot bumped, or set up anew"),
+        () if name.starts_with("board_in_base.") => Some("table or robot moves on its foundation"),
+        () if name.starts_with("joint") && name.ends_with(".theta") && step => {
+            Some("belt slipped, coupling turned, or encoder zeroed anew")
+        }
+        () if name.starts_with("error.") => Some("the model describes the arm worse or better than before"),
+        () if name.starts_with("tip.") && step => Some("another tool, or the same one clamped anew"),
+        () if name.starts_with("base.") && step => Some("camera or robot set up anew"),
+        () => None,
+    }
+}
+
+/// Signed, with the half width of its interval, in the unit for people.
+fn size(change: &Change, times: f64) -> String {
+    let (value, symbol) = shown(change.unit, change.size * times);
+    let half = change.ci95.map(|[low, high]| shown(change.unit, 0.5 * (high - low) * times).0);
+    let sign = if change.size > 0.0 { "+" } else { "" };
+    let half = half.map_or(String::new(), |half| format!(" ± {half}"));
+    format!("{sign}{value}{half} {symbol}").trim_end().to_owned()
+}
+
+fn shown(unit: Unit, si: f64) -> (String, &'static str) {
+    (in_display_unit(unit, si), unit.display_symbol())
+}

@@ -1,0 +1,296 @@
+use crate::support::slurm::slurm;
+use crate::support::{armcal, paper_pipeline, python_with, read_json, root};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// An archive: a folder with recordings, a manifest and a pipeline.
+struct Archive {
+    folder: TempDir,
+}
+
+impl Archive {
+    /// The shipped recordings, each under several names, and one that is no recording. Names make them different work.
+    fn shipped(copies: usize) -> Archive {
+        let archive = Archive { folder: tempfile::tempdir().expect("temporary folder") };
+        archive.write_pipeline();
+        let mut manifest = "pipeline = \"rig.toml\"\n".to_owned();
+        for copy in 0..copies {
+            for (name, tilt) in [
+                ("normal", ""),
+                ("roll", "tilt = { roll_deg = 11.7 }"),
+                ("pitch", "tilt = { pitch_deg = 11.8 }"),
+            ] {
+                let path = root().join("fixtures/paper").join(format!("{name}.mcap"));
+                manifest.push_str(&format!(
+                    "[[recordings]]\nname = \"{copy}/{name}\"\npaths = [\"{}\"]\n{tilt}\n",
+                    path.display()
+                ));
+            }
+        }
+        std::fs::write(archive.path("broken.mcap"), "no recording").expect("written");
+        manifest.push_str("[[recordings]]\npaths = [\"broken.mcap\"]\n");
+        std::fs::write(archive.path("manifest.toml"), manifest).expect("written");
+        archive
+    }
+
+    /// The paper's pipeline without diagnosis, which is another test's question.
+    fn write_pipeline(&self) {
+        let shipped = paper_pipeline(Path::new("/nowhere"));
+        let text = format!("{shipped}\n[diagnosis]\nenabled = false\n");
+        std::fs::write(self.path("rig.toml"), text).expect("pipeline");
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn batch(&self, out: &str) -> Output {
+        armcal([Path::new("batch"), &self.path("manifest.toml"), Path::new("--out"), &self.path(out)])
+    }
+
+    fn map(&self, out: &str, shard: &str) -> Output {
+        let arg = Path::new;
+        let (manifest, out) = (self.path("manifest.toml"), self.path(out));
+        armcal([arg("map"), arg("--manifest"), &manifest, arg("--shard"), arg(shard), arg("--out"), &out])
+    }
+
+    fn reduce(&self, out: &str) -> Output {
+        armcal([Path::new("reduce"), &self.path(out)])
+    }
+
+    /// Everything that is a result, by path.
+    fn results(&self, out: &str) -> BTreeMap<String, Vec<u8>> {
+        let mut found = BTreeMap::new();
+        collect(&self.path(out), "", &mut found);
+        // Receipts say how the work was shared, logs what the machines said.
+        found.retain(|name, _| !name.starts_with("shards/") && !name.starts_with("log/"));
+        found
+    }
+}
+
+/// Files below a folder; what is remembered about inputs and the gate of the store are no results.
+fn collect(folder: &Path, below: &str, found: &mut BTreeMap<String, Vec<u8>>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = entry.path();
+        match (name.as_str(), path.is_dir()) {
+            (".inputs" | ".gate", _) => {}
+            (_, true) => collect(&path, &format!("{below}{name}/"), found),
+            (_, false) => drop(found.insert(format!("{below}{name}"), std::fs::read(path).expect("a file"))),
+        }
+    }
+}
+
+fn assert_same(one: &BTreeMap<String, Vec<u8>>, other: &BTreeMap<String, Vec<u8>>) {
+    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+    for (name, bytes) in one {
+        assert!(bytes == &other[name], "{name} differs");
+    }
+}
+
+fn expect(output: &Output, code: i32) -> String {
+    let said =
+        format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+#[test]
+fn killed_at_any_moment_it_goes_on_and_ends_in_the_same_bytes() {
+    let archive = Archive::shipped(4);
+    let said = expect(&archive.batch("undisturbed"), 3);
+    assert!(said.contains("12 of 13 recordings calibrated"), "{said}");
+    assert!(said.contains("broken: "), "{said}");
+    let whole = archive.results("undisturbed");
+    assert_eq!(whole.len(), 3 + 12 * 5, "{:?}", whole.keys());
+    let mut finished = 0;
+    for kill in 0..8u64 {
+        let mut batch = Command::new(env!("CARGO_BIN_EXE_armcal"))
+            .arg("batch")
+            .args([&archive.path("manifest.toml"), Path::new("--out"), &archive.path("killed")])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("starting armcal");
+        // Odd moments from the first file on; slow machines are killed early, fast ones late.
+        std::thread::sleep(Duration::from_millis(40 + 173 * kill));
+        batch.kill().expect("SIGKILL");
+        batch.wait().expect("its end");
+        let partial =
+            if archive.path("killed").is_dir() { archive.results("killed") } else { BTreeMap::new() };
+        finished =
+            partial.keys().filter(|name| name.ends_with("row.json") && !name.contains(".part/")).count();
+        for (name, bytes) in partial.iter().filter(|(name, _)| !name.contains(".part/")) {
+            // A campaign of an earlier turn could only be there if that turn had ended.
+            assert!(bytes == &whole[name], "{name} is half or wrong after a kill");
+        }
+    }
+    println!("{finished} of 12 results survived the kills");
+    let said = expect(&archive.batch("killed"), 3);
+    assert!(finished == 0 || said.contains(&format!("{finished} results were there already")), "{said}");
+    assert_same(&whole, &archive.results("killed"));
+    let again = expect(&archive.batch("killed"), 3);
+    assert!(again.contains("12 results were there already"), "{again}");
+}
+
+#[test]
+fn shares_of_any_number_give_the_bytes_of_a_batch() {
+    let archive = Archive::shipped(2);
+    expect(&archive.batch("whole"), 3);
+    let whole = archive.results("whole");
+    for shares in [1, 3, 17] {
+        let out = format!("in-{shares}");
+        for number in (1..=shares).rev() {
+            let said = archive.map(&out, &format!("{number}/{shares}"));
+            // The broken recording is the seventh.
+            expect(&said, if (7 - 1) % shares == number - 1 { 3 } else { 0 });
+        }
+        expect(&archive.reduce(&out), 3);
+        assert_same(&whole, &archive.results(&out));
+    }
+    std::fs::remove_file(archive.path("in-3/shards/2-of-3.json")).expect("a receipt");
+    let said = expect(&archive.reduce("in-3"), 1);
+    assert!(said.contains("share 2/3 is missing"), "{said}");
+    expect(&archive.map("in-3", "2/17"), 0);
+    let said = expect(&archive.reduce("in-3"), 1);
+    assert!(said.contains("two partitions"), "{said}");
+}
+
+#[test]
+fn a_changed_pipeline_or_recording_is_worked_on_again_and_nothing_else_is() {
+    let archive = Archive::shipped(1);
+    expect(&archive.batch("out"), 3);
+    let pipeline = std::fs::read_to_string(archive.path("rig.toml")).expect("pipeline");
+    std::fs::write(archive.path("rig.toml"), format!("# a remark\n{pipeline}")).expect("written");
+    assert!(expect(&archive.batch("out"), 3).contains("3 results were there already"));
+    let manifest = std::fs::read_to_string(archive.path("manifest.toml")).expect("manifest");
+    std::fs::write(archive.path("manifest.toml"), manifest.replace("11.8", "11.9")).expect("written");
+    assert!(expect(&archive.batch("out"), 3).contains("2 results were there already"));
+    std::fs::write(archive.path("rig.toml"), pipeline.replace("k = 5", "k = 4")).expect("written");
+    assert!(!expect(&archive.batch("out"), 3).contains("there already"));
+}
+
+/// Simulates so many recordings of the shipped rig, a week apart, with something hidden in them.
+fn weeks(folder: &Path, count: usize, hidden: &str) {
+    let shipped = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
+    let own = shipped.split("[[recordings]]").next().expect("a head");
+    let boards = format!("\"{}/pipelines/boards/", root().display());
+    let mut lab = own.replace("\"../boards/", &boards).replace("interval_s = 900.0", "interval_s = 604800.0");
+    lab.push_str(hidden);
+    (0..count).for_each(|week| lab.push_str(&format!("\n[[recordings]]\nname = \"week{week:02}\"\n")));
+    let file = folder.join("lab.toml");
+    std::fs::write(&file, lab).expect("lab file");
+    expect(&armcal([Path::new("simulate"), &file, Path::new("--out"), folder]), 0);
+}
+
+fn changes(json: &Value) -> Vec<(String, String, String, f64)> {
+    let name = |row: &Value| {
+        let row = row.as_u64().expect("a row") as usize;
+        json["recordings"][row]["recording"].as_str().expect("a name").to_owned()
+    };
+    let all = json["changes"].as_array().expect("changes");
+    all.iter()
+        .map(|c| {
+            let place = if c["after"].is_null() { String::new() } else { name(&c["after"]) };
+            let text = |key: &str| c[key].as_str().expect("a word").to_owned();
+            (text("quantity"), text("kind"), place, c["size"].as_f64().expect("a size"))
+        })
+        .collect()
+}
+
+#[test]
+fn a_bumped_table_and_a_slipped_tooth_are_flagged_in_their_week() {
+    let archive = Archive { folder: tempfile::tempdir().expect("temporary folder") };
+    archive.write_pipeline();
+    let lab = archive.path("lab");
+    std::fs::create_dir(&lab).expect("a folder");
+    let hidden = "
+        [[mechanisms]]
+        kind = \"bump\"
+        body = \"board\"
+        shift_mm = [4.0, 0.0, 0.0]
+        recording = 5
+        [[mechanisms]]
+        kind = \"zero_slip\"
+        joint = 2
+        slip_deg = 1.5
+        recording = 9
+    ";
+    weeks(&lab, 13, hidden);
+    let arg = Path::new;
+    let glob = lab.join("*.mcap");
+    let output = armcal([
+        arg("batch"),
+        &glob,
+        arg("--pipeline"),
+        &archive.path("rig.toml"),
+        arg("--out"),
+        &archive.path("out"),
+    ]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{said}");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found = changes(&read_json(&archive.path("out/campaign.json")));
+    let in_week = |week: &str, quantity: &str| {
+        found.iter().find(|(q, kind, after, _)| q == quantity && kind == "step" && after == week)
+    };
+    let table = in_week("week05", "board_in_base.x").unwrap_or_else(|| panic!("{found:?}"));
+    assert!((table.3 - 4e-3).abs() < 5e-4, "{table:?}");
+    let slip = in_week("week09", "joint2.theta").unwrap_or_else(|| panic!("{found:?}"));
+    assert!((slip.3.abs() - 1.5f64.to_radians()).abs() < 3e-3, "{slip:?}");
+    // Nothing moves in any other week.
+    assert!(found.iter().all(|(_, _, after, _)| ["week05", "week09"].contains(&after.as_str())), "{found:?}");
+}
+
+#[test]
+fn a_slurm_job_array_gives_the_bytes_of_a_batch() {
+    let Some(slurm) = slurm() else { return };
+    let archive = Archive::shipped(2);
+    expect(&archive.batch("whole"), 3);
+    let output = slurm
+        .command(&root().join("pipelines/cluster/slurm.sh").display().to_string())
+        .args([archive.path("manifest.toml"), archive.path("rig.toml"), archive.path("slurm")])
+        .arg("3")
+        .env("ARMCAL", env!("CARGO_BIN_EXE_armcal"))
+        .output()
+        .expect("submitting");
+    expect(&output, 0);
+    slurm.wait_for_jobs();
+    let log = std::fs::read_to_string(archive.path("slurm/log/reduce.log")).unwrap_or_default();
+    assert!(log.contains("6 of 7 recordings calibrated"), "{log}");
+    assert_same(&archive.results("whole"), &archive.results("slurm"));
+}
+
+#[test]
+fn a_snakemake_workflow_gives_the_bytes_of_a_batch() {
+    let Some(python) = python_with("snakemake") else { return };
+    let archive = Archive::shipped(2);
+    expect(&archive.batch("whole"), 3);
+    let setting = |name: &str, file: &str| format!("{name}={}", archive.path(file).display());
+    let run = || {
+        let output = Command::new(&python)
+            .args(["-m", "snakemake", "--cores", "2", "--directory"])
+            .arg(archive.path("work"))
+            .arg("-s")
+            .arg(root().join("pipelines/cluster/Snakefile"))
+            .arg("--config")
+            .args([
+                setting("manifest", "manifest.toml"),
+                setting("pipeline", "rig.toml"),
+                setting("out", "snake"),
+            ])
+            .arg("shards=3")
+            .env("ARMCAL", env!("CARGO_BIN_EXE_armcal"))
+            .output()
+            .expect("starting Snakemake");
+        expect(&output, 0)
+    };
+    run();
+    assert_same(&archive.results("whole"), &archive.results("snake"));
+    let again = run();
+    assert!(again.contains("Nothing to be done"), "{again}");
+}
