@@ -1,0 +1,143 @@
+//! One fit from nominal on one core, beside scipy and Ceres on the same problem, with the same optimum.
+
+use crate::clock::{Spent, median, spent};
+use crate::fit_problem::{Problem, Session};
+use crate::page::{Bar, Section, Table};
+use crate::peers::{self, Python, number, single_threaded};
+use crate::{Options, Result};
+use armcal_calibrate::{Fit, Objective, fit};
+use serde_json::Value;
+
+/// Repetitions of armcal's fit.
+const REPETITIONS: usize = 200;
+/// Costs may differ by this share: all have found the same optimum.
+const SAME_COST: f64 = 1e-9;
+
+/// A solver's answer.
+struct Answer {
+    who: String,
+    spent: Spent,
+    evaluations: usize,
+    cost: f64,
+}
+
+pub fn section(options: &Options) -> Result<Section> {
+    let session = Session::observe()?;
+    let mut section = Section::new("Fit");
+    let free = session.problem(Objective::LeastSquares)?.free();
+    section.say(format!(
+        "{} dwells of the paper's experiment from the lab's quick path, {free} free parameters with priors and bounds, from \
+         nominal, one core. armcal's time is that of `fit` as the program calls it: checks, whitening, optimum, covariance, \
+         intervals and what is undetermined. The peers are given the whitened problem and only solve it; with the robust \
+         loss they are also given the residual scale, which armcal finds by itself. Reading files and starting processes \
+         are not counted. Medians of many repetitions.",
+        session.observations.len(),
+    ));
+    section.say(
+        "scipy evaluates all dwells at once in numpy. Ceres differentiates by Jets (`AutoDiffCostFunction`) and has Huber's \
+         loss on the norm of a dwell; scipy gets the dwell stretched so that half its square is that loss. Every answer is \
+         judged by armcal's cost function, and the run fails unless all are equal to 1e-9.",
+    );
+    let python = Python::find(options)?;
+    let ceres = peers::ceres(options);
+    if python.is_none() {
+        section.skipped("scipy: no Python with `benches/peers/requirements.txt` could be made");
+    }
+    if ceres.is_none() {
+        section.skipped("Ceres: `apt-get install g++ libceres-dev` provides it");
+    }
+    for (name, objective) in [("least squares", Objective::LeastSquares), ("robust", Objective::Robust)] {
+        let problem = session.problem(objective)?;
+        let mut answers = vec![ours(&session, &problem)?];
+        let file = options.data.join(format!("fit-{}.json", name.replace(' ', "-")));
+        if let Some(python) = &python {
+            std::fs::write(&file, problem.json()?.to_string())?;
+            let said = python.run("fit_scipy.py", &file)?;
+            answers.extend(theirs("scipy", &said, &problem, |values| Ok(values))?);
+        }
+        if let Some(ceres) = &ceres {
+            let file = file.with_extension("txt");
+            std::fs::write(&file, problem.numbers()?)?;
+            let said = peers::json(single_threaded(ceres).arg(&file))?;
+            let version = said[0]["version"].as_str().unwrap_or_default();
+            let in_order = |values: Vec<f64>| problem.from_blocks(&values);
+            answers.extend(theirs(&format!("Ceres {version}"), &said, &problem, in_order)?);
+        }
+        judge(name, &answers, &mut section)?;
+    }
+    Ok(section)
+}
+
+fn ours(session: &Session, problem: &Problem<'_>) -> Result<Answer> {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let config = &problem.config;
+    let once = || one.install(|| fit(&session.model, &session.observations, config));
+    let mut last: Fit = once()?;
+    let mut times = Vec::new();
+    for _ in 0..REPETITIONS {
+        let (fitted, took) = spent(once);
+        last = fitted?;
+        times.push(took);
+    }
+    let cost = problem.cost(&last.values())?;
+    Ok(Answer { who: "armcal".into(), spent: median(&times), evaluations: last.iterations, cost })
+}
+
+fn theirs(
+    who: &str,
+    said: &Value,
+    problem: &Problem<'_>,
+    in_order: impl Fn(Vec<f64>) -> Result<Vec<f64>>,
+) -> Result<Vec<Answer>> {
+    let answer = |one: &Value| {
+        let values: Vec<f64> = serde_json::from_value(one["values"].clone())?;
+        Ok(Answer {
+            who: format!("{who}: {}", one["how"].as_str().unwrap_or_default()),
+            spent: Spent { wall_s: number(one, "wall_s")?, cpu_s: number(one, "cpu_s")? },
+            evaluations: number(one, "evaluations")? as usize,
+            cost: problem.cost(&in_order(values)?)?,
+        })
+    };
+    said.as_array().into_iter().flatten().map(answer).collect()
+}
+
+fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
+    let Some((ours, peers)) = answers.split_first() else { return Ok(()) };
+    let best = answers.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
+    let title = format!("{name}: solver");
+    let mut table =
+        Table::new(&[&title, "wall [ms]", "CPU [ms]", "evaluations", "to armcal", "cost above the lowest"]);
+    for a in answers {
+        let excess = a.cost / best - 1.0;
+        table.row([
+            a.who.clone(),
+            format!("{:.3}", a.spent.wall_s * 1e3),
+            format!("{:.3}", a.spent.cpu_s * 1e3),
+            a.evaluations.to_string(),
+            format!("{:.1}", a.spent.wall_s / ours.spent.wall_s),
+            format!("{excess:.1e}"),
+        ]);
+    }
+    section.table(table);
+    let far: Vec<&str> =
+        answers.iter().filter(|a| a.cost > best * (1.0 + SAME_COST)).map(|a| a.who.as_str()).collect();
+    if !far.is_empty() {
+        return Err(format!("{name}: {} did not find the optimum\n{}", far.join(", "), section.text()).into());
+    }
+    section.bar(Bar {
+        what: format!("fit, {name}, one core"),
+        limit: "< 5 ms".into(),
+        measured: format!("{:.2} ms", ours.spent.wall_s * 1e3),
+        met: ours.spent.wall_s < 5e-3,
+    });
+    for peer in peers.iter().filter(|p| p.who.starts_with("scipy")) {
+        let ratio = peer.spent.wall_s / ours.spent.wall_s;
+        section.bar(Bar {
+            what: format!("fit, {name}, faster than {}", peer.who),
+            limit: ">= 50".into(),
+            measured: format!("{ratio:.0}"),
+            met: ratio >= 50.0,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! Every number of `/work/shared/design.md` that is about speed or memory, measured beside its peer in one run.
+//!
+//! `cargo bench -p armcal --bench performance` measures everything and rewrites `docs/performance.md`. With names of
+//! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`.
+//! `--size-mb N` sets the size of the recording that is read (default 1000). Data go to `target/bench-data`.
+//!
+//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `memory` are the parts; `peers` finds or makes
+//! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `page`
+//! lays out, `machine` says on what.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its numbers")]
+
+mod clock;
+mod diagnosis;
+mod fit;
+mod fit_problem;
+mod machine;
+mod memory;
+mod page;
+mod peers;
+mod reading;
+mod recordings;
+mod walk;
+
+use page::Section;
+use std::path::{Path, PathBuf};
+
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
+
+/// A part by name, in the order of the page.
+const PARTS: [(&str, fn(&Options) -> Result<Section>); 4] = [
+    ("reading", reading::section),
+    ("fit", fit::section),
+    ("diagnosis", diagnosis::section),
+    ("memory", memory::section),
+];
+
+/// What the command line asks for.
+pub struct Options {
+    /// Size of the recording that is read [MB].
+    pub size_mb: u64,
+    /// Where generated recordings and built peers lie.
+    pub data: PathBuf,
+}
+
+fn main() -> Result<()> {
+    // Cargo passes `--bench` to every bench.
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    if let [role, rest @ ..] = arguments.as_slice()
+        && role == memory::CHILD
+    {
+        return memory::child(rest);
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut options = Options { size_mb: 1000, data: root.join("target/bench-data") };
+    let mut named = Vec::new();
+    let mut arguments = arguments.iter();
+    while let Some(argument) = arguments.next() {
+        if argument == "--size-mb" {
+            let size = arguments.next().ok_or("--size-mb needs a number of megabytes")?;
+            options.size_mb = size.parse().map_err(|e| format!("--size-mb {size}: {e}"))?;
+        } else if PARTS.iter().any(|(name, _)| name == argument) {
+            named.push(argument.as_str());
+        } else {
+            let parts = PARTS.map(|(name, _)| name).join(", ");
+            return Err(format!("`{argument}` is no part: choose of {parts}").into());
+        }
+    }
+    std::fs::create_dir_all(&options.data)?;
+    let mut sections = Vec::new();
+    for (name, section) in PARTS.iter().filter(|(name, _)| named.is_empty() || named.contains(name)) {
+        eprintln!("measuring {name}");
+        let section = section(&options)?;
+        println!("{}", section.text());
+        sections.push(section);
+    }
+    if named.is_empty() {
+        let page = root.join("docs/performance.md");
+        armcal_recording::atomic::write(&page, page::page(&sections, &options).as_bytes())?;
+        println!("{}", page.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! Reading two streams into columns, beside a bare walk over the same chunks and beside the readers of Python.
+
+use crate::clock::{Spent, median, spent};
+use crate::page::{Bar, Section, Table, seconds};
+use crate::peers::{Python, number};
+use crate::recordings::{self, JOINT_NAMES, JOINTS, TIP};
+use crate::walk::walk;
+use crate::{Options, Result};
+use armcal_core::Samples;
+use armcal_recording::{JointStream, PoseStream, Recording, Streams};
+use rayon::ThreadPool;
+use serde_json::Value;
+use sha2::{Digest as _, Sha256};
+use std::path::Path;
+
+/// Rounds of the in-process readers, each reader once a round so that a busy machine hits all alike.
+const ROUNDS: usize = 9;
+
+pub fn section(options: &Options) -> Result<Section> {
+    let path = options.data.join(format!("streams-{}mb-seed1.mcap", options.size_mb));
+    recordings::streams(&path, options.size_mb * 1_000_000, 1)?;
+    let bytes = std::fs::metadata(&path)?.len();
+    let samples = read(&path)?;
+    let mut section = Section::new("Reading two streams into columns");
+    section.say(format!(
+        "One recording of {:.3} GB: {} joint states (1 kHz, 3 joints with efforts), {} poses of the tip (250 Hz), camera \
+         images (30 Hz, JPEG-like) between them; ROS 2 CDR, chunks of 1 MiB by zstd, in the page cache. armcal opens the \
+         file, checks the CRC of every chunk, decodes, sorts, judges clocks and occlusion (`Recording::open` + `read`). \
+         The bare walk inflates the same chunks from the same mapping with the same threads and steps over their records, \
+         and does nothing else. Medians of {ROUNDS} rounds.",
+        bytes as f64 * 1e-9,
+        samples.joints.len(),
+        samples.tip.as_ref().map_or(0, |t| t.len()),
+    ));
+    let threads = std::thread::available_parallelism()?.get();
+    let mut table = Table::new(&["reader", "threads", "wall [s]", "CPU [s]", "GB/s", "to armcal"]);
+    let mut fastest = None;
+    for threads in if threads > 1 { vec![1, threads] } else { vec![1] } {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let [ours, bare, checked] = rounds(&pool, &path)?;
+        let ratio = ours.wall_s / bare.wall_s;
+        for (name, it) in [
+            ("armcal, to columns", ours),
+            ("bare: inflate and walk", bare),
+            ("bare, and check the CRC", checked),
+        ] {
+            row(&mut table, name, threads, it, bytes, ours);
+        }
+        let what = format!("reading within 1.5x of inflating and walking, {threads} threads");
+        section.bar(Bar {
+            what,
+            limit: "<= 1.5".into(),
+            measured: format!("{ratio:.2} (CPU {:.2})", ours.cpu_s / bare.cpu_s),
+            met: ratio <= 1.5,
+        });
+        fastest = Some(ours);
+    }
+    if let Some(ours) = fastest {
+        python(options, &path, &samples, (ours, bytes), &mut section, &mut table)?;
+    }
+    section.table(table);
+    Ok(section)
+}
+
+/// armcal, the bare walk, the bare walk with CRC.
+fn rounds(pool: &ThreadPool, path: &Path) -> Result<[Spent; 3]> {
+    let mut times: [Vec<Spent>; 3] = Default::default();
+    for _ in 0..ROUNDS {
+        let (samples, took) = spent(|| pool.install(|| read(path)));
+        samples?;
+        times[0].push(took);
+        for (crc, times) in [false, true].into_iter().zip(&mut times[1..]) {
+            let (walked, took) = spent(|| pool.install(|| walk(path, crc)));
+            walked?;
+            times.push(took);
+        }
+    }
+    Ok(times.map(|times| median(&times)))
+}
+
+fn python(
+    options: &Options,
+    path: &Path,
+    samples: &Samples,
+    (ours, bytes): (Spent, u64),
+    section: &mut Section,
+    table: &mut Table,
+) -> Result<()> {
+    let Some(python) = Python::find(options)? else {
+        section.skipped("the Python readers: no Python with `benches/peers/requirements.txt` could be made");
+        return Ok(());
+    };
+    for (name, script) in
+        [("Python: mcap + mcap_ros2", "read_mcap_ros2.py"), ("Python: rosbags", "read_rosbags.py")]
+    {
+        let said = python.run(script, path)?;
+        same_columns(name, &said, samples)?;
+        let took = Spent { wall_s: number(&said, "wall_s")?, cpu_s: number(&said, "cpu_s")? };
+        row(table, name, 1, took, bytes, ours);
+        let ratio = took.wall_s / ours.wall_s;
+        section.bar(Bar {
+            what: format!("reading faster than {name}"),
+            limit: ">= 20".into(),
+            measured: format!("{ratio:.0}"),
+            met: ratio >= 20.0,
+        });
+    }
+    section.say(
+        "All readers returned the same columns: the same rows, and the same bits (SHA-256 over stamps, positions, efforts \
+         and tip positions), asserted in the run."
+            .to_owned(),
+    );
+    Ok(())
+}
+
+fn row(table: &mut Table, name: &str, threads: usize, it: Spent, bytes: u64, ours: Spent) {
+    let rate = bytes as f64 * 1e-9 / it.wall_s;
+    let ratio = it.wall_s / ours.wall_s;
+    let cells = [name.to_owned(), threads.to_string(), seconds(it.wall_s), seconds(it.cpu_s)];
+    table.row(cells.into_iter().chain([format!("{rate:.2}"), format!("{ratio:.2}")]));
+}
+
+/// The two streams as a pipeline reads them.
+pub fn read(path: &Path) -> Result<Samples> {
+    let streams = Streams {
+        joints: JointStream {
+            topic: JOINTS.to_owned(),
+            names: JOINT_NAMES.map(str::to_owned).into(),
+            ..JointStream::default()
+        },
+        tip: Some(PoseStream { topic: TIP.to_owned(), ..PoseStream::default() }),
+        ..Streams::default()
+    };
+    let (samples, _, _) = Recording::open(&[path.to_owned()])?.read(&streams)?;
+    Ok(samples)
+}
+
+/// Fails where a peer read something else than armcal.
+fn same_columns(peer: &str, said: &Value, samples: &Samples) -> Result<()> {
+    let (joints, tip) = (&samples.joints, samples.tip.as_ref().ok_or("armcal read no tip")?);
+    let effort = joints.effort_nm.as_ref().ok_or("armcal read no efforts")?;
+    let turns = tip.orientation.as_ref().ok_or("armcal read no orientations")?;
+    let mut hash = Sha256::new();
+    joints.time_ns.iter().for_each(|t| hash.update(t.to_le_bytes()));
+    joints.joint_rad.iter().chain(effort).flatten().for_each(|v| hash.update(v.to_le_bytes()));
+    tip.time_ns.iter().for_each(|t| hash.update(t.to_le_bytes()));
+    tip.position_m.iter().flat_map(|p| p.iter()).for_each(|v| hash.update(v.to_le_bytes()));
+    let hash: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    let rows = [joints.len() as f64, tip.len() as f64];
+    // armcal normalises quaternions, which moves their last bits.
+    let sum: f64 = turns.iter().map(|q| q.coords.sum()).sum();
+    let same = said["sha256"] == hash.as_str()
+        && [number(said, "joint_rows")?, number(said, "tip_rows")?] == rows
+        && (number(said, "quaternion_sum")? - sum).abs() <= 1e-9 * rows[1];
+    if same {
+        Ok(())
+    } else {
+        Err(format!("{peer} read other columns: {said}; armcal: {rows:?} rows, {hash}, {sum}").into())
+    }
+}
