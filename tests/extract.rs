@@ -23,7 +23,10 @@ fn open(path: &Path) -> Recording {
 }
 
 /// Everything there is to a message, and its channel, in file order.
-fn messages(path: &Path, wanted: impl Fn(&str) -> bool) -> Vec<(String, String, u32, u64, u64, Vec<u8>)> {
+fn messages(
+    path: &Path,
+    wanted: impl Fn(&str) -> bool + Sync,
+) -> Vec<(String, String, u32, u64, u64, Vec<u8>)> {
     let mut all = Vec::new();
     open(path)
         .for_each_raw(&mut |m| {
