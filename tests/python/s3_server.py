@@ -4,7 +4,8 @@ usage: s3_server.py BUCKET FOLDER LOG
 
 Prints the port, serves until stdin ends, and appends a JSON line to LOG for every request answered. Where moto
 does not behave as the real service can, this does: bucket `denied` refuses, bucket `elsewhere` is in another region, and for
-every key that begins with `flaky` the server is busy the first time.
+every key that begins with `flaky` the server is busy the first time; one that begins with `replaced` is replaced after the
+first time.
 """
 import json
 import sys
@@ -50,6 +51,10 @@ def logged(environ, start):
         return start(status, headers, *rest)
 
     body = b"".join(answer(environ, note))
+    path = environ["PATH_INFO"]
+    if path.startswith(f"/{bucket}/replaced") and environ["REQUEST_METHOD"] == "GET" and path not in asked:
+        asked.add(path)
+        s3.put_object(Bucket=bucket, Key=path.removeprefix(f"/{bucket}/"), Body=b"another" * 1000)
     entry = {"method": environ["REQUEST_METHOD"], "path": environ["PATH_INFO"], "bytes": len(body)}
     entry |= {"status": said["status"], "range": environ.get("HTTP_RANGE", "")}
     with lock:

@@ -27,6 +27,9 @@ const MAX_SUMMARY_BYTES: usize = 256 << 20;
 /// More than this between the records that the summary knows is not read as one block.
 const MAX_GAP_BYTES: usize = 16 << 20;
 
+/// A larger chunk is not read into memory.
+const MAX_CHUNK_BYTES: usize = 1 << 30;
+
 /// What the summary of a file is good for.
 pub(crate) enum Found {
     /// Everything.
@@ -176,6 +179,9 @@ impl Summary {
         for chunk in &self.chunks {
             let record =
                 range(chunk.chunk_start, chunk.chunk_length).filter(|r| r.len() > ENVELOPE).ok_or(OUTSIDE)?;
+            if record.len() > MAX_CHUNK_BYTES {
+                return Err("one of its chunks is larger than a chunk may be");
+            }
             let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
             let indexed = !chunk.message_indexes.is_empty();
             let block = Block {

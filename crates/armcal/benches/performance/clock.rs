@@ -22,9 +22,8 @@ pub fn spent<T>(work: impl FnOnce() -> T) -> (T, Spent) {
 
 /// Medians of wall and processor time.
 pub fn median(spent: &[Spent]) -> Spent {
-    let of = |pick: fn(&Spent) -> f64| {
-        armcal_core::robust::median(&spent.iter().map(pick).collect::<Vec<f64>>())
-    };
+    let of =
+        |pick: fn(&Spent) -> f64| armcal_core::robust::median(&spent.iter().map(pick).collect::<Vec<f64>>());
     Spent { wall_s: of(|s| s.wall_s), cpu_s: of(|s| s.cpu_s) }
 }
 

@@ -78,8 +78,8 @@ fn peak_mib(arguments: &[&std::ffi::OsStr]) -> Result<f64> {
     let output = Command::new(std::env::current_exe()?).arg(CHILD).args(arguments).output()?;
     let said = String::from_utf8_lossy(&output.stderr);
     let peak = said.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kib = peak.and_then(|text| text.trim().strip_suffix(" kB")).ok_or_else(|| {
-        format!("armcal {arguments:?} did not finish: {said}")
-    })?;
+    let kib = peak
+        .and_then(|text| text.trim().strip_suffix(" kB"))
+        .ok_or_else(|| format!("armcal {arguments:?} did not finish: {said}"))?;
     Ok(kib.trim().parse::<f64>()? / 1024.0)
 }
