@@ -173,6 +173,7 @@ fn refused(path: &Path) {
         assert!(!out.exists(), "something was written");
         said(&output)
     };
+    let only = [results.clone()];
     let empty = path.join("empty");
     std::fs::create_dir(&empty).expect("folder");
     let message = refusal(&week, &[results.clone(), empty]);
@@ -197,21 +198,21 @@ fn refused(path: &Path) {
     let shipped = format!("{}/pipelines/boards/paper.toml", root().display());
     let contradicting = path.join("contradicting.toml");
     write(&contradicting, &text.replace(&shipped, &other.display().to_string()));
-    let message = refusal(&contradicting, &[results.clone()]);
+    let message = refusal(&contradicting, &only);
     assert!(message.contains("friday") && message.contains("seat_sigma_mm"), "{message}");
 
     write(&contradicting, &format!("{text}[observations]\ntracked = false\n"));
-    let message = refusal(&contradicting, &[results.clone()]);
+    let message = refusal(&contradicting, &only);
     assert!(message.contains("[observations] were"), "{message}");
 
     let left = format!("{}/pipelines/models/left_arm.toml", root().display());
     let right = format!("{}/pipelines/models/right_arm.toml", root().display());
     write(&contradicting, &text.replace(&right, &left));
-    let message = refusal(&contradicting, &[results.clone()]);
+    let message = refusal(&contradicting, &only);
     assert!(message.contains("another nominal arm"), "{message}");
 
     write(&contradicting, &format!("{text}[pool]\nper_recording = [\"joint2.tehta\"]\n"));
-    let message = refusal(&contradicting, &[results]);
+    let message = refusal(&contradicting, &only);
     assert!(message.contains("joint2.theta"), "{message}");
 }
 
