@@ -298,9 +298,12 @@ impl Layout {
     /// A record whose length is wrong can hide chunks from the walk; the index still has them.
     fn add_unvisited(&mut self, bytes: &[u8]) {
         let known: BTreeSet<usize> = self.blocks.iter().map(|b| b.offset).collect();
-        let chunks = self.indexed.iter().filter_map(|c| indexed_chunk(bytes, c));
-        let hidden: BTreeMap<usize, Range<usize>> =
-            chunks.map(|r| (r.start - ENVELOPE, r)).filter(|(offset, _)| !known.contains(offset)).collect();
+        // Known chunks are not looked at again: that would bring a page of each back into memory.
+        let unknown = |c: &&ChunkIndex| {
+            usize::try_from(c.chunk_start_offset).is_ok_and(|offset| !known.contains(&offset))
+        };
+        let chunks = self.indexed.iter().filter(unknown).filter_map(|c| indexed_chunk(bytes, c));
+        let hidden: BTreeMap<usize, Range<usize>> = chunks.map(|r| (r.start - ENVELOPE, r)).collect();
         for (offset, range) in hidden {
             self.damaged(offset, "a chunk hidden by a record of wrong length; the index leads to it", false);
             self.blocks.push(Block::of(offset, Content::Chunk(range)));
