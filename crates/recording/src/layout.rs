@@ -308,8 +308,11 @@ impl Layout {
     /// a lie that would have the same bytes inflated again and again: the first of them counts.
     fn add_unvisited(&mut self, bytes: &[u8]) {
         let known: BTreeSet<usize> = self.blocks.iter().map(|b| b.offset).collect();
-        let chunks = self.indexed.iter().filter_map(|c| indexed_chunk(bytes, c));
-        let hidden: Vec<Range<usize>> = chunks.filter(|r| !known.contains(&(r.start - ENVELOPE))).collect();
+        // Known chunks are not looked at again: that would bring a page of each back into memory.
+        let unknown =
+            |c: &&ChunkIndex| usize::try_from(c.chunk_start).is_ok_and(|offset| !known.contains(&offset));
+        let chunks = self.indexed.iter().filter(unknown).filter_map(|c| indexed_chunk(bytes, c));
+        let hidden: Vec<Range<usize>> = chunks.collect();
         let mut free_from = 0;
         for range in hidden {
             let offset = range.start - ENVELOPE;

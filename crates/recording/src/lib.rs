@@ -48,7 +48,7 @@ pub use bytes::{Access, identity_of};
 pub use error::{RecordingError, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use open::Recording;
-pub use raw::{Attachment, RawChannel, RawMessage, RawSchema, RawVisitor};
+pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;
 pub use streams::{Encoder, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams};
 pub use url::{is_url, list, resolve};

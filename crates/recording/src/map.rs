@@ -11,8 +11,6 @@ use std::ops::{Deref, Range};
 
 /// A map is given back in stretches of this size: large enough that it costs no time.
 const WINDOW_BYTES: usize = 1 << 20;
-/// Touching a byte may bring as much before and behind it into memory: the largest page of the common processors.
-const PAGE_BYTES: usize = 2 << 20;
 /// A whole file is hashed in pieces of this size.
 const PIECE_BYTES: usize = 4 << 20;
 
@@ -34,7 +32,7 @@ impl Map {
     pub fn passed(&self, range: Range<usize>) {
         let window = range.start / WINDOW_BYTES;
         if range.end / WINDOW_BYTES != window {
-            self.release((window * WINDOW_BYTES).saturating_sub(PAGE_BYTES)..range.end);
+            self.release(window * WINDOW_BYTES..range.end);
         }
     }
 

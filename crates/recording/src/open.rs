@@ -281,7 +281,7 @@ impl RecordingFile {
             (read().map(|(_, declared)| declared).sum(), read().map(|(id, _)| found(id)).sum())
         };
         let why = format!("its statistics declare {declared} messages, {found} are usable");
-        (declared != found).then(|| Damage { offset: 0, why, lost: declared > found })
+        (declared != found).then_some(Damage { offset: 0, why, lost: declared > found })
     }
 
     /// Attachments and metadata that cannot be passed on; those of files read by ranges are judged when they are read.

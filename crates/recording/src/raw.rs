@@ -84,6 +84,9 @@ impl<'a> Attachment<'a> {
     }
 }
 
+/// Name and entries of a metadata record.
+pub type RawMetadata = (String, BTreeMap<String, String>);
+
 /// Takes messages in order; an error stops the pass.
 pub type RawVisitor<'a> = dyn FnMut(RawMessage<'_>) -> Result<(), RecordingError> + Send + 'a;
 
@@ -161,7 +164,7 @@ impl Recording {
     }
 
     /// Every metadata record that can be read, as (name, entries), in file order.
-    pub fn metadata(&self) -> Result<Vec<(String, BTreeMap<String, String>)>, RecordingError> {
+    pub fn metadata(&self) -> Result<Vec<RawMetadata>, RecordingError> {
         let ranges = self.files.iter().flat_map(|file| file.layout.metadata.iter().map(move |r| (file, r)));
         let bodies = ranges.map(|(file, range)| file.bytes.read(range.clone()));
         bodies.filter_map(|body| body.map(|body| parse_metadata(&body)).transpose()).collect()
@@ -180,7 +183,7 @@ impl Recording {
 }
 
 /// Name and entries of a metadata record; `None` when it is malformed.
-pub(crate) fn parse_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
+pub(crate) fn parse_metadata(body: &[u8]) -> Option<RawMetadata> {
     let mut fields = Cursor::new(body);
     Some((fields.string()?, fields.map(Cursor::string, Cursor::string)?))
 }
