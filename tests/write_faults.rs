@@ -1,5 +1,5 @@
 use crate::support::{files_made, quick_pipeline, root};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -239,6 +239,21 @@ fn odd_output_folders_are_made_or_refused_by_name() {
     assert_eq!(std::fs::read(bench.path("file-out")).expect("still there"), b"a file");
 }
 
+/// When to kill: so many parts are begun, or so many files have their names.
+#[derive(Debug, Clone, Copy)]
+enum Moment {
+    Begun(usize),
+    Named(usize),
+}
+use Moment::{Begun, Named};
+
+/// The files of a folder that are not hidden, each with what tells it from another of the same name.
+fn identities(out: &Path) -> BTreeSet<(String, u64)> {
+    use std::os::unix::fs::MetadataExt as _;
+    let files = entries(out).into_iter().filter(|p| !name(p).starts_with('.'));
+    files.filter_map(|p| Some((name(&p), p.metadata().ok()?.ino()))).collect()
+}
+
 /// Killed before, while and after files get their names; the next run makes everything whole and leaves no litter.
 #[test]
 fn killed_at_any_moment_results_are_whole() {
@@ -248,15 +263,27 @@ fn killed_at_any_moment_results_are_whole() {
     let done = bench.run("new.toml").arg("--out").arg(bench.path("third")).status().expect("starting armcal");
     assert!(matches!(done.code(), Some(0 | 3)));
     let whole_run = reference.elapsed();
-    // Some moments anywhere, the others counted from the first, the eighth, the last files being written.
-    let moments =
-        [(0, 0.1), (0, 0.6), (1, 0.0), (1, 0.002), (8, 0.0), (12, 0.0), (14, 0.0), (14, 0.004), (14, 0.02)];
-    for (parts, share) in moments {
-        let litter = hidden(&out);
+    // Some moments anywhere in the run, the others when so many files are begun, or have got their names.
+    let moments = [
+        (Begun(0), 0.1),
+        (Begun(0), 0.6),
+        (Begun(1), 0.0),
+        (Begun(8), 0.0),
+        (Begun(11), 0.0),
+        (Named(1), 0.0),
+        (Named(2), 0.0),
+        (Named(5), 0.0),
+        (Named(9), 0.0),
+    ];
+    for (moment, share) in moments {
+        let (litter, before) = (hidden(&out), identities(&out));
         let mut child = bench.run("new.toml").arg("--out").arg(&out).spawn().expect("starting armcal");
         let started = Instant::now();
-        let begun = || hidden(&out).iter().filter(|part| !litter.contains(part)).count();
-        while begun() < parts && started.elapsed() < 20 * whole_run {
+        let reached = || match moment {
+            Begun(parts) => hidden(&out).iter().filter(|part| !litter.contains(part)).count() >= parts,
+            Named(files) => identities(&out).difference(&before).count() >= files,
+        };
+        while !reached() && started.elapsed() < 20 * whole_run {
             if child.try_wait().expect("our own child").is_some() {
                 break;
             }
@@ -264,8 +291,8 @@ fn killed_at_any_moment_results_are_whole() {
         std::thread::sleep(whole_run.mul_f64(share));
         child.kill().expect("our own child");
         child.wait().expect("our own child");
-        let new = bench.whole(&out, &format!("{parts} parts, {share} of a run later"));
-        println!("killed at {parts} parts + {share}: {new} new files, {} parts left", hidden(&out).len());
+        let new = bench.whole(&out, &format!("{moment:?}, {share} of a run later"));
+        println!("killed at {moment:?} + {share}: {new} new files, {} parts left", hidden(&out).len());
         assert!(shown(&out).len() == bench.old.len(), "no result is missing");
         assert!(hidden(&out).iter().all(|n| n.ends_with(".part")), "{:?}", hidden(&out));
     }

@@ -1,6 +1,6 @@
 //! Steps, outliers and trends of a campaign's quantities, with their sizes.
 
-use crate::line::{Line, Mean, Weighed, scale, t95, weighed};
+use crate::line::{Line, Mean, Weighed, p_value, scale, t95, weighed};
 use crate::segment::{Shape, best};
 use crate::{Series, SeriesPoint};
 use armcal_core::Unit;
@@ -52,26 +52,27 @@ pub enum ChangeKind {
     },
 }
 
-/// Every change of these series that chance would give with less than one percent in all of them together.
+/// Every change of these series that chance would give with less than one percent in all of them together; by time,
+/// the surest of one moment first.
 pub fn changes(all: &[Series]) -> Vec<Change> {
     let alpha = FALSE_ALARMS / all.len().max(1) as f64;
-    all.iter().flat_map(|series| of_series(series, alpha, all.len() as f64)).collect()
+    let of_one = |series: &Series| {
+        let mut found = Found::default();
+        found.search(weighed(&series.points), true, alpha);
+        found.prune(alpha);
+        let changes = found.changes(series, all.len() as f64);
+        changes.into_iter().map(|c| (time_ns(series, &c), c)).collect::<Vec<_>>()
+    };
+    let mut found: Vec<(i64, Change)> = all.iter().flat_map(of_one).collect();
+    found.sort_by(|(at, a), (bt, b)| at.cmp(bt).then(a.p.total_cmp(&b.p)));
+    found.into_iter().map(|(_, change)| change).collect()
 }
 
-fn of_series(series: &Series, alpha: f64, tries: f64) -> Vec<Change> {
-    let mut found = Found::default();
-    found.search(weighed(&series.points), true, alpha);
-    found.stretches.sort_by_key(|s| s.first().map(|p| p.at.time_ns));
-    let mut changes = found.changes(series, tries);
-    changes.sort_by_key(|c| match c.kind {
-        ChangeKind::Step { after, .. } => time_ns(series, after),
-        ChangeKind::Outlier { at } => time_ns(series, at),
-        ChangeKind::Trend { from, .. } => time_ns(series, from),
-    });
-    changes
-}
-
-fn time_ns(series: &Series, row: usize) -> i64 {
+/// When a change shows first.
+fn time_ns(series: &Series, change: &Change) -> i64 {
+    let (ChangeKind::Step { after: row, .. }
+    | ChangeKind::Outlier { at: row }
+    | ChangeKind::Trend { from: row, .. }) = change.kind;
     series.points.iter().find(|p| p.row == row).map_or(i64::MAX, |p| p.time_ns)
 }
 
@@ -119,6 +120,20 @@ impl Found {
         }
     }
 
+    /// Takes back every step that does not stand by itself: the far end of an episode may be no more than scatter.
+    fn prune(&mut self, alpha: f64) {
+        self.stretches.sort_by_key(|s| s.first().map(|p| (p.at.time_ns, p.at.row)));
+        loop {
+            let p = |k: &usize| Between::of(&self.stretches[*k - 1], &self.stretches[*k]).p();
+            let weakest = (1..self.stretches.len()).max_by(|a, b| p(a).total_cmp(&p(b)));
+            let Some(k) = weakest.filter(|k| p(k) >= alpha) else { return };
+            let first = self.stretches[k].first().map(|w| w.at);
+            self.steps.retain(|(at, _)| Some(*at) != first);
+            let after = self.stretches.remove(k);
+            self.stretches[k - 1].extend(after);
+        }
+    }
+
     fn changes(&self, series: &Series, tries: f64) -> Vec<Change> {
         let change = |kind, size: f64, sigma: f64, freedom: usize, p: f64| Change {
             quantity: series.quantity.clone(),
@@ -131,11 +146,9 @@ impl Found {
         let steps = self.steps.iter().filter_map(|(first, p)| {
             let at = self.stretches.iter().position(|s| s.first().is_some_and(|w| w.at == *first))?;
             let (before, after) = (self.stretches.get(at.checked_sub(1)?)?, &self.stretches[at]);
-            let (m, n) = (Mean::of(before), Mean::of(after));
-            let freedom = before.len() + after.len() - 2;
-            let sigma = (1.0 / m.weight + 1.0 / n.weight).sqrt() * scale(m.squares + n.squares, freedom);
+            let between = Between::of(before, after);
             let kind = ChangeKind::Step { before: before.last()?.at.row, after: first.row };
-            Some(change(kind, n.value - m.value, sigma, freedom, *p))
+            Some(change(kind, between.size, between.sigma, between.freedom, *p))
         });
         let outliers = self.outliers.iter().filter_map(|(point, p)| {
             let around = |s: &&Vec<Weighed>| {
@@ -154,5 +167,26 @@ impl Found {
             change(kind, line.per_day, sigma, n - 2, *p)
         });
         steps.chain(outliers).chain(trends).collect()
+    }
+}
+
+/// What lies between two stretches.
+struct Between {
+    size: f64,
+    sigma: f64,
+    freedom: usize,
+}
+
+impl Between {
+    fn of(before: &[Weighed], after: &[Weighed]) -> Between {
+        let (m, n) = (Mean::of(before), Mean::of(after));
+        let freedom = (before.len() + after.len()).saturating_sub(2);
+        let sigma = (1.0 / m.weight + 1.0 / n.weight).sqrt() * scale(m.squares + n.squares, freedom);
+        Between { size: n.value - m.value, sigma, freedom }
+    }
+
+    /// Probability by chance of a step at this very place.
+    fn p(&self) -> f64 {
+        if self.freedom == 0 { 1.0 } else { p_value(self.size / self.sigma, self.freedom) }
     }
 }

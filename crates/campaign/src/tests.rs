@@ -77,6 +77,19 @@ fn bumped_and_put_right_again() {
 }
 
 #[test]
+fn the_last_of_several_after_a_step_is_no_second_step() {
+    let mut more = 0;
+    for seed in 0..200 {
+        let mut rng = ChaCha8Rng::seed_from_u64(5000 + seed);
+        let all = [recorded(13, [1e-4, 1e-4], |k| if k < 9 { 0.0 } else { 1.5e-3 }, &mut rng)];
+        let found = changes(&all);
+        assert!(!found.is_empty());
+        more += usize::from(found.len() > 1);
+    }
+    assert!(more <= 4, "{more} of 200 show a second change");
+}
+
+#[test]
 fn one_bad_recording_is_no_step() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let all = [recorded(25, [1e-4, 5e-5], |k| if k == 10 { 3e-3 } else { 0.0 }, &mut rng)];

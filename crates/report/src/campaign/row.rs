@@ -103,6 +103,6 @@ fn parameter(e: &Estimate) -> Quantity {
         unit: e.parameter.unit,
         value: e.value,
         sigma: Some(e.sigma).filter(|s| s.is_finite()),
-        determined: e.determined && !e.at_bound,
+        determined: e.determined,
     }
 }
