@@ -87,22 +87,28 @@ struct Found {
 }
 
 impl Found {
-    /// Binary segmentation (Vostrikova 1981): the best change first, then what is left on both sides of it.
+    /// Binary segmentation (Vostrikova 1981): the best change first, then what is left on both sides of it. `alpha` is
+    /// what may be spent on this stretch; its parts share it by their lengths.
     fn search(&mut self, mut points: Vec<Weighed>, trends: bool, alpha: f64) {
+        let n = points.len() as f64;
+        let share = |part: &[Weighed]| alpha * part.len() as f64 / n;
         match best(&points, trends, alpha) {
             None => self.stretches.push(points),
             Some((Shape::Step(k), p)) => {
                 self.steps.push((points[k].at, p));
                 let after = points.split_off(k);
-                self.search(points, trends, alpha);
-                self.search(after, trends, alpha);
+                for part in [points, after] {
+                    let alpha = share(&part);
+                    self.search(part, trends, alpha);
+                }
             }
             Some((Shape::Episode(i, j), p)) => {
                 self.steps.extend([(points[i].at, p), (points[j].at, p)]);
                 let after = points.split_off(j);
                 let during = points.split_off(i);
-                for stretch in [points, during, after] {
-                    self.search(stretch, trends, alpha);
+                for part in [points, during, after] {
+                    let alpha = share(&part);
+                    self.search(part, trends, alpha);
                 }
             }
             Some((Shape::Outlier(k), p)) => {

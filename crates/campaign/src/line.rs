@@ -18,10 +18,12 @@ pub(crate) struct Weighed {
     pub weight: f64,
 }
 
-/// The values of a series with what they scatter beyond their own standard errors.
+/// The values of a series, weighed against each other by their own standard errors and what they scatter beyond these.
 ///
 /// The scatter is taken from differences of successive recordings (von Neumann 1941), by their median: a step or an
-/// outlier touches one or two of them, a trend none by much.
+/// outlier touches one or two of them, a trend none by much. Only the relation of the weights counts. How sure anything
+/// is comes from the residuals: most of a standard error may be the same in every recording (how well markers represent
+/// a base, say) and says nothing about changes.
 pub(crate) fn weighed(points: &[SeriesPoint]) -> Vec<Weighed> {
     let start_ns = points.first().map_or(0, |p| p.time_ns);
     // Median of a chi-square variable with one degree of freedom.
@@ -30,11 +32,13 @@ pub(crate) fn weighed(points: &[SeriesPoint]) -> Vec<Weighed> {
     let total = median(squares) / (2.0 * CHI2_MEDIAN);
     let own = |p: &SeriesPoint| p.sigma.unwrap_or(0.0).powi(2);
     let extra = (total - median(points.iter().map(own).collect())).max(0.0);
+    let variance = |p: &SeriesPoint| (own(p) + extra).max(FINEST * FINEST);
+    let least = points.iter().map(variance).fold(f64::INFINITY, f64::min);
     let weigh = |p: &SeriesPoint| Weighed {
         at: *p,
-        day: (p.time_ns - start_ns) as f64 / NS_PER_DAY,
+        day: p.time_ns.saturating_sub(start_ns) as f64 / NS_PER_DAY,
         value: p.value,
-        weight: 1.0 / (own(p) + extra).max(FINEST * FINEST),
+        weight: least / variance(p) / (FINEST * FINEST),
     };
     points.iter().map(weigh).collect()
 }
@@ -110,7 +114,7 @@ impl Line {
     }
 }
 
-/// Factor by which residuals exceed what the weights promise; a lucky stretch does not make anything surer.
+/// Factor by which residuals exceed what the weights promise, which is the finest difference that means anything.
 pub(crate) fn scale(squares: f64, freedom: usize) -> f64 {
     (squares / freedom.max(1) as f64).max(1.0).sqrt()
 }

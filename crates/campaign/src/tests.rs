@@ -42,20 +42,31 @@ fn campaigns_without_a_change_rarely_show_one() {
 
 #[test]
 fn a_step_is_found_between_its_recordings_with_its_size() {
-    let (mut exact, mut inside) = (0, 0);
+    let (mut exact, mut inside, mut more) = (0, 0, 0);
     for seed in 0..100 {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         let at = rng.random_range(3..27);
         let all = [recorded(30, [1e-4, 1e-4], |k| if k < at { 0.1 } else { 0.101 }, &mut rng)];
         let found = changes(&all);
-        assert_eq!(found.len(), 1, "{found:?}");
-        let ChangeKind::Step { before, after } = found[0].kind else { panic!("{found:?}") };
+        more += found.len() - 1;
+        let surest = found.iter().min_by(|a, b| a.p.total_cmp(&b.p)).expect("a change");
+        let ChangeKind::Step { before, after } = surest.kind else { panic!("{found:?}") };
         exact += usize::from((before, after) == (30 - at, 29 - at));
-        let [low, high] = found[0].ci95.expect("an interval");
+        let [low, high] = surest.ci95.expect("an interval");
         inside += usize::from(low < 1e-3 && 1e-3 < high);
     }
+    // Two searches of one percent follow the first; 6 or more of 100 would happen once in sixty.
+    assert!(more <= 5, "{more} further changes in 100");
     assert!(exact >= 95, "placed exactly in {exact} of 100");
     assert!(inside >= 88, "inside its interval in {inside} of 100");
+}
+
+#[test]
+fn an_error_that_all_recordings_share_hides_no_step() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let mut series = recorded(20, [1e-4, 0.0], |k| if k < 12 { 0.0 } else { 1e-3 }, &mut rng);
+    series.points.iter_mut().for_each(|p| p.sigma = Some(5e-2));
+    assert_eq!(changes(&[series])[0].kind, ChangeKind::Step { before: 8, after: 7 });
 }
 
 #[test]
@@ -86,7 +97,8 @@ fn the_last_of_several_after_a_step_is_no_second_step() {
         assert!(!found.is_empty());
         more += usize::from(found.len() > 1);
     }
-    assert!(more <= 4, "{more} of 200 show a second change");
+    // The same; 10 or more of 200 would happen once in a hundred.
+    assert!(more <= 9, "{more} of 200 show a second change");
 }
 
 #[test]
