@@ -300,7 +300,7 @@ fn the_same_run_gives_the_same_bytes() {
         let (a, b) = (write(&s, input, "a"), write(&s, input, "b"));
         let mut names: Vec<_> = std::fs::read_dir(&a).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
-        assert_eq!(names.len(), 11);
+        assert_eq!(names.len(), 12);
         for name in names {
             let same = std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap();
             assert!(same, "{} differs", name.display());

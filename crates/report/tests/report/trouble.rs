@@ -58,7 +58,7 @@ fn inputs_are_not_needed_to_be_referenced() {
     let s = synthetic();
     let config = OutputConfig { input: InputMessages::Reference };
     let out = s.folder.path().join("out");
-    assert_eq!(write_all(&s.run, &[], &out, &config).unwrap().len(), 11);
+    assert_eq!(write_all(&s.run, &[], &out, &config).unwrap().len(), 12);
     assert!(write_all(&s.run, &[], &out, &OutputConfig::default()).is_err());
 }
 
