@@ -263,7 +263,7 @@ fn a_bumped_table_and_a_slipped_tooth_are_flagged_in_their_week() {
         [[mechanisms]]
         kind = \"zero_slip\"
         joint = 2
-        slip_deg = 1.5
+        slip_deg = -1.5
         recording = 9
     ";
     weeks(&lab, 13, hidden);

@@ -97,4 +97,6 @@ pub struct Quantity {
     pub sigma: Option<f64>,
     /// Whether the recording determines it; what a prior keeps near nominal tells nothing.
     pub determined: bool,
+    /// Whether it wants to go further than its bounds allow.
+    pub at_bound: bool,
 }

@@ -73,7 +73,14 @@ fn missing(run: &Run) -> Vec<String> {
 }
 
 fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
-    let known = |name: String, unit, value| Quantity { name, unit, value, sigma: None, determined: true };
+    let known = |name: String, unit, value| Quantity {
+        name,
+        unit,
+        value,
+        sigma: None,
+        determined: true,
+        at_bound: false,
+    };
     let calibration = &run.calibration;
     let own = |e: &&Estimate| e.parameter.free && !e.parameter.name.starts_with("board.");
     let mut all: Vec<Quantity> = calibration.fit.estimates.iter().filter(own).map(parameter).collect();
@@ -104,5 +111,6 @@ fn parameter(e: &Estimate) -> Quantity {
         value: e.value,
         sigma: Some(e.sigma).filter(|s| s.is_finite()),
         determined: e.determined,
+        at_bound: e.at_bound,
     }
 }

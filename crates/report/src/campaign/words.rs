@@ -18,7 +18,9 @@ pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {
     let name = printable(&change.quantity);
     match change.kind {
         ChangeKind::Step { before, after } => {
-            format!("{name} steps by {} between {} and {}", size(change, 1.0), row(before), row(after))
+            let own = campaign.rows[after].quantities.iter().find(|q| q.name == change.quantity);
+            let more = if own.is_some_and(|q| q.at_bound) { ", to its bound or beyond," } else { "" };
+            format!("{name} steps by {}{more} between {} and {}", size(change, 1.0), row(before), row(after))
         }
         ChangeKind::Outlier { at } => {
             format!("{name} is off by {} in {} alone", size(change, 1.0), row(at))
