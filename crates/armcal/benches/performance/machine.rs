@@ -13,7 +13,9 @@ pub fn facts(options: &Options) -> Vec<String> {
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = load.split_whitespace().next().unwrap_or("unknown").to_owned();
     let mut facts = vec![
-        format!("machine: {cpu}, {cores} cores, {memory}; load average {load} at the end (the bench itself is part of it)"),
+        format!(
+            "machine: {cpu}, {cores} cores, {memory}; load average {load} at the end (the bench itself is part of it)"
+        ),
         format!("system: {}", said("uname", &["-sr"])),
         format!("date: {}", said("date", &["-u", "+%Y-%m-%d %H:%M UTC"])),
         format!("armcal: {}{}", said("git", &["rev-parse", "--short", "HEAD"]), changed()),
@@ -28,7 +30,10 @@ pub fn facts(options: &Options) -> Vec<String> {
 
 /// Says when the numbers are of no commit.
 fn changed() -> &'static str {
-    let tracked = said("git", &["status", "--porcelain", "--untracked-files=no", "--", "..", ":!../../docs/performance.md"]);
+    let tracked = said(
+        "git",
+        &["status", "--porcelain", "--untracked-files=no", "--", "..", ":!../../docs/performance.md"],
+    );
     if tracked.is_empty() { "" } else { ", with uncommitted changes" }
 }
 

@@ -34,7 +34,9 @@ impl Table {
 
     fn markdown(&self) -> String {
         let widths: Vec<usize> = (0..self.head.len())
-            .map(|c| self.rows.iter().chain([&self.head]).map(|row| row[c].chars().count()).max().unwrap_or(0))
+            .map(|c| {
+                self.rows.iter().chain([&self.head]).map(|row| row[c].chars().count()).max().unwrap_or(0)
+            })
             .collect();
         let line = |row: &Vec<String>| {
             let cells = row.iter().zip(&widths).enumerate().map(|(c, (cell, &width))| match c {
