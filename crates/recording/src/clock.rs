@@ -36,6 +36,23 @@ impl Stamps {
         self.log_ns.append(&mut other.log_ns);
     }
 
+    /// Makes room for more rows.
+    pub fn reserve(&mut self, more: usize) {
+        self.header_ns.reserve(more);
+        self.publish_ns.reserve(more);
+        self.log_ns.reserve(more);
+    }
+
+    /// Keeps only these rows, given by their indices in rising order.
+    pub fn keep(&mut self, rows: &[usize]) {
+        if rows.len() == self.log_ns.len() {
+            return;
+        }
+        self.header_ns = rows.iter().map(|i| self.header_ns[*i]).collect();
+        self.publish_ns = rows.iter().map(|i| self.publish_ns[*i]).collect();
+        self.log_ns = rows.iter().map(|i| self.log_ns[*i]).collect();
+    }
+
     /// Time of each row on the given clock; `None` for a row without it.
     pub fn on(&self, clock: Clock) -> Vec<Option<i64>> {
         match clock {

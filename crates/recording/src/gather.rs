@@ -13,6 +13,7 @@ use crate::sweep::{blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Row-less messages of a filtered stream looked into for the names of the bodies they hold.
 const BODIES_SAMPLED: u64 = 20;
@@ -61,6 +62,16 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
+    /// Makes room for the rows of all parts at once, so that millions of rows are copied once.
+    fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Gathered> + Clone) {
+        let sum = |length: fn(&Gathered) -> usize| parts.clone().map(length).sum::<usize>();
+        self.stamps.reserve(sum(|part| part.stamps.log_ns.len()));
+        self.joints.position.reserve(sum(|part| part.joints.position.len()));
+        self.joints.effort.reserve(sum(|part| part.joints.effort.len()));
+        self.poses.seen.reserve(sum(|part| part.poses.seen.len()));
+        self.scalars.value.reserve(sum(|part| part.scalars.value.len()));
+    }
+
     fn append(&mut self, mut later: Gathered) {
         self.messages += later.messages;
         self.undecodable += later.undecodable;
@@ -93,10 +104,13 @@ pub(crate) fn gather(
         gathered.push(Gathered { unreadable, ..Gathered::default() });
     }
     let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
+    // Blocks of a recording are alike: one makes room for as many rows as the fullest so far had.
+    let most_rows: Vec<AtomicUsize> = requests.iter().map(|_| AtomicUsize::new(0)).collect();
+    let start = |r: (&Request<'_>, _)| Batch::new(r.0.kind.role(), r.1);
     let (surveys, blocks) = sweep(
         &recording.files,
         &blocks(&recording.files, &channels),
-        |file| (file, requests.iter().map(|r| Batch::new(r.kind.role())).collect::<Vec<_>>()),
+        |file| (file, requests.iter().zip(&most_rows).map(start).collect::<Vec<_>>()),
         |(file, batches), message| {
             for target in wanted[*file].get(&message.channel_id).into_iter().flatten() {
                 batches[target.request].take(target, message);
@@ -105,6 +119,9 @@ pub(crate) fn gather(
         |(_, batches)| batches.into_iter().zip(requests).map(|(b, r)| b.finish(r)).collect::<Vec<_>>(),
     )?;
     recording.remember(surveys);
+    for (index, whole) in gathered.iter_mut().enumerate() {
+        whole.reserve(blocks.iter().filter_map(|block| block.get(index)));
+    }
     for block in blocks {
         for (whole, part) in gathered.iter_mut().zip(block) {
             whole.append(part);
@@ -175,8 +192,10 @@ fn compile(channel: &Arc<RawChannel>, kind: Kind<'_>) -> Result<(Plan, f64), Str
 }
 
 /// One stream's rows of one block.
-struct Batch {
+struct Batch<'a> {
     rows: Rows,
+    /// Rows that room is made for as soon as there is one.
+    most_rows: &'a AtomicUsize,
     log_ns: Vec<i64>,
     publish_ns: Vec<i64>,
     to_m: Vec<f64>,
@@ -184,10 +203,11 @@ struct Batch {
     sampled: u64,
 }
 
-impl Batch {
-    fn new(role: Role) -> Batch {
+impl<'a> Batch<'a> {
+    fn new(role: Role, most_rows: &'a AtomicUsize) -> Batch<'a> {
         Batch {
             rows: Rows::new(role),
+            most_rows,
             log_ns: Vec::new(),
             publish_ns: Vec::new(),
             to_m: Vec::new(),
@@ -204,6 +224,9 @@ impl Batch {
             self.counted.first_error.get_or_insert_with(|| e.to_string());
         }
         let added = self.rows.len();
+        if before == 0 && added > 0 {
+            self.reserve();
+        }
         self.log_ns.resize(added, ns(message.log_ns));
         self.publish_ns.resize(added, ns(message.publish_ns));
         self.to_m.resize(added, target.to_m);
@@ -213,24 +236,33 @@ impl Batch {
         }
     }
 
+    /// Makes room for the rows to be expected, once it is known what a row is like.
+    fn reserve(&mut self) {
+        let more = self.most_rows.load(Ordering::Relaxed);
+        self.rows.reserve(more);
+        self.log_ns.reserve(more);
+        self.publish_ns.reserve(more);
+        self.to_m.reserve(more);
+    }
+
     /// Keeps of the rows what the stream wants.
     fn finish(self, request: &Request<'_>) -> Gathered {
-        let Batch { rows, log_ns, publish_ns, to_m, mut counted, .. } = self;
-        match (&rows, request.kind) {
+        let Batch { rows, most_rows, log_ns, publish_ns, to_m, mut counted, .. } = self;
+        most_rows.fetch_max(rows.len(), Ordering::Relaxed);
+        match (rows, request.kind) {
             (Rows::Joints(rows), Kind::Joints { wanted }) => {
-                let (joints, kept) = JointTable::select(rows, wanted);
-                let pick = |column: &[i64]| kept.iter().map(|i| column[*i]).collect();
-                let header_ns = kept.iter().map(|i| rows.stamp_ns[*i]).collect();
+                let (joints, kept) = JointTable::select(&rows, wanted);
                 counted.joints = joints;
-                counted.stamps = Stamps { header_ns, publish_ns: pick(&publish_ns), log_ns: pick(&log_ns) };
+                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
+                counted.stamps.keep(&kept);
             }
             (Rows::Pose(rows), _) => {
-                counted.poses = PoseTable::of(rows, &to_m);
-                counted.stamps = Stamps { header_ns: rows.stamp_ns.clone(), publish_ns, log_ns };
+                counted.poses = PoseTable::of(&rows, &to_m);
+                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
             }
             (Rows::Scalar(rows), _) => {
-                counted.scalars = ScalarTable::of(rows);
-                counted.stamps = Stamps { header_ns: rows.stamp_ns.clone(), publish_ns, log_ns };
+                counted.scalars = ScalarTable::of(&rows);
+                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
             }
             (Rows::Joints(_), _) => {}
         }

@@ -34,6 +34,8 @@ impl JointTable {
             table.present.extend(list.iter().cloned());
         }
         let mut kept = Vec::with_capacity(rows.len());
+        table.position.reserve(rows.len() * wanted.len());
+        table.effort.reserve(rows.len() * wanted.len());
         // The names of the row before, and where the wanted joints are in them.
         let mut last_names: Option<&Arc<[String]>> = None;
         let mut last_columns: Option<Vec<usize>> = None;

@@ -1,6 +1,7 @@
 //! Wall time, and the time that the threads of this process were on a processor: the second tells how much of the
 //! first was waiting for other programs.
 
+use crate::Result;
 use std::time::Instant;
 
 /// Time one piece of work took.
@@ -25,6 +26,15 @@ pub fn median(spent: &[Spent]) -> Spent {
     let of =
         |pick: fn(&Spent) -> f64| armcal_core::robust::median(&spent.iter().map(pick).collect::<Vec<f64>>());
     Spent { wall_s: of(|s| s.wall_s), cpu_s: of(|s| s.cpu_s) }
+}
+
+/// Time on a processor of the whole process since it began, ended threads included, user and system [s].
+pub fn process_cpu_s() -> Result<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
+    // Behind the name of the program, which may hold spaces: fields 14 and 15 of proc(5), in ticks of 10 ms.
+    let (_, fields) = stat.rsplit_once(')').ok_or("/proc/self/stat has no name")?;
+    let ticks = fields.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
+    Ok(ticks.sum::<std::result::Result<f64, _>>()? * 0.01)
 }
 
 /// Time on a processor of all living threads since they began [s]; not a number where there is no `/proc`.

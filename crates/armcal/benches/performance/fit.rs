@@ -10,7 +10,7 @@ use serde_json::Value;
 
 /// Repetitions of armcal's fit.
 const REPETITIONS: usize = 200;
-/// Costs may differ by this share: all have found the same optimum.
+/// armcal's cost may exceed the lowest by this share.
 const SAME_COST: f64 = 1e-9;
 
 /// A solver's answer.
@@ -19,6 +19,8 @@ struct Answer {
     spent: Spent,
     evaluations: usize,
     cost: f64,
+    /// The cost may exceed the lowest of all by this share.
+    same_cost: f64,
 }
 
 pub fn section(options: &Options) -> Result<Section> {
@@ -35,8 +37,9 @@ pub fn section(options: &Options) -> Result<Section> {
     ));
     section.say(
         "scipy evaluates all dwells at once in numpy. Ceres differentiates by Jets (`AutoDiffCostFunction`) and has Huber's \
-         loss on the norm of a dwell; scipy gets the dwell stretched so that half its square is that loss. Every answer is \
-         judged by armcal's cost function, and the run fails unless all are equal to 1e-9.",
+         loss on the norm of a dwell; scipy gets the dwell stretched so that half its square is that loss. scipy keeps its \
+         own tolerances, Ceres gets 1e-12 because its own stop short of the optimum. Every answer is judged by armcal's cost \
+         function, and the run fails unless all are equal to 1e-9, or 1e-8 where scipy differentiates by differences.",
     );
     let python = Python::find(options)?;
     let ceres = peers::ceres(options);
@@ -72,15 +75,20 @@ fn ours(session: &Session, problem: &Problem<'_>) -> Result<Answer> {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let config = &problem.config;
     let once = || one.install(|| fit(&session.model, &session.observations, config));
-    let mut last: Fit = once()?;
+    let last: Fit = once()?;
     let mut times = Vec::new();
-    for _ in 0..REPETITIONS {
-        let (fitted, took) = spent(once);
-        last = fitted?;
-        times.push(took);
-    }
+    // The system counts processor time in ticks of milliseconds: only that of many fits is known.
+    let (fitted, all) = spent(|| {
+        (0..REPETITIONS).try_for_each(|_| {
+            let (fitted, took) = spent(once);
+            times.push(took);
+            fitted.map(drop)
+        })
+    });
+    fitted?;
+    let spent = Spent { wall_s: median(&times).wall_s, cpu_s: all.cpu_s / REPETITIONS as f64 };
     let cost = problem.cost(&last.values())?;
-    Ok(Answer { who: "armcal".into(), spent: median(&times), evaluations: last.iterations, cost })
+    Ok(Answer { who: "armcal".into(), spent, evaluations: last.iterations, cost, same_cost: SAME_COST })
 }
 
 fn theirs(
@@ -96,6 +104,7 @@ fn theirs(
             spent: Spent { wall_s: number(one, "wall_s")?, cpu_s: number(one, "cpu_s")? },
             evaluations: number(one, "evaluations")? as usize,
             cost: problem.cost(&in_order(values)?)?,
+            same_cost: number(one, "same_cost")?,
         })
     };
     said.as_array().into_iter().flatten().map(answer).collect()
@@ -120,7 +129,7 @@ fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
     }
     section.table(table);
     let far: Vec<&str> =
-        answers.iter().filter(|a| a.cost > best * (1.0 + SAME_COST)).map(|a| a.who.as_str()).collect();
+        answers.iter().filter(|a| a.cost > best * (1.0 + a.same_cost)).map(|a| a.who.as_str()).collect();
     if !far.is_empty() {
         return Err(format!("{name}: {} did not find the optimum\n{}", far.join(", "), section.text()).into());
     }

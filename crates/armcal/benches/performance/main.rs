@@ -1,15 +1,18 @@
-//! Every number of `/work/shared/design.md` that is about speed or memory, measured beside its peer in one run.
+//! The numbers of speed and memory that the design promises, each measured beside its peer in one run.
 //!
 //! `cargo bench -p armcal --bench performance` measures everything and rewrites `docs/performance.md`. With names of
 //! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`.
-//! `--size-mb N` sets the size of the recording that is read (default 1000). Data go to `target/bench-data`.
+//! `--size-mb N` sets the size of the recording that is read, `--recordings N` the most recordings of a batch (1000 both).
+//! Data go to `target/bench-data`.
 //!
-//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `memory` are the parts; `peers` finds or makes
-//! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `page`
-//! lays out, `machine` says on what.
+//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `memory`, `batch` are the parts; `peers` finds or makes
+//! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `child`
+//! measures processes, `page` lays out, `machine` says on what.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its numbers")]
 
+mod batch;
+mod child;
 mod clock;
 mod diagnosis;
 mod fit;
@@ -28,17 +31,20 @@ use std::path::{Path, PathBuf};
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// A part by name, in the order of the page.
-const PARTS: [(&str, fn(&Options) -> Result<Section>); 4] = [
+const PARTS: [(&str, fn(&Options) -> Result<Section>); 5] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
     ("memory", memory::section),
+    ("batch", batch::section),
 ];
 
 /// What the command line asks for.
 pub struct Options {
     /// Size of the recording that is read [MB].
     pub size_mb: u64,
+    /// Most recordings of a batch.
+    pub recordings: usize,
     /// Where generated recordings and built peers lie.
     pub data: PathBuf,
 }
@@ -47,18 +53,19 @@ fn main() -> Result<()> {
     // Cargo passes `--bench` to every bench.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     if let [role, rest @ ..] = arguments.as_slice()
-        && role == memory::CHILD
+        && role == child::CHILD
     {
-        return memory::child(rest);
+        return child::run(rest);
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut options = Options { size_mb: 1000, data: root.join("target/bench-data") };
+    let mut options = Options { size_mb: 1000, recordings: 1000, data: root.join("target/bench-data") };
     let mut named = Vec::new();
     let mut arguments = arguments.iter();
     while let Some(argument) = arguments.next() {
         if argument == "--size-mb" {
-            let size = arguments.next().ok_or("--size-mb needs a number of megabytes")?;
-            options.size_mb = size.parse().map_err(|e| format!("--size-mb {size}: {e}"))?;
+            options.size_mb = count(argument, arguments.next())? as u64;
+        } else if argument == "--recordings" {
+            options.recordings = count(argument, arguments.next())?;
         } else if PARTS.iter().any(|(name, _)| name == argument) {
             named.push(argument.as_str());
         } else {
@@ -80,4 +87,10 @@ fn main() -> Result<()> {
         println!("{}", page.display());
     }
     Ok(())
+}
+
+/// The number behind an option.
+fn count(option: &str, value: Option<&String>) -> Result<usize> {
+    let value = value.ok_or_else(|| format!("{option} needs a number"))?;
+    value.parse().map_err(|e| format!("{option} {value}: {e}").into())
 }

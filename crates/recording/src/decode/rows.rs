@@ -47,6 +47,18 @@ impl Rows {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Makes room for `more` rows like those that are there.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        match self {
+            Rows::Joints(rows) => rows.reserve(more),
+            Rows::Pose(rows) => rows.reserve(more),
+            Rows::Scalar(rows) => {
+                rows.stamp_ns.reserve(more);
+                rows.value.reserve(more);
+            }
+        }
+    }
 }
 
 /// Joint readings of one channel, one row a message; the rows may differ in length and in joint names.
@@ -116,6 +128,17 @@ impl JointRows {
     /// The different lists of joint names seen, in order of appearance.
     pub fn name_lists(&self) -> &[Arc<[String]>] {
         &self.name_lists
+    }
+
+    fn reserve(&mut self, more: usize) {
+        let a_row = |values: &[f64]| values.len().div_ceil(self.stamp_ns.len().max(1));
+        let (positions, efforts) = (a_row(&self.position), a_row(&self.effort));
+        self.stamp_ns.reserve(more);
+        self.position.reserve(more.saturating_mul(positions));
+        self.position_end.reserve(more);
+        self.effort.reserve(more.saturating_mul(efforts));
+        self.effort_end.reserve(more);
+        self.names_of_row.reserve(more);
     }
 
     /// The bytes of the list of names of the last row, and how many names it has.
@@ -235,6 +258,15 @@ impl PoseRows {
     /// The different frames of the rows, in order of appearance.
     pub fn frames(&self) -> Vec<&str> {
         self.frames.used(&self.frame_of_row)
+    }
+
+    fn reserve(&mut self, more: usize) {
+        self.stamp_ns.reserve(more);
+        self.position.reserve(more);
+        self.quaternion_xyzw.reserve(more);
+        self.occluded.reserve(more);
+        self.frame_of_row.reserve(more);
+        self.body_of_row.reserve(more);
     }
 
     pub(super) fn truncate(&mut self, len: usize) {

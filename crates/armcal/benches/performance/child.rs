@@ -1,0 +1,47 @@
+//! armcal as a process of its own, which tells what it cost: this program again, called with an armcal command line.
+
+use crate::Result;
+use crate::clock::{self, Spent};
+use armcal::cli::Cli;
+use armcal::commands;
+use clap::Parser as _;
+use std::ffi::OsStr;
+use std::process::Command;
+use std::time::Instant;
+
+/// First argument of a child: the rest is an armcal command line.
+pub const CHILD: &str = "as-armcal";
+
+/// What a command cost.
+pub struct Cost {
+    /// Its time, from start to end of the process.
+    pub spent: Spent,
+    /// High-water mark of its resident memory [MiB].
+    pub peak_mib: f64,
+}
+
+/// The child's side: runs the command, and ends stderr with its high-water mark [KiB] and processor time [s].
+pub fn run(arguments: &[String]) -> Result<()> {
+    let cli = Cli::try_parse_from([String::from("armcal")].iter().chain(arguments))?;
+    commands::dispatch(&cli)?;
+    let status = std::fs::read_to_string("/proc/self/status")?;
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).ok_or("no VmHWM")?;
+    let peak_kib: f64 = peak.trim().trim_end_matches(" kB").parse()?;
+    eprintln!("\n{CHILD} {peak_kib} {}", clock::process_cpu_s()?);
+    Ok(())
+}
+
+/// Runs an armcal command in a child.
+pub fn armcal<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(arguments: I) -> Result<Cost> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command.arg(CHILD).args(arguments);
+    let began = Instant::now();
+    let output = command.output()?;
+    let wall_s = began.elapsed().as_secs_f64();
+    let said = String::from_utf8_lossy(&output.stderr);
+    let told = said.lines().last().and_then(|line| line.strip_prefix(CHILD)?.trim().split_once(' '));
+    let Some((peak_kib, cpu_s)) = told.filter(|_| output.status.success()) else {
+        return Err(format!("{command:?} did not finish: {said}").into());
+    };
+    Ok(Cost { spent: Spent { wall_s, cpu_s: cpu_s.parse()? }, peak_mib: peak_kib.parse::<f64>()? / 1024.0 })
+}
