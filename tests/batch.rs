@@ -158,7 +158,8 @@ fn a_thousand_recordings_killed_ten_times() {
     archive.write_pipeline();
     let lab = archive.path("lab");
     std::fs::create_dir(&lab).expect("a folder");
-    weeks(&lab, 1000, "");
+    // A lab keeps a session in memory: twenty of them.
+    (0..20).for_each(|k| weeks(&lab, 100 + k, 50 * k..50 * k + 50, ""));
     let recordings = (0..1000).map(|week| format!("lab/week{week:02}.mcap\n"));
     let manifest = format!(
         "pipeline = \"rig.toml\"\n{}",
@@ -220,14 +221,16 @@ fn a_changed_pipeline_or_recording_is_worked_on_again_and_nothing_else_is() {
     assert!(!expect(&archive.batch("out"), 3).contains("there already"));
 }
 
-/// Simulates so many recordings of the shipped rig, a week apart, with something hidden in them.
-fn weeks(folder: &Path, count: usize, hidden: &str) {
+/// Simulates recordings of the rig that this seed draws, a week apart, with something hidden in them.
+fn weeks(folder: &Path, seed: u64, weeks: std::ops::Range<u64>, hidden: &str) {
     let shipped = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
     let own = shipped.split("[[recordings]]").next().expect("a head");
     let boards = format!("\"{}/pipelines/boards/", root().display());
+    let start_s = 1_760_000_000 + weeks.start * 604_800;
     let mut lab = own.replace("\"../boards/", &boards).replace("interval_s = 900.0", "interval_s = 604800.0");
+    lab = lab.replace("1_760_000_000", &start_s.to_string()).replace("seed = 4", &format!("seed = {seed}"));
     lab.push_str(hidden);
-    (0..count).for_each(|week| lab.push_str(&format!("\n[[recordings]]\nname = \"week{week:02}\"\n")));
+    weeks.for_each(|week| lab.push_str(&format!("\n[[recordings]]\nname = \"week{week:02}\"\n")));
     let file = folder.join("lab.toml");
     std::fs::write(&file, lab).expect("lab file");
     expect(&armcal([Path::new("simulate"), &file, Path::new("--out"), folder]), 0);
@@ -266,7 +269,7 @@ fn a_bumped_table_and_a_slipped_tooth_are_flagged_in_their_week() {
         slip_deg = -1.5
         recording = 9
     ";
-    weeks(&lab, 13, hidden);
+    weeks(&lab, 4, 0..13, hidden);
     let arg = Path::new;
     let glob = lab.join("*.mcap");
     let output = armcal([
