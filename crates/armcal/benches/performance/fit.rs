@@ -56,14 +56,14 @@ pub fn section(options: &Options) -> Result<Section> {
         if let Some(python) = &python {
             std::fs::write(&file, problem.json()?.to_string())?;
             let said = python.run("fit_scipy.py", &file)?;
-            answers.extend(theirs("scipy", &said, &problem, |values| Ok(values))?);
+            answers.extend(theirs("scipy", &said, &problem, Ok)?);
         }
         if let Some(ceres) = &ceres {
             let file = file.with_extension("txt");
             std::fs::write(&file, problem.numbers()?)?;
             let said = peers::json(single_threaded(ceres).arg(&file))?;
             let version = said[0]["version"].as_str().unwrap_or_default();
-            let in_order = |values: Vec<f64>| problem.from_blocks(&values);
+            let in_order = |values: Vec<f64>| problem.in_own_order(&values);
             answers.extend(theirs(&format!("Ceres {version}"), &said, &problem, in_order)?);
         }
         judge(name, &answers, &mut section)?;

@@ -54,6 +54,9 @@ pub struct Problem<'a> {
     judge: WhitenedProblem<'a>,
 }
 
+/// A dwell, its measured point in the world [m], and what whitens its residual.
+type Weighted<'a> = (&'a Observation, [f64; 3], Matrix3<f64>);
+
 impl Problem<'_> {
     /// Free parameters.
     pub fn free(&self) -> usize {
@@ -79,8 +82,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Measured point in the world [m] and whitener of each dwell, both at nominal: the boards are given.
-    fn dwells(&self) -> Result<Vec<(&Observation, [f64; 3], Matrix3<f64>)>> {
+    /// Every dwell, at nominal: the boards are given.
+    fn dwells(&self) -> Result<Vec<Weighted<'_>>> {
         let (model, nominal) = (&self.session.model, self.session.model.nominal());
         let dwell = |o| {
             let covariance = position_covariance_m2(model, &nominal, o);
@@ -140,7 +143,7 @@ impl Problem<'_> {
     }
 
     /// Ceres' answer in the order of the model.
-    pub fn from_blocks(&self, values: &[f64]) -> Result<Vec<f64>> {
+    pub fn in_own_order(&self, values: &[f64]) -> Result<Vec<f64>> {
         let mut all = self.session.model.nominal();
         for (index, value) in self.blocks()?.into_iter().flatten().zip(values) {
             all[index] = *value;

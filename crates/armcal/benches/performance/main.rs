@@ -30,8 +30,11 @@ use std::path::{Path, PathBuf};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
-/// A part by name, in the order of the page.
-const PARTS: [(&str, fn(&Options) -> Result<Section>); 5] = [
+/// Measures one part.
+type Part = fn(&Options) -> Result<Section>;
+
+/// Each by its name, in the order of the page.
+const PARTS: [(&str, Part); 5] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
