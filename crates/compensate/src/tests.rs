@@ -59,11 +59,15 @@ fn compensator<'a>(nominal: &'a Model, (model, values): (&'a Model, &[f64])) -> 
     Compensator {
         nominal: Arm { model: nominal, values: nominal.nominal() },
         calibrated: Arm { model, values: values.to_vec() },
-        conditions: Conditions { recording: 0, dwell: 0, time_ns: 0, load_kg: 0.0, temperature_c: None },
+        conditions: unloaded(),
         limits: Limits::none(joints),
         postures_rad: vec![Past::at(&vec![0.0; joints]).joint_rad().unwrap()],
         recorded_rad: vec![[-1.0, 1.0]; joints],
         approach_rad: 0.0,
         crossing_s: 0.0,
     }
+}
+
+fn unloaded() -> Conditions {
+    Conditions { recording: 0, dwell: 0, time_ns: 0, load_kg: 0.0, temperature_c: None }
 }
