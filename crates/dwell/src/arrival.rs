@@ -1,23 +1,85 @@
-//! From which side each joint came to rest.
+//! The past of a joint's readings, looked through from its end; and from which side each joint came to rest.
 
 use armcal_core::Arrival;
 use std::ops::Range;
 
-/// Rows per block of the summary that lets long pauses be skipped.
-const BLOCK: usize = 256;
+/// Rows per block of the summary that lets pauses and long ways be passed over.
+const BLOCK: usize = 64;
 
-/// One encoder column, prepared for questions about its past.
+/// What is looked back at: readings of one joint, or those of two joints together.
+#[derive(Clone, Copy)]
+enum Readings<'a> {
+    One(&'a [f64]),
+    /// `of + sense * and`.
+    Two {
+        of: &'a [f64],
+        and: &'a [f64],
+        sense: f64,
+    },
+}
+
+impl Readings<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Readings::One(column) => column.len(),
+            Readings::Two { of, and, .. } => of.len().min(and.len()),
+        }
+    }
+
+    fn at(&self, row: usize) -> f64 {
+        match self {
+            Readings::One(column) => column[row],
+            Readings::Two { of, and, sense } => of[row] + sense * and[row],
+        }
+    }
+
+    /// Smallest and largest of these rows.
+    fn extremes(&self, rows: Range<usize>) -> (f64, f64) {
+        rows.map(|row| self.at(row))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (q.min(lo), q.max(hi)))
+    }
+}
+
+/// A column of readings, prepared for questions about its past.
 pub(crate) struct Past<'a> {
-    column: &'a [f64],
+    readings: Readings<'a>,
+    /// Smallest and largest reading of each block.
     blocks: Vec<(f64, f64)>,
 }
 
 impl<'a> Past<'a> {
+    /// Of one joint.
     pub(crate) fn of(column: &'a [f64]) -> Past<'a> {
-        let extremes = |block: &[f64]| {
-            block.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &q| (q.min(lo), q.max(hi)))
-        };
-        Past { column, blocks: column.chunks(BLOCK).map(extremes).collect() }
+        Past::new(Readings::One(column))
+    }
+
+    /// Of a joint's readings plus `sense` times another's, row by row.
+    pub(crate) fn of_pair(of: &'a [f64], and: &'a [f64], sense: f64) -> Past<'a> {
+        Past::new(Readings::Two { of, and, sense })
+    }
+
+    fn new(readings: Readings<'a>) -> Past<'a> {
+        let rows = readings.len();
+        let block = |block: usize| readings.extremes(block * BLOCK..((block + 1) * BLOCK).min(rows));
+        Past { readings, blocks: (0..rows.div_ceil(BLOCK)).map(block).collect() }
+    }
+
+    /// The readings of rows, newest first.
+    pub(crate) fn back(&self, rows: Range<usize>) -> impl Iterator<Item = f64> {
+        rows.rev().map(|row| self.readings.at(row))
+    }
+
+    /// Rows in blocks, newest first: which they are, their smallest and their largest reading.
+    pub(crate) fn blocks_back(&self, rows: Range<usize>) -> impl Iterator<Item = (Range<usize>, f64, f64)> {
+        let end = rows.end.min(self.readings.len());
+        let blocks = if rows.start < end { rows.start / BLOCK..end.div_ceil(BLOCK) } else { 0..0 };
+        blocks.rev().map(move |block| {
+            let whole = block * BLOCK..((block + 1) * BLOCK).min(self.readings.len());
+            let part = whole.start.max(rows.start)..whole.end.min(end);
+            let (lowest, highest) =
+                if part == whole { self.blocks[block] } else { self.readings.extremes(part.clone()) };
+            (part, lowest, highest)
+        })
     }
 
     /// Direction of arrival at `rest_rad`, where the dwell begins at row `start`.
@@ -27,19 +89,13 @@ impl<'a> Past<'a> {
     /// yet begun, and what the joint did in the break is unknown. No such row: unknown.
     pub(crate) fn arrival(&self, since: usize, start: usize, rest_rad: f64, h_rad: f64) -> Arrival {
         let away = |q: f64| (q - rest_rad).abs() >= h_rad;
-        let mut end = start.min(self.column.len());
-        while end > since {
-            let block = (end - 1) / BLOCK;
-            let rows: Range<usize> = (block * BLOCK).max(since)..end;
-            let (lowest, highest) = self.blocks[block];
-            if (away(lowest) || away(highest))
-                && let Some(q) = self.column[rows.clone()].iter().rev().find(|q| away(**q))
-            {
-                return if *q < rest_rad { Arrival::Positive } else { Arrival::Negative };
-            }
-            end = rows.start;
+        let mut blocks = self.blocks_back(since..start);
+        let with_some = blocks.find(|(_, lowest, highest)| away(*lowest) || away(*highest));
+        match with_some.and_then(|(rows, ..)| self.back(rows).find(|q| away(*q))) {
+            Some(q) if q < rest_rad => Arrival::Positive,
+            Some(_) => Arrival::Negative,
+            None => Arrival::Unknown,
         }
-        Arrival::Unknown
     }
 }
 

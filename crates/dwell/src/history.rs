@@ -10,13 +10,17 @@ use armcal_core::Arrival;
 pub(crate) struct History<'a> {
     encoders: &'a Encoders<'a>,
     past: Vec<Past<'a>>,
+    /// Sum and difference of each joint from the second on and the one before it.
+    pairs: Vec<[Past<'a>; 2]>,
     config: &'a DwellConfig,
 }
 
 impl<'a> History<'a> {
     pub fn of(encoders: &'a Encoders<'a>, config: &'a DwellConfig) -> History<'a> {
-        let past = encoders.joints.joint_rad.iter().map(|column| Past::of(column)).collect();
-        History { encoders, past, config }
+        let columns = &encoders.joints.joint_rad;
+        let past = columns.iter().map(|column| Past::of(column)).collect();
+        let pair = |pair: &'a [Vec<f64>]| [1.0, -1.0].map(|sense| Past::of_pair(&pair[1], &pair[0], sense));
+        History { encoders, past, pairs: columns.windows(2).map(pair).collect(), config }
     }
 
     /// Direction from which each joint came to the readings `at_rad`; what lies before row `row` is its past.
@@ -37,29 +41,28 @@ impl<'a> History<'a> {
 
     /// Turning points of each joint before row `row`, ending at `at_rad` [rad].
     pub fn path_memory(&self, row: usize, at_rad: &[f64]) -> Vec<Vec<f64>> {
-        let past = self.unbroken_since(row)..row;
-        let joints = self.encoders.joints.joint_rad.iter().zip(at_rad).zip(&self.encoders.step_rad);
+        let rows = self.unbroken_since(row)..row;
+        let joints = self.past.iter().zip(at_rad).zip(&self.encoders.step_rad);
         joints
-            .map(|((column, at_rad), step_rad)| {
-                path_memory(column[past.clone()].iter().copied(), *at_rad, self.deadband_rad(*step_rad))
+            .map(|((past, at_rad), step_rad)| {
+                path_memory(past, rows.clone(), *at_rad, self.deadband_rad(*step_rad))
             })
             .collect()
     }
 
     /// Turning points of the sum and of the difference of each joint from the second on and the one before it [rad].
     pub fn pair_memory(&self, row: usize, at_rad: &[f64]) -> Vec<[Vec<f64>; 2]> {
-        (1..at_rad.len()).map(|joint| self.pair(joint, row, at_rad)).collect()
-    }
-
-    fn pair(&self, joint: usize, row: usize, at_rad: &[f64]) -> [Vec<f64>; 2] {
-        let columns = [&self.encoders.joints.joint_rad[joint - 1], &self.encoders.joints.joint_rad[joint]];
-        let past = self.unbroken_since(row)..row;
-        let step_rad = self.encoders.step_rad[joint - 1] + self.encoders.step_rad[joint];
-        [1.0, -1.0].map(|sense| {
-            let together = past.clone().map(|row| columns[1][row] + sense * columns[0][row]);
-            let rest_rad = at_rad[joint] + sense * at_rad[joint - 1];
-            path_memory(together, rest_rad, self.deadband_rad(step_rad))
-        })
+        let rows = self.unbroken_since(row)..row;
+        let pairs = self.pairs.iter().zip(at_rad.windows(2)).zip(self.encoders.step_rad.windows(2));
+        pairs
+            .map(|((pasts, at_rad), step_rad)| {
+                let deadband_rad = self.deadband_rad(step_rad[0] + step_rad[1]);
+                let [sum, difference] = pasts;
+                [(sum, 1.0), (difference, -1.0)].map(|(past, sense)| {
+                    path_memory(past, rows.clone(), at_rad[1] + sense * at_rad[0], deadband_rad)
+                })
+            })
+            .collect()
     }
 
     /// Tremor and quantisation at rest are no turning points [rad].

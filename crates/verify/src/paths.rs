@@ -5,6 +5,7 @@ use crate::plane::Plane;
 use crate::polyline::Polyline;
 use armcal_core::DwellId;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -75,6 +76,36 @@ pub enum Against {
     Planned,
 }
 
+/// A moment as the rows see it.
+struct Sample<'a> {
+    error: &'a PathError,
+    /// Name of its stretch.
+    stretch: String,
+    /// Distances from the planned paths before and after, in every view [m]; `None` where nothing was planned.
+    planned_m: Option<[[f64; 2]; 4]>,
+}
+
+impl<'a> Sample<'a> {
+    fn of(error: &'a PathError, planned: &BTreeMap<DwellId, Planned>) -> Sample<'a> {
+        let planned_m = planned.get(&error.motion).map(|path| {
+            Plane::ALL
+                .map(|plane| [&path.before, &path.after].map(|way| way.distance_m(&error.measured_m, plane)))
+        });
+        Sample { error, stretch: stretch(error.motion, error.time_ns), planned_m }
+    }
+
+    /// Errors before and after [m] in a view, the `at`-th of all.
+    fn errors_m(&self, (at, plane): (usize, Plane), against: Against) -> Option<[f64; 2]> {
+        let PathError { measured_m, before_m, after_m, .. } = self.error;
+        match against {
+            Against::Encoders => {
+                Some([before_m, after_m].map(|model_m| plane.seen(&(measured_m - model_m)).norm()))
+            }
+            Against::Planned => self.planned_m.map(|distances_m| distances_m[at]),
+        }
+    }
+}
+
 /// Rows for all recordings together and each alone, in every view. `clocks` has one entry a recording.
 ///
 /// Rows against the planned path exist for the motions in `planned`.
@@ -84,61 +115,46 @@ pub fn paths(
     clocks: &[Option<ClockError>],
     planned: &BTreeMap<DwellId, Planned>,
 ) -> Vec<PathRow> {
-    let mut rows = Vec::new();
+    let samples: Vec<Sample<'_>> = errors.par_iter().map(|error| Sample::of(error, planned)).collect();
     let one = (0..recordings.len()).map(Some);
-    for recording in std::iter::once(None).chain(one.filter(|_| recordings.len() > 1)) {
-        let chosen: Vec<&PathError> =
-            errors.iter().filter(|e| recording.is_none_or(|r| e.motion.recording == r)).collect();
-        let subject = recording.map_or("all", |r| recordings[r].as_str());
+    let subjects = std::iter::once(None).chain(one.filter(|_| recordings.len() > 1));
+    let rows = subjects.flat_map(|recording| {
+        let of_it = |s: &&Sample<'_>| recording.is_none_or(|r| s.error.motion.recording == r);
+        let chosen: Vec<&Sample<'_>> = samples.iter().filter(of_it).collect();
         let clock = match recording {
             Some(r) => clocks.get(r).copied().flatten(),
             None => together(&chosen, clocks),
         };
-        for plane in Plane::ALL {
-            rows.extend(row(subject, plane, &chosen, clock, None));
-        }
-        for plane in Plane::ALL {
-            rows.extend(row(subject, plane, &chosen, clock, Some(planned)));
-        }
-    }
-    rows
+        let subject = recording.map_or("all", |r| recordings[r].as_str());
+        let views = |against| Plane::ALL.into_iter().enumerate().map(move |view| (view, against));
+        let views = views(Against::Encoders).chain(views(Against::Planned));
+        views.filter_map(move |(view, against)| row(subject, view, against, &chosen, clock))
+    });
+    rows.collect()
 }
 
-fn row(
+fn row<'a>(
     subject: &str,
-    plane: Plane,
-    errors: &[&PathError],
+    view: (usize, Plane),
+    against: Against,
+    samples: &[&'a Sample<'_>],
     clock: Option<ClockError>,
-    planned: Option<&BTreeMap<DwellId, Planned>>,
 ) -> Option<PathRow> {
-    let stretches: Vec<String> = errors.iter().map(|e| stretch(e.motion, e.time_ns)).collect();
-    let pairs: Vec<Error<'_>> = errors
-        .iter()
-        .zip(&stretches)
-        .filter_map(|(e, group)| {
-            let apart = |model: &Vector3<f64>| plane.seen(&(e.measured_m - model)).norm();
-            let (before_m, after_m) = match planned {
-                None => (apart(&e.before_m), apart(&e.after_m)),
-                Some(planned) => {
-                    let path = planned.get(&e.motion)?;
-                    let from = |path: &Polyline| path.distance_m(&e.measured_m, plane);
-                    (from(&path.before), from(&path.after))
-                }
-            };
-            Some(Error { group, before_m, after_m })
-        })
-        .collect();
+    let pair = |s: &&'a Sample<'_>| {
+        let [before_m, after_m] = s.errors_m(view, against)?;
+        Some(Error { group: &s.stretch, before_m, after_m })
+    };
+    let pairs: Vec<Error<'_>> = samples.iter().filter_map(pair).collect();
     let mut compared = Compared::of(&pairs)?;
     // Where a path lies in space does not depend on when.
-    let clock = clock.filter(|_| planned.is_none());
+    let clock = clock.filter(|_| against == Against::Encoders);
     if let Some(clock) = clock {
         widen(&mut compared.before, clock.before_m);
         widen(&mut compared.after, clock.after_m);
         let change_m = clock.after_m - clock.before_m;
         compared.difference_ci95_m = compared.difference_ci95_m.map(|i| wider(i, change_m));
     }
-    let against = if planned.is_some() { Against::Planned } else { Against::Encoders };
-    Some(PathRow { subject: subject.to_owned(), plane, against, errors: compared, clock })
+    Some(PathRow { subject: subject.to_owned(), plane: view.1, against, errors: compared, clock })
 }
 
 /// Name of the stretch of a motion that a moment belongs to: what is independent of other stretches.
@@ -148,10 +164,10 @@ pub fn stretch(motion: DwellId, time_ns: i64) -> String {
 }
 
 /// Clocks of different recordings err independently: their effects on the common mean add in square.
-fn together(errors: &[&PathError], clocks: &[Option<ClockError>]) -> Option<ClockError> {
+fn together(samples: &[&Sample<'_>], clocks: &[Option<ClockError>]) -> Option<ClockError> {
     let mut sizes: BTreeMap<usize, f64> = BTreeMap::new();
-    errors.iter().for_each(|e| *sizes.entry(e.motion.recording).or_default() += 1.0);
-    let n = errors.len() as f64;
+    samples.iter().for_each(|s| *sizes.entry(s.error.motion.recording).or_default() += 1.0);
+    let n = samples.len() as f64;
     let known: Vec<(f64, ClockError)> = sizes
         .into_iter()
         .filter_map(|(r, size)| clocks.get(r).copied().flatten().map(|c| (size / n, c)))

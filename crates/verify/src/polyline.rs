@@ -72,9 +72,9 @@ impl Polyline {
     /// Distance of a point from the nearest place of the path, as seen in a plane [m].
     pub fn distance_m(&self, point_m: &Vector3<f64>, plane: Plane) -> f64 {
         let at = plane.seen(point_m);
-        let seen: Vec<Vector3<f64>> = self.points_m.iter().map(|p| plane.seen(p)).collect();
-        let first = seen.first().map_or(f64::INFINITY, |p| (at - p).norm());
-        seen.windows(2).map(|piece| (at - nearest(&at, &piece[0], &piece[1])).norm()).fold(first, f64::min)
+        let first = self.points_m.first().map_or(f64::INFINITY, |p| (at - plane.seen(p)).norm());
+        let pieces = self.points_m.windows(2).map(|piece| [plane.seen(&piece[0]), plane.seen(&piece[1])]);
+        pieces.map(|[from, to]| (at - nearest(&at, &from, &to)).norm()).fold(first, f64::min)
     }
 }
 
