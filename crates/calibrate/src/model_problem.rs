@@ -7,8 +7,9 @@
 use crate::problem::{Known, Problem};
 use crate::{CalibrateError, FitConfig, Scene};
 use armcal_core::{Observation, Parameter, Reference};
-use armcal_model::Model;
+use armcal_model::{Model, ModelResidual};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
+use std::ops::Range;
 
 /// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
 /// the fit.
@@ -72,6 +73,17 @@ impl<'a> ModelProblem<'a> {
         }
     }
 
+    /// The rows that are used.
+    fn used(
+        &self,
+        block: usize,
+        (residual, jacobian): (ModelResidual, DMatrix<f64>),
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let rows = self.rows(block);
+        let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
+        (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
+    }
+
     /// d orientation of the tip in world axes / d joint reading, by central differences.
     fn turning_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
         let (model, p) = self.scene.seen(o, p);
@@ -115,10 +127,25 @@ impl Problem for ModelProblem<'_> {
 
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let (model, p) = self.scene.seen(self.observations[block], p);
-        let (residual, jacobian) = model.residual_with_jacobian(&p, self.observations[block]);
-        let rows = self.rows(block);
-        let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
-        (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
+        self.used(block, model.residual_with_jacobian(&p, self.observations[block]))
+    }
+
+    fn linearise_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
+    ) -> Result<(), CalibrateError> {
+        let mut at = blocks.start;
+        for run in self.scene.alike(&self.observations[blocks]) {
+            let (model, p) = self.scene.seen(run[0], p);
+            for linearised in model.residuals_with_jacobians(&p, run.iter().copied()) {
+                let (residual, jacobian) = self.used(at, linearised);
+                each(at, residual, jacobian)?;
+                at += 1;
+            }
+        }
+        Ok(())
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

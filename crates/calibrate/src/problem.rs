@@ -1,6 +1,7 @@
 //! What a solver needs to know about a calibration, and nothing about robots: blocks of residual rows (one block an
 //! observation), their exact derivatives, their covariance, and the parameters.
 
+use crate::CalibrateError;
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -42,6 +43,18 @@ pub trait Problem: Sync {
     /// The same with its derivative, one column for each parameter that the block knows ([`Problem::known`]);
     /// fixed ones may be zero.
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>);
+    /// [`Problem::linearised`] of these blocks in order; stops at the first error of `each`.
+    fn linearise_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
+    ) -> Result<(), CalibrateError> {
+        blocks.into_iter().try_for_each(|block| {
+            let (residual, jacobian) = self.linearised(block, p);
+            each(block, residual, jacobian)
+        })
+    }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
     /// Which blocks know which parameters, in the order of the blocks; all of them know all where nothing is said. What
@@ -79,6 +92,15 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         (**self).linearised(block, p)
+    }
+
+    fn linearise_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
+    ) -> Result<(), CalibrateError> {
+        (**self).linearise_each(blocks, p, each)
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

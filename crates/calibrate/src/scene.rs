@@ -83,6 +83,15 @@ impl<'a> Scene<'a> {
         known
     }
 
+    /// Runs of observations that are all seen by the same model and parameters.
+    pub(crate) fn alike<'o>(
+        &self,
+        observations: &'o [&'o Observation],
+    ) -> impl Iterator<Item = &'o [&'o Observation]> + use<'o> {
+        let pooled = matches!(self, Scene::Pooled(_));
+        observations.chunk_by(move |a, b| !pooled || a.dwell.recording == b.dwell.recording)
+    }
+
     /// Names of the parts that only some recordings have (copies in a pool), for the recordings observed.
     pub(crate) fn own_parts(&self, observations: &[&Observation]) -> Vec<String> {
         let Scene::Pooled(pool) = self else { return Vec::new() };

@@ -2,7 +2,7 @@
 
 use crate::effects::{Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
-use crate::path::{Twist, follow, linearise};
+use crate::path::{Still, StillSegment, Twist, follow, linearise};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
@@ -33,6 +33,13 @@ pub struct Model {
 struct Sides {
     measured_m: Vector3<f64>,
     predicted: Rigid<f64>,
+}
+
+/// The frames that are alike in every pose, at one parameter vector.
+struct StillFrames {
+    path: Still,
+    /// By recording.
+    boards: BTreeMap<usize, StillSegment>,
 }
 
 impl Model {
@@ -203,9 +210,30 @@ impl Model {
 
     /// The residual and d residual / d p: 3 or 6 rows, one column for every parameter, free or not. Exact.
     pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        self.linearised(p, o, None)
+    }
+
+    /// [`Model::residual_with_jacobian`] of many observations at the same parameters, in their order: what is alike for
+    /// all of them is worked out once.
+    pub fn residuals_with_jacobians<'a>(
+        &'a self,
+        p: &'a [f64],
+        observations: impl IntoIterator<Item = &'a Observation>,
+    ) -> impl Iterator<Item = (ModelResidual, DMatrix<f64>)> {
+        let boards = self.boards.iter().map(|(recording, board)| (*recording, StillSegment::of(board, p)));
+        let still = StillFrames { path: Still::of(&self.path, p), boards: boards.collect() };
+        observations.into_iter().map(move |o| self.linearised(p, o, Some(&still)))
+    }
+
+    fn linearised(
+        &self,
+        p: &[f64],
+        o: &Observation,
+        still: Option<&StillFrames>,
+    ) -> (ModelResidual, DMatrix<f64>) {
         let (predicted, in_board_m, columns, seats) = match &self.effects {
             None => {
-                let path = linearise(&self.path, p, &o.joint_rad);
+                let path = linearise(&self.path, p, &o.joint_rad, still.map(|still| &still.path));
                 (path.tip, seated_m(o), path.parameters, Vec::new())
             }
             Some(effects) => {
@@ -213,7 +241,23 @@ impl Model {
                 (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
             }
         };
-        let residual = Sides { measured_m: self.measured_m(p, o, &in_board_m), predicted }.residual(o);
+        let seated_on = self.boards.get(&o.dwell.recording).filter(|_| o.cavity().is_some());
+        let own;
+        let board = match (seated_on, still.and_then(|still| still.boards.get(&o.dwell.recording))) {
+            (Some(board), Some(known)) => Some((board, known)),
+            (Some(board), None) => {
+                own = StillSegment::of(board, p);
+                Some((board, &own))
+            }
+            (None, _) => None,
+        };
+        let measured_m = match &o.reference {
+            Reference::Tracked { position_m, .. } => *position_m,
+            Reference::Seated { .. } => {
+                board.map_or(Vector3::repeat(f64::NAN), |(_, at)| at.transform.point(&in_board_m))
+            }
+        };
+        let residual = Sides { measured_m, predicted }.residual(o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.parameters.len());
         for (column, twist) in &columns {
             add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
@@ -224,16 +268,12 @@ impl Model {
                 add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
             }
         }
-        if let (Reference::Seated { .. }, Some(board)) = (&o.reference, self.boards.get(&o.dwell.recording)) {
-            let derivatives = board.derivatives(p, &[]);
-            for (column, change) in board.parameters.clone().zip(&derivatives.parameters) {
+        if let Some((board, at)) = board {
+            for (column, change) in board.parameters.clone().zip(&at.derivatives.parameters) {
                 add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
             }
-            if !seats.is_empty() {
-                let rotation = board.transform(p, &[]).rotation;
-                for (column, change_m) in &seats {
-                    add_to_column(&mut jacobian, 0, *column, &(rotation * change_m));
-                }
+            for (column, change_m) in &seats {
+                add_to_column(&mut jacobian, 0, *column, &(at.transform.rotation * change_m));
             }
         }
         (residual, jacobian)
@@ -266,7 +306,7 @@ impl Model {
 
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
-            None => linearise(&self.path, p, &o.joint_rad).joints,
+            None => linearise(&self.path, p, &o.joint_rad, None).joints,
             Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
         }
     }

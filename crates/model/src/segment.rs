@@ -6,11 +6,14 @@
 
 use crate::rigid::{Rigid, Scalar, product, rotation_of_vector};
 use nalgebra::{Matrix3, Vector3};
-use num_dual::Dual64;
+use num_dual::DualSVec64;
 use std::ops::Range;
 
 /// Most parameters one segment has (x, y, z, rx, ry, rz of an origin).
 pub(crate) const MAX_PARAMETERS: usize = 6;
+
+/// A dual number that differentiates by all quantities of a segment at once.
+type Lanes = DualSVec64<MAX_PARAMETERS>;
 
 /// How a joint moves its segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,22 +99,22 @@ impl Segment {
         self.local(&p[self.parameters.clone()], self.joint_value(joints))
     }
 
-    /// The derivatives of [`Segment::transform`], one dual pass over this segment for each.
+    /// The derivatives of [`Segment::transform`], by one pass with a dual lane for each.
     pub fn derivatives(&self, p: &[f64], joints: &[f64]) -> SegmentDerivatives {
         let own = &p[self.parameters.clone()];
-        let q = self.joint_value(joints);
-        let mut lanes = [Dual64::from(0.0); MAX_PARAMETERS];
-        for (lane, &value) in lanes.iter_mut().zip(own) {
-            *lane = Dual64::from(value);
+        let mut lanes = [Lanes::from(0.0); MAX_PARAMETERS];
+        for (k, (lane, &value)) in lanes.iter_mut().zip(own).enumerate() {
+            *lane = Lanes::from(value).derivative(k);
         }
-        let mut parameters = [Rigid::identity(); MAX_PARAMETERS];
-        for (k, derivative) in parameters.iter_mut().enumerate().take(own.len()) {
-            lanes[k].eps = 1.0;
-            *derivative = dual_part(&self.local(&lanes[..own.len()], Dual64::from(q)));
-            lanes[k].eps = 0.0;
+        // Only a segment with at most five parameters has a joint: there is a lane left for it.
+        let q = Lanes::from(self.joint_value(joints));
+        let q = if self.joint.is_some() { q.derivative(own.len()) } else { q };
+        let dual = self.local(&lanes[..own.len()], q);
+        SegmentDerivatives {
+            parameters: std::array::from_fn(|k| dual_part(&dual, k)),
+            count: own.len(),
+            joint: self.joint.map(|_| dual_part(&dual, own.len())),
         }
-        let joint = self.joint.map(|_| dual_part(&self.local(&lanes[..own.len()], Dual64::new(q, 1.0))));
-        SegmentDerivatives { parameters, count: own.len(), joint }
     }
 
     fn joint_value(&self, joints: &[f64]) -> f64 {
@@ -207,6 +210,7 @@ fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D>
     }
 }
 
-fn dual_part(dual: &Rigid<Dual64>) -> Rigid<f64> {
-    Rigid { rotation: dual.rotation.map(|x| x.eps), translation_m: dual.translation_m.map(|x| x.eps) }
+fn dual_part(dual: &Rigid<Lanes>, lane: usize) -> Rigid<f64> {
+    let part = |x: Lanes| x.eps.0.map_or(0.0, |eps| eps[lane]);
+    Rigid { rotation: dual.rotation.map(part), translation_m: dual.translation_m.map(part) }
 }

@@ -196,7 +196,7 @@ impl Effects {
     pub fn linearise(&self, p: &[f64], x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let path = linearise(&self.path, &p, &q);
+        let path = linearise(&self.path, &p, &q, None);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
             path.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];
