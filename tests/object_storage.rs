@@ -265,6 +265,49 @@ fn a_cut_object_is_read_with_its_damage_told_and_a_busy_server_asked_again() {
 }
 
 #[test]
+fn an_archive_in_a_bucket_gives_the_campaign_it_gives_on_disk() {
+    let fill = |folder: &Path| {
+        for (day, name) in [("monday", "normal"), ("tuesday", "roll")] {
+            std::fs::create_dir_all(folder.join("2026").join(day)).expect("folder");
+            let fixture = root().join("fixtures/paper").join(format!("{name}.mcap"));
+            std::fs::copy(fixture, folder.join("2026").join(day).join("arm.mcap")).expect("copied");
+        }
+        std::fs::write(folder.join("2026/notes.txt"), "no recording").expect("written");
+    };
+    let Some(store) = Store::start(fill) else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let at = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let settings = format!("{}\n[diagnosis]\nenabled = false\n", paper_pipeline(Path::new("/nowhere")));
+    std::fs::write(at("rig.toml"), settings).expect("pipeline");
+    let batch = |inputs: &str, out: &str| {
+        let output = store.armcal(&["batch", inputs, "--pipeline", &at("rig.toml"), "--out", &at(out)]);
+        // Without the declared tilt the rolled board is doubtful, in the bucket as on disk.
+        assert!(matches!(output.status.code(), Some(0 | 3)), "{}", said(&output));
+        let rows = read_json(&folder.path().join(out).join("campaign.json"))["recordings"].clone();
+        let mut rows = rows.as_array().expect("rows").clone();
+        // Where a recording is and what tells it from others differ; what it says does not.
+        for row in rows.iter_mut().filter_map(Value::as_object_mut) {
+            for place in ["paths", "identity", "folder"] {
+                row.remove(place).expect(place);
+            }
+        }
+        (rows, said(&output))
+    };
+    let (remote, _) = batch("s3://lab/2026/**/*.mcap", "remote");
+    let (local, _) = batch(&store.on_disk("2026/**/*.mcap").to_string_lossy(), "local");
+    assert_eq!(remote.len(), 2);
+    assert_eq!(remote, local);
+
+    // A second time, only what tells whether they are still the same is asked.
+    let before = store.sent("2026/monday/arm.mcap");
+    let (again, said) = batch("s3://lab/2026/**/*.mcap", "remote");
+    assert_eq!(again, remote);
+    assert!(said.contains("2 results were there already"), "{said}");
+    let after = store.sent("2026/monday/arm.mcap");
+    assert!(after.1 - before.1 < 100_000, "{before:?} {after:?}");
+}
+
+#[test]
 fn what_cannot_be_read_is_named_with_what_to_do() {
     let Some(store) = Store::start(|_| ()) else { return };
     let cases = [

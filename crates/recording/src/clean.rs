@@ -33,7 +33,9 @@ pub(crate) fn in_time_order(
         latest = latest.max(time);
         rows.push((time, i));
     }
-    rows.sort_by_key(|(time, _)| *time);
+    if counts.backward > 0 {
+        rows.sort_by_key(|(time, _)| *time);
+    }
     (rows, counts)
 }
 

@@ -73,7 +73,7 @@ impl Map {
     pub fn sha256_hex(&self) -> String {
         let mut hasher = Sha256::new();
         self.pieces(0..self.0.len(), |piece| hasher.update(piece));
-        hex(hasher)
+        hex::encode(hasher.finalize())
     }
 }
 
@@ -83,9 +83,4 @@ impl Deref for Map {
     fn deref(&self) -> &[u8] {
         &self.0
     }
-}
-
-/// A finished digest, hexadecimal.
-pub(crate) fn hex(hasher: Sha256) -> String {
-    hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

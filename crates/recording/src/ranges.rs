@@ -1,6 +1,6 @@
 //! Bytes of a file that are read by range, on demand: an object in a store, or a local file that is not mapped.
 
-use crate::map::{Map, hex};
+use crate::map::Map;
 use crate::{Fetched, ObjectIdentity, RecordingError};
 use bytes::Bytes;
 use sha2::{Digest as _, Sha256};
@@ -111,7 +111,7 @@ impl Ranged {
             hasher.update(bytes);
             Ok(())
         })?;
-        Ok(hex(hasher))
+        Ok(hex::encode(hasher.finalize()))
     }
 
     /// Hands the file to `f` in order, some pieces at a time in memory.

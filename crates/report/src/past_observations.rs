@@ -116,7 +116,7 @@ pub fn observations_json(run: &Run) -> Result<String, ReportError> {
 
 /// SHA-256 of a text, hexadecimal.
 pub fn sha256(text: &str) -> String {
-    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex::encode(Sha256::digest(text))
 }
 
 impl PastObservations {

@@ -187,7 +187,7 @@ impl RecordingRun {
                 for file in files {
                     hasher.update(format!("{}\n", file.identity()));
                 }
-                hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+                hex::encode(hasher.finalize())
             }
         }
     }

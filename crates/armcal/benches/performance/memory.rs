@@ -9,7 +9,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Sizes of the recording [MB].
-const SIZES_MB: [u64; 3] = [10, 100, 1000];
+const SIZES_MB: [u64; 4] = [10, 100, 1000, 2000];
 /// The largest recording may take this many times the memory of the smallest.
 const FLAT: f64 = 1.25;
 

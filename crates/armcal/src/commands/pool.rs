@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Pools results, writes to `out`, prints the table (or `pool.json`).
 pub fn run(pipeline: &Path, results: &[PathBuf], out: &Path, json: bool) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(pipeline)?;
+    let pipeline = Pipeline::load_for_others(pipeline)?;
     let progress = Progress::new();
     let run = pool::run(&pipeline, results, &progress)?;
     progress.step("writing results");

@@ -23,7 +23,7 @@ impl Guard {
     pub fn new(port: u16) -> Result<Guard, getrandom::Error> {
         let mut bytes = [0; SECRET_BYTES];
         getrandom::fill(&mut bytes)?;
-        let secret = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let secret = hex::encode(bytes);
         Ok(Guard { hosts: [format!("127.0.0.1:{port}"), format!("localhost:{port}")], secret })
     }
 
