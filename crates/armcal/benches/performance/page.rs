@@ -117,7 +117,8 @@ pub fn page(sections: &[Section], options: &Options) -> String {
     let mut text = String::from("# Performance\n\n");
     let about = "Written by `cargo bench -p armcal --bench performance`; do not edit. Every number is of one run, armcal \
                  and its peers taking turns on the same machine. CPU is time on a processor, of all threads: where wall \
-                 time is longer, the machine was busy with something else.";
+                 time is longer, the machine was busy with something else. How often hidden effects are named rightly, and how \
+                 often nothing is claimed where nothing is hidden, is counted by `armcal score` (`docs/confusion.md`).";
     text += &wrapped(about);
     text += "\n";
     for fact in machine::facts(options) {
