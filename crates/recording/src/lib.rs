@@ -27,6 +27,8 @@ mod index;
 mod joints;
 mod layout;
 mod map;
+#[cfg(any(test, not(feature = "s3")))]
+mod no_object;
 #[cfg(feature = "s3")]
 mod object;
 mod occlusion;

@@ -1,9 +1,13 @@
 //! Recordings named by URL: `s3://bucket/key`, beside paths of local files.
 //!
 //! A URL travels through pipelines as a path like any other; only [`resolve`] and opening look at which it is. Object
-//! storage itself is in [`crate::object`], compiled with the feature `s3`.
+//! storage itself is in `object`, compiled with the feature `s3`.
 
 use crate::RecordingError;
+#[cfg(not(feature = "s3"))]
+use crate::no_object as object;
+#[cfg(feature = "s3")]
+use crate::object;
 use crate::ranges::Ranged;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +36,7 @@ pub fn list(url: &str) -> Result<Vec<String>, RecordingError> {
     // Everything before the first part with a wildcard is a folder that the store can look in by itself.
     let fixed: Vec<&str> = key.split('/').take_while(|part| !part.contains(['*', '?', '['])).collect();
     let folder = if fixed.len() == key.split('/').count() { &fixed[..fixed.len() - 1] } else { &fixed };
-    let mut keys = keys(url, &bucket, &folder.join("/"))?;
+    let mut keys = object::keys(url, &bucket, &folder.join("/"))?;
     keys.retain(|key| pattern.matches_with(key, options));
     keys.sort();
     Ok(keys.into_iter().map(|key| format!("s3://{bucket}/{key}")).collect())
@@ -42,29 +46,7 @@ pub fn list(url: &str) -> Result<Vec<String>, RecordingError> {
 pub(crate) fn open(path: &Path) -> Result<Ranged, RecordingError> {
     let url = path.to_string_lossy();
     let location = Location::parse(&url)?;
-    #[cfg(feature = "s3")]
-    return crate::object::open(&url, &location);
-    #[cfg(not(feature = "s3"))]
-    Err(without_storage(&url, &location.bucket))
-}
-
-#[cfg(feature = "s3")]
-fn keys(url: &str, bucket: &str, folder: &str) -> Result<Vec<String>, RecordingError> {
-    crate::object::keys(url, bucket, folder)
-}
-
-#[cfg(not(feature = "s3"))]
-fn keys(url: &str, bucket: &str, _: &str) -> Result<Vec<String>, RecordingError> {
-    Err(without_storage(url, bucket))
-}
-
-#[cfg(not(feature = "s3"))]
-fn without_storage(url: &str, bucket: &str) -> RecordingError {
-    let why = format!(
-        "this armcal was built without object storage and cannot reach bucket {bucket:?}; build it with \
-         `cargo install --path crates/armcal --features s3`"
-    );
-    RecordingError::Object { url: url.to_owned(), why }
+    object::open(&url, &location)
 }
 
 /// A bucket and what is in it.
@@ -115,17 +97,5 @@ mod tests {
         }
         let location = Location::parse("s3://bucket/a/b.mcap").expect("an object");
         assert_eq!(location, Location { bucket: "bucket".into(), key: "a/b.mcap".into() });
-    }
-
-    #[cfg(not(feature = "s3"))]
-    #[test]
-    fn without_the_feature_the_way_to_it_is_named() {
-        let errors = [
-            crate::Recording::open(&["s3://bucket/key.mcap".into()]).err().map(|e| e.to_string()),
-            list("s3://bucket/*.mcap").err().map(|e| e.to_string()),
-        ];
-        for said in errors.map(|e| e.expect("refused")) {
-            assert!(said.contains("--features s3") && said.contains("bucket"), "{said}");
-        }
     }
 }
