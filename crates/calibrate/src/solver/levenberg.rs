@@ -59,8 +59,10 @@ pub(crate) fn minimise(
             let value = cost.value(&trial).unwrap_or(f64::INFINITY);
             let gain = (model.value - value) / predicted;
             if done {
-                let better = value <= model.value + rounding;
-                let x = if better { trial } else { x };
+                // Costs at two points this close differ by less than their rounding: only what more than the tolerated
+                // step is worth says that the last step was wrong.
+                let tolerated = rounding.max(0.5 * settings.step_tolerance.powi(2));
+                let x = if value - model.value <= tolerated { trial } else { x };
                 return Ok(stopped(x, model, Status::Converged, iterations + 1));
             }
             if gain > 1e-4 {
