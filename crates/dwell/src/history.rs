@@ -1,8 +1,9 @@
 //! What each joint went through before a moment: from which side it came, and the turning points a gap remembers.
 
 use crate::DwellConfig;
-use crate::arrival::Past;
+use crate::arrival::arrival;
 use crate::memory::path_memory;
+use crate::past::Past;
 use crate::pauses::Encoders;
 use armcal_core::Arrival;
 
@@ -25,7 +26,7 @@ impl<'a> History<'a> {
 
     /// Direction from which each joint came to the readings `at_rad`; what lies before row `row` is its past.
     pub fn arrival(&self, row: usize, at_rad: &[f64]) -> Vec<Arrival> {
-        let since = self.unbroken_since(row);
+        let rows = self.unbroken_since(row)..row;
         let joints = self.past.iter().zip(at_rad).zip(&self.encoders.step_rad);
         joints
             .map(|((past, at_rad), step_rad)| {
@@ -34,7 +35,7 @@ impl<'a> History<'a> {
                     .arrival_threshold_deg
                     .to_radians()
                     .max(self.config.arrival_threshold_counts * step_rad);
-                past.arrival(since, row, *at_rad, away_rad)
+                arrival(past, rows.clone(), *at_rad, away_rad)
             })
             .collect()
     }

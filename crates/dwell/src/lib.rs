@@ -17,6 +17,7 @@ mod detect;
 mod error;
 mod history;
 mod memory;
+mod past;
 mod pauses;
 mod series;
 mod static_pose;
