@@ -81,7 +81,7 @@ struct Sample<'a> {
     error: &'a PathError,
     /// Name of its stretch.
     stretch: String,
-    /// Distances from the planned paths before and after, in every view [m]; `None` where nothing was planned.
+    /// Distances from the planned paths before and after, by [`Plane`] [m]; `None` where nothing was planned.
     planned_m: Option<[[f64; 2]; 4]>,
 }
 
@@ -94,14 +94,14 @@ impl<'a> Sample<'a> {
         Sample { error, stretch: stretch(error.motion, error.time_ns), planned_m }
     }
 
-    /// Errors before and after [m] in a view, the `at`-th of all.
-    fn errors_m(&self, (at, plane): (usize, Plane), against: Against) -> Option<[f64; 2]> {
+    /// Errors before and after [m] in a view.
+    fn errors_m(&self, plane: Plane, against: Against) -> Option<[f64; 2]> {
         let PathError { measured_m, before_m, after_m, .. } = self.error;
         match against {
             Against::Encoders => {
                 Some([before_m, after_m].map(|model_m| plane.seen(&(measured_m - model_m)).norm()))
             }
-            Against::Planned => self.planned_m.map(|distances_m| distances_m[at]),
+            Against::Planned => self.planned_m.map(|distances_m| distances_m[plane as usize]),
         }
     }
 }
@@ -126,22 +126,22 @@ pub fn paths(
             None => together(&chosen, clocks),
         };
         let subject = recording.map_or("all", |r| recordings[r].as_str());
-        let views = |against| Plane::ALL.into_iter().enumerate().map(move |view| (view, against));
-        let views = views(Against::Encoders).chain(views(Against::Planned));
-        views.filter_map(move |(view, against)| row(subject, view, against, &chosen, clock))
+        let views = |against| Plane::ALL.map(|plane| (plane, against));
+        let views = views(Against::Encoders).into_iter().chain(views(Against::Planned));
+        views.filter_map(move |(plane, against)| row(subject, plane, against, &chosen, clock))
     });
     rows.collect()
 }
 
 fn row<'a>(
     subject: &str,
-    view: (usize, Plane),
+    plane: Plane,
     against: Against,
     samples: &[&'a Sample<'_>],
     clock: Option<ClockError>,
 ) -> Option<PathRow> {
     let pair = |s: &&'a Sample<'_>| {
-        let [before_m, after_m] = s.errors_m(view, against)?;
+        let [before_m, after_m] = s.errors_m(plane, against)?;
         Some(Error { group: &s.stretch, before_m, after_m })
     };
     let pairs: Vec<Error<'_>> = samples.iter().filter_map(pair).collect();
@@ -154,7 +154,7 @@ fn row<'a>(
         let change_m = clock.after_m - clock.before_m;
         compared.difference_ci95_m = compared.difference_ci95_m.map(|i| wider(i, change_m));
     }
-    Some(PathRow { subject: subject.to_owned(), plane: view.1, against, errors: compared, clock })
+    Some(PathRow { subject: subject.to_owned(), plane, against, errors: compared, clock })
 }
 
 /// Name of the stretch of a motion that a moment belongs to: what is independent of other stretches.

@@ -18,7 +18,7 @@ pub enum Plane {
 }
 
 impl Plane {
-    /// All views, in the order they are shown.
+    /// All views, in the order they are declared and shown.
     pub const ALL: [Plane; 4] = [Plane::Space, Plane::Xy, Plane::Yz, Plane::Xz];
 
     /// As tables and files spell it.
