@@ -1,13 +1,16 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+mod linearisation;
+
 use crate::effects::{Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
-use crate::path::{Still, StillSegment, Twist, follow, linearise};
+use crate::path::{PathAt, Twist, follow};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
+use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,13 +36,6 @@ pub struct Model {
 struct Sides {
     measured_m: Vector3<f64>,
     predicted: Rigid<f64>,
-}
-
-/// The frames that are alike in every pose, at one parameter vector.
-struct StillFrames {
-    path: Still,
-    /// By recording.
-    boards: BTreeMap<usize, StillSegment>,
 }
 
 impl Model {
@@ -210,73 +206,18 @@ impl Model {
 
     /// The residual and d residual / d p: 3 or 6 rows, one column for every parameter, free or not. Exact.
     pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
-        self.linearised(p, o, None)
+        Linearisation::of(self, p, &[o]).residual_with_jacobian(o)
     }
 
     /// [`Model::residual_with_jacobian`] of many observations at the same parameters, in their order: what is alike for
     /// all of them is worked out once.
-    pub fn residuals_with_jacobians<'a>(
-        &'a self,
-        p: &'a [f64],
-        observations: impl IntoIterator<Item = &'a Observation>,
-    ) -> impl Iterator<Item = (ModelResidual, DMatrix<f64>)> {
-        let boards = self.boards.iter().map(|(recording, board)| (*recording, StillSegment::of(board, p)));
-        let still = StillFrames { path: Still::of(&self.path, p), boards: boards.collect() };
-        observations.into_iter().map(move |o| self.linearised(p, o, Some(&still)))
-    }
-
-    fn linearised(
+    pub fn residuals_with_jacobians(
         &self,
         p: &[f64],
-        o: &Observation,
-        still: Option<&StillFrames>,
-    ) -> (ModelResidual, DMatrix<f64>) {
-        let (predicted, in_board_m, columns, seats) = match &self.effects {
-            None => {
-                let path = linearise(&self.path, p, &o.joint_rad, still.map(|still| &still.path));
-                (path.tip, seated_m(o), path.parameters, Vec::new())
-            }
-            Some(effects) => {
-                let arm = effects.linearise(p, &effects.drivers(self, o));
-                (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
-            }
-        };
-        let seated_on = self.boards.get(&o.dwell.recording).filter(|_| o.cavity().is_some());
-        let own;
-        let board = match (seated_on, still.and_then(|still| still.boards.get(&o.dwell.recording))) {
-            (Some(board), Some(known)) => Some((board, known)),
-            (Some(board), None) => {
-                own = StillSegment::of(board, p);
-                Some((board, &own))
-            }
-            (None, _) => None,
-        };
-        let measured_m = match &o.reference {
-            Reference::Tracked { position_m, .. } => *position_m,
-            Reference::Seated { .. } => {
-                board.map_or(Vector3::repeat(f64::NAN), |(_, at)| at.transform.point(&in_board_m))
-            }
-        };
-        let residual = Sides { measured_m, predicted }.residual(o);
-        let mut jacobian = DMatrix::zeros(residual.len(), self.parameters.len());
-        for (column, twist) in &columns {
-            add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
-        }
-        if let Some(error_rad) = &residual.rotation_rad {
-            let rate = rotation_error_rate(error_rad);
-            for (column, twist) in &columns {
-                add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
-            }
-        }
-        if let Some((board, at)) = board {
-            for (column, change) in board.parameters.clone().zip(&at.derivatives.parameters) {
-                add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
-            }
-            for (column, change_m) in &seats {
-                add_to_column(&mut jacobian, 0, *column, &(at.transform.rotation * change_m));
-            }
-        }
-        (residual, jacobian)
+        observations: &[&Observation],
+    ) -> Vec<(ModelResidual, DMatrix<f64>)> {
+        let at = Linearisation::of(self, p, observations);
+        observations.iter().map(|o| at.residual_with_jacobian(o)).collect()
     }
 
     /// d predicted tip / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
@@ -306,7 +247,7 @@ impl Model {
 
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
-            None => linearise(&self.path, p, &o.joint_rad, None).joints,
+            None => PathAt::of(&self.path, p).linearised(&o.joint_rad).joints,
             Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
         }
     }
@@ -370,17 +311,13 @@ impl Model {
                 (at.tip, at.in_board_m)
             }
         };
-        Sides { measured_m: self.measured_m(p, o, &in_board_m), predicted }
+        let board = self.board_under(o).map(|board| board.transform(p, &[]));
+        Sides { measured_m: measured_m(o, board.as_ref(), &in_board_m), predicted }
     }
 
-    fn measured_m(&self, p: &[f64], o: &Observation, in_board_m: &Vector3<f64>) -> Vector3<f64> {
-        match &o.reference {
-            Reference::Tracked { position_m, .. } => *position_m,
-            Reference::Seated { .. } => match self.boards.get(&o.dwell.recording) {
-                Some(board) => board.transform(p, &[]).point(in_board_m),
-                None => Vector3::repeat(f64::NAN),
-            },
-        }
+    /// The board that the tip is seated in.
+    fn board_under(&self, o: &Observation) -> Option<&Segment> {
+        self.boards.get(&o.dwell.recording).filter(|_| o.cavity().is_some())
     }
 
     /// Indices of the parameters that an exact name or a glob means (`joint*.alpha`); never none.
@@ -416,6 +353,14 @@ impl Sides {
             _ => None,
         };
         ModelResidual { position_m, rotation_rad }
+    }
+}
+
+/// Where the tip was, in the world [m]; NaN in a cavity of a board that the model does not have.
+fn measured_m(o: &Observation, board: Option<&Rigid<f64>>, in_board_m: &Vector3<f64>) -> Vector3<f64> {
+    match &o.reference {
+        Reference::Tracked { position_m, .. } => *position_m,
+        Reference::Seated { .. } => board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m)),
     }
 }
 

@@ -1,12 +1,12 @@
 //! The product rule along the path from world to tip.
 //!
-//! With `tip = P_i A_i S_i` (everything before segment i, the segment, everything after it), a small
-//! change of segment i moves the tip by `P_i dA_i S_i`. `P_i` are the running products of the forward
-//! pass and the tip seen from behind segment i is found by going back from the tip, so one forward
-//! pass and one segment derivative per parameter give the whole Jacobian.
+//! With `tip = P_i A_i S_i` (everything before segment i, the segment, everything after it), a small change of segment i
+//! moves everything behind it by `P_i (dA_i A_i^-1) P_i^-1`, whatever stands there: a rotation `w` and a velocity, the
+//! spatial twist (Lynch and Park, Modern Robotics, 2017, section 5.1.1). Seen at the path's origin the velocity is `v_i`, at
+//! the tip it is `v_i + w_i x tip`, so that one forward pass with the segments' derivatives gives the whole Jacobian.
 
 use crate::rigid::{Rigid, rotation_rate};
-use crate::segment::{Segment, SegmentDerivatives};
+use crate::segment::{LinearisedSegment, Segment};
 use nalgebra::Vector3;
 
 /// Motion of the tip per unit of one quantity, in the frame the path starts in.
@@ -63,78 +63,49 @@ pub(crate) fn follow(path: &[Segment], p: &[f64], joints: &[f64]) -> Rigid<f64> 
     path.iter().fold(Rigid::identity(), |before, segment| before.then(&segment.transform(p, joints)))
 }
 
-/// Segments that no joint moves, at one parameter vector: alike in every pose, so worked out once for many.
-pub(crate) struct Still(Vec<Option<StillSegment>>);
-
-/// One of them.
-pub(crate) struct StillSegment {
-    pub transform: Rigid<f64>,
-    pub derivatives: SegmentDerivatives,
+/// A path at one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
+pub(crate) struct PathAt<'a> {
+    path: &'a [Segment],
+    p: &'a [f64],
+    /// By segment; `None` where a joint moves it.
+    still: Vec<Option<LinearisedSegment>>,
 }
 
-impl Still {
-    /// The still segments of a path.
-    pub fn of(path: &[Segment], p: &[f64]) -> Still {
-        let still = |s: &Segment| s.joint.is_none().then(|| StillSegment::of(s, p));
-        Still(path.iter().map(still).collect())
+impl<'a> PathAt<'a> {
+    pub fn of(path: &'a [Segment], p: &'a [f64]) -> PathAt<'a> {
+        let still = |segment: &Segment| segment.joint.is_none().then(|| segment.linearised(p, &[]));
+        PathAt { path, p, still: path.iter().map(still).collect() }
     }
 
-    /// A segment of that path, if it is still.
-    pub fn get(&self, index: usize) -> Option<&StillSegment> {
-        self.0.get(index)?.as_ref()
-    }
-}
-
-impl StillSegment {
-    /// A segment without a joint.
-    pub fn of(segment: &Segment, p: &[f64]) -> StillSegment {
-        StillSegment { transform: segment.transform(p, &[]), derivatives: segment.derivatives(p, &[]) }
-    }
-}
-
-/// The end of the path and its derivatives with respect to every parameter and joint on it. `still`: of this path at this
-/// parameter vector, where it is known.
-pub(crate) fn linearise(
-    path: &[Segment],
-    p: &[f64],
-    joints: &[f64],
-    still: Option<&Still>,
-) -> LinearisedPath {
-    let known = |index: usize| still.and_then(|still| still.get(index));
-    let mut ends = Vec::with_capacity(path.len() + 1);
-    let mut end = Rigid::identity();
-    ends.push(end);
-    for (index, segment) in path.iter().enumerate() {
-        end = match known(index) {
-            Some(still) => end.then(&still.transform),
-            None => end.then(&segment.transform(p, joints)),
-        };
-        ends.push(end);
-    }
-    let tip = end;
-    let mut parameters = Vec::with_capacity(p.len());
-    let mut joint_twists = Vec::with_capacity(joints.len());
-    for (index, (segment, pair)) in path.iter().zip(ends.windows(2)).enumerate() {
-        let (before, after) = (&pair[0], &pair[1]);
-        let tip_from_after_m = after.rotation.tr_mul(&(tip.translation_m - after.translation_m));
-        let own_rotation = before.rotation.tr_mul(&after.rotation);
-        let carry = |change: &Rigid<f64>| Twist {
-            translation_m: before.rotation * (change.rotation * tip_from_after_m + change.translation_m),
-            rotation_rad: before.rotation * rotation_rate(&change.rotation, &own_rotation),
-        };
-        let own;
-        let derivatives = match known(index) {
-            Some(still) => &still.derivatives,
-            None => {
-                own = segment.derivatives(p, joints);
-                &own
-            }
-        };
-        let changes = derivatives.parameters.iter().take(derivatives.count);
-        parameters.extend(segment.parameters.clone().zip(changes.map(carry)));
-        if let (Some(joint), Some(change)) = (segment.joint, &derivatives.joint) {
-            joint_twists.push((joint.index, carry(change)));
+    /// The end of the path and its derivatives with respect to every parameter and joint on it.
+    pub fn linearised(&self, joints: &[f64]) -> LinearisedPath {
+        let mut tip = Rigid::identity();
+        let mut parameters = Vec::with_capacity(self.p.len());
+        let mut joint_twists = Vec::with_capacity(joints.len());
+        for (segment, still) in self.path.iter().zip(&self.still) {
+            let moved;
+            let linearised = match still {
+                Some(still) => still,
+                None => {
+                    moved = segment.linearised(self.p, joints);
+                    &moved
+                }
+            };
+            let (before, own) = (tip, &linearised.transform);
+            tip = before.then(own);
+            let twist = |change: &Rigid<f64>| {
+                let rotation_rad = before.rotation * rotation_rate(&change.rotation, &own.rotation);
+                let at_end_m = before.rotation * change.translation_m;
+                Twist { translation_m: at_end_m - rotation_rad.cross(&tip.translation_m), rotation_rad }
+            };
+            let (by_parameter, by_joint) = linearised.derivatives.split_at(segment.parameters.len());
+            parameters.extend(segment.parameters.clone().zip(by_parameter.iter().map(twist)));
+            let joint = segment.joint.iter().map(|joint| joint.index);
+            joint_twists.extend(joint.zip(by_joint.iter().map(twist)));
         }
+        for (_, twist) in parameters.iter_mut().chain(&mut joint_twists) {
+            twist.translation_m += twist.rotation_rad.cross(&tip.translation_m);
+        }
+        LinearisedPath { tip, parameters, joints: joint_twists }
     }
-    LinearisedPath { tip, parameters, joints: joint_twists }
 }

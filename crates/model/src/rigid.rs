@@ -77,7 +77,9 @@ pub(crate) fn rotation_of_vector<D: Scalar>(r: &Vector3<D>) -> Matrix3<D> {
     } else {
         let angle = squared.sqrt();
         let (sine, cosine) = angle.sin_cos();
-        (sine / angle, (one - cosine) / squared)
+        // A quotient of dual numbers is rounded otherwise than one of f64, a reciprocal is not: predicting and
+        // differentiating agree to the last bit.
+        (sine * angle.recip(), (one - cosine) * squared.recip())
     };
     let (x, y, z) = (r.x, r.y, r.z);
     Matrix3::new(

@@ -81,14 +81,12 @@ pub(crate) struct Segment {
     pub parameters: Range<usize>,
 }
 
-/// Derivatives of one segment's transform.
-pub(crate) struct SegmentDerivatives {
-    /// With respect to each parameter, in order; `count` of them are meaningful.
-    pub parameters: [Rigid<f64>; MAX_PARAMETERS],
-    /// How many parameters there are.
-    pub count: usize,
-    /// With respect to the joint value.
-    pub joint: Option<Rigid<f64>>,
+/// A segment's transform and its derivatives.
+pub(crate) struct LinearisedSegment {
+    /// The transform.
+    pub transform: Rigid<f64>,
+    /// Its derivatives: by each parameter in order, then by the joint value; zero where there is neither.
+    pub derivatives: [Rigid<f64>; MAX_PARAMETERS],
 }
 
 impl Segment {
@@ -99,8 +97,8 @@ impl Segment {
         self.local(&p[self.parameters.clone()], self.joint_value(joints))
     }
 
-    /// The derivatives of [`Segment::transform`], by one pass with a dual lane for each.
-    pub fn derivatives(&self, p: &[f64], joints: &[f64]) -> SegmentDerivatives {
+    /// [`Segment::transform`] with its derivatives, in one pass.
+    pub fn linearised(&self, p: &[f64], joints: &[f64]) -> LinearisedSegment {
         let own = &p[self.parameters.clone()];
         let mut lanes = [Lanes::from(0.0); MAX_PARAMETERS];
         for (k, (lane, &value)) in lanes.iter_mut().zip(own).enumerate() {
@@ -109,12 +107,7 @@ impl Segment {
         // Only a segment with at most five parameters has a joint: there is a lane left for it.
         let q = Lanes::from(self.joint_value(joints));
         let q = if self.joint.is_some() { q.derivative(own.len()) } else { q };
-        let dual = self.local(&lanes[..own.len()], q);
-        SegmentDerivatives {
-            parameters: std::array::from_fn(|k| dual_part(&dual, k)),
-            count: own.len(),
-            joint: self.joint.map(|_| dual_part(&dual, own.len())),
-        }
+        LinearisedSegment::from(&self.local(&lanes[..own.len()], q))
     }
 
     fn joint_value(&self, joints: &[f64]) -> f64 {
@@ -138,6 +131,27 @@ impl Segment {
             Geometry::Origin { nominal, .. } => origin(nominal, own),
             Geometry::Axis(axis) => moved(&axis.map(D::from), q, motion),
         }
+    }
+}
+
+impl From<&Rigid<Lanes>> for LinearisedSegment {
+    fn from(dual: &Rigid<Lanes>) -> LinearisedSegment {
+        let transform = Rigid {
+            rotation: dual.rotation.map(|entry| entry.re),
+            translation_m: dual.translation_m.map(|entry| entry.re),
+        };
+        let zero = Rigid { rotation: Matrix3::zeros(), translation_m: Vector3::zeros() };
+        let mut derivatives = [zero; MAX_PARAMETERS];
+        // An entry that depends on nothing has no lanes.
+        for (at, eps) in dual.rotation.iter().enumerate().filter_map(|(at, entry)| Some((at, entry.eps.0?))) {
+            derivatives.iter_mut().zip(eps.iter()).for_each(|(d, eps)| d.rotation[at] = *eps);
+        }
+        for (at, eps) in
+            dual.translation_m.iter().enumerate().filter_map(|(at, entry)| Some((at, entry.eps.0?)))
+        {
+            derivatives.iter_mut().zip(eps.iter()).for_each(|(d, eps)| d.translation_m[at] = *eps);
+        }
+        LinearisedSegment { transform, derivatives }
     }
 }
 
@@ -208,9 +222,4 @@ fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D>
         Some(Motion::Revolute) => Rigid { rotation: rotation_of_vector(&(axis * q)), ..Rigid::identity() },
         None => Rigid::identity(),
     }
-}
-
-fn dual_part(dual: &Rigid<Lanes>, lane: usize) -> Rigid<f64> {
-    let part = |x: Lanes| x.eps.0.map_or(0.0, |eps| eps[lane]);
-    Rigid { rotation: dual.rotation.map(part), translation_m: dual.translation_m.map(part) }
 }

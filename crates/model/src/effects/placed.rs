@@ -7,7 +7,7 @@ use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::error::nearest;
-use crate::path::{Twist, linearise};
+use crate::path::{PathAt, Twist};
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::{Model, ModelError};
@@ -196,7 +196,7 @@ impl Effects {
     pub fn linearise(&self, p: &[f64], x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let path = linearise(&self.path, &p, &q, None);
+        let path = PathAt::of(&self.path, &p).linearised(&q);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
             path.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];

@@ -1,0 +1,75 @@
+//! A model at one parameter vector: residual and exact Jacobian of as many observations as are asked for.
+
+use super::{Model, Sides, measured_m, seated_m};
+use crate::effects::Effects;
+use crate::path::PathAt;
+use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
+use crate::segment::{LinearisedSegment, Segment};
+use armcal_core::Observation;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// What is alike for all observations is worked out once.
+pub(crate) struct Linearisation<'a> {
+    model: &'a Model,
+    p: &'a [f64],
+    arm: Arm<'a>,
+    /// The boards that something is seated in, by recording.
+    boards: BTreeMap<usize, LinearisedSegment>,
+}
+
+enum Arm<'a> {
+    Rigid(PathAt<'a>),
+    /// With every pose another path.
+    Deformed(&'a Effects),
+}
+
+impl<'a> Linearisation<'a> {
+    /// For these observations.
+    pub fn of(model: &'a Model, p: &'a [f64], observations: &[&Observation]) -> Linearisation<'a> {
+        let arm = match &model.effects {
+            None => Arm::Rigid(PathAt::of(&model.path, p)),
+            Some(effects) => Arm::Deformed(effects),
+        };
+        let seated = observations.iter().filter_map(|o| Some((o.dwell.recording, model.board_under(o)?)));
+        let boards: BTreeMap<usize, &Segment> = seated.collect();
+        let boards = boards.into_iter().map(|(recording, board)| (recording, board.linearised(p, &[])));
+        Linearisation { model, p, arm, boards: boards.collect() }
+    }
+
+    /// The residual of one of them and d residual / d p.
+    pub fn residual_with_jacobian(&self, o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        let (predicted, in_board_m, columns, seats) = match &self.arm {
+            Arm::Rigid(path) => {
+                let path = path.linearised(&o.joint_rad);
+                (path.tip, seated_m(o), path.parameters, Vec::new())
+            }
+            Arm::Deformed(effects) => {
+                let arm = effects.linearise(self.p, &effects.drivers(self.model, o));
+                (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
+            }
+        };
+        let board = self.model.board_under(o).zip(self.boards.get(&o.dwell.recording));
+        let measured_m = measured_m(o, board.map(|(_, at)| &at.transform), &in_board_m);
+        let residual = Sides { measured_m, predicted }.residual(o);
+        let mut jacobian = DMatrix::zeros(residual.len(), self.model.parameters.len());
+        for (column, twist) in &columns {
+            add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
+        }
+        if let Some(error_rad) = &residual.rotation_rad {
+            let rate = rotation_error_rate(error_rad);
+            for (column, twist) in &columns {
+                add_to_column(&mut jacobian, 3, *column, &(rate * twist.rotation_rad));
+            }
+        }
+        if let Some((board, at)) = board {
+            for (column, change) in board.parameters.clone().zip(&at.derivatives) {
+                add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
+            }
+            for (column, change_m) in &seats {
+                add_to_column(&mut jacobian, 0, *column, &(at.transform.rotation * change_m));
+            }
+        }
+        (residual, jacobian)
+    }
+}
