@@ -4,7 +4,7 @@
 //! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading. Cross-covariance between
 //! position and orientation enters through the encoders only.
 
-use crate::problem::{Known, Problem};
+use crate::problem::{Known, Linearised, Problem};
 use crate::{CalibrateError, FitConfig, Scene};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::{Model, ModelResidual};
@@ -74,11 +74,7 @@ impl<'a> ModelProblem<'a> {
     }
 
     /// The rows that are used.
-    fn used(
-        &self,
-        block: usize,
-        (residual, jacobian): (ModelResidual, DMatrix<f64>),
-    ) -> (DVector<f64>, DMatrix<f64>) {
+    fn used(&self, block: usize, (residual, jacobian): (ModelResidual, DMatrix<f64>)) -> Linearised {
         let rows = self.rows(block);
         let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
         (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
@@ -125,27 +121,18 @@ impl Problem for ModelProblem<'_> {
         DVector::from_iterator(self.rows(block), residual.rows().take(self.rows(block)))
     }
 
-    fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
         let (model, p) = self.scene.seen(self.observations[block], p);
         self.used(block, model.residual_with_jacobian(&p, self.observations[block]))
     }
 
-    fn linearise_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
-    ) -> Result<(), CalibrateError> {
-        let mut at = blocks.start;
-        for run in self.scene.alike(&self.observations[blocks]) {
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
+        let runs = self.scene.alike(&self.observations[blocks.clone()]);
+        let linearised = runs.flat_map(|run| {
             let (model, p) = self.scene.seen(run[0], p);
-            for linearised in model.residuals_with_jacobians(&p, run.iter().copied()) {
-                let (residual, jacobian) = self.used(at, linearised);
-                each(at, residual, jacobian)?;
-                at += 1;
-            }
-        }
-        Ok(())
+            model.residuals_with_jacobians(&p, run)
+        });
+        blocks.zip(linearised).map(|(block, linearised)| self.used(block, linearised)).collect()
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

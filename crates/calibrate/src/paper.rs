@@ -9,7 +9,8 @@
 //! the one nearest nominal. It has no noise model and no weights; unlike `fmincon`, the paper's solver, it needs no
 //! derivative of a norm at zero, where a distance that is fitted exactly has none.
 
-use crate::whitened::{Linearised, Whitened};
+use crate::problem::Linearised;
+use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, PaperObjective, Status};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver as _, SolverStatus, SupportedConeT};

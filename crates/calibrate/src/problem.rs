@@ -1,10 +1,12 @@
 //! What a solver needs to know about a calibration, and nothing about robots: blocks of residual rows (one block an
 //! observation), their exact derivatives, their covariance, and the parameters.
 
-use crate::CalibrateError;
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
+
+/// Residual rows and their derivative, one column a parameter.
+pub type Linearised = (DVector<f64>, DMatrix<f64>);
 
 /// A motion of the parameters that no observation of a problem can ever see.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,18 +44,10 @@ pub trait Problem: Sync {
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64>;
     /// The same with its derivative, one column for each parameter that the block knows ([`Problem::known`]);
     /// fixed ones may be zero.
-    fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>);
-    /// [`Problem::linearised`] of these blocks in order; stops at the first error of `each`.
-    fn linearise_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
-    ) -> Result<(), CalibrateError> {
-        blocks.into_iter().try_for_each(|block| {
-            let (residual, jacobian) = self.linearised(block, p);
-            each(block, residual, jacobian)
-        })
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised;
+    /// [`Problem::linearised`] of these blocks, in order.
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
+        blocks.map(|block| self.linearised(block, p)).collect()
     }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
@@ -90,17 +84,12 @@ impl<P: Problem + ?Sized> Problem for &P {
         (**self).residual(block, p)
     }
 
-    fn linearised(&self, block: usize, p: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
         (**self).linearised(block, p)
     }
 
-    fn linearise_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        each: &mut dyn FnMut(usize, DVector<f64>, DMatrix<f64>) -> Result<(), CalibrateError>,
-    ) -> Result<(), CalibrateError> {
-        (**self).linearise_each(blocks, p, each)
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
+        (**self).linearised_each(blocks, p)
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

@@ -74,7 +74,7 @@ impl<'a> Scene<'a> {
         let Scene::Pooled(pool) = self else { return Vec::new() };
         let mut known: Vec<Known> = Vec::new();
         let mut end = 0;
-        for run in observations.chunk_by(|a, b| a.dwell.recording == b.dwell.recording) {
+        for run in self.alike(observations) {
             let blocks = end..end + run.len();
             end = blocks.end;
             let view = run.first().and_then(|o| pool.views().get(o.dwell.recording));

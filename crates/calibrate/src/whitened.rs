@@ -6,7 +6,7 @@
 //! (or a ridge of 1 m, 1 rad), wide enough not to be felt by anything the data see at all, and keeps directions that
 //! nothing determines where they started.
 
-use crate::problem::Problem;
+use crate::problem::{Linearised, Problem};
 use crate::products::inner;
 use crate::solver::{Arrow, Curvature, triangle};
 use crate::structure::Structure;
@@ -22,9 +22,6 @@ const RIDGE_SIGMA_SI: f64 = 1.0;
 
 /// Half the width of the bounds times this is the standard deviation of the prior they stand for.
 const BOUNDS_TO_SIGMA: f64 = 0.8;
-
-/// Residual rows of one block and their derivative by x.
-pub(crate) type Linearised = (DVector<f64>, DMatrix<f64>);
 
 /// One free parameter in solver units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,7 +141,8 @@ impl<'a> Whitened<'a> {
                 let raw = self.problem.residual(block, &p);
                 self.finite(block, raw.iter(), "the residual")?;
                 let at = self.offsets[block] - first;
-                stacked.rows_mut(at, raw.len()).copy_from(&(&self.whitener[block] * raw));
+                let out = &mut stacked.as_mut_slice()[at..at + raw.len()];
+                whiten(&self.whitener[block], raw.as_slice(), 1.0, out);
             }
             Ok(stacked)
         })?;
@@ -238,7 +236,8 @@ impl<'a> Whitened<'a> {
         let height = self.offsets[at_group.blocks.end] - first;
         let (mut stacked, mut jacobian) =
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
-        self.problem.linearise_each(at_group.blocks.clone(), p, &mut |block, raw, full| {
+        let linearised = self.problem.linearised_each(at_group.blocks.clone(), p);
+        for (block, (raw, full)) in at_group.blocks.clone().zip(linearised) {
             self.finite(block, raw.iter(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
@@ -256,8 +255,7 @@ impl<'a> Whitened<'a> {
                 }
                 whiten(white, raw, a.scale, &mut column[at..at + rows]);
             }
-            Ok(())
-        })?;
+        }
         Ok((stacked, jacobian))
     }
 
