@@ -39,7 +39,7 @@ mod text;
 mod verification;
 mod write;
 
-pub use campaign::{Campaign, FailedRecording, campaign_files, campaign_json, campaign_row, campaign_text};
+pub use campaign::{Campaign, FailedRecording, campaign_json, campaign_row, campaign_text, write_campaign};
 pub use closed_chain::{
     CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_summary_json, closed_terminal, write_closed,
 };

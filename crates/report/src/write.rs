@@ -14,7 +14,7 @@ use crate::{ReportError, Run, summary_json};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError};
 use serde::{Deserialize, Serialize};
-use std::io::Write as _;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 const PAGE: &str = "report.html";
@@ -139,10 +139,19 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
 
 /// A complete file that has no name yet.
 pub(crate) fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
-    let mut file = AtomicFile::create(path).map_err(at(path))?;
-    file.write_all(bytes)
-        .map_err(|e| at(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() }))?;
-    Ok(file)
+    stage_pieces(path, |out| out.write_all(bytes))
+}
+
+/// The same of a file that is written piece by piece, and never in memory as a whole.
+pub(crate) fn stage_pieces(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<AtomicFile>) -> io::Result<()>,
+) -> Result<AtomicFile, ReportError> {
+    let refused =
+        |e: io::Error| at(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() });
+    let mut file = BufWriter::new(AtomicFile::create(path).map_err(at(path))?);
+    write(&mut file).map_err(refused)?;
+    file.into_inner().map_err(|e| refused(e.into_error()))
 }
 
 /// What writing this file ran into.

@@ -19,7 +19,7 @@ pub use shard::Shard;
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use armcal_report::{Campaign, FailedRecording, campaign_files};
+use armcal_report::{Campaign, FailedRecording, write_campaign};
 use key::Keys;
 use shard::{Done, Receipt};
 use std::path::{Path, PathBuf};
@@ -101,7 +101,6 @@ fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<Pat
         }
     }
     let campaign = Campaign::of(&pipeline, rows, failed);
-    let files = campaign_files(&campaign)?;
-    let written = store::write(out, &files)?;
+    let written = write_campaign(&campaign, out)?;
     Ok((campaign, written))
 }

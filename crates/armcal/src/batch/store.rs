@@ -87,7 +87,7 @@ impl Store {
     pub fn finish(&self, made: Unfinished, row: &Row, folder: &str) -> Result<(), Error> {
         let target = self.results.join(folder);
         let at = |source| Error::Folder { path: target.clone(), source };
-        write(made.path(), &[(ROW, serde_json::to_vec_pretty(row).map_err(Error::Json)?)])?;
+        write_one(&made.path().join(ROW), &serde_json::to_vec_pretty(row).map_err(Error::Json)?)?;
         std::fs::remove_file(made.path().join(LOCK)).map_err(at)?;
         readable_by_all(made.path()).map_err(at)?;
         match std::fs::rename(made.path(), &target) {
@@ -140,16 +140,6 @@ impl Unfinished {
 /// A result's folder as seen from the campaign's.
 pub(super) fn relative(folder: &str) -> String {
     format!("{RESULTS}/{folder}")
-}
-
-/// Writes files into a folder, each whole or not at all.
-pub(super) fn write(folder: &Path, files: &[(&'static str, Vec<u8>)]) -> Result<Vec<PathBuf>, Error> {
-    let write = |(name, bytes): &(&'static str, Vec<u8>)| {
-        let path = folder.join(name);
-        write_one(&path, bytes)?;
-        Ok(path)
-    };
-    files.iter().map(write).collect()
 }
 
 /// Writes a file whole or not at all.

@@ -1,15 +1,20 @@
 //! A campaign for programs, and its page.
 
-use super::page::campaign_html;
+use super::page::CampaignPage;
 use super::terminal::conclusion;
 use super::words::{meaning, sentence};
 use super::{Campaign, FailedRecording};
 use crate::ReportError;
 use crate::run::{Status, VERSION};
 use crate::tables::Columns;
+use crate::write::{at, stage, stage_pieces};
 use armcal_campaign::{Change, Row};
 use armcal_core::Unit;
+use armcal_recording::atomic::AtomicFile;
+use askama::Template as _;
 use serde::Serialize;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
 
 /// Version of the contract of `campaign.json`.
 const SCHEMA: &str = "armcal.campaign/1";
@@ -44,37 +49,55 @@ struct Told<'a> {
 
 /// `campaign.json`: every row in SI, what failed, what changed; indented, with a final newline.
 pub fn campaign_json(campaign: &Campaign) -> String {
-    let told = |change| Told { change, sentence: sentence(campaign, change), meaning: meaning(change) };
-    let file = File {
-        schema: SCHEMA,
-        version: VERSION,
-        pipeline: &campaign.pipeline,
-        status: campaign.status(),
-        conclusion: conclusion(campaign),
-        recordings: campaign
-            .rows
-            .iter()
-            .zip(&campaign.folders)
-            .map(|(row, folder)| Recording { folder, row })
-            .collect(),
-        failed: &campaign.failed,
-        changes: campaign.changes.iter().map(told).collect(),
-    };
-    let json = serde_json::to_string_pretty(&file);
+    let json = serde_json::to_string_pretty(&File::of(campaign));
     json.expect("strings, numbers and lists under literal names always serialise") + "\n"
 }
 
-/// Files of a campaign, by name: `campaign.html`, `campaign.json`, and `campaign.parquet` with a row a recording and a
-/// column a quantity.
+impl<'a> File<'a> {
+    fn of(campaign: &'a Campaign) -> File<'a> {
+        let told = |change| Told { change, sentence: sentence(campaign, change), meaning: meaning(change) };
+        File {
+            schema: SCHEMA,
+            version: VERSION,
+            pipeline: &campaign.pipeline,
+            status: campaign.status(),
+            conclusion: conclusion(campaign),
+            recordings: campaign
+                .rows
+                .iter()
+                .zip(&campaign.folders)
+                .map(|(row, folder)| Recording { folder, row })
+                .collect(),
+            failed: &campaign.failed,
+            changes: campaign.changes.iter().map(told).collect(),
+        }
+    }
+}
+
+/// Writes `campaign.html`, `campaign.json`, and `campaign.parquet` with a row a recording and a column a quantity, into
+/// `folder`; returns their paths. All are complete before the first one appears.
 ///
 /// # Errors
-/// A page or table that cannot be made.
-pub fn campaign_files(campaign: &Campaign) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
-    Ok(vec![
-        ("campaign.html", campaign_html(campaign)?.into_bytes()),
-        ("campaign.json", campaign_json(campaign).into_bytes()),
-        ("campaign.parquet", columns(campaign).encode("campaign.parquet")?),
-    ])
+/// A page or table that cannot be made, a file that cannot be written.
+pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    let [html, json, parquet] =
+        ["campaign.html", "campaign.json", "campaign.parquet"].map(|name| folder.join(name));
+    let staged = [
+        {
+            let page = CampaignPage::of(campaign)?;
+            stage_pieces(&html, |out| page.write_into(out))?
+        },
+        stage_pieces(&json, |out| {
+            serde_json::to_writer_pretty(&mut *out, &File::of(campaign))?;
+            out.write_all(b"\n")
+        })?,
+        stage(&parquet, &columns(campaign).encode("campaign.parquet")?)?,
+    ];
+    let named = |file: AtomicFile| {
+        let path = file.target().to_owned();
+        file.commit().map_err(at(&path)).map(|()| path)
+    };
+    staged.into_iter().map(named).collect()
 }
 
 fn columns(campaign: &Campaign) -> Columns {

@@ -15,14 +15,15 @@ use serde::Serialize;
 /// Points of one curve; more are thinned out evenly.
 const MOST_POINTS: usize = 5000;
 
+/// A campaign as one offline HTML page.
 #[derive(Template)]
 #[template(path = "campaign.html")]
-struct CampaignPage<'a> {
+pub(super) struct CampaignPage<'a> {
     policy: String,
     style: &'a str,
     plotly: &'a str,
     data: String,
-    script: &'a str,
+    script: String,
     version: &'a str,
     pipeline: &'a str,
     sentence: String,
@@ -44,25 +45,27 @@ struct Shown<'a> {
     warnings: usize,
 }
 
-/// A campaign as one offline HTML page.
-pub(super) fn campaign_html(campaign: &Campaign) -> Result<String, ReportError> {
-    let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")]);
-    let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
-    let rows = campaign.rows.iter().zip(&campaign.folders);
-    let page = CampaignPage {
-        policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
-        style: embed::STYLE,
-        plotly: embed::PLOTLY,
-        data: embed::json_for_html(&Document::of(campaign))?,
-        script: &script,
-        version: VERSION,
-        pipeline: &campaign.pipeline,
-        sentence: conclusion(campaign),
-        changes: told.collect(),
-        rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
-        failed: &campaign.failed,
-    };
-    Ok(page.render()?)
+impl<'a> CampaignPage<'a> {
+    /// # Errors
+    /// Data that cannot be written as JSON.
+    pub fn of(campaign: &'a Campaign) -> Result<CampaignPage<'a>, ReportError> {
+        let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")]);
+        let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
+        let rows = campaign.rows.iter().zip(&campaign.folders);
+        Ok(CampaignPage {
+            policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
+            style: embed::STYLE,
+            plotly: embed::PLOTLY,
+            data: embed::json_for_html(&Document::of(campaign))?,
+            script,
+            version: VERSION,
+            pipeline: &campaign.pipeline,
+            sentence: conclusion(campaign),
+            changes: told.collect(),
+            rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
+            failed: &campaign.failed,
+        })
+    }
 }
 
 fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {
