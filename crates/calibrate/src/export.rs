@@ -7,7 +7,7 @@
 use crate::model_problem::ModelProblem;
 use crate::outcome::Fit;
 use crate::robust::RobustCost;
-use crate::whitened::Whitened;
+use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective, fit, frames};
 use armcal_core::Observation;
 use armcal_model::Model;
@@ -86,24 +86,18 @@ impl WhitenedProblem<'_> {
 
     /// f(x): whitened rows of the observations, then one row for each prior.
     pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
-        Ok(self.evaluate(x, self.white.residual(x)?, None).0)
+        Ok(self.evaluate(&self.white.at(x.clone())?).0)
     }
 
     /// df/dx.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, CalibrateError> {
-        let (residual, jacobian) = self.white.linearised(x)?;
-        Ok(self.evaluate(x, residual, Some(jacobian)).1)
+        Ok(self.evaluate(&self.white.at(x.clone())?).1)
     }
 
-    fn evaluate(
-        &self,
-        x: &DVector<f64>,
-        mut residual: DVector<f64>,
-        jacobian: Option<DMatrix<f64>>,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (rows, n) = (residual.len(), x.len());
+    fn evaluate(&self, at: &Point) -> (DVector<f64>, DMatrix<f64>) {
+        let (mut residual, mut jacobian) = (at.residual.clone(), self.white.jacobian(at));
+        let (rows, n) = (residual.len(), at.x.len());
         let cost = RobustCost::new(&self.white, &self.config, self.sigma_scale);
-        let mut jacobian = jacobian.unwrap_or_else(|| DMatrix::zeros(rows, n));
         for (j, u) in cost.norms(&residual).into_iter().enumerate() {
             let (at, count, loss) = (self.white.offsets[j], self.white.dimension(j), cost.loss(j));
             let root = (2.0 * loss.rho(u)).sqrt();
@@ -122,7 +116,7 @@ impl WhitenedProblem<'_> {
         let mut derivative = DMatrix::zeros(rows + n, n);
         derivative.rows_mut(0, rows).copy_from(&jacobian);
         for (k, a) in self.white.axes.iter().enumerate() {
-            all[rows + k] = a.precision.sqrt() * x[k];
+            all[rows + k] = a.precision.sqrt() * at.x[k];
             derivative[(rows + k, k)] = a.precision.sqrt();
         }
         (all, derivative)

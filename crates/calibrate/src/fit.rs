@@ -7,7 +7,7 @@ use crate::problem::Problem;
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Settings};
 use crate::statistics::{self, Uncertainty};
-use crate::whitened::Whitened;
+use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, undetermined};
 use armcal_core::{Observation, Parameter, Role};
 use armcal_model::Model;
@@ -76,27 +76,27 @@ fn fit_from(
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
     let solved = solve(&white, sigma_scale, config)?;
-    let (residual, squares) = white.squares(&solved.x)?;
+    let (residual, squares) = (&solved.at.residual, white.squares(&solved.at));
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
-    let uncertainty = statistics::uncertainty(&cost, &residual, &squares, &name)?;
+    let uncertainty = statistics::uncertainty(&cost, residual, &squares, &name)?;
     let fitted = statistics::fitted_directions(&uncertainty.variances, &white.axes);
     let weights = match solved.paper {
         Some(_) => vec![1.0; white.blocks()],
-        None => cost.weights(&residual),
+        None => cost.weights(residual),
     };
     let mut fit = Fit {
         objective: in_words(config).to_string(),
-        estimates: estimates(&white, &solved.x, &uncertainty),
+        estimates: estimates(&white, &solved.at.x, &uncertainty),
         covariance: full_covariance(&white, &uncertainty.covariance),
         weights,
-        sigma_scale: proposal2_scale(&cost, &residual, fitted),
+        sigma_scale: proposal2_scale(&cost, residual, fitted),
         rank: uncertainty.rank,
         undetermined: undetermined::directions(
             &uncertainty.undetermined,
             &white.axes,
             problem.parameters(),
-            &problem.symmetries(&white.parameters_at(&solved.x)),
+            &problem.symmetries(&white.parameters_at(&solved.at.x)),
         ),
         paper: solved.paper,
         status: solved.status,
@@ -109,7 +109,7 @@ fn fit_from(
 
 /// Where the parameters ended, and the scale the loss was judged at.
 pub(crate) struct Solved {
-    pub x: DVector<f64>,
+    pub at: Point,
     pub sigma_scale: f64,
     pub paper: Option<PaperObjective>,
     pub status: Status,
@@ -138,15 +138,14 @@ pub(crate) fn solve(
     }
     let solution = paper::minimise(white, config)?;
     let mut solved = Solved {
-        x: solution.x,
+        at: white.at(solution.x)?,
         sigma_scale: 1.0,
         paper: Some(solution.objective),
         status: solution.status,
         iterations: solution.iterations,
     };
-    let residual = white.residual(&solved.x)?;
-    solved.sigma_scale =
-        proposal2_scale(&solved.cost(white, config), &residual, white.axes.len() as f64).max(1.0);
+    let cost = solved.cost(white, config);
+    solved.sigma_scale = proposal2_scale(&cost, &solved.at.residual, white.axes.len() as f64).max(1.0);
     Ok(solved)
 }
 
@@ -159,11 +158,11 @@ fn solve_robust(
     config: &FitConfig,
 ) -> Result<Solved, CalibrateError> {
     let estimated = config.objective == Objective::Robust && config.scale == Scale::Estimated;
-    let mut x = white.start();
+    let mut at = white.at(white.start())?;
     let mut sigma_scale = match known {
         _ if !estimated => 1.0,
         Some(scale) => scale.max(1.0),
-        None => (GENEROUS * median_scale(white, &white.residual(&x)?)).max(1.0),
+        None => (GENEROUS * median_scale(white, &at.residual)).max(1.0),
     };
     let mut iterations = 0;
     let mut round = if known.is_some() { ROUGH_ROUNDS } else { 0 };
@@ -173,17 +172,17 @@ fn solve_robust(
         let step_tolerance = if rough { ROUGH_STEP_TOLERANCE } else { STEP_TOLERANCE };
         let cost = RobustCost { exact_curvature: !rough, ..RobustCost::new(white, config, sigma_scale) };
         let settings = Settings { max_iterations: config.max_iterations, step_tolerance };
-        let solution = solver::minimise(&cost, &x, settings)?;
+        let solution = solver::minimise(&cost, at, settings);
         iterations += solution.iterations;
         let fitted = solution.fitted_directions(white);
-        x = solution.x;
+        at = solution.at;
         let mut next = sigma_scale;
         if estimated {
-            next = proposal2_scale(&cost, &white.residual(&x)?, fitted).max(1.0);
+            next = proposal2_scale(&cost, &at.residual, fitted).max(1.0);
         }
         let settled = (next / sigma_scale - 1.0).abs() < SCALE_TOLERANCE;
         if !rough && (settled || round >= SCALE_ROUNDS) {
-            return Ok(Solved { x, sigma_scale, paper: None, status: solution.status, iterations });
+            return Ok(Solved { at, sigma_scale, paper: None, status: solution.status, iterations });
         }
         sigma_scale = next;
     }

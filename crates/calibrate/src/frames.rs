@@ -82,7 +82,7 @@ pub(crate) fn fit_some(
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
     let solved = fit::solve(&white, None, &FitConfig { objective, ..config.clone() })?;
-    Ok(white.parameters_at(&solved.x))
+    Ok(white.parameters_at(&solved.at.x))
 }
 
 /// The alternation on all observations; what a recording of a pool has for itself then on its own ones.

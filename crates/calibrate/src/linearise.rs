@@ -45,8 +45,7 @@ pub fn linearise(
 ) -> Result<Linearisation, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
-    let x = white.start();
-    let (residual, jacobian) = white.linearised(&x)?;
+    let at = white.at(white.start())?;
     let axis = |(a, x): (&crate::whitened::Axis, &f64)| LinearAxis {
         index: a.index,
         scale: a.scale,
@@ -54,10 +53,10 @@ pub fn linearise(
         offset: *x,
     };
     Ok(Linearisation {
-        axes: white.axes.iter().zip(x.iter()).map(axis).collect(),
+        axes: white.axes.iter().zip(at.x.iter()).map(axis).collect(),
         rows: white.offsets.windows(2).map(|pair| pair[0]..pair[1]).collect(),
-        residual,
-        jacobian,
+        jacobian: white.jacobian(&at),
+        residual: at.residual,
         whitener: white.into_whitener(),
     })
 }

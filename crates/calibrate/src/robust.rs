@@ -4,9 +4,10 @@
 //! the residuals in units of the declared noise, and w the prior precision (1 in units of its own standard deviation).
 
 use crate::loss::{Loss, chi_median};
+use crate::problem::Linearised;
 use crate::products::inner;
 use crate::solver::{Arrow, Cost, Curvature, Quadratic, triangle};
-use crate::whitened::Whitened;
+use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::robust::median;
 use nalgebra::{DMatrix, DVector};
@@ -44,27 +45,27 @@ impl<'a, 'p> RobustCost<'a, 'p> {
         let norms = self.norms(residual);
         norms.iter().enumerate().map(|(j, &u)| self.loss(j).weight(u)).collect()
     }
-
-    fn of_residual(&self, x: &DVector<f64>, residual: &DVector<f64>) -> f64 {
-        let data: f64 = self.norms(residual).iter().enumerate().map(|(j, &u)| self.loss(j).rho(u)).sum();
-        let prior: f64 = self.white.axes.iter().zip(x.iter()).map(|(a, x)| a.precision * x * x).sum();
-        data + 0.5 * prior
-    }
 }
 
 impl Cost for RobustCost<'_, '_> {
-    fn value(&self, x: &DVector<f64>) -> Result<f64, CalibrateError> {
-        Ok(self.of_residual(x, &self.white.residual(x)?))
+    fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
+        self.white.at(x)
+    }
+
+    fn value(&self, at: &Point) -> f64 {
+        let norms = self.norms(&at.residual);
+        let data: f64 = norms.iter().enumerate().map(|(j, &u)| self.loss(j).rho(u)).sum();
+        let prior: f64 = self.white.axes.iter().zip(at.x.iter()).map(|(a, x)| a.precision * x * x).sum();
+        data + 0.5 * prior
     }
 
     /// Gauss-Newton in the model, exact in the loss: for an outlier `w (I - u u')` instead of `w I`, because Huber's
     /// loss has no curvature along the residual (Triggs et al. 2000, section 4.3, with rho'' from the table).
-    fn model(&self, x: &DVector<f64>) -> Result<Quadratic, CalibrateError> {
-        let (p, structure) = (self.white.parameters_at(x), &self.white.structure);
+    fn model(&self, at: &Point) -> Quadratic {
+        let (x, structure) = (&at.x, &self.white.structure);
         let precision =
             DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.precision));
-        let parts = self.white.of_groups(|group| self.part(&p, group))?;
-        let residual = self.white.stacked(parts.iter().map(|part| &part.residual));
+        let parts = self.white.each_group(|group| self.part(group, &at.groups[group]));
         let (mut gradient, mut damping) = (DVector::zeros(x.len()), DVector::zeros(x.len()));
         for (group, part) in parts.iter().enumerate() {
             for (k, axis) in structure.axes(group).enumerate() {
@@ -74,7 +75,6 @@ impl Cost for RobustCost<'_, '_> {
         }
         gradient += precision.component_mul(x);
         damping += &precision;
-        let value = self.of_residual(x, &residual);
         let mut of_data: Vec<DMatrix<f64>> = parts.into_iter().map(|part| part.curvature).collect();
         let hessian = match of_data.pop() {
             Some(mut hessian) if structure.is_dense() => {
@@ -86,7 +86,7 @@ impl Cost for RobustCost<'_, '_> {
                 Curvature::Arrow(Arrow::new(structure.clone(), of_data, precision))
             }
         };
-        Ok(Quadratic { value, gradient, hessian, damping })
+        Quadratic { value: self.value(at), gradient, hessian, damping }
     }
 
     fn lower(&self) -> DVector<f64> {
@@ -100,8 +100,6 @@ impl Cost for RobustCost<'_, '_> {
 
 /// What the blocks of one group add to the model, over the group's columns.
 struct Part {
-    /// Whitened, not weighted.
-    residual: DVector<f64>,
     gradient: DVector<f64>,
     /// Diagonal of the curvature, without what outliers take from it.
     squares: DVector<f64>,
@@ -110,8 +108,8 @@ struct Part {
 }
 
 impl RobustCost<'_, '_> {
-    fn part(&self, p: &[f64], group: usize) -> Result<Part, CalibrateError> {
-        let (residual, mut jacobian) = self.white.linearised_group(p, group)?;
+    fn part(&self, group: usize, (residual, jacobian): &Linearised) -> Part {
+        let mut jacobian = jacobian.clone();
         let blocks = self.white.structure.groups[group].blocks.clone();
         let (first, count) = (self.white.offsets[blocks.start], blocks.len());
         let mut weighted = residual.clone();
@@ -134,7 +132,7 @@ impl RobustCost<'_, '_> {
         if self.white.structure.is_dense() {
             let squares = inner(&jacobian, &jacobian);
             let curvature = &squares - inner(&removed, &removed);
-            return Ok(Part { residual, gradient, squares: squares.diagonal(), curvature });
+            return Part { gradient, squares: squares.diagonal(), curvature };
         }
         let squares = DVector::from_iterator(
             jacobian.ncols(),
@@ -145,7 +143,7 @@ impl RobustCost<'_, '_> {
             let mut rows = jacobian.rows_mut(*at, direction.len());
             rows -= direction * removed.row(k);
         }
-        Ok(Part { residual, gradient, squares, curvature: triangle(jacobian) })
+        Part { gradient, squares, curvature: triangle(jacobian) }
     }
 }
 

@@ -54,6 +54,16 @@ pub(crate) struct Whitened<'a> {
     pub structure: Arc<Structure>,
 }
 
+/// The whitened problem linearised at x.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub x: DVector<f64>,
+    /// Whitened residuals of all blocks, stacked.
+    pub residual: DVector<f64>,
+    /// Rows and derivative of each group, over its columns.
+    pub groups: Vec<Linearised>,
+}
+
 impl<'a> Whitened<'a> {
     /// Whitens `problem` at `start`, with the parameters `free` of it free.
     pub fn new(
@@ -130,41 +140,19 @@ impl<'a> Whitened<'a> {
         p
     }
 
-    /// Whitened residuals of all blocks, stacked.
-    pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
-        let p = self.parameters_at(x);
-        let parts = self.of_groups(|group| {
-            let blocks = self.structure.groups[group].blocks.clone();
-            let first = self.offsets[blocks.start];
-            let mut stacked = DVector::zeros(self.offsets[blocks.end] - first);
-            for block in blocks {
-                let raw = self.problem.residual(block, &p);
-                self.finite(block, raw.iter(), "the residual")?;
-                let at = self.offsets[block] - first;
-                let out = &mut stacked.as_mut_slice()[at..at + raw.len()];
-                whiten(&self.whitener[block], raw.as_slice(), 1.0, out);
-            }
-            Ok(stacked)
-        })?;
-        Ok(self.stacked(parts.iter()))
+    /// Linearises at x.
+    pub fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
+        let p = self.parameters_at(&x);
+        let groups = self.each_group(|group| self.linearised_group(&p, group));
+        let groups = groups.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let rows = groups.iter().flat_map(|(residual, _)| residual.iter().copied());
+        Ok(Point { x, residual: DVector::from_iterator(self.rows(), rows), groups })
     }
 
-    /// Something of every group of blocks, in their order; of several errors the first group's.
-    pub fn of_groups<T: Send>(
-        &self,
-        of: impl Fn(usize) -> Result<T, CalibrateError> + Send + Sync,
-    ) -> Result<Vec<T>, CalibrateError> {
+    /// Something of every group of blocks, in their order.
+    pub fn each_group<T: Send>(&self, of: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let count = self.structure.groups.len();
-        if count == 1 {
-            return Ok(vec![of(0)?]);
-        }
-        let found: Vec<Result<T, CalibrateError>> = (0..count).into_par_iter().map(of).collect();
-        found.into_iter().collect()
-    }
-
-    /// Rows of the groups, one under the other.
-    pub fn stacked<'v>(&self, parts: impl Iterator<Item = &'v DVector<f64>>) -> DVector<f64> {
-        DVector::from_iterator(self.rows(), parts.flat_map(|part| part.iter().copied()))
+        if count == 1 { vec![of(0)] } else { (0..count).into_par_iter().map(of).collect() }
     }
 
     /// Position residuals [m] of all blocks and their derivative by x, neither whitened.
@@ -195,42 +183,31 @@ impl<'a> Whitened<'a> {
         (0..self.blocks()).map(norm).collect()
     }
 
-    /// Whitened residuals and their derivative by x, stacked.
-    pub fn linearised(&self, x: &DVector<f64>) -> Result<Linearised, CalibrateError> {
-        let p = self.parameters_at(x);
-        if self.structure.is_dense() {
-            return self.linearised_group(&p, 0);
-        }
-        let parts = self.of_groups(|group| self.linearised_group(&p, group))?;
+    /// The derivative of all residuals by x.
+    pub fn jacobian(&self, at: &Point) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.rows(), self.axes.len());
-        for (group, (_, part)) in parts.iter().enumerate() {
+        for (group, (_, part)) in at.groups.iter().enumerate() {
             let first = self.offsets[self.structure.groups[group].blocks.start];
             for (axis, column) in self.structure.axes(group).zip(part.column_iter()) {
                 jacobian.view_mut((first, axis), (part.nrows(), 1)).copy_from(&column);
             }
         }
-        Ok((self.stacked(parts.iter().map(|(residual, _)| residual)), jacobian))
+        jacobian
     }
 
-    /// Whitened residuals, stacked, and `J'J` of their derivative.
-    pub fn squares(&self, x: &DVector<f64>) -> Result<(DVector<f64>, Curvature), CalibrateError> {
-        let p = self.parameters_at(x);
+    /// `J'J` of that derivative.
+    pub fn squares(&self, at: &Point) -> Curvature {
         if self.structure.is_dense() {
-            let (residual, jacobian) = self.linearised_group(&p, 0)?;
-            return Ok((residual, Curvature::Dense(inner(&jacobian, &jacobian))));
+            let jacobian = &at.groups[0].1;
+            return Curvature::Dense(inner(jacobian, jacobian));
         }
-        let parts = self.of_groups(|group| {
-            let (residual, jacobian) = self.linearised_group(&p, group)?;
-            Ok((residual, triangle(jacobian)))
-        })?;
-        let (residuals, triangles): (Vec<DVector<f64>>, Vec<DMatrix<f64>>) = parts.into_iter().unzip();
+        let triangles = self.each_group(|group| triangle(at.groups[group].1.clone()));
         let nothing = DVector::zeros(self.axes.len());
-        let arrow = Arrow::new(self.structure.clone(), triangles, nothing);
-        Ok((self.stacked(residuals.iter()), Curvature::Arrow(arrow)))
+        Curvature::Arrow(Arrow::new(self.structure.clone(), triangles, nothing))
     }
 
     /// The rows of one group at parameters `p`, with the columns of its own axes, then those of the shared ones.
-    pub fn linearised_group(&self, p: &[f64], group: usize) -> Result<Linearised, CalibrateError> {
+    fn linearised_group(&self, p: &[f64], group: usize) -> Result<Linearised, CalibrateError> {
         let at_group = &self.structure.groups[group];
         let first = self.offsets[at_group.blocks.start];
         let height = self.offsets[at_group.blocks.end] - first;

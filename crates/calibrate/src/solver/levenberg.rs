@@ -1,7 +1,8 @@
 //! Levenberg-Marquardt with bounds: every step is the exact minimiser of the damped quadratic model within the box.
 
 use super::{Cost, Curvature, Quadratic, bounded_qp};
-use crate::{CalibrateError, Status};
+use crate::Status;
+use crate::whitened::Point;
 use nalgebra::DVector;
 
 /// When to stop.
@@ -16,7 +17,7 @@ pub(crate) struct Settings {
 /// Where the iteration ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
-    pub x: DVector<f64>,
+    pub at: Point,
     /// Curvature at the last point it was computed at: the solution or one step before it.
     pub hessian: Curvature,
     pub status: Status,
@@ -28,26 +29,22 @@ pub(crate) struct Solution {
 /// Marquardt's scaling by the largest curvature seen; damping by the ratio of actual to predicted decrease (Madsen,
 /// Nielsen and Tingleff 2004, with a factor of ten instead of three on the way down). The test of convergence has no
 /// unit: the step in the metric of the Hessian, that is, in standard deviations of the estimate. A trial point at
-/// which the cost is not finite counts as a failed step; at the start it is an error.
-pub(crate) fn minimise(
-    cost: &dyn Cost,
-    start: &DVector<f64>,
-    settings: Settings,
-) -> Result<Solution, CalibrateError> {
+/// which the cost is not finite counts as a failed step; the start is evaluated by the caller.
+pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Solution {
     let (lower, upper) = (cost.lower(), cost.upper());
-    let mut x = start.clone();
-    let mut model = cost.model(&x)?;
+    let mut at = start;
+    let mut model = cost.model(&at);
     let mut damping = model.damping.clone();
     let (mut mu, mut growth) = (1e-8, 10.0);
     for iterations in 0..settings.max_iterations {
         damping.zip_apply(&model.damping, |d, new| *d = d.max(new));
         loop {
             let damped = model.hessian.damped(&(&damping * mu));
-            let step = bounded_qp::minimise(&damped, &model.gradient, &(&lower - &x), &(&upper - &x));
+            let step = bounded_qp::minimise(&damped, &model.gradient, &(&lower - &at.x), &(&upper - &at.x));
             let Some(step) = step.filter(|d| d.iter().all(|v| v.is_finite())) else {
                 mu *= growth;
                 if mu > 1e20 {
-                    return Ok(stopped(x, model, Status::IterationLimit, iterations));
+                    return stopped(at, model, Status::IterationLimit, iterations);
                 }
                 continue;
             };
@@ -55,35 +52,35 @@ pub(crate) fn minimise(
             let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
             let rounding = 16.0 * f64::EPSILON * model.value.abs();
             let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;
-            let trial = snapped(&x + step, &lower, &upper);
-            let value = cost.value(&trial).unwrap_or(f64::INFINITY);
+            let trial = cost.at(snapped(&at.x + step, &lower, &upper)).ok();
+            let value = trial.as_ref().map_or(f64::INFINITY, |trial| cost.value(trial));
             let gain = (model.value - value) / predicted;
             if done {
                 // Costs at two points this close differ by less than their rounding: only what more than the tolerated
                 // step is worth says that the last step was wrong.
                 let tolerated = rounding.max(0.5 * settings.step_tolerance.powi(2));
-                let x = if value - model.value <= tolerated { trial } else { x };
-                return Ok(stopped(x, model, Status::Converged, iterations + 1));
+                let end = trial.filter(|_| value - model.value <= tolerated).unwrap_or(at);
+                return stopped(end, model, Status::Converged, iterations + 1);
             }
-            if gain > 1e-4 {
+            if let Some(trial) = trial.filter(|_| gain > 1e-4) {
                 mu = if gain > 0.5 { (0.1 * mu).max(1e-15) } else { mu };
                 growth = 10.0;
-                x = trial;
+                at = trial;
                 break;
             }
             mu *= growth;
             growth *= 2.0;
             if !mu.is_finite() {
-                return Ok(stopped(x, model, Status::IterationLimit, iterations));
+                return stopped(at, model, Status::IterationLimit, iterations);
             }
         }
-        model = cost.model(&x)?;
+        model = cost.model(&at);
     }
-    Ok(stopped(x, model, Status::IterationLimit, settings.max_iterations))
+    stopped(at, model, Status::IterationLimit, settings.max_iterations)
 }
 
-fn stopped(x: DVector<f64>, model: Quadratic, status: Status, iterations: usize) -> Solution {
-    Solution { x, hessian: model.hessian, status, iterations }
+fn stopped(at: Point, model: Quadratic, status: Status, iterations: usize) -> Solution {
+    Solution { at, hessian: model.hessian, status, iterations }
 }
 
 /// Puts what is at a bound up to rounding onto the bound.

@@ -20,14 +20,17 @@ pub(crate) use curvature::Curvature;
 pub(crate) use levenberg::{Settings, Solution, minimise};
 
 use crate::CalibrateError;
+use crate::whitened::Point;
 use nalgebra::DVector;
 
 /// A cost with its second-order model.
 pub(crate) trait Cost {
-    /// Value at x.
-    fn value(&self, x: &DVector<f64>) -> Result<f64, CalibrateError>;
-    /// Value, gradient and a positive semidefinite approximation of the Hessian at x.
-    fn model(&self, x: &DVector<f64>) -> Result<Quadratic, CalibrateError>;
+    /// What is known at x: evaluated once, whatever is asked of it.
+    fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError>;
+    /// Value there.
+    fn value(&self, at: &Point) -> f64;
+    /// Value, gradient and a positive semidefinite approximation of the Hessian there.
+    fn model(&self, at: &Point) -> Quadratic;
     /// Lower bound of every x.
     fn lower(&self) -> DVector<f64>;
     /// Upper bound of every x.
