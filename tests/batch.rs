@@ -159,8 +159,8 @@ fn a_thousand_recordings_killed_ten_times() {
     let lab = archive.path("lab");
     std::fs::create_dir(&lab).expect("a folder");
     // A lab keeps a session in memory: twenty of them.
-    (0..20).for_each(|k| weeks(&lab, 100 + k, 50 * k..50 * k + 50, ""));
-    let recordings = (0..1000).map(|week| format!("lab/week{week:02}.mcap\n"));
+    (0..20).for_each(|k| sessions(&lab, 100 + k, 50 * k..50 * k + 50, DAY_S, ""));
+    let recordings = (0..1000).map(|number| format!("lab/week{number:02}.mcap\n"));
     let manifest = format!(
         "pipeline = \"rig.toml\"\n{}",
         recordings.map(|r| format!("[[recordings]]\npaths = [\"{}\"]\n", r.trim())).collect::<String>()
@@ -221,16 +221,20 @@ fn a_changed_pipeline_or_recording_is_worked_on_again_and_nothing_else_is() {
     assert!(!expect(&archive.batch("out"), 3).contains("there already"));
 }
 
-/// Simulates recordings of the rig that this seed draws, a week apart, with something hidden in them.
-fn weeks(folder: &Path, seed: u64, weeks: std::ops::Range<u64>, hidden: &str) {
+const DAY_S: u64 = 86_400;
+const WEEK_S: u64 = 7 * DAY_S;
+
+/// Simulates these of many recordings of the rig that this seed draws, one every so often, with something hidden in them.
+fn sessions(folder: &Path, seed: u64, numbers: std::ops::Range<u64>, every_s: u64, hidden: &str) {
     let shipped = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
     let own = shipped.split("[[recordings]]").next().expect("a head");
     let boards = format!("\"{}/pipelines/boards/", root().display());
-    let start_s = 1_760_000_000 + weeks.start * 604_800;
-    let mut lab = own.replace("\"../boards/", &boards).replace("interval_s = 900.0", "interval_s = 604800.0");
+    let start_s = 1_760_000_000 + numbers.start * every_s;
+    let every = format!("interval_s = {every_s}.0");
+    let mut lab = own.replace("\"../boards/", &boards).replace("interval_s = 900.0", &every);
     lab = lab.replace("1_760_000_000", &start_s.to_string()).replace("seed = 4", &format!("seed = {seed}"));
     lab.push_str(hidden);
-    weeks.for_each(|week| lab.push_str(&format!("\n[[recordings]]\nname = \"week{week:02}\"\n")));
+    numbers.for_each(|number| lab.push_str(&format!("\n[[recordings]]\nname = \"week{number:02}\"\n")));
     let file = folder.join("lab.toml");
     std::fs::write(&file, lab).expect("lab file");
     expect(&armcal([Path::new("simulate"), &file, Path::new("--out"), folder]), 0);
@@ -269,7 +273,7 @@ fn a_bumped_table_and_a_slipped_tooth_are_flagged_in_their_week() {
         slip_deg = -1.5
         recording = 9
     ";
-    weeks(&lab, 4, 0..13, hidden);
+    sessions(&lab, 4, 0..13, WEEK_S, hidden);
     let arg = Path::new;
     let glob = lab.join("*.mcap");
     let output = armcal([
