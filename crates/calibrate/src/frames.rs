@@ -98,7 +98,7 @@ fn aligned(
     let mut p = start;
     let of_model = all.run(p[..scene.model().parameters().len()].to_vec(), which);
     p[..of_model.len()].copy_from_slice(&of_model);
-    for run in problem.observations().chunk_by(|a, b| a.dwell.recording == b.dwell.recording) {
+    for run in scene.alike(problem.observations()) {
         let Some(view) = run.first().and_then(|o| pool.views().get(o.dwell.recording)) else { continue };
         let own = view.model.parameters().iter().zip(&view.index);
         let own = own.filter(|(_, global)| pool.is_copy(**global) && which(&pool.parameters()[**global]));

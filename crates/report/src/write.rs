@@ -110,11 +110,7 @@ pub fn write_all(
     write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
 
     let mut written = vec![mcap_path];
-    for file in staged {
-        let path = file.target().to_owned();
-        file.commit().map_err(at(&path))?;
-        written.push(path);
-    }
+    written.extend(commit_all(staged)?);
     Ok(written)
 }
 
@@ -152,6 +148,15 @@ pub(crate) fn stage_pieces(
     let mut file = BufWriter::new(AtomicFile::create(path).map_err(at(path))?);
     write(&mut file).map_err(refused)?;
     file.into_inner().map_err(|e| refused(e.into_error()))
+}
+
+/// Gives complete files their names; returns their paths.
+pub(crate) fn commit_all(staged: impl IntoIterator<Item = AtomicFile>) -> Result<Vec<PathBuf>, ReportError> {
+    let named = |file: AtomicFile| {
+        let path = file.target().to_owned();
+        file.commit().map_err(at(&path)).map(|()| path)
+    };
+    staged.into_iter().map(named).collect()
 }
 
 /// What writing this file ran into.

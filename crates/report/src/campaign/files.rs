@@ -7,10 +7,9 @@ use super::{Campaign, FailedRecording};
 use crate::ReportError;
 use crate::run::{Status, VERSION};
 use crate::tables::Columns;
-use crate::write::{at, stage, stage_pieces};
+use crate::write::{commit_all, stage, stage_pieces};
 use armcal_campaign::{Change, Row};
 use armcal_core::Unit;
-use armcal_recording::atomic::AtomicFile;
 use askama::Template as _;
 use serde::Serialize;
 use std::io::Write as _;
@@ -93,11 +92,7 @@ pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>
         })?,
         stage(&parquet, &columns(campaign).encode("campaign.parquet")?)?,
     ];
-    let named = |file: AtomicFile| {
-        let path = file.target().to_owned();
-        file.commit().map_err(at(&path)).map(|()| path)
-    };
-    staged.into_iter().map(named).collect()
+    commit_all(staged)
 }
 
 fn columns(campaign: &Campaign) -> Columns {

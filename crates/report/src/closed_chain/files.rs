@@ -11,7 +11,7 @@ use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
 use crate::run::{Status, VERSION};
 use crate::summary::{FitSummary, fit};
 use crate::text::conclusion_about;
-use crate::write::{at, stage};
+use crate::write::{at, commit_all, stage};
 use armcal_calibrate::Residual;
 use armcal_core::Warning;
 use armcal_recording::Recording;
@@ -117,11 +117,7 @@ pub fn write_closed(
     let staged = texts.iter().map(|(name, text)| stage(&out_dir.join(name), text.as_bytes()));
     let staged = staged.collect::<Result<Vec<_>, ReportError>>()?;
     let mut written = vec![write_run(run, recordings, &texts, out_dir)?];
-    for file in staged {
-        let path = file.target().to_owned();
-        file.commit().map_err(at(&path))?;
-        written.push(path);
-    }
+    written.extend(commit_all(staged)?);
     Ok(written)
 }
 

@@ -13,7 +13,7 @@ use crate::summary::{
     ErrorSummary, FitSummary, ParameterSummary, SideSummary, error_summary, fit, parameter, side,
 };
 use crate::text::conclusion;
-use crate::write::{at, stage};
+use crate::write::{commit_all, stage};
 use armcal_calibrate::Estimate;
 use armcal_core::{Pose, Warning};
 use serde::Serialize;
@@ -101,13 +101,7 @@ pub fn write_pooled(run: &PooledRun, out_dir: &Path) -> Result<Vec<PathBuf>, Rep
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let staged = texts.iter().map(|(name, text)| stage(&out_dir.join(name), text.as_bytes()));
-    let mut written = Vec::new();
-    for file in staged.collect::<Result<Vec<_>, ReportError>>()? {
-        let path = file.target().to_owned();
-        file.commit().map_err(at(&path))?;
-        written.push(path);
-    }
-    Ok(written)
+    commit_all(staged.collect::<Result<Vec<_>, ReportError>>()?)
 }
 
 /// The summary of a pool: indented JSON with a final newline.
