@@ -8,6 +8,7 @@
 
 mod key;
 mod manifest;
+mod memory;
 mod shard;
 mod store;
 mod work;
@@ -44,6 +45,7 @@ pub struct Request<'a> {
 pub fn batch(request: &Request<'_>, progress: &Progress) -> Result<(Campaign, Vec<PathBuf>, usize), Error> {
     let receipt = work_on(request, Shard::WHOLE, progress)?;
     let skipped = receipt.skipped;
+    memory::give_back();
     let (campaign, written) = put_together(vec![receipt], request.out)?;
     Ok((campaign, written, skipped))
 }
