@@ -8,6 +8,7 @@
 //! noise-like term and a physical one compete on equal ground (formula 9, evaluated exactly for all terms).
 
 use crate::problem::{DwellRow, Problem};
+use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -141,9 +142,9 @@ impl Whitener {
             Kind::White => {}
             Kind::Groups(unit, groups) => {
                 for (rows, p) in groups {
-                    for mut column in columns.column_iter_mut() {
-                        let x = DVector::from_iterator(rows.len(), rows.iter().map(|r| column[*r]));
-                        let change = p * p.tr_mul(&x);
+                    let x = columns.select_rows(rows);
+                    let change = p * inner(p, &x);
+                    for (mut column, change) in columns.column_iter_mut().zip(change.column_iter()) {
                         rows.iter()
                             .zip(change.iter())
                             .for_each(|(r, c)| column[*r] = unit * (column[*r] - c));
@@ -154,7 +155,7 @@ impl Whitener {
             Kind::Both { scale, filters, p } => {
                 columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(scale));
                 innovations(filters, columns);
-                let shared = p.tr_mul(columns);
+                let shared = inner(p, columns);
                 columns.gemm(-1.0, p, &shared, 1.0);
             }
         }
@@ -201,7 +202,7 @@ fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
 
 /// P with `(I - P P')^2 = (I + b^2 Z Z')^-1`, and ln of the determinant of `I + b^2 Z Z'`.
 fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
-    let eigen = z.tr_mul(z).symmetric_eigen();
+    let eigen = inner(z, z).symmetric_eigen();
     let mut p = z * &eigen.eigenvectors;
     let mut ln_det = 0.0;
     for (k, w) in eigen.eigenvalues.iter().enumerate() {
