@@ -29,10 +29,10 @@ pub fn section(options: &Options) -> Result<Section> {
     let free = session.problem(Objective::LeastSquares)?.free();
     section.say(format!(
         "{} dwells of the paper's experiment from the lab's quick path, {free} free parameters with priors and bounds, from \
-         nominal, one core. armcal's time is that of `fit` as the program calls it: checks, whitening, optimum, covariance, \
-         intervals and what is undetermined. The peers are given the whitened problem and only solve it; with the robust \
-         loss they are also given the residual scale, which armcal finds by itself. Reading files and starting processes \
-         are not counted. Medians of many repetitions.",
+         nominal, one core. The whole fit is `fit` as the program calls it: checks, whitening, the scale of the residuals, \
+         optimum, covariance, intervals and what is undetermined. The peers are given the whitened problem and the scale, \
+         and only look for the optimum: armcal's optimum alone is the same work, and what their bars are about. Reading \
+         files and starting processes are not counted. Medians of many repetitions.",
         session.observations.len(),
     ));
     section.say(
@@ -51,7 +51,7 @@ pub fn section(options: &Options) -> Result<Section> {
     }
     for (name, objective) in [("least squares", Objective::LeastSquares), ("robust", Objective::Robust)] {
         let problem = session.problem(objective)?;
-        let mut answers = vec![ours(&session, &problem)?];
+        let mut answers = ours(&session, &problem)?;
         let file = options.data.join(format!("fit-{}.json", name.replace(' ', "-")));
         if let Some(python) = &python {
             std::fs::write(&file, problem.json()?.to_string())?;
@@ -71,24 +71,37 @@ pub fn section(options: &Options) -> Result<Section> {
     Ok(section)
 }
 
-fn ours(session: &Session, problem: &Problem<'_>) -> Result<Answer> {
+/// The whole fit, then the optimum alone.
+fn ours(session: &Session, problem: &Problem<'_>) -> Result<Vec<Answer>> {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let config = &problem.config;
-    let once = || one.install(|| fit(&session.model, &session.observations, config));
-    let last: Fit = once()?;
+    let answer = |who: &str, spent, (values, evaluations): (Vec<f64>, usize)| -> Result<Answer> {
+        let cost = problem.cost(&values)?;
+        Ok(Answer { who: who.to_owned(), spent, evaluations, cost, same_cost: SAME_COST })
+    };
+    let whole = || -> Result<Fit> { Ok(fit(&session.model, &session.observations, &problem.config)?) };
+    let (fitted, of_fit) = repeated(|| one.install(whole))?;
+    let (optimum, of_optimum) = repeated(|| one.install(|| problem.minimise()))?;
+    Ok(vec![
+        answer("armcal: the whole fit", of_fit, (fitted.values(), fitted.iterations))?,
+        answer("armcal: the optimum alone", of_optimum, optimum)?,
+    ])
+}
+
+/// The last answer, and the median of what one took.
+fn repeated<T>(once: impl Fn() -> Result<T>) -> Result<(T, Spent)> {
+    let mut last = once()?;
     let mut times = Vec::new();
-    // The system counts processor time in ticks of milliseconds: only that of many fits is known.
-    let (fitted, all) = spent(|| {
-        (0..REPETITIONS).try_for_each(|_| {
-            let (fitted, took) = spent(once);
+    // The system counts processor time in ticks of milliseconds: only that of many is known.
+    let (done, all) = spent(|| -> Result<()> {
+        for _ in 0..REPETITIONS {
+            let (answer, took) = spent(&once);
+            last = answer?;
             times.push(took);
-            fitted.map(drop)
-        })
+        }
+        Ok(())
     });
-    fitted?;
-    let spent = Spent { wall_s: median(&times).wall_s, cpu_s: all.cpu_s / REPETITIONS as f64 };
-    let cost = problem.cost(&last.values())?;
-    Ok(Answer { who: "armcal".into(), spent, evaluations: last.iterations, cost, same_cost: SAME_COST })
+    done?;
+    Ok((last, Spent { wall_s: median(&times).wall_s, cpu_s: all.cpu_s / REPETITIONS as f64 }))
 }
 
 fn theirs(
@@ -111,11 +124,18 @@ fn theirs(
 }
 
 fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
-    let Some((ours, peers)) = answers.split_first() else { return Ok(()) };
+    let [whole, optimum, peers @ ..] = answers else { return Ok(()) };
     let best = answers.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     let title = format!("{name}: solver");
-    let mut table =
-        Table::new(&[&title, "wall [ms]", "CPU [ms]", "evaluations", "to armcal", "cost above the lowest"]);
+    let mut table = Table::new(&[
+        &title,
+        "wall [ms]",
+        "CPU [ms]",
+        "evaluations",
+        "to the optimum alone",
+        "to the whole fit",
+        "cost above the lowest",
+    ]);
     for a in answers {
         let excess = a.cost / best - 1.0;
         table.row([
@@ -123,7 +143,8 @@ fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
             format!("{:.3}", a.spent.wall_s * 1e3),
             format!("{:.3}", a.spent.cpu_s * 1e3),
             a.evaluations.to_string(),
-            format!("{:.1}", a.spent.wall_s / ours.spent.wall_s),
+            format!("{:.1}", a.spent.wall_s / optimum.spent.wall_s),
+            format!("{:.1}", a.spent.wall_s / whole.spent.wall_s),
             format!("{excess:.1e}"),
         ]);
     }
@@ -136,15 +157,15 @@ fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
     section.bar(Bar {
         what: format!("fit, {name}, one core"),
         limit: "< 5 ms".into(),
-        measured: format!("{:.2} ms", ours.spent.wall_s * 1e3),
-        met: ours.spent.wall_s < 5e-3,
+        measured: format!("{:.2} ms", whole.spent.wall_s * 1e3),
+        met: whole.spent.wall_s < 5e-3,
     });
     for peer in peers.iter().filter(|p| p.who.starts_with("scipy")) {
-        let ratio = peer.spent.wall_s / ours.spent.wall_s;
+        let [ratio, of_whole] = [optimum, whole].map(|own| peer.spent.wall_s / own.spent.wall_s);
         section.bar(Bar {
-            what: format!("fit, {name}, faster than {}", peer.who),
+            what: format!("optimum, {name}, faster than {}", peer.who),
             limit: ">= 50".into(),
-            measured: format!("{ratio:.0}"),
+            measured: format!("{ratio:.0} (whole fit {of_whole:.0})"),
             met: ratio >= 50.0,
         });
     }
