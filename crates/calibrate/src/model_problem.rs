@@ -132,7 +132,9 @@ impl Problem for ModelProblem<'_> {
             let (model, p) = self.scene.seen(run[0], p);
             model.residuals_with_jacobians(&p, run)
         });
-        blocks.zip(linearised).map(|(block, linearised)| self.used(block, linearised)).collect()
+        let mut all = Vec::with_capacity(blocks.len());
+        all.extend(blocks.zip(linearised).map(|(block, linearised)| self.used(block, linearised)));
+        all
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

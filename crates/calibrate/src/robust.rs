@@ -109,39 +109,41 @@ struct Part {
 
 impl RobustCost<'_, '_> {
     fn part(&self, group: usize, (residual, jacobian): &Linearised) -> Part {
-        let mut jacobian = jacobian.clone();
         let blocks = self.white.structure.groups[group].blocks.clone();
-        let (first, count) = (self.white.offsets[blocks.start], blocks.len());
-        let mut weighted = residual.clone();
-        let mut removed = DMatrix::zeros(count, jacobian.ncols());
-        let mut along = vec![None; count];
-        for (k, j) in blocks.enumerate() {
+        let first = self.white.offsets[blocks.start];
+        let mut scale = DVector::zeros(residual.len());
+        let mut outliers = Vec::new();
+        for j in blocks {
             let (at, rows) = (self.white.offsets[j] - first, self.white.dimension(j));
             let own = residual.rows(at, rows);
-            let weight = self.loss(j).weight(own.norm() / self.sigma_scale);
-            let scaled = weight.sqrt() / self.sigma_scale;
-            jacobian.rows_mut(at, rows).scale_mut(scaled);
-            weighted.rows_mut(at, rows).scale_mut(scaled);
+            let norm = own.norm();
+            let weight = self.loss(j).weight(norm / self.sigma_scale);
+            scale.rows_mut(at, rows).fill(weight.sqrt() / self.sigma_scale);
             if weight < 1.0 && self.exact_curvature {
-                let direction = own.normalize();
-                removed.row_mut(k).copy_from(&(direction.transpose() * jacobian.rows(at, rows)));
-                along[k] = Some((at, direction));
+                outliers.push((at, own / norm));
             }
         }
-        let gradient = jacobian.tr_mul(&weighted);
+        let mut jacobian = jacobian.clone();
+        jacobian.column_iter_mut().for_each(|mut column| column.component_mul_assign(&scale));
+        let gradient = jacobian.tr_mul(&residual.component_mul(&scale));
+        // What lies along the residual, by outlier.
+        let mut along = DMatrix::zeros(outliers.len(), jacobian.ncols());
+        for (mut along, (at, direction)) in along.row_iter_mut().zip(&outliers) {
+            along.copy_from(&(direction.transpose() * jacobian.rows(*at, direction.len())));
+        }
         if self.white.structure.is_dense() {
             let squares = inner(&jacobian, &jacobian);
-            let curvature = &squares - inner(&removed, &removed);
+            let curvature = &squares - inner(&along, &along);
             return Part { gradient, squares: squares.diagonal(), curvature };
         }
         let squares = DVector::from_iterator(
             jacobian.ncols(),
             jacobian.column_iter().map(|column| column.norm_squared()),
         );
-        // The rows without what lies along the residual: I - u u' is its own square root.
-        for (k, (at, direction)) in along.iter().enumerate().filter_map(|(k, a)| Some((k, a.as_ref()?))) {
+        // The rows without it: I - u u' is its own square root.
+        for (along, (at, direction)) in along.row_iter().zip(&outliers) {
             let mut rows = jacobian.rows_mut(*at, direction.len());
-            rows -= direction * removed.row(k);
+            rows -= direction * along;
         }
         Part { gradient, squares, curvature: triangle(jacobian) }
     }

@@ -165,8 +165,8 @@ impl<'a> Whitened<'a> {
             let jacobian = DMatrix::from_fn(rows, self.axes.len(), |r, c| {
                 full[(r, self.axes[c].index)] * self.axes[c].scale
             });
-            self.finite(block, raw.iter(), "the residual")?;
-            self.finite(block, jacobian.iter(), "the derivative")?;
+            self.finite(block, raw.as_slice(), "the residual")?;
+            self.finite(block, jacobian.as_slice(), "the derivative")?;
             blocks.push((raw.rows(0, rows).into_owned(), jacobian));
         }
         Ok(blocks)
@@ -177,7 +177,7 @@ impl<'a> Whitened<'a> {
         let p = self.parameters_at(x);
         let norm = |block| {
             let raw = self.problem.residual(block, &p);
-            self.finite(block, raw.iter(), "the residual")?;
+            self.finite(block, raw.as_slice(), "the residual")?;
             Ok(raw.rows(0, raw.len().min(3)).norm())
         };
         (0..self.blocks()).map(norm).collect()
@@ -215,19 +215,16 @@ impl<'a> Whitened<'a> {
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
         let linearised = self.problem.linearised_each(at_group.blocks.clone(), p);
         for (block, (raw, full)) in at_group.blocks.clone().zip(linearised) {
-            self.finite(block, raw.iter(), "the residual")?;
+            self.finite(block, raw.as_slice(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
             whiten(white, raw.as_slice(), 1.0, &mut stacked.as_mut_slice()[at..at + rows]);
+            let suspect = !all_finite(full.as_slice());
             let columns = jacobian.as_mut_slice().chunks_exact_mut(height);
             for ((axis, known), column) in self.structure.axes(group).zip(&at_group.columns).zip(columns) {
                 let (Some(known), a) = (known, &self.axes[axis]) else { continue };
                 let raw = &full.as_slice()[known * rows..(known + 1) * rows];
-                // An observation sees few frames: most columns of a many-board model are zero.
-                if raw.iter().all(|v| *v == 0.0) {
-                    continue;
-                }
-                if !raw.iter().all(|v| v.is_finite()) {
+                if suspect && !all_finite(raw) {
                     return Err(self.not_finite(block, "the derivative", Some(a.index)));
                 }
                 whiten(white, raw, a.scale, &mut column[at..at + rows]);
@@ -236,13 +233,8 @@ impl<'a> Whitened<'a> {
         Ok((stacked, jacobian))
     }
 
-    fn finite<'v>(
-        &self,
-        block: usize,
-        mut values: impl Iterator<Item = &'v f64>,
-        what: &'static str,
-    ) -> Result<(), CalibrateError> {
-        if values.all(|v| v.is_finite()) { Ok(()) } else { Err(self.not_finite(block, what, None)) }
+    fn finite(&self, block: usize, values: &[f64], what: &'static str) -> Result<(), CalibrateError> {
+        if all_finite(values) { Ok(()) } else { Err(self.not_finite(block, what, None)) }
     }
 
     fn not_finite(&self, block: usize, what: &'static str, parameter: Option<usize>) -> CalibrateError {
@@ -256,9 +248,20 @@ impl<'a> Whitened<'a> {
     }
 }
 
-/// `scale * white * raw`, white lower triangular: nalgebra's product of matrices whose size it does not know takes several
-/// times as long for three rows.
+/// Without a branch for each value: nearly always the answer is yes.
+fn all_finite(values: &[f64]) -> bool {
+    values.iter().fold(true, |all, v| all & v.is_finite())
+}
+
+/// `scale * white * raw`, white lower triangular. Three rows, all that a block of most calibrations has, are written out:
+/// products whose size is not known take several times as long.
 fn whiten(white: &DMatrix<f64>, raw: &[f64], scale: f64, out: &mut [f64]) {
+    if let ([x, y, z], [a, b, c], [xx, yx, zx, _, yy, zy, _, _, zz]) = (raw, &mut *out, white.as_slice()) {
+        *a = scale * (xx * x);
+        *b = scale * (yx * x + yy * y);
+        *c = scale * (zx * x + zy * y + zz * z);
+        return;
+    }
     for (r, out) in out.iter_mut().enumerate() {
         let sum: f64 = raw[..=r].iter().enumerate().map(|(c, v)| white[(r, c)] * v).sum();
         *out = scale * sum;

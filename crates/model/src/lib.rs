@@ -27,6 +27,7 @@ mod path;
 mod residual;
 mod rigid;
 mod segment;
+mod twist;
 mod urdf;
 mod urdf_write;
 

@@ -4,10 +4,11 @@ mod linearisation;
 
 use crate::effects::{Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
-use crate::path::{PathAt, Twist, follow};
+use crate::path::{follow, joint_twists};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
+use crate::twist::Twist;
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
 use linearisation::Linearisation;
@@ -247,8 +248,8 @@ impl Model {
 
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
-            None => PathAt::of(&self.path, p).linearised(&o.joint_rad).joints,
-            Some(effects) => effects.linearise(p, &effects.drivers(self, o)).joints,
+            None => joint_twists(&self.path, p, &o.joint_rad).1,
+            Some(effects) => effects.joint_twists(p, &effects.drivers(self, o)),
         }
     }
 

@@ -5,31 +5,10 @@
 //! spatial twist (Lynch and Park, Modern Robotics, 2017, section 5.1.1). Seen at the path's origin the velocity is `v_i`, at
 //! the tip it is `v_i + w_i x tip`, so that one forward pass with the segments' derivatives gives the whole Jacobian.
 
-use crate::rigid::{Rigid, rotation_rate};
-use crate::segment::{LinearisedSegment, Segment};
-use nalgebra::Vector3;
-
-/// Motion of the tip per unit of one quantity, in the frame the path starts in.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Twist {
-    /// d position [m per unit].
-    pub translation_m: Vector3<f64>,
-    /// d rotation: `w` with `dR = [w]x R` [rad per unit].
-    pub rotation_rad: Vector3<f64>,
-}
-
-impl Twist {
-    /// No motion.
-    pub fn none() -> Twist {
-        Twist { translation_m: Vector3::zeros(), rotation_rad: Vector3::zeros() }
-    }
-
-    /// Adds `factor` of another motion.
-    pub fn add(&mut self, other: &Twist, factor: f64) {
-        self.translation_m += other.translation_m * factor;
-        self.rotation_rad += other.rotation_rad * factor;
-    }
-}
+use crate::rigid::Rigid;
+use crate::segment::{LinearisedSegment, MAX_PARAMETERS, Segment};
+use crate::twist::{Twist, Twists};
+use std::borrow::Cow;
 
 /// The frame before the first segment and behind every one of them.
 pub(crate) struct Ends(pub Vec<Rigid<f64>>);
@@ -63,49 +42,81 @@ pub(crate) fn follow(path: &[Segment], p: &[f64], joints: &[f64]) -> Rigid<f64> 
     path.iter().fold(Rigid::identity(), |before, segment| before.then(&segment.transform(p, joints)))
 }
 
-/// A path at one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
+/// Motions of everything behind a segment, which `before` leads to and `end` leads out of, seen at the path's origin.
+fn at_origin(segment: &LinearisedSegment, before: &Rigid<f64>, end: &Rigid<f64>) -> Twists<MAX_PARAMETERS> {
+    let mut motions = segment.motions.turned(&before.rotation);
+    motions.shift(&-end.translation_m);
+    motions
+}
+
+/// The end of the path and its motion per unit of each joint, in the order of the path.
+pub(crate) fn joint_twists(path: &[Segment], p: &[f64], joints: &[f64]) -> (Rigid<f64>, Vec<(usize, Twist)>) {
+    let mut tip = Rigid::identity();
+    let mut twists = Vec::with_capacity(joints.len());
+    for segment in path {
+        let before = tip;
+        let Some(joint) = segment.joint else {
+            tip = before.then(&segment.transform(p, joints));
+            continue;
+        };
+        let linearised = segment.linearised(p, joints);
+        tip = before.then(&linearised.transform);
+        let motions = at_origin(&linearised, &before, &tip);
+        twists.push((joint.index, motions.by(segment.parameters.len())));
+    }
+    for (_, twist) in &mut twists {
+        twist.translation_m += twist.rotation_rad.cross(&tip.translation_m);
+    }
+    (tip, twists)
+}
+
+/// A path at or about one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
 pub(crate) struct PathAt<'a> {
     path: &'a [Segment],
-    p: &'a [f64],
+    p: Cow<'a, [f64]>,
     /// By segment; `None` where a joint moves it.
     still: Vec<Option<LinearisedSegment>>,
 }
 
 impl<'a> PathAt<'a> {
-    pub fn of(path: &'a [Segment], p: &'a [f64]) -> PathAt<'a> {
-        let still = |segment: &Segment| segment.joint.is_none().then(|| segment.linearised(p, &[]));
-        PathAt { path, p, still: path.iter().map(still).collect() }
+    pub fn of(path: &'a [Segment], p: impl Into<Cow<'a, [f64]>>) -> PathAt<'a> {
+        let p = p.into();
+        let still = |segment: &Segment| segment.joint.is_none().then(|| segment.linearised(&p, &[]));
+        let still = path.iter().map(still).collect();
+        PathAt { path, p, still }
     }
 
     /// The end of the path and its derivatives with respect to every parameter and joint on it.
     pub fn linearised(&self, joints: &[f64]) -> LinearisedPath {
+        self.with(&self.p, joints)
+    }
+
+    /// The same with parameters of the pose's own: a segment whose parameters it leaves alone is as it was.
+    pub fn with(&self, p: &[f64], joints: &[f64]) -> LinearisedPath {
         let mut tip = Rigid::identity();
-        let mut parameters = Vec::with_capacity(self.p.len());
-        let mut joint_twists = Vec::with_capacity(joints.len());
+        let mut motions = Vec::with_capacity(self.path.len());
         for (segment, still) in self.path.iter().zip(&self.still) {
+            let own = segment.parameters.clone();
             let moved;
             let linearised = match still {
-                Some(still) => still,
-                None => {
-                    moved = segment.linearised(self.p, joints);
+                Some(still) if p[own.clone()] == self.p[own] => still,
+                _ => {
+                    moved = segment.linearised(p, joints);
                     &moved
                 }
             };
-            let (before, own) = (tip, &linearised.transform);
-            tip = before.then(own);
-            let twist = |change: &Rigid<f64>| {
-                let rotation_rad = before.rotation * rotation_rate(&change.rotation, &own.rotation);
-                let at_end_m = before.rotation * change.translation_m;
-                Twist { translation_m: at_end_m - rotation_rad.cross(&tip.translation_m), rotation_rad }
-            };
-            let (by_parameter, by_joint) = linearised.derivatives.split_at(segment.parameters.len());
-            parameters.extend(segment.parameters.clone().zip(by_parameter.iter().map(twist)));
-            let joint = segment.joint.iter().map(|joint| joint.index);
-            joint_twists.extend(joint.zip(by_joint.iter().map(twist)));
+            let before = tip;
+            tip = before.then(&linearised.transform);
+            motions.push(at_origin(linearised, &before, &tip));
         }
-        for (_, twist) in parameters.iter_mut().chain(&mut joint_twists) {
-            twist.translation_m += twist.rotation_rad.cross(&tip.translation_m);
+        let mut parameters = Vec::with_capacity(p.len());
+        let mut of_joints = Vec::with_capacity(joints.len());
+        for (segment, motions) in self.path.iter().zip(&mut motions) {
+            motions.shift(&tip.translation_m);
+            let own = segment.parameters.clone();
+            of_joints.extend(segment.joint.map(|joint| (joint.index, motions.by(own.len()))));
+            parameters.extend(own.enumerate().map(|(k, index)| (index, motions.by(k))));
         }
-        LinearisedPath { tip, parameters, joints: joint_twists }
+        LinearisedPath { tip, parameters, joints: of_joints }
     }
 }

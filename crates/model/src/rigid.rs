@@ -95,12 +95,6 @@ pub(crate) fn rotation_of_vector<D: Scalar>(r: &Vector3<D>) -> Matrix3<D> {
     )
 }
 
-/// The rotation vector behind an infinitesimal rotation: `w` with `dR = [w]x R`.
-pub(crate) fn rotation_rate(d_rotation: &Matrix3<f64>, rotation: &Matrix3<f64>) -> Vector3<f64> {
-    let skew = |i: usize, j: usize| d_rotation.row(i).dot(&rotation.row(j));
-    Vector3::new(skew(2, 1), skew(0, 2), skew(1, 0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

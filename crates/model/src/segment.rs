@@ -5,8 +5,10 @@
 //! lines that predict.
 
 use crate::rigid::{Rigid, Scalar, product, rotation_of_vector};
-use nalgebra::{Matrix3, Vector3};
+use crate::twist::Twists;
+use nalgebra::{Matrix3, SVector, Vector3};
 use num_dual::DualSVec64;
+use std::array;
 use std::ops::Range;
 
 /// Most parameters one segment has (x, y, z, rx, ry, rz of an origin).
@@ -81,12 +83,13 @@ pub(crate) struct Segment {
     pub parameters: Range<usize>,
 }
 
-/// A segment's transform and its derivatives.
+/// A segment's transform and how its end moves.
 pub(crate) struct LinearisedSegment {
     /// The transform.
     pub transform: Rigid<f64>,
-    /// Its derivatives: by each parameter in order, then by the joint value; zero where there is neither.
-    pub derivatives: [Rigid<f64>; MAX_PARAMETERS],
+    /// Motions of its end, in axes of its start: by each parameter in order, then by the joint value; none where there is
+    /// neither.
+    pub motions: Twists<MAX_PARAMETERS>,
 }
 
 impl Segment {
@@ -97,7 +100,7 @@ impl Segment {
         self.local(&p[self.parameters.clone()], self.joint_value(joints))
     }
 
-    /// [`Segment::transform`] with its derivatives, in one pass.
+    /// [`Segment::transform`] and its derivatives, in one pass.
     pub fn linearised(&self, p: &[f64], joints: &[f64]) -> LinearisedSegment {
         let own = &p[self.parameters.clone()];
         let mut lanes = [Lanes::from(0.0); MAX_PARAMETERS];
@@ -140,19 +143,20 @@ impl From<&Rigid<Lanes>> for LinearisedSegment {
             rotation: dual.rotation.map(|entry| entry.re),
             translation_m: dual.translation_m.map(|entry| entry.re),
         };
-        let zero = Rigid { rotation: Matrix3::zeros(), translation_m: Vector3::zeros() };
-        let mut derivatives = [zero; MAX_PARAMETERS];
-        // An entry that depends on nothing has no lanes.
-        for (at, eps) in dual.rotation.iter().enumerate().filter_map(|(at, entry)| Some((at, entry.eps.0?))) {
-            derivatives.iter_mut().zip(eps.iter()).for_each(|(d, eps)| d.rotation[at] = *eps);
-        }
-        for (at, eps) in
-            dual.translation_m.iter().enumerate().filter_map(|(at, entry)| Some((at, entry.eps.0?)))
-        {
-            derivatives.iter_mut().zip(eps.iter()).for_each(|(d, eps)| d.translation_m[at] = *eps);
-        }
-        LinearisedSegment { transform, derivatives }
+        // Of dR R' = [w]x, the entry below the diagonal for each axis.
+        let rate = |i: usize, j: usize| {
+            let term = |k: usize| lanes(&dual.rotation[(i, k)]) * transform.rotation[(j, k)];
+            term(0) + term(1) + term(2)
+        };
+        let rotation_rad = [rate(2, 1), rate(0, 2), rate(1, 0)];
+        let translation_m = array::from_fn(|axis| lanes(&dual.translation_m[axis]));
+        LinearisedSegment { transform, motions: Twists { translation_m, rotation_rad } }
     }
+}
+
+/// The derivatives of an entry; one that depends on nothing has none.
+fn lanes(entry: &Lanes) -> SVector<f64, MAX_PARAMETERS> {
+    entry.eps.0.unwrap_or_default()
 }
 
 /// `theta` and `d` of a DH row with the joint value added to the one that moves.

@@ -7,9 +7,10 @@ use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::error::nearest;
-use crate::path::{PathAt, Twist};
+use crate::path::{PathAt, joint_twists};
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
+use crate::twist::Twist;
 use crate::{Model, ModelError};
 use armcal_core::{Parameter, Reference, Role};
 use nalgebra::{Matrix3, Vector3};
@@ -70,8 +71,6 @@ pub(crate) struct Linearised {
     pub at: Evaluated,
     /// Motion of the tip per unit of a parameter.
     pub parameters: Vec<(usize, Twist)>,
-    /// Motion of the tip per unit of a joint reading.
-    pub joints: Vec<(usize, Twist)>,
     /// Motion of the seated point in its board per unit of a parameter.
     pub seats: Vec<(usize, Vector3<f64>)>,
 }
@@ -192,11 +191,16 @@ impl Effects {
         Evaluated { tip, in_board_m }
     }
 
-    /// The deformed arm and its derivatives with respect to everything.
-    pub fn linearise(&self, p: &[f64], x: &Drivers<'_>) -> Linearised {
+    /// The path before a pose deforms it.
+    pub fn path_at(&self, p: &[f64]) -> PathAt<'_> {
+        PathAt::of(&self.path, self.extended(p))
+    }
+
+    /// The deformed arm and its derivatives by every parameter; `path` is that of [`Effects::path_at`].
+    pub fn linearise(&self, path: &PathAt<'_>, p: &[f64], x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let path = PathAt::of(&self.path, &p).linearised(&q);
+        let path = path.with(&p, &q);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
             path.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];
@@ -237,9 +241,16 @@ impl Effects {
             }
         }
         let mut at = Evaluated { tip: path.tip, in_board_m };
-        let mut joints = path.joints;
-        self.distort(&p, x, &mut at.tip, &mut parameters, &mut joints);
-        Linearised { at, parameters, joints, seats }
+        self.distort(&p, x, &mut at.tip, &mut parameters, &mut []);
+        Linearised { at, parameters, seats }
+    }
+
+    /// Motion of the tip per unit of each joint reading.
+    pub fn joint_twists(&self, p: &[f64], x: &Drivers<'_>) -> Vec<(usize, Twist)> {
+        let (p, q, _) = self.deformed(p, x);
+        let (mut tip, mut joints) = joint_twists(&self.path, &p, &q);
+        self.distort(&p, x, &mut tip, &mut [], &mut joints);
+        joints
     }
 
     /// Parameters with the twists behind them, joint readings, and the seated point.
@@ -248,9 +259,7 @@ impl Effects {
         for effect in self.placed.iter().filter(|effect| effect.acts_on(x)) {
             effect.physics.predict(&p[effect.parameters.clone()], x, &mut change);
         }
-        let mut extended = Vec::with_capacity(p.len() + 6 * self.slots.len());
-        extended.extend_from_slice(p);
-        extended.resize(p.len() + 6 * self.slots.len(), 0.0);
+        let mut extended = self.extended(p);
         for (index, value) in &change.parameters {
             extended[*index] += value;
         }
@@ -270,6 +279,14 @@ impl Effects {
             Reference::Tracked { .. } => Vector3::zeros(),
         };
         (extended, q, in_board_m)
+    }
+
+    /// Parameters, and behind them a twist of zero for every slot.
+    fn extended(&self, p: &[f64]) -> Vec<f64> {
+        let mut extended = Vec::with_capacity(p.len() + 6 * self.slots.len());
+        extended.extend_from_slice(p);
+        extended.resize(p.len() + 6 * self.slots.len(), 0.0);
+        extended
     }
 
     /// Where the twist of a slot stands behind the `count` parameters.

@@ -20,8 +20,8 @@ pub(crate) struct Linearisation<'a> {
 
 enum Arm<'a> {
     Rigid(PathAt<'a>),
-    /// With every pose another path.
-    Deformed(&'a Effects),
+    /// With every pose other parameters.
+    Deformed(&'a Effects, PathAt<'a>),
 }
 
 impl<'a> Linearisation<'a> {
@@ -29,7 +29,7 @@ impl<'a> Linearisation<'a> {
     pub fn of(model: &'a Model, p: &'a [f64], observations: &[&Observation]) -> Linearisation<'a> {
         let arm = match &model.effects {
             None => Arm::Rigid(PathAt::of(&model.path, p)),
-            Some(effects) => Arm::Deformed(effects),
+            Some(effects) => Arm::Deformed(effects, effects.path_at(p)),
         };
         let seated = observations.iter().filter_map(|o| Some((o.dwell.recording, model.board_under(o)?)));
         let boards: BTreeMap<usize, &Segment> = seated.collect();
@@ -44,8 +44,8 @@ impl<'a> Linearisation<'a> {
                 let path = path.linearised(&o.joint_rad);
                 (path.tip, seated_m(o), path.parameters, Vec::new())
             }
-            Arm::Deformed(effects) => {
-                let arm = effects.linearise(self.p, &effects.drivers(self.model, o));
+            Arm::Deformed(effects, path) => {
+                let arm = effects.linearise(path, self.p, &effects.drivers(self.model, o));
                 (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
             }
         };
@@ -63,8 +63,10 @@ impl<'a> Linearisation<'a> {
             }
         }
         if let Some((board, at)) = board {
-            for (column, change) in board.parameters.clone().zip(&at.derivatives) {
-                add_to_column(&mut jacobian, 0, column, &change.point(&in_board_m));
+            let mut seated = at.motions;
+            seated.shift(&(at.transform.rotation * in_board_m));
+            for (k, column) in board.parameters.clone().enumerate() {
+                add_to_column(&mut jacobian, 0, column, &seated.by(k).translation_m);
             }
             for (column, change_m) in &seats {
                 add_to_column(&mut jacobian, 0, *column, &(at.transform.rotation * change_m));
