@@ -7,7 +7,6 @@
 use crate::model_problem::ModelProblem;
 use crate::outcome::Fit;
 use crate::robust::RobustCost;
-use crate::solver;
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective, fit, frames};
 use armcal_core::Observation;
@@ -93,14 +92,6 @@ impl WhitenedProblem<'_> {
     /// df/dx.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, CalibrateError> {
         Ok(self.evaluate(&self.white.at(x.clone())?).1)
-    }
-
-    /// The minimum from [`start`](WhitenedProblem::start) by the solver of [`fit`](crate::fit()), and its iterations: what
-    /// another solver of this problem is compared with.
-    pub fn minimise(&self) -> Result<(DVector<f64>, usize), CalibrateError> {
-        let cost = RobustCost::new(&self.white, &self.config, self.sigma_scale);
-        let solution = solver::minimise(&cost, self.white.at(self.start())?, fit::accurate(&self.config));
-        Ok((solution.at.x, solution.iterations))
     }
 
     fn evaluate(&self, at: &Point) -> (DVector<f64>, DMatrix<f64>) {

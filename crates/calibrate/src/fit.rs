@@ -149,11 +149,6 @@ pub(crate) fn solve(
     Ok(solved)
 }
 
-/// When an iteration towards the answer itself ends.
-pub(crate) fn accurate(config: &FitConfig) -> Settings {
-    Settings { max_iterations: config.max_iterations, step_tolerance: STEP_TOLERANCE }
-}
-
 /// Alternates between the fit at a scale and the scale of its residuals, never below the declared noise. The first,
 /// rough rounds begin with all but gross outliers in the square part of the loss and end with outliers in the linear
 /// one; the accurate ones confirm the scale. Where the scale is `known` roughly, so are the parameters: no rough rounds.
@@ -174,11 +169,9 @@ fn solve_robust(
     loop {
         round += 1;
         let rough = estimated && round <= ROUGH_ROUNDS;
-        let mut settings = accurate(config);
-        if rough {
-            settings.step_tolerance = ROUGH_STEP_TOLERANCE;
-        }
+        let step_tolerance = if rough { ROUGH_STEP_TOLERANCE } else { STEP_TOLERANCE };
         let cost = RobustCost { exact_curvature: !rough, ..RobustCost::new(white, config, sigma_scale) };
+        let settings = Settings { max_iterations: config.max_iterations, step_tolerance };
         let solution = solver::minimise(&cost, at, settings);
         iterations += solution.iterations;
         let fitted = solution.fitted_directions(white);

@@ -8,8 +8,8 @@ use crate::{Options, Result};
 use armcal_calibrate::{Fit, Objective, fit};
 use serde_json::Value;
 
-/// Repetitions of armcal's fit.
-const REPETITIONS: usize = 200;
+/// Repetitions of armcal's fit before, between and after its peers.
+const REPETITIONS: usize = 100;
 /// armcal's cost may exceed the lowest by this share.
 const SAME_COST: f64 = 1e-9;
 
@@ -29,10 +29,10 @@ pub fn section(options: &Options) -> Result<Section> {
     let free = session.problem(Objective::LeastSquares)?.free();
     section.say(format!(
         "{} dwells of the paper's experiment from the lab's quick path, {free} free parameters with priors and bounds, from \
-         nominal, one core. The whole fit is `fit` as the program calls it: checks, whitening, the scale of the residuals, \
-         optimum, covariance, intervals and what is undetermined. The peers are given the whitened problem and the scale, \
-         and only look for the optimum: armcal's optimum alone is the same work, and what their bars are about. Reading \
-         files and starting processes are not counted. Medians of many repetitions.",
+         nominal, one core. armcal's time is that of `fit` as the program calls it: checks, whitening, optimum, covariance, \
+         intervals and what is undetermined. The peers are given the whitened problem and only solve it; with the robust \
+         loss they are also given the residual scale, which armcal finds by itself. Reading files and starting processes \
+         are not counted. Medians of many repetitions.",
         session.observations.len(),
     ));
     section.say(
@@ -51,12 +51,14 @@ pub fn section(options: &Options) -> Result<Section> {
     }
     for (name, objective) in [("least squares", Objective::LeastSquares), ("robust", Objective::Robust)] {
         let problem = session.problem(objective)?;
-        let mut answers = ours(&session, &problem)?;
+        let (mut own, mut answers) = (Own::default(), Vec::new());
+        own.measure(&session, &problem)?;
         let file = options.data.join(format!("fit-{}.json", name.replace(' ', "-")));
         if let Some(python) = &python {
             std::fs::write(&file, problem.json()?.to_string())?;
             let said = python.run("fit_scipy.py", &file)?;
             answers.extend(theirs("scipy", &said, &problem, Ok)?);
+            own.measure(&session, &problem)?;
         }
         if let Some(ceres) = &ceres {
             let file = file.with_extension("txt");
@@ -65,43 +67,49 @@ pub fn section(options: &Options) -> Result<Section> {
             let version = said[0]["version"].as_str().unwrap_or_default();
             let in_order = |values: Vec<f64>| problem.in_own_order(&values);
             answers.extend(theirs(&format!("Ceres {version}"), &said, &problem, in_order)?);
+            own.measure(&session, &problem)?;
         }
-        judge(name, &answers, &mut section)?;
+        judge(name, &own.answer(&problem)?, &answers, &mut section)?;
     }
     Ok(section)
 }
 
-/// The whole fit, then the optimum alone.
-fn ours(session: &Session, problem: &Problem<'_>) -> Result<Vec<Answer>> {
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let answer = |who: &str, spent, (values, evaluations): (Vec<f64>, usize)| -> Result<Answer> {
-        let cost = problem.cost(&values)?;
-        Ok(Answer { who: who.to_owned(), spent, evaluations, cost, same_cost: SAME_COST })
-    };
-    let whole = || -> Result<Fit> { Ok(fit(&session.model, &session.observations, &problem.config)?) };
-    let (fitted, of_fit) = repeated(|| one.install(whole))?;
-    let (optimum, of_optimum) = repeated(|| one.install(|| problem.minimise()))?;
-    Ok(vec![
-        answer("armcal: the whole fit", of_fit, (fitted.values(), fitted.iterations))?,
-        answer("armcal: the optimum alone", of_optimum, optimum)?,
-    ])
+/// armcal's fits, at several moments: a machine's speed changes while the peers work.
+#[derive(Default)]
+struct Own {
+    last: Option<Fit>,
+    each: Vec<Spent>,
+    cpu_s: f64,
 }
 
-/// The last answer, and the median of what one took.
-fn repeated<T>(once: impl Fn() -> Result<T>) -> Result<(T, Spent)> {
-    let mut last = once()?;
-    let mut times = Vec::new();
-    // The system counts processor time in ticks of milliseconds: only that of many is known.
-    let (done, all) = spent(|| -> Result<()> {
-        for _ in 0..REPETITIONS {
-            let (answer, took) = spent(&once);
-            last = answer?;
-            times.push(took);
-        }
-        Ok(())
-    });
-    done?;
-    Ok((last, Spent { wall_s: median(&times).wall_s, cpu_s: all.cpu_s / REPETITIONS as f64 }))
+impl Own {
+    fn measure(&mut self, session: &Session, problem: &Problem<'_>) -> Result<()> {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        let once = || one.install(|| fit(&session.model, &session.observations, &problem.config));
+        self.last = Some(once()?);
+        // The system counts processor time in ticks of milliseconds: only that of many fits is known.
+        let (fitted, all) = spent(|| {
+            (0..REPETITIONS).try_for_each(|_| {
+                let (fitted, took) = spent(once);
+                self.each.push(took);
+                fitted.map(drop)
+            })
+        });
+        self.cpu_s += all.cpu_s;
+        Ok(fitted?)
+    }
+
+    fn answer(&self, problem: &Problem<'_>) -> Result<Answer> {
+        let last = self.last.as_ref().ok_or("nothing was measured")?;
+        let cpu_s = self.cpu_s / self.each.len() as f64;
+        Ok(Answer {
+            who: "armcal".into(),
+            spent: Spent { wall_s: median(&self.each).wall_s, cpu_s },
+            evaluations: last.iterations,
+            cost: problem.cost(&last.values())?,
+            same_cost: SAME_COST,
+        })
+    }
 }
 
 fn theirs(
@@ -123,49 +131,41 @@ fn theirs(
     said.as_array().into_iter().flatten().map(answer).collect()
 }
 
-fn judge(name: &str, answers: &[Answer], section: &mut Section) -> Result<()> {
-    let [whole, optimum, peers @ ..] = answers else { return Ok(()) };
-    let best = answers.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
+fn judge(name: &str, ours: &Answer, peers: &[Answer], section: &mut Section) -> Result<()> {
+    let answers = || std::iter::once(ours).chain(peers);
+    let best = answers().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     let title = format!("{name}: solver");
-    let mut table = Table::new(&[
-        &title,
-        "wall [ms]",
-        "CPU [ms]",
-        "evaluations",
-        "to the optimum alone",
-        "to the whole fit",
-        "cost above the lowest",
-    ]);
-    for a in answers {
+    let mut table =
+        Table::new(&[&title, "wall [ms]", "CPU [ms]", "evaluations", "to armcal", "cost above the lowest"]);
+    for a in answers() {
         let excess = a.cost / best - 1.0;
         table.row([
             a.who.clone(),
             format!("{:.3}", a.spent.wall_s * 1e3),
             format!("{:.3}", a.spent.cpu_s * 1e3),
             a.evaluations.to_string(),
-            format!("{:.1}", a.spent.wall_s / optimum.spent.wall_s),
-            format!("{:.1}", a.spent.wall_s / whole.spent.wall_s),
+            format!("{:.1}", a.spent.wall_s / ours.spent.wall_s),
             format!("{excess:.1e}"),
         ]);
     }
     section.table(table);
     let far: Vec<&str> =
-        answers.iter().filter(|a| a.cost > best * (1.0 + a.same_cost)).map(|a| a.who.as_str()).collect();
+        answers().filter(|a| a.cost > best * (1.0 + a.same_cost)).map(|a| a.who.as_str()).collect();
     if !far.is_empty() {
         return Err(format!("{name}: {} did not find the optimum\n{}", far.join(", "), section.text()).into());
     }
     section.bar(Bar {
         what: format!("fit, {name}, one core"),
         limit: "< 5 ms".into(),
-        measured: format!("{:.2} ms", whole.spent.wall_s * 1e3),
-        met: whole.spent.wall_s < 5e-3,
+        measured: format!("{:.2} ms", ours.spent.wall_s * 1e3),
+        met: ours.spent.wall_s < 5e-3,
     });
     for peer in peers.iter().filter(|p| p.who.starts_with("scipy")) {
-        let [ratio, of_whole] = [optimum, whole].map(|own| peer.spent.wall_s / own.spent.wall_s);
+        let ratio = peer.spent.wall_s / ours.spent.wall_s;
         section.bar(Bar {
-            what: format!("optimum, {name}, faster than {}", peer.who),
+            what: format!("fit, {name}, faster than {}", peer.who),
             limit: ">= 50".into(),
-            measured: format!("{ratio:.0} (whole fit {of_whole:.0})"),
+            measured: format!("{ratio:.0}"),
             met: ratio >= 50.0,
         });
     }

@@ -63,12 +63,6 @@ impl Problem<'_> {
         self.judge.names().len()
     }
 
-    /// armcal's optimum alone, from nominal: all parameters in the order of the model, and iterations.
-    pub fn minimise(&self) -> Result<(Vec<f64>, usize)> {
-        let (x, iterations) = self.judge.minimise()?;
-        Ok((self.judge.parameters_at(&x), iterations))
-    }
-
     /// Cost at parameters given in the order of the model: whitened rows and priors, halved squares, Huber where robust.
     pub fn cost(&self, values: &[f64]) -> Result<f64> {
         let mut x = Vec::new();

@@ -171,8 +171,6 @@ fn basin_finds_the_same_optimum_of_the_exported_problem() {
     assert!(ours.estimates[model.index("joint2.a").unwrap()].at_bound);
     let problem = whitened_problem(&model, &observations, &config).unwrap();
     let found = problem.x_of(&ours);
-    let (alone, _) = problem.minimise().unwrap();
-    assert!((&found - &alone).amax() < 1e-5, "{}", (&found - &alone).amax());
     let for_basin = || ForBasin { problem: &problem, lower: problem.lower(), upper: problem.upper() };
     let clock = Instant::now();
     let solver = BoundedLevenbergMarquardt::new().with_absolute_scaled_gradient_tolerance(1e-7);
