@@ -2,12 +2,12 @@
 //!
 //! With `tip = P_i A_i S_i` (everything before segment i, the segment, everything after it), a small change of segment i
 //! moves everything behind it by `P_i (dA_i A_i^-1) P_i^-1`, whatever stands there: a rotation `w` and a velocity, the
-//! spatial twist (Lynch and Park, Modern Robotics, 2017, section 5.1.1). Seen at the path's origin the velocity is `v_i`, at
-//! the tip it is `v_i + w_i x tip`, so that one forward pass with the segments' derivatives gives the whole Jacobian.
+//! twist (Lynch and Park, Modern Robotics, 2017, section 5.1). Where the segment ends the velocity is `v_i`, at the tip it is
+//! `v_i + w_i x (tip - end_i)`, so that one forward pass with the segments' derivatives gives the whole Jacobian.
 
 use crate::rigid::Rigid;
-use crate::segment::{LinearisedSegment, MAX_PARAMETERS, Segment};
-use crate::twist::{Twist, Twists};
+use crate::segment::{LinearisedSegment, Segment};
+use crate::twist::Twist;
 use std::borrow::Cow;
 
 /// The frame before the first segment and behind every one of them.
@@ -42,32 +42,17 @@ pub(crate) fn follow(path: &[Segment], p: &[f64], joints: &[f64]) -> Rigid<f64> 
     path.iter().fold(Rigid::identity(), |before, segment| before.then(&segment.transform(p, joints)))
 }
 
-/// Motions of everything behind a segment, which `before` leads to and `end` leads out of, seen at the path's origin.
-fn at_origin(segment: &LinearisedSegment, before: &Rigid<f64>, end: &Rigid<f64>) -> Twists<MAX_PARAMETERS> {
-    let mut motions = segment.motions.turned(&before.rotation);
-    motions.shift(&-end.translation_m);
-    motions
-}
-
 /// The end of the path and its motion per unit of each joint, in the order of the path.
 pub(crate) fn joint_twists(path: &[Segment], p: &[f64], joints: &[f64]) -> (Rigid<f64>, Vec<(usize, Twist)>) {
-    let mut tip = Rigid::identity();
-    let mut twists = Vec::with_capacity(joints.len());
-    for segment in path {
-        let before = tip;
-        let Some(joint) = segment.joint else {
-            tip = before.then(&segment.transform(p, joints));
-            continue;
-        };
-        let linearised = segment.linearised(p, joints);
-        tip = before.then(&linearised.transform);
-        let motions = at_origin(&linearised, &before, &tip);
-        twists.push((joint.index, motions.by(segment.parameters.len())));
-    }
-    for (_, twist) in &mut twists {
-        twist.translation_m += twist.rotation_rad.cross(&tip.translation_m);
-    }
-    (tip, twists)
+    let Ends(ends) = Ends::of(path, p, joints);
+    let tip = ends[path.len()];
+    let twist = |(segment, ends): (&Segment, &[Rigid<f64>])| {
+        let joint = segment.joint?;
+        let mut motions = segment.linearised(p, joints).motions.turned(&ends[0].rotation);
+        motions.shift(&(tip.translation_m - ends[1].translation_m));
+        Some((joint.index, motions.by(segment.parameters.len())))
+    };
+    (tip, path.iter().zip(ends.windows(2)).filter_map(twist).collect())
 }
 
 /// A path at or about one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
@@ -107,12 +92,12 @@ impl<'a> PathAt<'a> {
             };
             let before = tip;
             tip = before.then(&linearised.transform);
-            motions.push(at_origin(linearised, &before, &tip));
+            motions.push((linearised.motions.turned(&before.rotation), tip.translation_m));
         }
         let mut parameters = Vec::with_capacity(p.len());
         let mut of_joints = Vec::with_capacity(joints.len());
-        for (segment, motions) in self.path.iter().zip(&mut motions) {
-            motions.shift(&tip.translation_m);
+        for (segment, (motions, end_m)) in self.path.iter().zip(&mut motions) {
+            motions.shift(&(tip.translation_m - *end_m));
             let own = segment.parameters.clone();
             of_joints.extend(segment.joint.map(|joint| (joint.index, motions.by(own.len()))));
             parameters.extend(own.enumerate().map(|(k, index)| (index, motions.by(k))));
