@@ -238,6 +238,22 @@ pub enum Error {
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,
+    /// Nothing can be calibrated, and a mistake of the setup explains it.
+    #[error("{mistakes} (as it is: {source})")]
+    Setup {
+        /// What stopped the calibration.
+        source: Box<Error>,
+        /// What would undo it.
+        mistakes: String,
+    },
+    /// A mistake of the setup stands before any diagnosis.
+    #[error("the setup contradicts the data, so no physical effect is looked for [{code}]: {message}")]
+    SetupFirst {
+        /// Stable name of the mistake.
+        code: &'static str,
+        /// What would undo it.
+        message: String,
+    },
     /// `armcal add suggested` where nothing is.
     #[error("the diagnosis of `{pipeline}` suggests no effect; name one (see `armcal effects`)")]
     NothingSuggested {

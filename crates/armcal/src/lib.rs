@@ -15,6 +15,7 @@ pub mod plan;
 pub mod pool;
 pub mod progress;
 pub mod score;
+pub mod setup;
 pub mod stages;
 pub mod story;
 pub mod verify;

@@ -1,17 +1,17 @@
-//! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> diagnosis -> run.
+//! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> setup -> diagnosis -> run.
 
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::perceive::Seen;
+use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate};
-use armcal_core::{Observation, Rejection, Severity, Stage, Warning};
-use armcal_diagnose::{Diagnosis, diagnose};
+use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
+use armcal_diagnose::{Calibrated, Diagnosis, diagnose};
 use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
-use armcal_report::{Refit, Run};
-use armcal_table::{Association, Board};
+use armcal_report::{Refit, Run, Undiagnosed};
+use armcal_table::{Association, Place};
 use rayon::prelude::*;
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
@@ -38,18 +38,72 @@ pub fn diagnosed(
     pipeline: &Pipeline,
     progress: &Progress,
 ) -> Result<(Run, Vec<Recording>), Error> {
-    let diagnosis = settled.diagnose(pipeline, progress)?;
-    Ok(settled.into_run(pipeline, diagnosis))
+    let diagnosed = Diagnosed::of(settled.diagnose(pipeline, progress));
+    Ok(settled.into_run(pipeline, diagnosed))
 }
+
+/// What came of a diagnosis. Whatever came of it, the calibration stands.
+pub struct Diagnosed {
+    diagnosis: Option<Diagnosis>,
+    undiagnosed: Option<Undiagnosed>,
+    warning: Option<Warning>,
+}
+
+impl Diagnosed {
+    /// That nobody asked for one.
+    pub const NOT_ASKED: Diagnosed =
+        Diagnosed { diagnosis: None, undiagnosed: Some(Undiagnosed::NotAsked), warning: None };
+
+    fn of(result: Result<Option<Diagnosis>, Error>) -> Diagnosed {
+        match result {
+            Ok(Some(diagnosis)) => Diagnosed { diagnosis: Some(diagnosis), undiagnosed: None, warning: None },
+            Ok(None) => Diagnosed::NOT_ASKED,
+            Err(Error::SetupFirst { .. }) => {
+                Diagnosed { diagnosis: None, undiagnosed: Some(Undiagnosed::SetupFirst), warning: None }
+            }
+            Err(e) => Diagnosed {
+                diagnosis: None,
+                undiagnosed: Some(Undiagnosed::Failed),
+                warning: Some(Warning::new(
+                    Severity::Inadequate,
+                    Stage::Diagnose,
+                    DIAGNOSIS_FAILED,
+                    "diagnosis",
+                    format!("what is missing could not be looked for: {e}; the calibration stands"),
+                )),
+            },
+        }
+    }
+}
+
+/// Code of the warning about a diagnosis that could not be made.
+const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
 
 /// Recordings whose dwells have found their places, and the calibration on them.
 pub struct Settled {
     /// The opened recordings.
     pub recordings: Vec<Recording>,
-    /// The calibration table, if there is one.
-    pub board: Option<Board>,
     /// Text of the nominal model file.
     pub model_text: String,
+    /// What it was calibrated from.
+    pub inputs: Inputs,
+    /// What contradicts the data about the setup.
+    pub setup: SetupReport,
+    /// The arm in its frames, without effects.
+    pub geometry: Model,
+    /// The same with the pipeline's effects: what was calibrated.
+    pub model: Model,
+    /// What the fit saw.
+    pub observations: Vec<Observation>,
+    /// The calibration.
+    pub calibration: Calibration,
+    places: Vec<Option<Association>>,
+    rejections: Vec<Rejection>,
+    rounds: usize,
+}
+
+/// Inputs with every dwell in its place, calibrated.
+pub struct Fitted {
     /// The nominal arm in its frames, without effects.
     pub geometry: Model,
     /// The same with the pipeline's effects: what was calibrated.
@@ -58,49 +112,77 @@ pub struct Settled {
     pub observations: Vec<Observation>,
     /// The calibration.
     pub calibration: Calibration,
-    /// What each recording showed by itself.
-    pub seen: Vec<Seen>,
     places: Vec<Option<Association>>,
     rejections: Vec<Rejection>,
     rounds: usize,
 }
 
-/// Reads the recordings, and associates and calibrates in turn until every dwell stays in its place.
+impl Fitted {
+    /// Where the dwells turned out to be, where there is a table.
+    pub fn places(&self) -> impl Iterator<Item = &Place> {
+        self.places.iter().flatten().flat_map(|a| &a.assignments).map(|a| &a.place)
+    }
+}
+
+/// Reads the recordings, associates and calibrates in turn until every dwell stays in its place, and looks for mistakes
+/// in the setup.
 pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
     let (model_text, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
+    let inputs = Inputs { pipeline: pipeline.clone(), chain, board, seen, changes: Vec::new() };
+    let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
+    progress.step("checking the setup");
+    let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
+    let setup = setup::examine(&inputs, &fitted);
+    let Fitted { geometry, model, observations, calibration, places, rejections, rounds } = fitted;
+    Ok(Settled {
+        recordings,
+        model_text,
+        inputs,
+        setup,
+        geometry,
+        model,
+        observations,
+        calibration,
+        places,
+        rejections,
+        rounds,
+    })
+}
 
-    let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
+/// The error of inputs that cannot be calibrated, with the mistake of the setup that would explain it.
+fn without_setup(source: Error, inputs: &Inputs) -> Error {
+    let report = setup::examine_failed(inputs);
+    let messages: Vec<String> = report.mistakes().map(|f| format!("[{}] {}", f.code, f.message)).collect();
+    match messages.is_empty() {
+        true => source,
+        false => Error::Setup { source: Box::new(source), mistakes: messages.join("; also, ") },
+    }
+}
+
+/// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
+pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
+    let Inputs { pipeline, chain, board, seen, changes } = inputs;
+    let board = board.as_ref();
+    let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
+    frames::change_nominals(&mut geometry, changes)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
-    let mut places =
-        observe::associate_all(pipeline, board.as_ref(), &geometry, &geometry.nominal(), false, &seen)?;
+    let mut places = observe::associate_all(pipeline, board, &geometry, &geometry.nominal(), false, seen)?;
     let mut rounds = 0;
     loop {
         rounds += 1;
-        progress.step(&format!("calibrating (round {rounds})"));
+        told(rounds);
         frames::start_frames(pipeline, &mut geometry, &places);
-        let observed = observe::observations(pipeline, board.as_ref(), &seen, &places)?;
+        let observed = observe::observations(pipeline, board, seen, &places)?;
         let (observations, rejections) = (observed.observations, observed.rejections);
         let model = with_effects(pipeline, &geometry, &effects, &observations)?;
         let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
         let values = calibration.fit.values();
-        let again = observe::associate_all(pipeline, board.as_ref(), &model, &values, true, &seen)?;
+        let again = observe::associate_all(pipeline, board, &model, &values, true, seen)?;
         if observe::same_places(&again, &places) || rounds == MAX_ROUNDS {
-            return Ok(Settled {
-                recordings,
-                board,
-                model_text,
-                geometry,
-                model,
-                observations,
-                calibration,
-                seen,
-                places,
-                rejections,
-                rounds,
-            });
+            return Ok(Fitted { geometry, model, observations, calibration, places, rejections, rounds });
         }
         places = again;
     }
@@ -108,24 +190,33 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
 
 impl Settled {
     /// Looks for the effect that the calibrated model is missing, if the pipeline wants to know.
+    ///
+    /// # Errors
+    /// A mistake of the setup, which would get the name of an effect; a diagnosis that cannot be made.
     pub fn diagnose(&self, pipeline: &Pipeline, progress: &Progress) -> Result<Option<Diagnosis>, Error> {
+        if let Some(mistake) = self.setup.mistakes().next() {
+            return Err(Error::SetupFirst { code: mistake.code, message: mistake.message.clone() });
+        }
         diagnosis(pipeline, &self.model, &self.calibration, &self.observations, progress)
     }
 
     /// Everything for the report.
-    pub fn into_run(self, pipeline: &Pipeline, diagnosis: Option<Diagnosis>) -> (Run, Vec<Recording>) {
-        let warnings = closing_warnings(self.rounds, &self.calibration);
+    pub fn into_run(self, pipeline: &Pipeline, diagnosed: Diagnosed) -> (Run, Vec<Recording>) {
+        let mut warnings = closing_warnings(self.rounds, &self.calibration);
+        warnings.extend(diagnosed.warning);
         let run = Run {
             pipeline_name: pipeline.name.clone(),
             pipeline_text: pipeline.text.clone(),
             model_text: self.model_text,
-            recordings: perceive::recording_runs(pipeline, self.seen, self.places, &self.rejections),
-            board: self.board,
+            recordings: perceive::recording_runs(pipeline, self.inputs.seen, self.places, &self.rejections),
+            board: self.inputs.board,
             model: self.model,
             session: frames::session(pipeline, &self.observations),
             observations: self.observations,
             calibration: self.calibration,
-            diagnosis,
+            setup: self.setup,
+            diagnosis: diagnosed.diagnosis,
+            undiagnosed: diagnosed.undiagnosed,
             steps: Vec::new(),
             alternatives: Vec::new(),
             warnings,
@@ -144,9 +235,14 @@ pub fn recalibrate(
 ) -> Result<(), Error> {
     run.model = with_effects(pipeline, geometry, effects, &run.observations)?;
     run.calibration = calibrate(&run.model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
-    run.diagnosis = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress)?;
-    run.warnings.retain(|w| w.code != HOLDOUT_WORSE);
+    run.warnings.retain(|w| ![HOLDOUT_WORSE, DIAGNOSIS_FAILED].contains(&w.code));
     run.warnings.extend(holdout_worse(&run.calibration));
+    if run.setup.mistakes().next().is_none() {
+        let found = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress);
+        let Diagnosed { diagnosis, undiagnosed, warning } = Diagnosed::of(found);
+        (run.diagnosis, run.undiagnosed) = (diagnosis, undiagnosed);
+        run.warnings.extend(warning);
+    }
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
     add_refits(run, pipeline, progress)
@@ -171,7 +267,16 @@ fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<
     counts.dedup();
     for count in counts.into_iter().filter(|count| *count > 0) {
         progress.step(&format!("fitting what was found ({count} of {})", found.len()));
-        match refit(run, pipeline, &found[..count]) {
+        let known = diagnosis.refitted.as_deref().filter(|r| r.effects == found[..count]);
+        let step = match known {
+            Some(r) => Ok(Refit {
+                effects: r.effects.iter().map(EffectSpec::to_string).collect(),
+                model: r.model.clone(),
+                calibration: r.calibration.clone(),
+            }),
+            None => refit(run, pipeline, &found[..count]),
+        };
+        match step {
             Ok(step) => run.steps.push(step),
             // The verdict stands without it; only the picture of this step is missing.
             Err(e) => {
@@ -224,8 +329,15 @@ fn diagnosis(
     }
     progress.step("diagnosing");
     let session = frames::session(pipeline, observations);
-    let found = diagnose(model, calibration, observations, &session, &pipeline.fit, &pipeline.diagnosis)?;
-    Ok(Some(found))
+    let calibrated = Calibrated {
+        model,
+        calibration,
+        observations,
+        session: &session,
+        fit: &pipeline.fit,
+        holdout: &pipeline.holdout,
+    };
+    Ok(Some(diagnose(&calibrated, &pipeline.diagnosis)?))
 }
 
 fn with_effects(

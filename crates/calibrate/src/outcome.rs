@@ -131,3 +131,27 @@ pub struct Calibration {
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }
+
+impl Calibration {
+    /// Whether anything was held out: then the calibration is judged by that side, else by the side it was fitted to.
+    pub fn held_out(&self) -> bool {
+        self.holdout.fitted.n > 0
+    }
+
+    /// The side by which the calibration is judged: [`Calibration::noise_floor_m`] is that of its points.
+    pub fn judged(&self) -> &SideErrors {
+        if self.held_out() { &self.holdout } else { &self.train }
+    }
+
+    /// Mean error of the judged side over the mean error that the declared noise alone would give. Infinite where no
+    /// noise is declared.
+    pub fn times_floor(&self) -> f64 {
+        self.judged().fitted.mean_m / self.noise_floor_m
+    }
+
+    /// The residuals of the judged side.
+    pub fn judged_residuals(&self) -> impl Iterator<Item = &Residual> {
+        let held_out = self.held_out();
+        self.residuals.iter().filter(move |r| r.held_out == held_out)
+    }
+}

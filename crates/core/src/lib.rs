@@ -14,6 +14,7 @@ pub mod observation;
 pub mod parameter;
 pub mod robust;
 pub mod samples;
+pub mod setup;
 pub mod units;
 pub mod warning;
 
@@ -23,5 +24,6 @@ pub use frames::{Pose, RollPitchYaw};
 pub use observation::{Observation, Reference, Rejection};
 pub use parameter::{Parameter, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
+pub use setup::{Certainty, SetupFinding, SetupReport};
 pub use units::Unit;
 pub use warning::{Severity, Stage, Warning, listed};

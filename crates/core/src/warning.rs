@@ -35,8 +35,12 @@ pub enum Stage {
     Dwell,
     /// Board and association.
     Table,
+    /// Mistakes of wiring, files, frames and units.
+    Setup,
     /// Fit and hold-out.
     Calibrate,
+    /// What is missing from the model.
+    Diagnose,
     /// Writing results.
     Output,
 }

@@ -49,6 +49,12 @@ pub struct DiagnosisConfig {
     pub max_set: usize,
     /// A dwell is set aside when its left-out residual is as rare as this many sigma; default 5.
     pub outlier_sigma: f64,
+    /// Errors up to this many times the noise floor, scattering up to this many times as declared, are at the floor: only
+    /// then may nothing be missing; default 1.5.
+    pub floor_factor: f64,
+    /// With everything found in the model, errors above this many times the floor take back every name: what leaves so
+    /// much has not been understood; default 10.
+    pub unexplained_factor: f64,
     /// Most dwells that weigh explanations; of more, as many are drawn evenly over time. All of them take part in
     /// fits. Default 400.
     pub max_weighed: usize,
@@ -80,6 +86,8 @@ impl Default for DiagnosisConfig {
             max_effects: 8,
             max_set: 8,
             outlier_sigma: 5.0,
+            floor_factor: 1.5,
+            unexplained_factor: 10.0,
             max_weighed: 400,
             same_pose_deg: 0.6,
         }
@@ -109,6 +117,8 @@ impl DiagnosisConfig {
             ("noise_prior_dof", self.noise_prior_dof),
             ("unlisted_effect_mm", self.unlisted_effect_mm),
             ("outlier_sigma", self.outlier_sigma),
+            ("floor_factor", self.floor_factor),
+            ("unexplained_factor", self.unexplained_factor),
             ("same_pose_deg", self.same_pose_deg),
         ] {
             if !(value.is_finite() && value > 0.0) {

@@ -2,8 +2,11 @@
 
 use crate::contrasts::Contrast;
 use crate::crossval::HeldOut;
+use crate::error_places::ErrorPlace;
 use crate::structure::Structure;
+use armcal_calibrate::Calibration;
 use armcal_core::{DwellId, Unit, Warning};
+use armcal_model::{EffectSpec, Model};
 use serde::{Deserialize, Serialize};
 
 /// Stands in a set where an explanation outside the catalogue cannot be excluded.
@@ -19,8 +22,32 @@ pub enum Verdict {
     Identified,
     /// Something listed is missing, and these data leave more than one name for it.
     Ambiguous,
-    /// Something is missing that no listed effect explains.
+    /// Something is missing that no listed effect explains, and an unlisted shape predicts.
     Unknown,
+    /// The errors do not agree with the declared noise, and nothing that was tried predicts them.
+    Unexplained,
+}
+
+impl Verdict {
+    /// Every verdict.
+    pub const ALL: [Verdict; 5] = [
+        Verdict::NothingMissing,
+        Verdict::Identified,
+        Verdict::Ambiguous,
+        Verdict::Unknown,
+        Verdict::Unexplained,
+    ];
+
+    /// As the pipeline and `summary.json` spell it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::NothingMissing => "nothing_missing",
+            Verdict::Identified => "identified",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::Unknown => "unknown",
+            Verdict::Unexplained => "unexplained",
+        }
+    }
 }
 
 /// The whole diagnosis.
@@ -30,8 +57,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Names, most probable first: one for each effect when identified, all members of the sets when ambiguous.
     pub names: Vec<String>,
-    /// Probability of the answer (the least probable effect's, when there are several).
-    pub probability: f64,
+    /// Probability of the answer (the least probable effect's, when there are several); none where the answer is that
+    /// nothing explains the errors, or that of a verdict which the refit has taken back.
+    pub probability: Option<f64>,
     /// Largest family-wise p-value of the effects named; of the best candidate when none is.
     pub p_adjusted: f64,
     /// Effects that belong in the model, in the order in which they were found.
@@ -56,14 +84,89 @@ pub struct Diagnosis {
     pub structure: Structure,
     /// Probability that nothing is missing, before any effect was added.
     pub p_nothing: f64,
-    /// Mean position error before and after the effects found, on places the fit did not see [mm].
+    /// Unlisted shapes that were weighed.
+    pub tried_unlisted: usize,
+    /// Whether what is left over is so small a part of the first effect that it may be that effect's shape.
+    pub rest_may_be_shape: bool,
+    /// Mean position error before and after what was found [mm]: of the calibrations with and without it, on the
+    /// points by which they are judged (see `judged`).
     pub holdout_mm: BeforeAfter,
+    /// Mean error that the declared noise alone would give on those points [mm].
+    pub floor_mm: f64,
+    /// What the errors of `holdout_mm` are.
+    pub judged: JudgedOn,
+    /// What is neither explained nor at the floor; also beside effects that explain a part.
+    pub unexplained: Option<Unexplained>,
     /// Dwells set aside as suspect.
     pub set_aside: Vec<DwellId>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
     /// Each number of the verdict in a plain sentence.
     pub explanations: Vec<Explanation>,
+    /// The calibration with everything that was found; none where nothing was, or where it cannot be fitted.
+    #[serde(skip)]
+    pub refitted: Option<Box<Refitted>>,
+}
+
+/// Which errors a number is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JudgedOn {
+    /// Points held out of the fit, predicted by a fit that never saw them.
+    HeldOut,
+    /// The points the fit saw: nothing was held out.
+    Fitted,
+    /// Places left out in turn of the linearised fit: no calibration was at hand.
+    Linearised,
+}
+
+impl JudgedOn {
+    /// For people: what stands before "error".
+    pub fn words(self) -> &'static str {
+        match self {
+            JudgedOn::HeldOut => "held-out",
+            JudgedOn::Fitted => "fitted",
+            JudgedOn::Linearised => "left-out (linearised)",
+        }
+    }
+}
+
+/// Errors that nothing explains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Mean error with everything found in the model [mm].
+    pub error_mm: f64,
+    /// Mean error that the declared noise alone would give [mm].
+    pub floor_mm: f64,
+    /// The first over the second; `null` in JSON where no noise is declared.
+    pub times_floor: f64,
+    /// In which dwells it is largest, the clearest first; empty where it is alike everywhere.
+    pub places: Vec<ErrorPlace>,
+    /// What was tried and did not explain it: the number of listed effects and of unlisted shapes, and names with what
+    /// became of them.
+    pub tried: Tried,
+}
+
+/// What a diagnosis tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tried {
+    /// Effects of the catalogue, each at every target.
+    pub listed: usize,
+    /// Shapes outside the catalogue: where something may enter, over what it may depend.
+    pub unlisted: usize,
+    /// Names that the refit did not confirm, with the errors before and after [mm].
+    pub refitted: Vec<(String, BeforeAfter)>,
+}
+
+/// The model with what was found in it, calibrated anew.
+#[derive(Debug, Clone)]
+pub struct Refitted {
+    /// What was added.
+    pub effects: Vec<EffectSpec>,
+    /// The model with it.
+    pub model: Model,
+    /// Its calibration, on the observations and the hold-out of the one without.
+    pub calibration: Calibration,
 }
 
 /// An error before and after [mm].

@@ -1,15 +1,15 @@
 //! Each number of the verdict in one plain sentence.
 
 use crate::config::DiagnosisConfig;
-use crate::diagnosis::{Diagnosis, Explanation, FoundEffect, Verdict};
+use crate::diagnosis::{Diagnosis, Explanation, FoundEffect, Unexplained, Verdict};
 
 /// Sentences for the verdict and its numbers.
-pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &DiagnosisConfig) -> Vec<Explanation> {
+pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Explanation> {
     let mut all = Vec::new();
     let mut say = |number: &str, sentence: String| {
         all.push(Explanation { number: number.to_string(), sentence });
     };
-    say("verdict", verdict(d, may_be_shape));
+    say("verdict", verdict(d));
     say(
         "p_nothing",
         format!(
@@ -36,11 +36,17 @@ pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &Diagnosis
     for e in &d.effects {
         effect(e, config, &mut say);
     }
+    let found = match d.effects.is_empty() && d.unlisted.is_empty() {
+        true => String::new(),
+        false => format!(" without and {:.3} mm with what was found", d.holdout_mm.after),
+    };
     say(
         "holdout_mm",
         format!(
-            "on places the fit did not see the mean error is {:.3} mm without and {:.3} mm with what was found",
-            d.holdout_mm.before, d.holdout_mm.after
+            "the mean {} error is {:.3} mm{found}; the declared noise alone would give {:.3} mm",
+            d.judged.words(),
+            d.holdout_mm.before,
+            d.floor_mm
         ),
     );
     for u in &d.unlisted {
@@ -57,7 +63,7 @@ pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &Diagnosis
             "unknown",
             format!(
                 "what no listed effect explains looks most like something that enters at {} and depends on {}; with that \
-                 shape in the model the mean error on places the fit did not see goes from {:.3} to {:.3} mm{known}",
+                 shape in the linearised model the mean error of places left out in turn goes from {:.3} to {:.3} mm{known}",
                 u.channel, u.driver, u.places.before, u.places.after
             ),
         );
@@ -88,8 +94,8 @@ pub(crate) fn explanations(d: &Diagnosis, may_be_shape: bool, config: &Diagnosis
     all
 }
 
-fn verdict(d: &Diagnosis, may_be_shape: bool) -> String {
-    let rest = match (&d.unknown, may_be_shape) {
+fn verdict(d: &Diagnosis) -> String {
+    let rest = match (&d.unknown, d.rest_may_be_shape) {
         (Some(_), true) => "; what is left over is so small that it may be the shape of the first effect",
         (Some(_), false) => "; something without a listed name is left over",
         (None, _) => "",
@@ -108,6 +114,10 @@ fn verdict(d: &Diagnosis, may_be_shape: bool) -> String {
             format!("an effect is missing, and these data leave more than one name: {}{rest}", sets.join("; and: "))
         }
         Verdict::Unknown => "something is missing, and no listed effect explains it better than an unlisted one".to_string(),
+        Verdict::Unexplained => d.unexplained.as_ref().map_or_else(
+            || "the errors do not agree with the declared noise, and nothing that was tried predicts them".to_string(),
+            Unexplained::sentence,
+        ),
     }
 }
 
@@ -131,8 +141,8 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
     say(
         &format!("{}.places", e.name),
         format!(
-            "{} changes the mean error on places the fit did not see from {:.3} to {:.3} mm (95 % interval of the change \
-             {:.3} to {:.3} mm)",
+            "{} in the linearised model changes the mean error of places left out in turn from {:.3} to {:.3} mm (95 % \
+             interval of the change {:.3} to {:.3} mm)",
             e.name, e.places.before, e.places.after, e.places.change_ci95[0], e.places.change_ci95[1]
         ),
     );

@@ -4,7 +4,7 @@ use crate::config::DiagnosisConfig;
 use crate::confusion::likeness;
 use crate::crossval::{by_place, left_out, norms_m};
 use crate::diagnosis::{
-    BeforeAfter, Diagnosis, FoundEffect, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
+    BeforeAfter, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
 };
 use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
@@ -79,9 +79,12 @@ fn assemble(
         _ => effects.iter().map(|e| e.name.clone()).collect(),
     };
     let probability = match verdict {
-        Verdict::NothingMissing => weighed.p_nothing,
-        Verdict::Unknown => 1.0 - weighed.p_nothing,
-        _ => effects.iter().map(|e| e.probability).fold(1.0, f64::min),
+        Verdict::NothingMissing => Some(weighed.p_nothing),
+        Verdict::Unexplained => None,
+        Verdict::Unknown => Some(1.0 - weighed.p_nothing),
+        Verdict::Identified | Verdict::Ambiguous => {
+            Some(effects.iter().map(|e| e.probability).fold(1.0, f64::min))
+        }
     };
     let p_adjusted = match effects.is_empty() {
         true => top.map_or(1.0, |t| t.own().p_adjusted),
@@ -104,6 +107,12 @@ fn assemble(
         record_next: Vec::new(),
         structure: structure(problem, config),
         p_nothing: weighed.p_nothing,
+        tried_unlisted: weighed.unlisted.len(),
+        rest_may_be_shape: search.may_be_shape,
+        floor_mm: floor_mm(problem),
+        judged: JudgedOn::Linearised,
+        unexplained: None,
+        refitted: None,
         holdout_mm: BeforeAfter { before: mean(problem), after: mean(&search.with_curves.problem) },
         warnings: warnings(&noise, &set_aside, whole.dwells.len(), search, config),
         noise,
@@ -115,8 +124,15 @@ fn assemble(
         explanations: Vec::new(),
     };
     diagnosis.record_next = next::record_next(problem, &diagnosis);
-    diagnosis.explanations = explanations(&diagnosis, search.may_be_shape, config);
+    diagnosis.explanations = explanations(&diagnosis, config);
     diagnosis
+}
+
+/// Mean error that the declared noise alone gives [mm].
+fn floor_mm(problem: &Problem) -> f64 {
+    let expected_m =
+        |d: &crate::problem::DwellRow| armcal_calibrate::expected_norm_m(&(d.metres * d.metres.transpose()));
+    problem.dwells.iter().map(expected_m).sum::<f64>() / problem.dwells.len().max(1) as f64 * 1e3
 }
 
 fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {

@@ -13,6 +13,8 @@
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
+//!   explains;
 //! * `implied`: what each dwell says about each joint, for the eye;
 //! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
 //!
@@ -21,6 +23,7 @@
 mod bootstrap;
 mod cells;
 mod compare;
+mod conclude;
 mod config;
 mod confusion;
 mod contrasts;
@@ -29,6 +32,7 @@ mod curves;
 mod diagnosis;
 mod drivers;
 mod error;
+mod error_places;
 mod evidence;
 mod explain;
 mod expression;
@@ -71,9 +75,10 @@ pub use contrasts::Contrast;
 pub use crossval::HeldOut;
 pub use diagnosis::*;
 pub use error::DiagnoseError;
+pub use error_places::ErrorPlace;
 pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
-pub use observed::diagnose;
+pub use observed::{Calibrated, diagnose};
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use planned::plan_dwells;
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};

@@ -1,25 +1,36 @@
 //! The outer room: a calibrated model and its observations become a [`Problem`], and accepted effects are refitted.
 
+use crate::conclude::Evidence;
+use crate::diagnosis::Refitted;
 use crate::places::thinned;
 use crate::problem::{Candidate, Problem};
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
-use armcal_calibrate::{Calibration, FitConfig, ModelProblem, fit_problem};
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem};
 use armcal_core::Observation;
 use armcal_model::{Model, Session};
 use std::collections::BTreeMap;
 
+/// A calibrated model, and what it was calibrated with.
+#[derive(Debug, Clone, Copy)]
+pub struct Calibrated<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Its calibration on `observations`.
+    pub calibration: &'a Calibration,
+    /// What the fit saw, and the dwells held out of it.
+    pub observations: &'a [Observation],
+    /// What the effects need to know about all of them.
+    pub session: &'a Session,
+    /// How it was fitted.
+    pub fit: &'a FitConfig,
+    /// What was held out.
+    pub holdout: &'a HoldoutConfig,
+}
+
 /// Diagnoses a calibrated model: which effect do its observations ask for?
-///
-/// `calibration` is that of `model` on `observations`; `session` says what the effects need to know about all of them.
-pub fn diagnose(
-    model: &Model,
-    calibration: &Calibration,
-    observations: &[Observation],
-    session: &Session,
-    fit: &FitConfig,
-    config: &DiagnosisConfig,
-) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
+    let Calibrated { model, calibration, observations, session, fit, .. } = *calibrated;
     let values = calibration.fit.values();
     let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
     let mut refit = ModelRefit {
@@ -33,7 +44,24 @@ pub fn diagnose(
         known: BTreeMap::new(),
         sizes: BTreeMap::new(),
     };
-    diagnose_problem(&mut refit, config)
+    let mut diagnosis = diagnose_problem(&mut refit, config)?;
+    let joint_names = model.chain().joint_names();
+    let refitted = refitted(calibrated, &diagnosis);
+    diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
+    Ok(diagnosis)
+}
+
+/// The model with everything that was found, on the same observations and hold-out. None where nothing was found, or
+/// where this hold-out leaves no way to fit it.
+fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {
+    let Calibrated { model, observations, session, fit, holdout, .. } = *calibrated;
+    let effects = diagnosis.suggested(model.chain().joint_names()).ok()?;
+    if effects.is_empty() {
+        return None;
+    }
+    let model = model.with_effects(&effects, session).ok()?;
+    let calibration = calibrate(&model, observations, fit, holdout).ok()?;
+    Some(Refitted { effects, model, calibration })
 }
 
 /// Refits the model with accepted effects, each set of effects once: all observations fit, some of them weigh.

@@ -48,9 +48,10 @@ impl View<'_> {
         })
     }
 
-    /// Whether the model has an effect already.
+    /// Whether the model has an effect already, whatever a pipeline says of its parameters.
     fn taken(&self, spec: &EffectSpec) -> bool {
-        self.model.effects().iter().any(|e| e.spec == *spec)
+        let name = spec.to_string();
+        self.model.effects().iter().any(|e| e.spec.to_string() == name)
     }
 
     /// The model with more effects at zero, linearised at the fit.

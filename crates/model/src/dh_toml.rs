@@ -105,6 +105,28 @@ impl Chain {
         Ok(table.into_chain())
     }
 
+    /// The same numbers read by the other convention (standard by Craig's modified one, and the reverse); none where the
+    /// chain came from a URDF.
+    pub fn in_other_convention(&self) -> Option<Chain> {
+        let Source::Dh(table) = &self.source else { return None };
+        let convention = match table.convention {
+            Convention::Standard => Convention::Modified,
+            Convention::Modified => Convention::Standard,
+        };
+        Some(DhTable { convention, ..table.clone() }.into_chain())
+    }
+
+    /// The DH table with the numbers of a row and the next one exchanged, names and joints staying where they are; none
+    /// where there are no such rows.
+    pub fn with_rows_exchanged(&self, row: usize) -> Option<Chain> {
+        let Source::Dh(table) = &self.source else { return None };
+        let mut table = table.clone();
+        let (a, b) = (table.rows.get(row)?.clone(), table.rows.get(row + 1)?.clone());
+        table.rows[row] = Row { name: a.name.clone(), joint: a.joint, ..b.clone() };
+        table.rows[row + 1] = Row { name: b.name, joint: b.joint, ..a };
+        Some(table.into_chain())
+    }
+
     /// The DH table with calibrated numbers, in the same format: everything else as it was read.
     ///
     /// `values` is a parameter vector that begins with the chain's parameters, such as a model's. Errors

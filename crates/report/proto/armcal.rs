@@ -658,8 +658,8 @@ pub struct Diagnosis {
     pub sentence: ::prost::alloc::string::String,
     #[prost(string, repeated, tag = "4")]
     pub names: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
-    #[prost(double, tag = "5")]
-    pub probability: f64,
+    #[prost(double, optional, tag = "5")]
+    pub probability: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "6")]
     pub p_adjusted: ::core::option::Option<f64>,
     #[prost(double, tag = "7")]

@@ -3,8 +3,8 @@
 use crate::diagnosis_text::pasted;
 use armcal_core::Unit;
 use armcal_diagnose::{
-    BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, NotTestable, ParameterReport,
-    ShapePoint, UnknownReport, Verdict,
+    BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, JudgedOn, NotTestable,
+    ParameterReport, ShapePoint, Unexplained, UnknownReport, Verdict,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -14,7 +14,8 @@ use std::collections::BTreeMap;
 pub(crate) struct DiagnosisSummary<'a> {
     verdict: Verdict,
     names: &'a [String],
-    probability: f64,
+    /// `null` where the answer is no explanation.
+    probability: Option<f64>,
     p_adjusted: f64,
     candidates: Vec<Candidate<'a>>,
     unknown: Option<Unknown<'a>>,
@@ -24,7 +25,12 @@ pub(crate) struct DiagnosisSummary<'a> {
     not_testable: &'a [NotTestable],
     record_next: &'a [String],
     p_nothing: f64,
+    /// Mean errors of the calibrations without and with what was found, on the points that `judged` names.
     holdout_mm: BeforeAfter,
+    floor_mm: f64,
+    judged: JudgedOn,
+    /// What is neither explained nor at the floor.
+    unexplained: Option<&'a Unexplained>,
     sigma_ratio: f64,
     effects: &'a [FoundEffect],
     explanations: &'a [Explanation],
@@ -40,6 +46,7 @@ struct Candidate<'a> {
     log_evidence: f64,
     probability: f64,
     p_adjusted: f64,
+    /// Of the linearised fit, each place left out in turn; `refits` has the calibrations.
     holdout_mm: Option<BeforeAfter>,
     same_to_the_data: &'a [String],
     absorbed: f64,
@@ -63,6 +70,7 @@ struct Unknown<'a> {
     /// The `[[effects]]` table to paste into the pipeline; empty where nothing offered reaches the shape.
     table: String,
     probability: f64,
+    /// Of the linearised fit, each place left out in turn.
     holdout_mm: BeforeAfter,
     unit: Unit,
     shape: &'a [ShapePoint],
@@ -84,6 +92,9 @@ impl<'a> DiagnosisSummary<'a> {
             record_next: &d.record_next,
             p_nothing: d.p_nothing,
             holdout_mm: d.holdout_mm,
+            floor_mm: d.floor_mm,
+            judged: d.judged,
+            unexplained: d.unexplained.as_ref(),
             sigma_ratio: d.noise.sigma_ratio,
             effects: &d.effects,
             explanations: &d.explanations,

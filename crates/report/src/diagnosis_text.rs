@@ -4,6 +4,7 @@ use crate::past_run::PastRun;
 use crate::run::Run;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{in_display_unit, printable};
+use armcal_core::SetupReport;
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, ParameterReport, UnknownReport, Verdict};
 use armcal_model::effects_toml;
 use comfy_table::Cell;
@@ -11,6 +12,8 @@ use serde_json::Value;
 
 /// Rows of the ranking.
 const RANKED: usize = 8;
+/// Heading of errors that no calibration gave.
+const PREDICTED: &str = "linearised, left out [mm]";
 /// Heading of the tables that add what is unlisted.
 const PASTE: &str = "To paste into the pipeline";
 
@@ -18,7 +21,7 @@ const PASTE: &str = "To paste into the pipeline";
 pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
     let pen = Pen { style };
     match &run.diagnosis {
-        None => "This run was not diagnosed ([diagnosis] enabled = false).\n".to_owned(),
+        None => run.answer().sentence + "\n",
         Some(d) => full(&pen, d),
     }
 }
@@ -29,12 +32,17 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
     let d = &past.summary["diagnosis"];
     let text = |v: &Value| v.as_str().map(printable).unwrap_or_default();
     let list = |v: &Value| v.as_array().into_iter().flatten().map(text).collect::<Vec<_>>();
+    let answer = text(&past.summary["answer_sentence"]);
     if d.is_null() {
-        return format!("{} was not diagnosed ([diagnosis] enabled = false).\n", past.path.display());
+        let answer = if answer.is_empty() { "It was not diagnosed.".to_owned() } else { answer };
+        return format!("{}: {answer}\n", past.path.display());
     }
     let names = list(&d["names"]).join(", ");
-    let headline = format!("{} {names}", text(&d["verdict"]).replace('_', " "));
-    let mut table = pen.table(&["effect", "probability", "ln B", "p", "held out [mm]"]);
+    let headline = match answer.is_empty() {
+        true => format!("{} {names}", text(&d["verdict"]).replace('_', " ")),
+        false => answer,
+    };
+    let mut table = pen.table(&["effect", "probability", "ln B", "p", PREDICTED]);
     let three = |v: &Value| v.as_f64().map_or("-".to_owned(), |v| format!("{v:.3}"));
     for c in d["candidates"].as_array().into_iter().flatten().take(RANKED) {
         let h = &c["holdout_mm"];
@@ -85,10 +93,12 @@ pub fn headline(d: &Diagnosis) -> String {
             format!("Nothing is missing that these data can show{not_shown}.")
         }
         Verdict::Identified => {
-            format!("Missing: {names} (probability {:.2}, p = {:.3}).", d.probability, d.p_adjusted)
+            let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
+            format!("Missing: {names} ({probability}p = {:.3}){}.", d.p_adjusted, beside(d))
         }
         Verdict::Ambiguous => {
-            format!("An effect is missing, and these data cannot tell which of: {names}.")
+            let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
+            format!("Missing: {}{}.", printable(&sets.join("; and ")), beside(d))
         }
         Verdict::Unknown => match &d.unknown {
             Some(u) => format!(
@@ -98,7 +108,34 @@ pub fn headline(d: &Diagnosis) -> String {
             ),
             None => "Something is missing, and nothing listed explains it.".to_owned(),
         },
+        Verdict::Unexplained => {
+            let sentence = d.unexplained.as_ref().map(armcal_diagnose::Unexplained::sentence);
+            let sentence =
+                sentence.unwrap_or_else(|| "nothing that was tried predicts the errors".to_owned());
+            printable(&format!("Unexplained: {sentence}."))
+        }
     }
+}
+
+/// The mistakes of the setup in one sentence; none where there is none.
+pub(crate) fn setup_sentence(setup: &SetupReport) -> Option<String> {
+    let messages: Vec<&str> = setup.mistakes().map(|f| f.message.as_str()).collect();
+    (!messages.is_empty()).then(|| printable(&format!("Setup first: {}.", messages.join("; also, "))))
+}
+
+/// One effect by its name, or by all names that these data leave.
+fn one_of(set: &[String]) -> String {
+    match set {
+        [name] => name.clone(),
+        names => format!("one of {} (these data cannot tell which)", names.join(", ")),
+    }
+}
+
+/// What stands beside the names: how much of the error they leave.
+fn beside(d: &Diagnosis) -> String {
+    d.unexplained.as_ref().map_or(String::new(), |u| {
+        format!("; with it {:.3} mm remain, {:.1} times the noise floor", u.error_mm, u.times_floor)
+    })
 }
 
 fn full(pen: &Pen, d: &Diagnosis) -> String {
@@ -128,8 +165,7 @@ fn full(pen: &Pen, d: &Diagnosis) -> String {
 }
 
 fn ranking(pen: &Pen, d: &Diagnosis) -> String {
-    let mut table =
-        pen.table(&["effect", "size", "probability", "ln B", "p", "held out [mm]", "absorbed", "also"]);
+    let mut table = pen.table(&["effect", "size", "probability", "ln B", "p", PREDICTED, "absorbed", "also"]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
             Cell::new(printable(&c.spec)),
@@ -154,10 +190,19 @@ pub(crate) fn sizes(c: &CandidateReport) -> String {
     printable(&shown.join(", "))
 }
 
-/// `width 0.052 ± 0.004 deg`.
+/// `width 0.052 ± 0.004 deg`. An interval wider than the value is no size: it says how large the value can be at most.
 pub fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
     let shown = |si| in_display_unit(p.unit, si);
+    if half > p.value.abs() {
+        let text = format!(
+            "{} not determined by itself (at most {} {})",
+            p.name,
+            shown(p.upper_limit95),
+            p.unit.display_symbol()
+        );
+        return text.replace(" )", ")");
+    }
     let text = format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol());
     text.trim_end().to_owned()
 }
@@ -176,7 +221,8 @@ pub(crate) fn found(e: &FoundEffect) -> String {
         format!("; the next listed explanation, {}, would leave {:.3} mm", r.name, r.places.after)
     });
     printable(&format!(
-        "{}{set}: {}; held out {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 %){rival}{contrast}",
+        "{}{set}: {}; linearised, each place left out in turn: {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 \
+         %){rival}{contrast}",
         e.name,
         sizes.join(", "),
         h.before,
@@ -205,7 +251,8 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
         .as_ref()
         .map_or(String::new(), |e| format!("; as a formula on {}: {}", e.acts_on, e.formula));
     printable(&format!(
-        "unlisted, at {} over {}: held out {:.3} -> {:.3} mm with its shape{range}{formula}",
+        "unlisted, at {} over {}: linearised, each place left out in turn: {:.3} -> {:.3} mm with its \
+         shape{range}{formula}",
         u.channel, u.driver, u.places.before, u.places.after
     ))
 }

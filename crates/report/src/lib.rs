@@ -54,7 +54,7 @@ pub use past_observations::{
 };
 pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
 pub use pooled::{POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_json, pooled_terminal, write_pooled};
-pub use run::{RecordingRun, Refit, Run, Status, VERSION};
+pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};

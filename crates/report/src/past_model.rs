@@ -162,7 +162,7 @@ impl PastModel {
             Some(facts(&format!("board.{name}"), &pose))
         });
         let recordings = of.recordings.iter().enumerate();
-        let judged = if calibration.holdout.fitted.n > 0 { &calibration.holdout } else { &calibration.train };
+        let judged = calibration.judged();
         PastModel {
             schema: SCHEMA.into(),
             version: VERSION.into(),

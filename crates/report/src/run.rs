@@ -1,7 +1,10 @@
 //! Everything a finished run knows. All outputs are views of this one value.
 
+use crate::diagnosis_text::{headline, setup_sentence};
 use armcal_calibrate::Calibration;
-use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, Severity, Warning};
+use armcal_core::{
+    Dwell, DwellId, Observation, Rejection, Role, SetupFinding, SetupReport, Severity, Warning,
+};
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
@@ -35,14 +38,38 @@ pub struct Run {
     pub session: Session,
     /// The calibration; its residuals are in the order of `observations`.
     pub calibration: Calibration,
-    /// Which effect the calibrated model is missing; `None` when nobody asked.
+    /// What contradicts the data about the setup, before any physics.
+    pub setup: SetupReport,
+    /// Which effect the calibrated model is missing; `None` where `undiagnosed` says why.
     pub diagnosis: Option<Diagnosis>,
+    /// Why there is no diagnosis.
+    pub undiagnosed: Option<Undiagnosed>,
     /// What the diagnosis found, added one effect after the other (what has no name at once), fitted and held out anew.
     pub steps: Vec<Refit>,
     /// What the most probable candidates would do, each alone in the run's model; those that are no step already.
     pub alternatives: Vec<Refit>,
     /// What concerns the run as a whole.
     pub warnings: Vec<Warning>,
+}
+
+/// Why a run has no diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Undiagnosed {
+    /// `[diagnosis] enabled = false`.
+    NotAsked,
+    /// The setup contradicts the data: no physical effect is looked for in such data.
+    SetupFirst,
+    /// It could not be made; a warning says why.
+    Failed,
+}
+
+/// What a run says about its model in one word and one sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// A verdict as `summary.json` spells it; `setup`, where the setup contradicts the data; `not_diagnosed`.
+    pub word: &'static str,
+    /// The sentence.
+    pub sentence: String,
 }
 
 /// The run's model with more effects, fitted to the same observations and judged on the same hold-out.
@@ -117,10 +144,29 @@ impl Run {
         let of_diagnosis = self.diagnosis.iter().flat_map(|d| &d.warnings);
         let calibration = &self.calibration;
         let all = self.warnings.iter().chain(&calibration.warnings).chain(&calibration.fit.warnings);
-        let all = all.chain(of_diagnosis);
+        let of_setup: Vec<Warning> = self.setup.findings.iter().map(SetupFinding::warning).collect();
+        let all = of_setup.iter().chain(all).chain(of_diagnosis);
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));
         own.into_iter().cloned().collect()
+    }
+
+    /// What the run says about its model: the same in every output.
+    pub fn answer(&self) -> Answer {
+        if let Some(sentence) = setup_sentence(&self.setup) {
+            return Answer { word: "setup", sentence };
+        }
+        if let Some(diagnosis) = &self.diagnosis {
+            return Answer { word: diagnosis.verdict.word(), sentence: headline(diagnosis) };
+        }
+        let why = match self.undiagnosed {
+            Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.",
+            Some(Undiagnosed::SetupFirst) => "The setup comes first; what is missing was not looked for.",
+            Some(Undiagnosed::NotAsked) | None => {
+                "What is missing was not looked for ([diagnosis] enabled = false)."
+            }
+        };
+        Answer { word: "not_diagnosed", sentence: why.to_owned() }
     }
 
     /// Every other calibration of the observations: the steps, then the alternatives.

@@ -12,7 +12,7 @@ use crate::parameters::{FrameEntry, frames};
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
-use armcal_core::{Dwell, ErrorStats, Unit, Warning};
+use armcal_core::{Dwell, ErrorStats, SetupReport, Unit, Warning};
 use armcal_table::{Assignment, Place};
 use serde::Serialize;
 use std::path::Path;
@@ -39,7 +39,12 @@ struct Summary<'a> {
     /// The same observations and hold-out with more effects in the model: what was found, step by step, then the best
     /// candidates, each alone.
     refits: Vec<RefitSummary<'a>>,
-    /// `null` when the pipeline asks for no diagnosis.
+    /// What contradicts the data about the setup, before any physics.
+    setup: &'a SetupReport,
+    /// The answer in one word (a verdict, `setup` or `not_diagnosed`), and in one sentence.
+    answer: &'static str,
+    answer_sentence: String,
+    /// `null` when the pipeline asks for no diagnosis, when the setup comes first, and when it could not be made.
     diagnosis: Option<DiagnosisSummary<'a>>,
     conclusion: String,
     warnings: Vec<Warning>,
@@ -156,6 +161,7 @@ struct PaperSummary {
 
 impl<'a> Summary<'a> {
     fn of(run: &'a Run) -> Summary<'a> {
+        let answer = run.answer();
         Summary {
             schema: SCHEMA,
             version: VERSION,
@@ -165,6 +171,9 @@ impl<'a> Summary<'a> {
             fit: fit(&run.calibration),
             frames: frames(run),
             refits: run.refits().map(refit).collect(),
+            setup: &run.setup,
+            answer: answer.word,
+            answer_sentence: answer.sentence,
             diagnosis: run.diagnosis.as_ref().map(DiagnosisSummary::of),
             conclusion: conclusion(&run.calibration),
             warnings: run.overall_warnings(),

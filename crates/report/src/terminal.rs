@@ -26,13 +26,18 @@ pub enum TerminalStyle {
 pub fn terminal(run: &Run, style: TerminalStyle) -> String {
     let pen = Pen { style };
     let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&run.pipeline_name))];
+    let answer = run.answer();
+    let leads = matches!(answer.word, "setup" | "unexplained");
+    sections.extend(leads.then(|| pen.verdict(&answer.sentence, false)));
     sections.push(pen.section("Recordings", recordings(&pen, run)));
     sections.push(pen.section("Position errors [mm]", errors(&pen, &run.calibration)));
     sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
     sections.extend(undetermined(&pen, &run.calibration));
     sections.extend(run.diagnosis.iter().map(|d| brief(&pen, d)));
     sections.extend(warnings(&pen, run));
-    sections.push(pen.verdict(&conclusion(&run.calibration), run.status() == Status::Ok));
+    let conclusion = conclusion(&run.calibration);
+    let last = if leads { format!("{conclusion} {}", answer.sentence) } else { conclusion };
+    sections.push(pen.verdict(&last, run.status() == Status::Ok));
     sections.join("\n")
 }
 

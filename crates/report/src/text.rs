@@ -18,7 +18,7 @@ pub(crate) fn conclusion_about(calibration: &Calibration, error: &str) -> String
         1 => "1 point".to_owned(),
         n => format!("{n} points"),
     };
-    if calibration.holdout.fitted.n > 0 {
+    if calibration.held_out() {
         let side = &calibration.holdout;
         let held_out = points(side).replacen(' ', " held-out ", 1);
         return format!("On {held_out} the mean {error} {}{floor}", change(side));

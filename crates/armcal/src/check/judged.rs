@@ -7,7 +7,7 @@ use super::reference::Calibrated;
 use super::{frame_shifts, shifts, verdict};
 use crate::error::Error;
 use armcal_core::Severity;
-use armcal_diagnose::{Diagnosis, Verdict};
+use armcal_diagnose::Verdict;
 use armcal_report::{Run, VERSION, printable};
 use serde::Serialize;
 
@@ -88,7 +88,7 @@ fn line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
         1 => "; 1 warning makes it doubtful".to_owned(),
         n => format!("; {n} warnings make it doubtful"),
     };
-    let missing = missing(run.diagnosis.as_ref(), held == checks.len());
+    let missing = missing(run, held == checks.len());
     printable(&format!(
         "{}: {held} of {} checks hold{broken}; {error}, {missing}{doubts}",
         run.pipeline_name,
@@ -97,15 +97,23 @@ fn line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
 }
 
 /// What the diagnosis says. Beside a broken limit `nothing missing` would read as a contradiction: it is about effects.
-fn missing(diagnosis: Option<&Diagnosis>, all_hold: bool) -> String {
-    match diagnosis {
-        None => "not diagnosed".to_owned(),
+fn missing(run: &Run, all_hold: bool) -> String {
+    match &run.diagnosis {
+        None => {
+            run.setup.mistakes().next().map_or("not diagnosed".to_owned(), |f| format!("setup: {}", f.code))
+        }
         Some(d) => match d.verdict {
             Verdict::NothingMissing if all_hold => "nothing missing".to_owned(),
             Verdict::NothingMissing => "no effect found missing".to_owned(),
             Verdict::Identified => format!("missing {}", d.names.join(", ")),
-            Verdict::Ambiguous => format!("missing one of {}", d.names.join(", ")),
+            Verdict::Ambiguous => {
+                let sets = d.effects.iter().map(|e| e.set.join(" or ")).collect::<Vec<_>>();
+                format!("missing {}", sets.join(", and "))
+            }
             Verdict::Unknown => "something unlisted missing".to_owned(),
+            Verdict::Unexplained => {
+                format!("unexplained at {:.1} times the floor", run.calibration.times_floor())
+            }
         },
     }
 }

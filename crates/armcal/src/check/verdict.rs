@@ -5,7 +5,7 @@ use super::measured::{Check, Measured};
 use super::reasons;
 use armcal_diagnose::{Diagnosis, Verdict};
 use armcal_model::EffectSpec;
-use armcal_report::{Run, headline};
+use armcal_report::Run;
 
 /// Whether the verdict is one of the right ones, or all that is missing may be.
 ///
@@ -28,7 +28,7 @@ pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
         d.unlisted.is_empty() && !d.effects.is_empty() && names.into_iter().all(may_miss)
     };
     let holds = diagnosis.is_some_and(|d| right.contains(&d.verdict) || allowed(d));
-    let words = right.iter().map(|v| word(*v).to_owned());
+    let words = right.iter().map(|v| v.word().to_owned());
     let effects = limits.allowed.iter().map(EffectSpec::to_string);
     let check = Check {
         name: if section.verdicts.is_some() { "verdicts" } else { "allowed_effects" }.to_owned(),
@@ -39,7 +39,7 @@ pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
         said: String::new(),
         why: Vec::new(),
     };
-    let said = diagnosis.map_or("the run was not diagnosed".to_owned(), |d| uncapitalised(&headline(d)));
+    let said = uncapitalised(&run.answer().sentence);
     Some(check.saying(said, || reasons::of_run(run, limits)))
 }
 
@@ -50,20 +50,11 @@ fn covers(allowed: &EffectSpec, found: &EffectSpec) -> bool {
         && (allowed.since.is_none() || allowed.since == found.since)
 }
 
-/// As `[check]` spells it.
-pub fn word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::NothingMissing => "nothing_missing",
-        Verdict::Identified => "identified",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unknown => "unknown",
-    }
-}
-
 /// The verdict with its names: `identified: zero_slip:2@1`.
 fn answer(d: &Diagnosis) -> String {
     let names = d.names.join(", ");
-    if names.is_empty() { word(d.verdict).to_owned() } else { format!("{}: {names}", word(d.verdict)) }
+    let word = d.verdict.word();
+    if names.is_empty() { word.to_owned() } else { format!("{word}: {names}") }
 }
 
 /// A sentence as the end of another one: without its capital and full stop.
@@ -94,8 +85,8 @@ mod tests {
 
     #[test]
     fn verdicts_are_spelt_as_the_pipeline_spells_them() {
-        for verdict in [Verdict::NothingMissing, Verdict::Identified, Verdict::Ambiguous, Verdict::Unknown] {
-            assert_eq!(serde_json::to_value(verdict).expect("JSON"), word(verdict));
+        for verdict in Verdict::ALL {
+            assert_eq!(serde_json::to_value(verdict).expect("JSON"), verdict.word());
         }
     }
 }

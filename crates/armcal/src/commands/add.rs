@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::frames;
-use crate::story::{self, Settled};
+use crate::story::{self, Diagnosed, Settled};
 use crate::view;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, effects_toml};
@@ -53,7 +53,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let geometry = settled.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     effects.extend(new.iter().cloned());
-    let (mut run, recordings) = settled.into_run(&pipeline, None);
+    let (mut run, recordings) = settled.into_run(&pipeline, Diagnosed::NOT_ASKED);
     let before = PastRun::of(&run);
     story::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
     let comparison = Comparison::of(&before, &PastRun::of(&run));

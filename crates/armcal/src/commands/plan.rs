@@ -59,9 +59,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         observations: &settled.observations,
         session: &session,
         fit: &pipeline.fit,
-        board: settled.board.as_ref().filter(|_| pipeline.observations.seated),
+        board: settled.inputs.board.as_ref().filter(|_| pipeline.observations.seated),
         tracked: tracking(&pipeline, &settled),
-        recordings: settled.seen.iter().map(|s| s.name.clone()).collect(),
+        recordings: settled.inputs.seen.iter().map(|s| s.name.clone()).collect(),
     };
     let proposal = propose(&known, &open, &allowed, &pipeline.diagnosis)?;
     progress.finish();
@@ -123,7 +123,7 @@ fn tracking(pipeline: &Pipeline, settled: &Settled) -> Option<Tracking> {
     }
     let settings = &pipeline.observations;
     let mut seen: Vec<_> =
-        settled.seen.iter().flat_map(|s| &s.dwells).filter_map(|d| d.tip.as_ref()).collect();
+        settled.inputs.seen.iter().flat_map(|s| &s.dwells).filter_map(|d| d.tip.as_ref()).collect();
     seen.sort_by(|a, b| a.covariance_m2.trace().total_cmp(&b.covariance_m2.trace()));
     let floor_m2 = Matrix3::identity() * (settings.sensor_sigma_mm * 1e-3).powi(2);
     Some(match seen.get(seen.len() / 2) {

@@ -7,7 +7,7 @@ use crate::stages::frames;
 use crate::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_core::Observation;
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, diagnose};
+use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
@@ -60,7 +60,15 @@ pub fn quick(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let calibration_seconds = begin.elapsed().as_secs_f64();
     let begin = std::time::Instant::now();
     let config = DiagnosisConfig::default();
-    let diagnosis = diagnose(&model, &calibration, observations, &session, &fit, &config)?;
+    let calibrated = Calibrated {
+        model: &model,
+        calibration: &calibration,
+        observations,
+        session: &session,
+        fit: &fit,
+        holdout: &holdout,
+    };
+    let diagnosis = diagnose(&calibrated, &config)?;
     let seconds = begin.elapsed().as_secs_f64();
     let suggested = diagnosis.suggested(model.chain().joint_names())?;
     let after = with(&model, &suggested, &session, observations, &fit, &holdout)?;
@@ -117,10 +125,7 @@ fn answer(
     before: &Calibration,
     after: Option<&Calibration>,
 ) -> Answer {
-    let held_out_mm = |c: &Calibration| {
-        let side = if c.holdout.fitted.n > 0 { &c.holdout } else { &c.train };
-        side.fitted.mean_m * 1e3
-    };
+    let held_out_mm = |c: &Calibration| c.judged().fitted.mean_m * 1e3;
     Answer {
         verdict: diagnosis.verdict,
         names: diagnosis.names.clone(),

@@ -5,6 +5,7 @@ use crate::pipeline::{
     BoardPose, FramePose, FrameSection, MarkersOn, ModelSection, ParameterOverride, Pipeline, TableSection,
     Vertical,
 };
+use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
@@ -75,6 +76,20 @@ pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> 
                 (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));
             }
             p.prior_sigma = change.prior.map(si).or(p.prior_sigma);
+        })?;
+    }
+    Ok(())
+}
+
+/// Applies changes to nominal values and bounds, in their order.
+pub fn change_nominals(model: &mut Model, changes: &[Change]) -> Result<(), Error> {
+    for change in changes {
+        model.set_parameter(&change.name, |p| {
+            let nominal = p.nominal * change.times + change.plus;
+            let widths = [p.lower, p.upper].map(|bound| (bound - p.nominal) * change.widened);
+            (p.lower, p.upper) = (nominal + widths[0], nominal + widths[1]);
+            p.nominal = nominal;
+            p.prior_sigma = p.prior_sigma.map(|sigma| sigma * change.widened);
         })?;
     }
     Ok(())

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
+use armcal_core::robust::{median, percentile};
 use armcal_core::{Dwell, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Frames, Model};
@@ -12,6 +13,7 @@ use armcal_table::Association;
 use std::path::PathBuf;
 
 /// What one recording showed before any table or fit is involved.
+#[derive(Clone)]
 pub struct Seen {
     /// Name in the pipeline.
     pub name: String,
@@ -27,6 +29,9 @@ pub struct Seen {
     pub base: Option<MeanPose>,
     /// Mean pose of the table subject, where there is a stream.
     pub table: Option<MeanPose>,
+    /// How far each body that should stand still was from its median position, by its role; all but the worst hundredth
+    /// of its frames [m].
+    pub travels_m: Vec<(&'static str, f64)>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }
@@ -115,11 +120,26 @@ fn dwells_of_one(
     let (dwells, said) = detect_dwells(index, &samples, clock.as_ref(), &pipeline.dwell).map_err(in_dwell)?;
     warnings.extend(said);
     let (base, table) = static_bodies(pipeline, &samples, name, &mut warnings)?;
+    let bodies = [("base", base.is_some(), &samples.base), ("table", table.is_some(), &samples.table)];
+    let travels_m = bodies
+        .into_iter()
+        .filter(|(_, used, _)| *used)
+        .filter_map(|(role, _, stream)| Some((role, travel_m(&stream.as_ref()?.position_m))))
+        .collect();
 
     let mut report = recording.report().clone();
     report.streams = streams;
-    let seen = Seen { name: name.to_owned(), load_kg, report, clock, dwells, base, table, warnings };
+    let name = name.to_owned();
+    let seen = Seen { name, load_kg, report, clock, dwells, base, table, travels_m, warnings };
     Ok((samples, seen))
+}
+
+/// Distance from the median position that all but the worst hundredth of the frames keep [m].
+fn travel_m(positions_m: &[nalgebra::Vector3<f64>]) -> f64 {
+    let axis = |k: usize| median(&positions_m.iter().map(|p| p[k]).collect::<Vec<_>>());
+    let centre_m = nalgebra::Vector3::new(axis(0), axis(1), axis(2));
+    let distances_m: Vec<f64> = positions_m.iter().map(|p| (p - centre_m).norm()).collect();
+    percentile(&distances_m, 0.99)
 }
 
 /// Mean poses of the base and the table, where the pipeline uses them.

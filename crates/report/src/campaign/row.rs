@@ -13,7 +13,7 @@ use armcal_table::Tilt;
 pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
     let recording = run.recordings.first()?;
     let calibration = &run.calibration;
-    let judged = if calibration.holdout.fitted.n > 0 { &calibration.holdout } else { &calibration.train };
+    let judged = calibration.judged();
     let warnings = recording.all_warnings().into_iter().map(ToString::to_string);
     let tilt = words(tilt);
     Some(Row {
@@ -35,7 +35,7 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         nominal: figures(&judged.nominal),
         calibrated: figures(&judged.fitted),
         noise_floor_m: calibration.noise_floor_m,
-        verdict: run.diagnosis.as_ref().map(crate::headline).unwrap_or_default(),
+        verdict: run.answer().sentence,
         missing: missing(run),
         warnings: warnings.chain(run.overall_warnings().iter().map(ToString::to_string)).collect(),
         quantities: quantities(run, &judged.fitted, &tilt),

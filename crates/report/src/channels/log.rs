@@ -70,7 +70,9 @@ pub(super) fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
         Stage::Recording => "armcal.recording",
         Stage::Dwell => "armcal.dwell",
         Stage::Table => "armcal.table",
+        Stage::Setup => "armcal.setup",
         Stage::Calibrate => "armcal.calibrate",
+        Stage::Diagnose => "armcal.diagnose",
         Stage::Output => "armcal.report",
     };
     let message = format!("{warning} [{}]", warning.code);

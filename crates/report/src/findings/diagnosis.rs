@@ -3,7 +3,8 @@
 use super::{finite, or_zero};
 use crate::diagnosis_text::{headline, size, sizes};
 use crate::proto;
-use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, Verdict};
+use crate::run::Answer;
+use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect};
 
 pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
     let not_testable = d.not_testable.iter().map(|n| proto::NotTestable {
@@ -18,10 +19,10 @@ pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
         .map(|e| proto::Explanation { number: e.number.clone(), sentence: e.sentence.clone() });
     proto::Diagnosis {
         timestamp: None,
-        verdict: verdict_word(d.verdict).into(),
+        verdict: d.verdict.word().into(),
         sentence: headline(d),
         names: d.names.clone(),
-        probability: or_zero(d.probability),
+        probability: d.probability.and_then(finite),
         p_adjusted: finite(d.p_adjusted),
         p_nothing: or_zero(d.p_nothing),
         effects: d.effects.iter().map(found).collect(),
@@ -30,6 +31,11 @@ pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
         explanations: explanations.collect(),
         cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
     }
+}
+
+/// The same of a run without one: why.
+pub(super) fn none(answer: Answer) -> proto::Diagnosis {
+    proto::Diagnosis { verdict: answer.word.into(), sentence: answer.sentence, ..Default::default() }
 }
 
 pub(super) fn candidates(d: &Diagnosis) -> proto::Candidates {
@@ -63,15 +69,5 @@ fn found(e: &FoundEffect) -> proto::FoundEffect {
         after_mm: finite(e.places.after),
         rival: e.rival.as_ref().map(|r| r.name.clone()).unwrap_or_default(),
         rival_behind_nats: e.rival.as_ref().and_then(|r| finite(r.behind_nats)),
-    }
-}
-
-/// As `summary.json` spells it.
-pub(crate) fn verdict_word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::NothingMissing => "nothing_missing",
-        Verdict::Identified => "identified",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unknown => "unknown",
     }
 }

@@ -16,7 +16,7 @@ pub(crate) use curves::error_curve;
 
 use crate::points::Point;
 use crate::proto;
-use crate::run::Run;
+use crate::run::{Run, Undiagnosed};
 
 /// Everything a run found.
 pub(crate) struct Findings {
@@ -28,7 +28,7 @@ pub(crate) struct Findings {
     pub course: proto::Course,
     /// The falling error.
     pub steps: proto::Steps,
-    /// The verdict, and what it was weighed against; `None` when nobody asked.
+    /// The verdict (or that the setup comes first), and what it was weighed against; `None` when nobody asked.
     pub diagnosis: Option<(proto::Diagnosis, proto::Candidates)>,
     /// What no name explains.
     pub curves: Vec<proto::ErrorCurve>,
@@ -46,7 +46,11 @@ impl Findings {
             boards: boards::board_errors(run, points, &in_time),
             course: course::course(run, points, &in_time),
             steps: steps::steps(run),
-            diagnosis: run.diagnosis.as_ref().map(|d| (diagnosis::diagnosis(d), diagnosis::candidates(d))),
+            diagnosis: match &run.diagnosis {
+                Some(d) => Some((diagnosis::diagnosis(d), diagnosis::candidates(d))),
+                None if run.undiagnosed == Some(Undiagnosed::NotAsked) => None,
+                None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
+            },
             curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
             quality: quality::quality(run),
         }

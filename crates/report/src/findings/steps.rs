@@ -8,7 +8,7 @@ use armcal_core::ErrorStats;
 
 pub(super) fn steps(run: &Run) -> Steps {
     let calibration = &run.calibration;
-    let held_out = calibration.holdout.fitted.n > 0;
+    let held_out = calibration.held_out();
     let side =
         |c: &armcal_calibrate::Calibration| -> SideErrors { if held_out { c.holdout } else { c.train } };
     let mut rows = vec![

@@ -15,6 +15,8 @@ pub(super) const GREEN: &str = "#009E73";
 pub(super) const PURPLE: &str = "#CC79A7";
 pub(super) const SKY: &str = "#56B4E9";
 pub(super) const GREY: &str = "#999999";
+/// Kept for results that must not be relied upon.
+pub(super) const RED: &str = "#B00020";
 /// Steps after the calibration, in their order; the last ones share the last colour.
 const STEPS: [&str; 4] = [GREEN, SKY, BLUE, PURPLE];
 
@@ -24,6 +26,9 @@ pub(super) fn verdict() -> Content {
         ["identified", BLUE, "the missing effect has a name"],
         ["ambiguous", ORANGE, "an effect is missing; more than one name fits"],
         ["unknown", VERMILION, "an effect is missing that is not listed"],
+        ["unexplained", RED, "inadequate: errors above the floor, and nothing explains them"],
+        ["setup", RED, "inadequate: the setup contradicts the data; mend it first"],
+        ["not_diagnosed", GREY, "what is missing was not looked for"],
     ];
     Content::panel("Verdict", Kind::Indicator("/armcal/diagnosis.verdict".into(), rules))
 }

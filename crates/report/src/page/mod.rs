@@ -23,7 +23,7 @@ mod signature;
 pub use basis::Basis;
 pub use compared::comparison_html;
 
-use crate::diagnosis_text::{headline, pasted, size, unlisted};
+use crate::diagnosis_text::{pasted, size, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
 use crate::text::millimetres;
 use crate::{ReportError, conclusion};
@@ -137,7 +137,7 @@ struct Verdict {
 fn verdict(run: &Run) -> Verdict {
     let Some(d) = &run.diagnosis else {
         return Verdict {
-            sentence: "Nobody asked what is missing ([diagnosis] enabled = false).".into(),
+            sentence: run.answer().sentence,
             found: Vec::new(),
             paste: Vec::new(),
             next: Vec::new(),
@@ -147,7 +147,7 @@ fn verdict(run: &Run) -> Verdict {
         };
     };
     Verdict {
-        sentence: headline(d),
+        sentence: run.answer().sentence,
         found: d.effects.iter().map(|e| found(run, e)).chain(d.unlisted.iter().map(unlisted)).collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
         next: d.record_next.clone(),
@@ -183,5 +183,5 @@ fn found(run: &Run, e: &FoundEffect) -> String {
 
 /// Errors on points that the fit never saw, or on all where nothing was held out.
 fn judged(c: &Calibration) -> &ErrorStats {
-    if c.holdout.fitted.n > 0 { &c.holdout.fitted } else { &c.train.fitted }
+    &c.judged().fitted
 }

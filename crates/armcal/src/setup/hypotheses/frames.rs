@@ -1,0 +1,43 @@
+//! Frames that are not where the pipeline has them, and recordings that do not belong together.
+
+use super::{Freedom, Hypothesis};
+use crate::pipeline::{BoardPose, FramePose};
+use crate::setup::trial::Inputs;
+
+const FRAMES: &str = "mend the pose in [frames], or estimate it (pose = \"estimated\")";
+const TABLE: &str = "mend [table] (`at`, `markers_on`, the streams), or estimate it (pose = \"estimated\")";
+const RECORDINGS: &str = "give it a pipeline of its own, with its own arm or tool";
+
+pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
+    let mut all = Vec::new();
+    let frames = &inputs.pipeline.frames;
+    if frames.base.pose != FramePose::Estimated {
+        let change = "the base's pose estimated";
+        let free = |i: &mut Inputs| i.pipeline.frames.base.pose = FramePose::Estimated;
+        all.push(Hypothesis::new("base-frame", "the base", change, FRAMES, free).with(Freedom::Frame));
+    }
+    if frames.tip.pose != FramePose::Estimated {
+        let change = "the tool point estimated";
+        let free = |i: &mut Inputs| i.pipeline.frames.tip.pose = FramePose::Estimated;
+        all.push(Hypothesis::new("tool-frame", "the tool", change, FRAMES, free).with(Freedom::Frame));
+    }
+    if inputs.pipeline.table.as_ref().is_some_and(|t| t.pose != BoardPose::Estimated) {
+        let change = "the board's pose estimated";
+        let free = |i: &mut Inputs| {
+            if let Some(table) = &mut i.pipeline.table {
+                table.pose = BoardPose::Estimated;
+            }
+        };
+        all.push(Hypothesis::new("board-pose", "the board", change, TABLE, free).with(Freedom::Frame));
+    }
+    if inputs.seen.len() > 1 {
+        for (r, seen) in inputs.seen.iter().enumerate() {
+            let subject = format!("recording `{}`", seen.name);
+            let change = format!("{subject} left out");
+            let without = move |i: &mut Inputs| i.seen[r].dwells.clear();
+            let hypothesis = Hypothesis::new("recordings-disagree", subject, change, RECORDINGS, without);
+            all.push(hypothesis.with(Freedom::Frame));
+        }
+    }
+    all
+}

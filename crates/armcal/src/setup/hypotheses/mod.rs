@@ -1,0 +1,108 @@
+//! The mistakes that are tried, each as the one change of the inputs that would undo it.
+
+mod board;
+mod frames;
+mod joints;
+mod model;
+mod poses;
+
+use super::trial::Inputs;
+use std::sync::Arc;
+
+/// A mistake that somebody may have made.
+#[derive(Clone)]
+pub struct Hypothesis {
+    /// Stable name, `kebab-case`.
+    pub code: &'static str,
+    /// What it is about.
+    pub subject: String,
+    /// The change that undoes it, to stand behind "with": `joint 2's sign reversed`.
+    pub change: String,
+    /// Where to make the change.
+    pub remedy: &'static str,
+    /// How much freedom the change takes.
+    pub freedom: Freedom,
+    /// The number that the change holds, where it holds one.
+    pub number: Option<Number>,
+    /// The change itself.
+    pub apply: Arc<dyn Fn(&mut Inputs) + Send + Sync>,
+}
+
+/// A number of which a few values are tried; the best one is then refined between its neighbours.
+#[derive(Clone)]
+pub struct Number {
+    /// The value tried.
+    pub value: f64,
+    /// Its neighbours.
+    pub between: [f64; 2],
+    /// The value that changes nothing, and how far from it a value is beyond what any effect does.
+    pub nothing: f64,
+    /// That distance.
+    pub far: f64,
+    /// The hypothesis of another value.
+    pub at: fn(f64) -> Hypothesis,
+}
+
+/// How much freedom a change takes. Of two that fit alike, the one with less is believed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Freedom {
+    /// One of a few: a sign, an order, a unit.
+    Discrete,
+    /// A number that is estimated.
+    Number,
+    /// A frame or many numbers that are estimated.
+    Frame,
+}
+
+impl Hypothesis {
+    fn new(
+        code: &'static str,
+        subject: impl Into<String>,
+        change: impl Into<String>,
+        remedy: &'static str,
+        apply: impl Fn(&mut Inputs) + Send + Sync + 'static,
+    ) -> Hypothesis {
+        let (subject, change) = (subject.into(), change.into());
+        Hypothesis {
+            code,
+            subject,
+            change,
+            remedy,
+            freedom: Freedom::Discrete,
+            number: None,
+            apply: Arc::new(apply),
+        }
+    }
+
+    /// The same hypothesis for each value of a number, in rising order; `nothing` is among them and is not tried.
+    fn of_each(values: &[f64], nothing: f64, far: f64, at: fn(f64) -> Hypothesis) -> Vec<Hypothesis> {
+        let inner = values.windows(3).filter(|w| w[1] != nothing);
+        inner
+            .map(|w| {
+                let number = Number { value: w[1], between: [w[0], w[2]], nothing, far, at };
+                Hypothesis { number: Some(number), freedom: Freedom::Number, ..at(w[1]) }
+            })
+            .collect()
+    }
+
+    fn with(self, freedom: Freedom) -> Hypothesis {
+        Hypothesis { freedom, ..self }
+    }
+
+    /// The inputs without the mistake.
+    pub fn undone(&self, inputs: &Inputs) -> Inputs {
+        let mut changed = inputs.clone();
+        (self.apply)(&mut changed);
+        changed
+    }
+}
+
+/// Everything worth trying on these inputs. `at_bound` are parameters that the fit left on their bounds.
+pub fn hypotheses(inputs: &Inputs, at_bound: &[String]) -> Vec<Hypothesis> {
+    let mut all = joints::hypotheses(inputs);
+    all.extend(poses::hypotheses(inputs));
+    all.extend(board::hypotheses(inputs));
+    all.extend(model::hypotheses(inputs, at_bound));
+    all.extend(frames::hypotheses(inputs));
+    all
+}

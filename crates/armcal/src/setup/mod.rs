@@ -1,0 +1,36 @@
+//! Mistakes of wiring, files, frames and units, looked for before any physics.
+//!
+//! A mistake of the setup is discrete: a sign, an order, a unit, a frame. Each is a hypothesis: the inputs with that one
+//! thing changed (`hypotheses`), fitted anew (`trial`), and weighed against the inputs as the pipeline has them
+//! (`search`). The right one makes the errors fall as nothing else does; it is reported with what it would do. What
+//! needs no refit (a body that never moves, a tilt that contradicts its measurement) is looked at directly (`facts`).
+//!
+//! No physical effect is looked for while a mistake stands: its name would be that of the mistake.
+
+mod facts;
+mod hypotheses;
+mod search;
+mod trial;
+
+pub use trial::{Change, Inputs};
+
+use crate::story::Fitted;
+use armcal_core::SetupReport;
+
+/// Looks for mistakes in the inputs of a calibration.
+pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
+    let mut report = SetupReport::default();
+    search::search(inputs, Some(fitted), &mut report);
+    // What a mistake does to tilts and frames is its consequence.
+    let alone = report.findings.is_empty();
+    report.findings.extend(facts::facts(inputs, fitted, alone));
+    report.findings.sort_by_key(|f| std::cmp::Reverse(f.certainty));
+    report
+}
+
+/// The same for inputs that could not be calibrated at all.
+pub fn examine_failed(inputs: &Inputs) -> SetupReport {
+    let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
+    search::search(inputs, None, &mut report);
+    report
+}

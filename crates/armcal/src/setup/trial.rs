@@ -1,0 +1,148 @@
+//! One trial: the inputs of a calibration, one of them changed, fitted quickly, and how badly that fits.
+
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::stages::perceive::Seen;
+use crate::story::{self, Fitted};
+use armcal_calibrate::{HoldoutConfig, Objective};
+use armcal_core::Dwell;
+use armcal_model::Chain;
+use armcal_table::{Board, Place};
+use std::collections::BTreeSet;
+
+/// An error of this many times its expectation is as bad as no error at all: a dwell that finds no place counts as much.
+const CAP: f64 = 300.0;
+/// What is wrong need not converge.
+const MOST_ITERATIONS: usize = 40;
+/// Dwells that take part in trials; of more, as many are drawn evenly over time.
+const MOST_DWELLS: usize = 300;
+
+/// Everything in which a mistake of the setup could be.
+#[derive(Clone)]
+pub struct Inputs {
+    /// The pipeline.
+    pub pipeline: Pipeline,
+    /// The nominal arm.
+    pub chain: Chain,
+    /// The calibration table, if there is one.
+    pub board: Option<Board>,
+    /// What each recording showed by itself.
+    pub seen: Vec<Seen>,
+    /// Changes to the nominal values of parameters, in order.
+    pub changes: Vec<Change>,
+}
+
+/// A change to the nominal values of the parameters that match a pattern.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Name or glob.
+    pub name: String,
+    /// Factor on the nominal value.
+    pub times: f64,
+    /// Added to it, SI.
+    pub plus: f64,
+    /// Factor on the width of the bounds and of the prior.
+    pub widened: f64,
+}
+
+impl Change {
+    /// Another nominal value.
+    pub fn nominal(name: &str, times: f64, plus: f64) -> Change {
+        Change { name: name.to_owned(), times, plus, widened: 1.0 }
+    }
+
+    /// Wider bounds.
+    pub fn widened(name: &str, widened: f64) -> Change {
+        Change { name: name.to_owned(), times: 1.0, plus: 0.0, widened }
+    }
+}
+
+/// How badly inputs fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Misfit {
+    /// Mean over all dwells of the logarithm of error over expectation, saturating at both ends: a factor of e in every
+    /// error is 1.
+    pub log: f64,
+    /// Mean error of the dwells that were used [m]; infinite where nothing could be fitted.
+    pub mean_m: f64,
+    /// Mean error that noise would give [m].
+    pub floor_m: f64,
+    /// Dwells that were used.
+    pub used: usize,
+    /// Dwells that sit in a cavity.
+    pub seated: usize,
+    /// Dwells at the board for which no cavity was found, though no more than one could be.
+    pub homeless: usize,
+}
+
+impl Misfit {
+    /// Of inputs that cannot be fitted.
+    pub const NOTHING: Misfit =
+        Misfit { log: 0.0, mean_m: f64::INFINITY, floor_m: 0.0, used: 0, seated: 0, homeless: 0 };
+
+    /// Mean error over the floor.
+    pub fn times_floor(&self) -> f64 {
+        self.mean_m / self.floor_m
+    }
+}
+
+impl Inputs {
+    /// The same with a plain robust fit to everything, nothing held out, no effects, and not more dwells than decide.
+    pub fn for_trials(&self) -> Inputs {
+        let mut inputs = self.clone();
+        inputs.pipeline.holdout = HoldoutConfig::None;
+        if inputs.pipeline.fit.objective == Objective::Paper {
+            inputs.pipeline.fit.objective = Objective::Robust;
+        }
+        inputs.pipeline.fit.max_iterations = inputs.pipeline.fit.max_iterations.min(MOST_ITERATIONS);
+        let total: usize = inputs.seen.iter().map(|s| s.dwells.len()).sum();
+        let share = MOST_DWELLS as f64 / total.max(1) as f64;
+        if share < 1.0 {
+            for seen in &mut inputs.seen {
+                let mut due = 0.0;
+                seen.dwells.retain(|_| {
+                    due += share;
+                    let taken = due >= 1.0;
+                    due -= f64::from(taken);
+                    taken
+                });
+            }
+        }
+        inputs
+    }
+
+    /// Fits them: associates, starts the frames, calibrates.
+    pub fn fit(&self) -> Result<Fitted, Error> {
+        story::fit_places(self, &mut |_| ())
+    }
+
+    /// How badly a fit of them fits.
+    pub fn misfit(&self, fitted: &Fitted) -> Misfit {
+        let used: BTreeSet<_> = fitted.observations.iter().map(|o| o.dwell).collect();
+        let saturating = |ratio: f64| 0.5 * (1.0 + ratio.min(CAP).powi(2)).ln();
+        let residuals = &fitted.calibration.residuals;
+        let of_used: f64 = residuals.iter().map(|r| saturating(r.fitted_m.norm() / r.expected_norm_m)).sum();
+        let total = self.dwells().count();
+        let unused = total.saturating_sub(used.len()) as f64;
+        let n = residuals.len().max(1) as f64;
+        let places = |of: &dyn Fn(&Place) -> bool| fitted.places().filter(|place| of(place)).count();
+        Misfit {
+            log: (of_used + unused * saturating(CAP)) / total.max(1) as f64,
+            mean_m: residuals.iter().map(|r| r.fitted_m.norm()).sum::<f64>() / n,
+            floor_m: residuals.iter().map(|r| r.expected_norm_m).sum::<f64>() / n,
+            used: used.len(),
+            seated: places(&|place| matches!(place, Place::Seated { .. })),
+            homeless: places(&|place| matches!(place, Place::Unassigned { .. } | Place::Ambiguous { .. })),
+        }
+    }
+
+    /// All dwells.
+    pub fn dwells(&self) -> impl Iterator<Item = &Dwell> {
+        self.seen.iter().flat_map(|s| &s.dwells)
+    }
+
+    /// Changes every dwell.
+    pub fn each_dwell(&mut self, mut change: impl FnMut(&mut Dwell)) {
+        self.seen.iter_mut().flat_map(|s| &mut s.dwells).for_each(&mut change);
+    }
+}

@@ -1,0 +1,62 @@
+//! Mistakes of wiring, files, frames and units: what is checked before any physics.
+
+use crate::warning::{Severity, Stage, Warning};
+use serde::Serialize;
+
+/// How sure a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Certainty {
+    /// Worth a look; the result may stand.
+    Possible,
+    /// With the change, the errors fall as only the right one makes them fall: no physical effect is named beside it.
+    Mistake,
+}
+
+/// Something about the setup that contradicts the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetupFinding {
+    /// Stable machine-readable name, `kebab-case`: `joint-sign`.
+    pub code: &'static str,
+    /// The joint, stream, frame, board or recording it is about.
+    pub subject: String,
+    /// What was seen, what the change would do, and where to make it.
+    pub message: String,
+    /// How sure it is.
+    pub certainty: Certainty,
+    /// Mean error as the pipeline has it [mm], where the change was tried by a refit.
+    pub before_mm: Option<f64>,
+    /// Mean error with the change [mm].
+    pub after_mm: Option<f64>,
+    /// Other changes that these data cannot tell from it.
+    pub alternatives: Vec<String>,
+}
+
+impl SetupFinding {
+    /// The finding as a warning, so that it reaches every output.
+    pub fn warning(&self) -> Warning {
+        let severity = match self.certainty {
+            Certainty::Possible => Severity::Notice,
+            Certainty::Mistake => Severity::Inadequate,
+        };
+        Warning::new(severity, Stage::Setup, self.code, self.subject.clone(), self.message.clone())
+    }
+}
+
+/// What the checks of the setup found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct SetupReport {
+    /// Changes of the setup that were tried by a refit; 0 where the errors gave no reason to.
+    pub tried: usize,
+    /// What contradicts the data, the surest first.
+    pub findings: Vec<SetupFinding>,
+    /// Mistakes of which these data could show nothing, in sentences.
+    pub not_testable: Vec<String>,
+}
+
+impl SetupReport {
+    /// The findings that forbid physical names.
+    pub fn mistakes(&self) -> impl Iterator<Item = &SetupFinding> {
+        self.findings.iter().filter(|f| f.certainty == Certainty::Mistake)
+    }
+}

@@ -1,0 +1,191 @@
+//! The verdict after the refit: a search in the linearised model proposes, calibrations with and without what it found
+//! decide.
+//!
+//! * *nothing missing* is said only of errors at the floor, of noise about as declared, and of a model that is not
+//!   improbable;
+//! * a name stays only where the refitted model errs less;
+//! * what is neither explained nor at the floor is `unexplained`, and says how much, where, and what was tried.
+
+use crate::config::DiagnosisConfig;
+use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
+use crate::error_places::{DwellError, error_places};
+use crate::explain::explanations;
+use armcal_calibrate::Calibration;
+use armcal_core::{Observation, Severity, Stage, Warning};
+
+/// A refit that leaves more than this share of the error, on either side of the hold-out, has not confirmed anything.
+const CONFIRMED_SHARE: f64 = 0.95;
+
+/// What the verdict is settled with.
+pub(crate) struct Evidence<'a> {
+    /// The calibration that was diagnosed.
+    pub before: &'a Calibration,
+    /// Its observations, in the order of its residuals.
+    pub observations: &'a [Observation],
+    /// The calibration with what was found.
+    pub refitted: Option<Refitted>,
+    /// Names of the joints.
+    pub joint_names: &'a [String],
+}
+
+impl Diagnosis {
+    /// Settles the verdict.
+    pub(crate) fn conclude(&mut self, evidence: Evidence<'_>, config: &DiagnosisConfig) {
+        let Evidence { before, observations, refitted, joint_names } = evidence;
+        let after = refitted.as_ref().map(|r| &r.calibration);
+        let mm = |c: &Calibration| c.judged().fitted.mean_m * 1e3;
+        self.judged = if before.held_out() { JudgedOn::HeldOut } else { JudgedOn::Fitted };
+        self.holdout_mm = BeforeAfter { before: mm(before), after: mm(after.unwrap_or(before)) };
+        self.floor_mm = before.noise_floor_m * 1e3;
+
+        let mut refuted = Vec::new();
+        let left = left_over(after.unwrap_or(before));
+        let withheld = match after {
+            Some(after) => !confirms(before, after) || left > config.unexplained_factor,
+            None => false,
+        };
+        if withheld {
+            let names = refitted.iter().flat_map(|r| &r.effects).map(ToString::to_string).collect::<Vec<_>>();
+            refuted.push((names.join(" + "), self.holdout_mm));
+            self.holdout_mm.after = self.holdout_mm.before;
+            self.effects.clear();
+            self.unlisted.clear();
+            self.unknown = None;
+            self.tentative.clear();
+        } else {
+            self.refitted = refitted.map(Box::new);
+        }
+        let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
+        let agrees = agrees(before, self.p_nothing, config);
+        self.verdict = match self.verdict {
+            Verdict::NothingMissing if agrees => Verdict::NothingMissing,
+            Verdict::NothingMissing | Verdict::Unexplained => Verdict::Unexplained,
+            _ if withheld && agrees => Verdict::NothingMissing,
+            _ if withheld => Verdict::Unexplained,
+            Verdict::Unknown if self.unlisted.is_empty() => Verdict::Unexplained,
+            named => named,
+        };
+        if matches!(self.verdict, Verdict::NothingMissing | Verdict::Unexplained) {
+            self.names.clear();
+        }
+        self.probability = match self.verdict {
+            Verdict::NothingMissing => Some(self.p_nothing),
+            Verdict::Unexplained => None,
+            _ => self.probability,
+        };
+        let times_floor = left_over(settled);
+        let unexplained = self.verdict == Verdict::Unexplained
+            || (self.verdict != Verdict::NothingMissing && times_floor > config.floor_factor);
+        if unexplained {
+            let errors: Vec<DwellError<'_>> = settled
+                .residuals
+                .iter()
+                .zip(observations)
+                .filter(|(r, _)| r.held_out == settled.held_out())
+                .map(|(r, observation)| DwellError {
+                    observation,
+                    error_m: r.fitted_m.norm(),
+                    expected_m: r.expected_norm_m,
+                })
+                .collect();
+            let unexplained = Unexplained {
+                error_mm: mm(settled),
+                floor_mm: settled.noise_floor_m * 1e3,
+                times_floor: settled.times_floor(),
+                places: error_places(&errors, joint_names),
+                tried: Tried {
+                    listed: self.candidates.len(),
+                    unlisted: self.tried_unlisted,
+                    refitted: refuted,
+                },
+            };
+            self.warnings.extend(warning(self.verdict, &unexplained, times_floor, config));
+            self.unexplained = Some(unexplained);
+        }
+        self.explanations = explanations(self, config);
+    }
+}
+
+/// Whether the calibrated errors are what the declared noise gives: at the floor, scattering about as declared, and
+/// not improbable.
+fn agrees(calibration: &Calibration, p_nothing: f64, config: &DiagnosisConfig) -> bool {
+    calibration.times_floor() <= config.floor_factor
+        && calibration.fit.sigma_scale <= config.floor_factor
+        && p_nothing >= config.max_probability_nothing
+}
+
+/// Whether a model with more effects errs less: on held-out points; or, where these cannot show what an effect does (it
+/// acts only in what was held out), clearly less on those that were fitted.
+fn confirms(before: &Calibration, after: &Calibration) -> bool {
+    let mean = |c: &Calibration| c.judged().fitted.mean_m;
+    mean(after) < mean(before) || after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m
+}
+
+/// How many times the floor the errors are; of a hold-out that cannot learn an effect, those of the fitted side.
+fn left_over(calibration: &Calibration) -> f64 {
+    let fitted = calibration.train.fitted;
+    match calibration.held_out() && fitted.n > 0 {
+        true => calibration.times_floor().min(fitted.mean_m / calibration.noise_floor_m),
+        false => calibration.times_floor(),
+    }
+}
+
+/// Errors far above the floor that nothing explains make a result inadequate, whatever was named beside them.
+fn warning(
+    verdict: Verdict,
+    unexplained: &Unexplained,
+    times_floor: f64,
+    config: &DiagnosisConfig,
+) -> Option<Warning> {
+    let alone = verdict == Verdict::Unexplained;
+    let inadequate = match alone {
+        true => unexplained.times_floor > config.floor_factor,
+        false => times_floor > 2.0 * config.floor_factor,
+    };
+    if !alone && !inadequate {
+        return None;
+    }
+    let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
+    let beside = if alone { "" } else { "beside what is named, " };
+    let message = format!("{beside}{}", unexplained.sentence());
+    Some(Warning::new(severity, Stage::Diagnose, "unexplained", "diagnosis", message))
+}
+
+impl Unexplained {
+    /// How much, where, and what was tried, in one sentence without its capital.
+    pub fn sentence(&self) -> String {
+        let much = match self.times_floor.is_finite() {
+            true => format!(
+                "the mean error of {:.3} mm is {:.1} times the noise floor of {:.3} mm",
+                self.error_mm, self.times_floor, self.floor_mm
+            ),
+            false => format!("the mean error is {:.3} mm, and no noise is declared", self.error_mm),
+        };
+        let places: Vec<String> = self
+            .places
+            .iter()
+            .map(|p| {
+                format!(
+                    "{} ({} dwells, {:.3} mm; elsewhere {:.3})",
+                    p.place, p.dwells, p.error_mm, p.elsewhere_mm
+                )
+            })
+            .collect();
+        let places = match places.is_empty() {
+            true => "about alike in all recordings, joint ranges and directions".to_owned(),
+            false => format!("largest in {}", places.join(" and in ")),
+        };
+        let refitted: Vec<String> = self
+            .tried
+            .refitted
+            .iter()
+            .map(|(names, e)| format!("; {names} would leave {:.3} mm", e.after))
+            .collect();
+        format!(
+            "{much}, {places}; {} listed effects and {} unlisted shapes were tried and do not explain it{}",
+            self.tried.listed,
+            self.tried.unlisted,
+            refitted.concat()
+        )
+    }
+}

@@ -1,0 +1,179 @@
+//! In which dwells errors are largest: the place in a session that a person would look at first.
+
+use armcal_core::{DwellId, Observation};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Fewest dwells on either side of a comparison.
+const FEWEST: usize = 5;
+/// A side is worth naming when its errors are this many times those elsewhere.
+const FACTOR: f64 = 1.5;
+/// And when chance would make so large a difference of mean logarithms less often than normal errors exceed this.
+const SIGMAS: f64 = 5.0;
+/// Places named at most.
+const MOST: usize = 2;
+
+/// Dwells in which the error is larger than elsewhere.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorPlace {
+    /// Which: `recording 2`, `shoulder from 10 to 25 deg`.
+    pub place: String,
+    /// How many dwells that are.
+    pub dwells: usize,
+    /// Their mean error [mm].
+    pub error_mm: f64,
+    /// The mean error of all others [mm].
+    pub elsewhere_mm: f64,
+}
+
+/// The error of one dwell, and what the declared noise would give.
+pub(crate) struct DwellError<'a> {
+    pub observation: &'a Observation,
+    pub error_m: f64,
+    pub expected_m: f64,
+}
+
+/// Where the errors are largest against what noise would give, the clearest place first. Dwells with larger noise are
+/// no places: errors are compared in units of their own expectation, as logarithms, so that no single one decides.
+pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) -> Vec<ErrorPlace> {
+    let log: Vec<f64> =
+        errors.iter().map(|e| (e.error_m.max(1e-12) / e.expected_m.max(1e-12)).ln()).collect();
+    let mut found: Vec<(f64, ErrorPlace)> = Vec::new();
+    for (place, members) in groups(errors, joint_names) {
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..errors.len()).partition(|i| members.binary_search(i).is_ok());
+        if inside.len() < FEWEST || outside.len() < FEWEST {
+            continue;
+        }
+        let (mean_in, variance_in) = moments(&log, &inside);
+        let (mean_out, variance_out) = moments(&log, &outside);
+        let sigma = (variance_in / inside.len() as f64 + variance_out / outside.len() as f64).sqrt();
+        let sigmas = (mean_in - mean_out) / sigma.max(1e-12);
+        if sigmas < SIGMAS || (mean_in - mean_out).exp() < FACTOR {
+            continue;
+        }
+        let mean_mm =
+            |of: &[usize]| of.iter().map(|i| errors[*i].error_m).sum::<f64>() / of.len() as f64 * 1e3;
+        let (error_mm, elsewhere_mm) = (mean_mm(&inside), mean_mm(&outside));
+        found.push((sigmas, ErrorPlace { place, dwells: inside.len(), error_mm, elsewhere_mm }));
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().take(MOST).map(|(_, place)| place).collect()
+}
+
+/// Every group of dwells that has a name: recordings, seated or tracked, halves and ends of the time, thirds of each
+/// joint's range, directions of arrival, cavities. Members in rising order.
+fn groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String, Vec<usize>> {
+    let mut all: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    let mut add = |name: String, i: usize| all.entry(name).or_default().push(i);
+    let mut in_time: Vec<(usize, i64, DwellId)> =
+        errors.iter().enumerate().map(|(i, e)| (i, e.observation.time_ns, e.observation.dwell)).collect();
+    in_time.sort_by_key(|(_, time_ns, dwell)| (*time_ns, *dwell));
+    let mut rank = vec![0; errors.len()];
+    in_time.iter().enumerate().for_each(|(position, (i, ..))| rank[*i] = position);
+    let ranges: Vec<(f64, f64)> = (0..joint_names.len()).map(|j| range(errors, j)).collect();
+    for (i, e) in errors.iter().enumerate() {
+        let o = e.observation;
+        add(format!("recording {}", o.dwell.recording + 1), i);
+        match o.cavity() {
+            Some(cavity) => {
+                add("the seated dwells".to_owned(), i);
+                add(format!("cavity {cavity}"), i);
+            }
+            None => add("the tracked dwells".to_owned(), i),
+        }
+        match 4 * rank[i] / errors.len() {
+            0 => add("the first quarter of the session".to_owned(), i),
+            3 => add("the last quarter of the session".to_owned(), i),
+            _ => {}
+        }
+        if 2 * rank[i] >= errors.len() {
+            add("the second half of the session".to_owned(), i);
+        }
+        for (j, name) in joint_names.iter().enumerate() {
+            let (low, high) = ranges[j];
+            let third = (high - low) / 3.0;
+            if third > 0.0 {
+                let k = (((o.joint_rad[j] - low) / third) as usize).min(2) as f64;
+                let edge = |n: f64| (low + n * third).to_degrees();
+                add(format!("{name} from {:.0} to {:.0} deg", edge(k), edge(k + 1.0)), i);
+            }
+            match o.arrival.get(j).map_or(0.0, |a| a.sign()) {
+                1.0 => add(format!("{name} arriving upwards"), i),
+                -1.0 => add(format!("{name} arriving downwards"), i),
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
+fn range(errors: &[DwellError<'_>], joint: usize) -> (f64, f64) {
+    let readings = errors.iter().map(|e| e.observation.joint_rad[joint]);
+    readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
+}
+
+/// Mean and variance of some values.
+fn moments(values: &[f64], of: &[usize]) -> (f64, f64) {
+    let n = of.len() as f64;
+    let mean = of.iter().map(|i| values[*i]).sum::<f64>() / n;
+    (mean, of.iter().map(|i| (values[*i] - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::{Arrival, Reference};
+    use nalgebra::Vector3;
+
+    fn observations(n: usize) -> Vec<Observation> {
+        (0..n)
+            .map(|i| {
+                let dwell = DwellId { recording: i % 3, dwell: i / 3 };
+                let q = vec![(i as f64 * 0.37).sin(), (i as f64 * 1.93).cos()];
+                let mut o = Observation::bare(dwell, q, Reference::position(Vector3::zeros()));
+                o.time_ns = i as i64;
+                o.arrival = vec![if i % 7 < 3 { Arrival::Positive } else { Arrival::Negative }; 2];
+                o
+            })
+            .collect()
+    }
+
+    fn places(all: &[Observation], error_m: impl Fn(usize, &Observation) -> f64) -> Vec<ErrorPlace> {
+        let of =
+            |(i, observation)| DwellError { observation, error_m: error_m(i, observation), expected_m: 1e-4 };
+        let errors: Vec<DwellError<'_>> = all.iter().enumerate().map(of).collect();
+        error_places(&errors, &["shoulder".to_owned(), "elbow".to_owned()])
+    }
+
+    /// A spread that repeats with nothing that has a name.
+    fn spread(i: usize) -> f64 {
+        1e-3 * (1.0 + 0.5 * ((i * i) as f64 * 0.71).sin())
+    }
+
+    #[test]
+    fn errors_that_are_alike_everywhere_have_no_place() {
+        assert_eq!(places(&observations(120), |i, _| spread(i)), vec![]);
+    }
+
+    #[test]
+    fn the_recording_the_range_and_the_direction_that_err_are_named() {
+        let all = observations(120);
+        let third = |i, o: &Observation| if o.dwell.recording == 2 { 5.0 * spread(i) } else { spread(i) };
+        let named = places(&all, third);
+        assert_eq!((named[0].place.as_str(), named[0].dwells), ("recording 3", 40));
+        assert!((named[0].error_mm / named[0].elsewhere_mm - 5.0).abs() < 0.5, "{named:?}");
+
+        let far = |i, o: &Observation| if o.joint_rad[1] > 1.0 / 3.0 { 4.0 * spread(i) } else { spread(i) };
+        assert_eq!(places(&all, far)[0].place, "elbow from 19 to 57 deg");
+
+        let up = |i, o: &Observation| spread(i) * if o.arrival[0].sign() > 0.0 { 4.0 } else { 1.0 };
+        assert!(places(&all, up)[0].place.ends_with("arriving upwards"));
+    }
+
+    #[test]
+    fn one_gross_dwell_is_no_place() {
+        let all = observations(120);
+        assert_eq!(places(&all, |i, _| if i == 17 { 1.0 } else { spread(i) }), vec![]);
+    }
+}
