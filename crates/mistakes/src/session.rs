@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Everything that `armcal run` is given.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Session {
     /// The rig it was recorded on.
     pub rig: Rig,
@@ -28,7 +28,7 @@ pub struct Session {
 }
 
 /// One recording.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     /// Its name; the file is `<name>.mcap`.
     pub name: String,

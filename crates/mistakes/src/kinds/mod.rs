@@ -76,3 +76,29 @@ fn about(session: &Session, joints: &[usize]) -> Result<Vec<String>, Error> {
     let names = session.joint_names();
     Ok(joints.iter().filter_map(|j| names.get(*j).cloned()).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_changes_the_session_the_same_way_each_time() {
+        for rig in Rig::ALL {
+            let sound = rig.session(3, "test").unwrap();
+            assert_eq!(sound, rig.session(3, "test").unwrap(), "{rig:?} is not the same twice");
+            for kind in kinds().iter().filter(|kind| kind.rigs.contains(&rig)) {
+                let make = |seed| {
+                    let mut session = sound.clone();
+                    let about = (kind.make)(&mut session, &mut Draw::new(seed, kind.name, rig)).unwrap();
+                    (session, about)
+                };
+                let (made, about) = make(5);
+                assert_ne!(made, sound, "{} leaves {rig:?} as it was", kind.name);
+                // Of what is not a number nothing is equal.
+                if kind.cause != "non-finite" {
+                    assert_eq!((made, about), make(5), "{} on {rig:?} is not the same twice", kind.name);
+                }
+            }
+        }
+    }
+}

@@ -56,7 +56,7 @@ impl Rig {
 }
 
 /// What makes recordings.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Source {
     /// The virtual lab.
     Lab(Box<LabConfig>),

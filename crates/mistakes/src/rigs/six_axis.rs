@@ -57,7 +57,7 @@ const WHITE_RAD: f64 = 5e-5;
 const SYSTEMATIC_RAD: f64 = 5e-5;
 
 /// The rig: what of it is drawn, and what may be changed between recordings.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Lab {
     /// Seed of the built arm, of the motion and of all noise.
     pub seed: u64,
