@@ -74,13 +74,21 @@ pub const CAUSES: &[Cause] = &[
     row(
         "joint-unit",
         &["joint-unit", "joint-scale", "unit-doubtful"],
-        &["degrees", "radians", "counts per turn", "counts_per_turn", "unit"],
+        &[
+            "degrees",
+            "radians",
+            "counts per turn",
+            "counts_per_turn",
+            "unit of the joints",
+            "unit of joint",
+            "units of both streams",
+        ],
         &["gear_ratio"],
     ),
     row(
         "joint-scale",
         &["joint-scale", "joint-unit", "gear"],
-        &["gear ratio", "counts per turn", "counts_per_turn", "scale of joint", "unit"],
+        &["gear ratio", "counts per turn", "counts_per_turn", "scale of joint"],
         &["gear_ratio"],
     ),
     row(
@@ -207,7 +215,7 @@ pub const CAUSES: &[Cause] = &[
     row(
         "position-unit",
         &["position-unit", "unit-doubtful"],
-        &["unit", "millimet", "inch"],
+        &["unit of the tip", "unit of the positions", "units of both streams", "millimet", "inch"],
         &["sensor_scale"],
     ),
     row(
@@ -239,7 +247,7 @@ pub const CAUSES: &[Cause] = &[
     row(
         "board-unit",
         &["board-unit", "board-scale", "wrong-board"],
-        &["unit", "inch", "metres", "scale of"],
+        &["unit of the board", "inch", "metres", "scale of"],
         &["board_scale"],
     ),
     row(
@@ -269,10 +277,15 @@ pub const CAUSES: &[Cause] = &[
     row(
         "length-unit",
         &["length-unit", "wrong-model", "link-length", "model-scale"],
-        &["unit", "inch", "metres", "lengths"],
+        &["unit of the model", "model's lengths", "lengths of the model", "inch", "metres"],
         &[],
     ),
-    row("angle-unit", &["angle-unit", "wrong-model", "dh-"], &["unit", "radians", "degrees"], &[]),
+    row(
+        "angle-unit",
+        &["angle-unit", "wrong-model", "dh-"],
+        &["unit of the model", "radians", "degrees"],
+        &[],
+    ),
     row(
         "dh-sign",
         &["dh-", "wrong-model", "link-length", "mirrored"],

@@ -3,7 +3,7 @@
 use crate::causes::{Cause, cause};
 use crate::run::{Place, Said, Statement};
 use crate::{Draw, Error, Kind, Rig, run};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A held-out error above this many times the floor, and the program may not end as if nothing were the matter.
@@ -13,7 +13,7 @@ pub const SHOWN: f64 = 2.0;
 pub const NOTHING: f64 = 1.5;
 
 /// How an answer is to be judged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
     /// The cause is reported.
@@ -53,12 +53,12 @@ impl Judgement {
 }
 
 /// One mistake on one rig, and what came of it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Case {
     /// The kind's name.
-    pub kind: &'static str,
+    pub kind: String,
     /// Its cause.
-    pub cause: &'static str,
+    pub cause: String,
     /// The rig.
     pub rig: Rig,
     /// The seed.
@@ -79,7 +79,16 @@ pub fn case(armcal: &Path, kind: &Kind, rig: Rig, seed: u64, folder: &Path) -> R
     let about = (kind.make)(&mut session, &mut Draw::new(seed, kind.name, rig))?;
     let said = run::run(armcal, &session, folder)?;
     let (reported, judgement) = judge(&said, kind.cause, &about);
-    Ok(Case { kind: kind.name, cause: kind.cause, rig, seed, about, said, reported, judgement })
+    let (kind, cause) = (kind.name.to_owned(), kind.cause.to_owned());
+    Ok(Case { kind, cause, rig, seed, about, said, reported, judgement })
+}
+
+impl Case {
+    /// Judges again what was said, as after a change of the table of causes.
+    pub fn judged_again(self) -> Case {
+        let (reported, judgement) = judge(&self.said, &self.cause, &self.about);
+        Case { reported, judgement, ..self }
+    }
 }
 
 /// What of it names the cause, and how right the whole is.
@@ -116,7 +125,7 @@ fn reported(said: &Said, cause: &Cause, about: &[String]) -> Option<String> {
 }
 
 fn names(statement: &Statement, cause: &Cause, about: &[String]) -> bool {
-    let text = statement.text.to_lowercase();
+    let text = without_checklists(&statement.text.to_lowercase());
     let code = cause.codes.iter().any(|code| statement.code.contains(code));
     if !code && !cause.words.iter().any(|word| text.contains(word)) {
         return false;
@@ -124,6 +133,19 @@ fn names(statement: &Statement, cause: &Cause, about: &[String]) -> bool {
     // A report about a joint, or about a cavity, has to be about the right one.
     let particular = statement.code.starts_with("joint") || cause.name == "board-typo";
     about.is_empty() || !particular || about.iter().any(|part| text.contains(&part.to_lowercase()))
+}
+
+/// The text without advice that lists several things to look at: that names none of them.
+fn without_checklists(text: &str) -> String {
+    let mut kept = String::new();
+    for sentence in text.split_inclusive([';', ':', '.', '\n']) {
+        let advice = ["check ", "look for "].iter().any(|word| sentence.trim_start().starts_with(word));
+        let parts: usize = [", ", " and ", " or "].iter().map(|word| sentence.matches(word).count()).sum();
+        if !(advice && parts >= 4) {
+            kept += sentence;
+        }
+    }
+    kept
 }
 
 #[cfg(test)]
@@ -179,6 +201,16 @@ mod tests {
         assert_eq!(judged(&both), Judgement::FalseNothing);
         let accused = with(said(0, 1.0, "nothing_missing"), Place::Setup, "board-mirror", "board");
         assert_eq!(judged(&accused), Judgement::Missed, "a false accusation is no silence");
+    }
+
+    #[test]
+    fn a_list_of_all_that_may_be_wrong_names_nothing() {
+        let list = "the board does not fit. Check that the board file is right, that its pose and tilt are right, and that \
+                    the model's base and tool are right";
+        let refused = |text: &str| with(Said { exit: Some(1), ..Said::default() }, Place::Error, "", text);
+        assert_eq!(judge(&refused(list), "tilt-declared-wrong", &[]).1, Judgement::Missed);
+        let short = "the board does not fit: check the declared tilt and the board's pose";
+        assert_eq!(judge(&refused(short), "tilt-declared-wrong", &[]).1, Judgement::Right);
     }
 
     #[test]

@@ -49,6 +49,9 @@ struct Args {
     /// The program; the one beside this one when absent.
     #[arg(long, value_name = "FILE")]
     armcal: Option<PathBuf>,
+    /// Run nothing: judge again what an earlier run wrote with --json.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["keep", "jobs", "armcal"])]
+    again: Option<PathBuf>,
     /// Print the kinds, their causes and rigs, and run nothing.
     #[arg(long)]
     list: bool,
@@ -73,6 +76,12 @@ fn suite(args: &Args) -> Result<ExitCode, Error> {
         }
         return Ok(ExitCode::SUCCESS);
     }
+    if let Some(path) = &args.again {
+        let Written { cases, sound } = written(path)?;
+        let cases: Vec<Case> = cases.into_iter().map(Case::judged_again).collect();
+        let sound: Vec<Sound> = sound.into_iter().map(Sound::judged_again).collect();
+        return report(args, &cases, &sound);
+    }
     let armcal = args.armcal.clone().or_else(run::beside_this).unwrap_or_else(|| "armcal".into());
     let wanted: Vec<(&Kind, Rig, u64)> = (args.seed..args.seed + args.seeds)
         .flat_map(|seed| rigs.iter().map(move |rig| (*rig, seed)))
@@ -88,7 +97,15 @@ fn suite(args: &Args) -> Result<ExitCode, Error> {
             let case = within(args.keep.as_deref(), &name, |folder| {
                 judge::case(&armcal, kind, *rig, *seed, folder)
             })?;
-            progress.step(&format!("{name}: {}", case.judgement.words()));
+            let (reported, verdict) = (case.reported.as_deref(), case.said.verdict.as_deref());
+            progress.step(&format!(
+                "{name}: {} (exit {:?}, {:.2} floors, {}, reported {})",
+                case.judgement.words(),
+                case.said.exit.unwrap_or(-1),
+                case.said.ratio().unwrap_or(f64::NAN),
+                verdict.unwrap_or("no verdict"),
+                reported.unwrap_or("nothing of it"),
+            ));
             Ok(case)
         });
         let cases = cases.collect::<Result<_, Error>>()?;
@@ -135,6 +152,22 @@ fn report(args: &Args, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, Erro
         sound.len()
     ));
     Ok(if counts.false_said + alarmed == 0 { ExitCode::SUCCESS } else { ExitCode::from(3) })
+}
+
+/// What --json writes.
+#[derive(serde::Deserialize)]
+struct Written {
+    cases: Vec<Case>,
+    sound: Vec<Sound>,
+}
+
+fn written(path: &Path) -> Result<Written, Error> {
+    let bytes = std::fs::read(path).map_err(Error::file("reading", path))?;
+    serde_json::from_slice(&bytes).map_err(|e| Error::File {
+        doing: "reading",
+        path: path.to_owned(),
+        source: e.into(),
+    })
 }
 
 fn chosen(args: &Args) -> Result<Vec<Kind>, Error> {

@@ -1,7 +1,7 @@
 //! The program itself on one session, and what it said.
 
 use crate::{Error, Session};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 const LONGEST: Duration = Duration::from_secs(600);
 
 /// Where a statement stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
     /// `setup.findings` of `summary.json`.
@@ -23,7 +23,7 @@ pub enum Place {
 }
 
 /// One statement of the program.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Statement {
     /// Where it stands.
     pub place: Place,
@@ -34,7 +34,7 @@ pub struct Statement {
 }
 
 /// What the program said.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Said {
     /// Exit code; none if it was stopped, or ended by a signal.
     pub exit: Option<i32>,

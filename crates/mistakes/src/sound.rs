@@ -5,14 +5,14 @@ use crate::rigs::{session_of, six_axis};
 use crate::run::{Place, Said};
 use crate::{Draw, Error, Rig, Session, draw, run};
 use armcal_lab::scenario::{Design, Scenario, families};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Codes of warnings that accuse the setup, where there is no section of its own to do it.
 const ACCUSING: [&str; 4] = ["unit-doubtful", "board-turned", "frame-declared-wrong", "recording-twice"];
 
 /// One sound session and what was said to it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Sound {
     /// Its number.
     pub number: usize,
@@ -32,6 +32,13 @@ pub fn sound(armcal: &Path, number: usize, seed: u64, folder: &Path) -> Result<S
     let said = run::run(armcal, &session, folder)?;
     let alarms = alarms(&said, &hidden);
     Ok(Sound { number, rig, hidden, said, alarms })
+}
+
+impl Sound {
+    /// Judges again what was said.
+    pub fn judged_again(self) -> Sound {
+        Sound { alarms: alarms(&self.said, &self.hidden), ..self }
+    }
 }
 
 /// The rigs in turn, and on each by turns nothing hidden and one effect of a drawn size.

@@ -6,13 +6,13 @@ mod table;
 use crate::session::{Body, JOINTS, Recorded, Session};
 use crate::{Error, draw};
 use armcal_lab::LabConfig;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toml::Table;
 
 pub use table::{session_of, small_lab};
 
 /// A rig.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rig {
     /// A three-axis arm at a calibration table, Vicon on base, table and tip.
