@@ -47,6 +47,9 @@ mod missing_effect;
 /// How often is the diagnosis right on scenarios whose truth it cannot see?
 mod sealed_scenarios;
 
+/// Are mistakes of the setup named for what they are, and sound sessions left in peace?
+mod setup_mistakes;
+
 /// Does comparing two results say what changed, on the same dwells?
 mod compare;
 

@@ -9,7 +9,7 @@
 //! | move | [`engine`], [`spline`], [`servo`], [`hand`] | cubic splines, inverse kinematics, PID against inertia and gravity; a guiding hand |
 //! | hide something | [`mechanism`], [`mechanisms`] | gaps, springs, growing links, slipping pulleys: `[[mechanisms]]` |
 //! | watch | [`sensors`] | counts, camera noise, occlusion, clocks, transport |
-//! | write | `record`, [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
+//! | write | [`record`], [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
 //!
 //! [`observe`] goes the same way without streams, one reading a dwell, in milliseconds. [`scenario`] draws rigs with
 //! one thing hidden, and seals them: recordings in one folder, the truth in another. [`pair`] joins the tips of two arms.
@@ -32,7 +32,7 @@ pub mod pair;
 pub mod plan;
 pub mod quick;
 pub mod random;
-mod record;
+pub mod record;
 pub mod rig;
 pub mod scenario;
 pub mod screw;

@@ -1,0 +1,104 @@
+//! The mistakes: each takes a sound session and makes it wrong.
+
+mod boards;
+mod clocks;
+mod encoders;
+mod faults;
+mod joints;
+mod models;
+mod noise;
+mod poses;
+mod rigging;
+
+use crate::rigs::Rig;
+use crate::session::Session;
+use crate::{Draw, Error};
+
+/// One kind of mistake.
+#[derive(Clone, Copy)]
+pub struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// The cause that a right report names, of [`crate::causes`].
+    pub cause: &'static str,
+    /// The rigs on which it can be made.
+    pub rigs: &'static [Rig],
+    /// Makes it.
+    pub make: Make,
+}
+
+/// Makes a mistake in a session. Returns words of which a report that is about a part has to name one, such as the joint;
+/// none where the report need not.
+pub type Make = fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>;
+
+const ALL: &[Rig] = &Rig::ALL;
+const SEEN: &[Rig] = &[Rig::Table, Rig::Poses];
+const BOARD: &[Rig] = &[Rig::Table, Rig::Sockets];
+const TABLE: &[Rig] = &[Rig::Table];
+const POSES: &[Rig] = &[Rig::Poses];
+
+const fn kind(name: &'static str, cause: &'static str, rigs: &'static [Rig], make: Make) -> Kind {
+    Kind { name, cause, rigs, make }
+}
+
+/// Every kind, in the order of the table.
+pub fn kinds() -> Vec<Kind> {
+    let groups = [
+        joints::KINDS,
+        encoders::KINDS,
+        poses::KINDS,
+        boards::KINDS,
+        models::KINDS,
+        rigging::KINDS,
+        clocks::KINDS,
+        faults::KINDS,
+        noise::KINDS,
+    ];
+    groups.concat()
+}
+
+/// A kind by its name.
+pub fn named(name: &str) -> Result<Kind, Error> {
+    kinds().into_iter().find(|kind| kind.name == name).ok_or_else(|| Error::Unknown {
+        what: "kind",
+        name: name.to_owned(),
+        known: kinds().iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// A report may be about anything.
+fn anything() -> Result<Vec<String>, Error> {
+    Ok(Vec::new())
+}
+
+/// A report has to name one of these joints.
+fn about(session: &Session, joints: &[usize]) -> Result<Vec<String>, Error> {
+    let names = session.joint_names();
+    Ok(joints.iter().filter_map(|j| names.get(*j).cloned()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_changes_the_session_the_same_way_each_time() {
+        for rig in Rig::ALL {
+            let sound = rig.session(3, "test").unwrap();
+            assert_eq!(sound, rig.session(3, "test").unwrap(), "{rig:?} is not the same twice");
+            for kind in kinds().iter().filter(|kind| kind.rigs.contains(&rig)) {
+                let make = |seed| {
+                    let mut session = sound.clone();
+                    let about = (kind.make)(&mut session, &mut Draw::new(seed, kind.name, rig)).unwrap();
+                    (session, about)
+                };
+                let (made, about) = make(5);
+                assert_ne!(made, sound, "{} leaves {rig:?} as it was", kind.name);
+                // Of what is not a number nothing is equal.
+                if kind.cause != "non-finite" {
+                    assert_eq!((made, about), make(5), "{} on {rig:?} is not the same twice", kind.name);
+                }
+            }
+        }
+    }
+}

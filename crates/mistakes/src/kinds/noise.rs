@@ -1,0 +1,61 @@
+//! Noise that is not what is declared.
+
+use super::{BOARD, Kind, POSES, SEEN, anything, kind};
+use crate::rigs::{Source, session_of};
+use crate::session::{Body, Session};
+use crate::{Draw, Error};
+use toml::Value;
+
+pub const KINDS: &[Kind] = &[
+    kind("board-tolerance-underdeclared", "noise-underdeclared", BOARD, |s, d| {
+        tolerances(s, d.uniform(0.02, 0.1))
+    }),
+    kind("board-tolerance-overdeclared", "noise-overdeclared", BOARD, |s, d| {
+        tolerances(s, d.uniform(8.0, 30.0))
+    }),
+    kind("seats-worn-out", "noise-underdeclared", BOARD, worn),
+    kind("sensor-noise-underdeclared", "noise-underdeclared", SEEN, wobbles),
+    kind("sensor-noise-overdeclared", "noise-overdeclared", POSES, overdeclared),
+];
+
+fn tolerances(session: &mut Session, factor: f64) -> Result<Vec<String>, Error> {
+    for key in ["cavity_sigma_mm", "seat_sigma_mm"] {
+        if let Some(Value::Float(sigma)) = session.board.as_mut().and_then(|b| b.get_mut(key)) {
+            *sigma *= factor;
+        }
+    }
+    anything()
+}
+
+/// Cavities that were used for years: half a millimetre off their drawing.
+fn worn(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+    let Source::Lab(config) = &session.source else { return anything() };
+    let mut config = config.clone();
+    config.board.true_cavity_sigma_mm = Some(draw.uniform(0.4, 0.9));
+    *session = session_of(session.rig, *config)?;
+    anything()
+}
+
+/// A mount that sways: an error that is constant through a rest and another in the next.
+fn wobbles(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+    let size_m = draw.uniform(0.6e-3, 1.5e-3);
+    let ends: Vec<Vec<i64>> = session
+        .recordings
+        .iter()
+        .map(|r| r.rests.iter().map(|rest| rest.end_ns + 150_000_000).collect())
+        .collect();
+    let offsets: Vec<Vec<_>> = ends
+        .iter()
+        .map(|ends| (0..=ends.len()).map(|_| draw.direction() * (size_m * draw.normal())).collect())
+        .collect();
+    session.poses(Body::Tip, |at, p, _| {
+        *p += offsets[at.recording][ends[at.recording].partition_point(|end| *end <= at.stamp_ns)];
+    });
+    anything()
+}
+
+fn overdeclared(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+    session.set(&["observations", "sensor_sigma_mm"], draw.uniform(1.0, 3.0));
+    session.set(&["observations", "sensor_sigma_deg"], draw.uniform(0.1, 0.3));
+    anything()
+}

@@ -1,0 +1,88 @@
+//! Sound recordings, half of them with a physical effect hidden in the rig: nothing is wrong with their setup.
+
+use crate::judge::{NOTHING, SHOWN};
+use crate::rigs::{session_of, six_axis};
+use crate::run::{Place, Said};
+use crate::{Draw, Error, Rig, Session, draw, run};
+use armcal_lab::scenario::{Design, Scenario, families};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Codes of warnings that accuse the setup, where there is no section of its own to do it.
+const ACCUSING: [&str; 4] = ["unit-doubtful", "board-turned", "frame-declared-wrong", "recording-twice"];
+
+/// One sound session and what was said to it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Sound {
+    /// Its number.
+    pub number: usize,
+    /// The rig.
+    pub rig: Rig,
+    /// The effect that is hidden, or `nothing`.
+    pub hidden: String,
+    /// What was said.
+    pub said: Said,
+    /// What of it is false: a mistake reported, a run refused, `nothing_missing` where something is.
+    pub alarms: Vec<String>,
+}
+
+/// Draws sound session `number`, runs the program on it in `folder`, and judges.
+pub fn sound(armcal: &Path, number: usize, seed: u64, folder: &Path) -> Result<Sound, Error> {
+    let (rig, hidden, session) = session(number, seed)?;
+    let said = run::run(armcal, &session, folder)?;
+    let alarms = alarms(&said, &hidden);
+    Ok(Sound { number, rig, hidden, said, alarms })
+}
+
+impl Sound {
+    /// Judges again what was said.
+    pub fn judged_again(self) -> Sound {
+        Sound { alarms: alarms(&self.said, &self.hidden), ..self }
+    }
+}
+
+/// The rigs in turn, and on each by turns nothing hidden and one effect of a drawn size.
+fn session(number: usize, seed: u64) -> Result<(Rig, String, Session), Error> {
+    let rig = Rig::ALL[number % 3];
+    let case = format!("sound {number}");
+    let mut draw = Draw::new(seed, &case, rig);
+    if (number / 3).is_multiple_of(2) {
+        return Ok((rig, "nothing".to_owned(), rig.session(seed, &case)?));
+    }
+    let seed = draw::mixed(seed, &case, rig);
+    if rig == Rig::Poses {
+        let hidden = six_axis::Hidden::draw(&mut draw);
+        let lab = six_axis::Lab { hidden: Some(hidden), ..six_axis::Lab::new(seed) };
+        return Ok((rig, hidden.word().to_owned(), six_axis::session(lab)?));
+    }
+    // What needs loads or events at known moments keeps its design.
+    let families = families();
+    let family = families[draw.pick(families.len())];
+    let design = [Design::ThreeTiltsOnePass, Design::ThreeTiltsBothWays, Design::FreePoses][draw.pick(3)];
+    let config = Scenario::new(family, design, seed).plant()?.config;
+    Ok((rig, family.to_owned(), session_of(rig, config)?))
+}
+
+fn alarms(said: &Said, hidden: &str) -> Vec<String> {
+    let mut alarms = Vec::new();
+    if !matches!(said.exit, Some(0 | 3)) {
+        let text = said.statements.last().map(|s| s.text.lines().next().unwrap_or_default().to_owned());
+        alarms.push(format!("refused: {}", text.unwrap_or_default()));
+    }
+    for s in &said.statements {
+        if s.place == Place::Setup || (s.place == Place::Warning && ACCUSING.contains(&s.code.as_str())) {
+            alarms.push(format!("{}: {}", s.code, s.text));
+        }
+    }
+    let above = |floors: f64| said.ratio().is_some_and(|ratio| ratio > floors);
+    match said.verdict.as_deref() {
+        Some("nothing_missing") if above(NOTHING) => {
+            alarms.push("nothing_missing above the floor".to_owned())
+        }
+        Some("unexplained") if hidden == "nothing" && !above(SHOWN) => {
+            alarms.push("unexplained at the floor".to_owned())
+        }
+        _ => {}
+    }
+    alarms
+}

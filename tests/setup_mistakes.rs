@@ -1,0 +1,43 @@
+use armcal_mistakes::judge::{Case, Judgement, case};
+use armcal_mistakes::{Rig, kinds, sound};
+use std::path::Path;
+
+/// A seed of its own: not that of the table in the documentation.
+const SEED: u64 = 41;
+
+/// Mistakes whose cause is named, on the rigs where it is.
+const NAMED: &[(&str, Rig)] = &[
+    ("degrees-read-as-radians", Rig::Sockets),
+    ("positions-in-millimetres", Rig::Table),
+    ("joint-name-misspelt", Rig::Poses),
+    ("topic-misspelt", Rig::Table),
+    ("file-cut", Rig::Sockets),
+    ("joint-stamps-zero", Rig::Poses),
+];
+
+fn answer(name: &str, rig: Rig) -> Case {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let kind = kinds::named(name).expect("a kind");
+    let case =
+        case(Path::new(env!("CARGO_BIN_EXE_armcal")), &kind, rig, SEED, folder.path()).expect("a case");
+    println!("{name} on {rig:?}: {:?}, reported {:?}", case.judgement, case.reported);
+    case
+}
+
+#[test]
+fn mistakes_that_are_named_stay_named() {
+    for (name, rig) in NAMED {
+        let case = answer(name, *rig);
+        assert_eq!(case.judgement, Judgement::Right, "{name} on {rig:?}: {:#?}", case.said);
+    }
+}
+
+#[test]
+fn a_sound_session_of_each_rig_is_not_accused() {
+    for number in 0..6 {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let armcal = Path::new(env!("CARGO_BIN_EXE_armcal"));
+        let sound = sound::sound(armcal, number, SEED, folder.path()).expect("a sound session");
+        assert!(sound.alarms.is_empty(), "{:?}, hidden {}: {:?}", sound.rig, sound.hidden, sound.alarms);
+    }
+}
