@@ -1,7 +1,7 @@
 use armcal::plan::{Allowed, Known, Place, Proposal, Tracking, propose, standing};
 use armcal::score::nominal_model;
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, diagnose};
+use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::config::{RecordingConfig, StopConfig, TourConfig};
 use armcal_lab::scenario::{Design, Scenario, Size};
 use armcal_lab::{LabConfig, observe};
@@ -25,8 +25,16 @@ fn ask(config: &LabConfig, allowed: &Allowed) -> Said {
     let session = Session::of(observations);
     let calibration = calibrate(&model, observations, &fit, &HoldoutConfig::default()).expect("calibrating");
     let diagnosed = DiagnosisConfig::default();
-    let diagnosis =
-        diagnose(&model, &calibration, observations, &session, &fit, &diagnosed).expect("diagnosing");
+    let holdout = HoldoutConfig::default();
+    let calibrated = Calibrated {
+        model: &model,
+        calibration: &calibration,
+        observations,
+        session: &session,
+        fit: &fit,
+        holdout: &holdout,
+    };
+    let diagnosis = diagnose(&calibrated, &diagnosed).expect("diagnosing");
     let board = Board::from_toml(BOARD, Path::new("paper.toml")).expect("board");
     let known = Known {
         model: &model,

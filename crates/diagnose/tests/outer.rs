@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
-use armcal_core::{Arrival, DwellId, Observation, Pose, Reference};
-use armcal_diagnose::{DiagnosisConfig, Verdict, compare_heldout, diagnose, plan_dwells};
+use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
+use armcal_diagnose::{
+    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, compare_heldout, diagnose, plan_dwells,
+};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -70,6 +72,14 @@ fn calibration(model: &Model, observations: &[Observation]) -> Calibration {
     calibrate(model, observations, &FitConfig::default(), &HoldoutConfig::CavityFolds { k: 5 }).unwrap()
 }
 
+fn diagnosed(model: &Model, calibration: &Calibration, observations: &[Observation]) -> Diagnosis {
+    let (session, fit, holdout) =
+        (Session::of(observations), FitConfig::default(), HoldoutConfig::CavityFolds { k: 5 });
+    let calibrated =
+        Calibrated { model, calibration, observations, session: &session, fit: &fit, holdout: &holdout };
+    diagnose(&calibrated, &config()).unwrap()
+}
+
 fn config() -> DiagnosisConfig {
     DiagnosisConfig { resamplings: 199, ..Default::default() }
 }
@@ -79,25 +89,103 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
     let (model, observations) = observed(&["backlash:2"], 1.0, 1);
     let session = Session::of(&observations);
     let before = calibration(&model, &observations);
-    let d = diagnose(&model, &before, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    let d = diagnosed(&model, &before, &observations);
     assert!(d.effects[0].set.iter().any(|n| n == "backlash:2"), "{:?} {:?}", d.verdict, d.names);
     assert_eq!(d.effects.len(), 1, "{:?}", d.names);
     let extended = model.with_effects(&[model.effect("backlash:2").unwrap()], &session).unwrap();
     let after = calibration(&extended, &observations);
     let held = compare_heldout(&before, &after, &observations, &config()).unwrap();
     assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
-    let left =
-        diagnose(&extended, &after, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    let left = diagnosed(&extended, &after, &observations);
     assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
 }
 
 #[test]
 fn a_complete_model_misses_nothing() {
     let (model, observations) = observed(&[], 0.0, 2);
-    let session = Session::of(&observations);
     let fit = calibration(&model, &observations);
-    let d = diagnose(&model, &fit, &observations, &session, &FitConfig::default(), &config()).unwrap();
+    let d = diagnosed(&model, &fit, &observations);
     assert_eq!(d.verdict, Verdict::NothingMissing, "{:?}", d.names);
+    assert_eq!((d.judged, d.holdout_mm.before), (JudgedOn::HeldOut, 1e3 * fit.holdout.fitted.mean_m));
+    assert_eq!(d.floor_mm, 1e3 * fit.noise_floor_m);
+    assert_eq!(d.probability, Some(d.p_nothing));
+}
+
+#[test]
+fn the_refit_gives_the_numbers_of_the_verdict() {
+    let (model, observations) = observed(&["backlash:2"], 1.0, 1);
+    let before = calibration(&model, &observations);
+    let d = diagnosed(&model, &before, &observations);
+    let refitted = d.refitted.as_ref().unwrap();
+    assert_eq!(d.holdout_mm.before, 1e3 * before.holdout.fitted.mean_m);
+    assert_eq!(d.holdout_mm.after, 1e3 * refitted.calibration.holdout.fitted.mean_m);
+    assert!(d.unexplained.is_none(), "{:?}", d.unexplained);
+}
+
+/// Errors of the size and kind that no effect makes: each dwell off by itself, twenty times the noise.
+fn scattered(mut observations: Vec<Observation>, seed: u64) -> Vec<Observation> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for o in &mut observations {
+        let off = Vector3::from_fn(|_, _| 20.0 * SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+        if let Reference::Tracked { position_m, .. } = &mut o.reference {
+            *position_m += off;
+        }
+    }
+    observations
+}
+
+#[test]
+fn errors_above_the_floor_without_an_explanation_are_unexplained() {
+    for seed in 0..4 {
+        let (model, observations) = observed(&[], 0.0, 2);
+        let observations = scattered(observations, seed);
+        let before = calibration(&model, &observations);
+        let d = diagnosed(&model, &before, &observations);
+        assert_eq!(d.verdict, Verdict::Unexplained, "{:?}", d.names);
+        assert!(d.names.is_empty() && d.effects.is_empty() && d.probability.is_none());
+        let left = d.unexplained.as_ref().unwrap();
+        assert!((15.0..25.0).contains(&left.times_floor), "{left:?}");
+        assert_eq!(left.times_floor, before.times_floor());
+        assert!(left.tried.listed > 20 && left.tried.unlisted > 20, "{left:?}");
+        let grave = d.warnings.iter().any(|w| w.code == "unexplained" && w.severity == Severity::Inadequate);
+        assert!(grave, "{:?}", d.warnings);
+    }
+}
+
+#[test]
+fn the_part_of_the_session_that_errs_is_named_as_the_place() {
+    let (model, observations) = observed(&[], 0.0, 5);
+    let (scatter, half) = (scattered(observations.clone(), 7), observations.len());
+    let mixed: Vec<Observation> = observations
+        .into_iter()
+        .zip(scatter)
+        .enumerate()
+        .map(|(i, (sound, off))| if 2 * i >= half { off } else { sound })
+        .collect();
+    let before = calibration(&model, &mixed);
+    let d = diagnosed(&model, &before, &mixed);
+    let left = d.unexplained.as_ref().unwrap();
+    assert_eq!(left.places[0].place, "the second half of the session", "{left:?}");
+}
+
+#[test]
+fn nothing_is_missing_only_at_the_floor_whatever_the_scatter() {
+    // A law, over scatter from none to forty times the noise, in all dwells or in some.
+    for seed in 0..12 {
+        let (model, observations) = observed(&[], 0.0, 10 + seed);
+        let scatter = scattered(observations.clone(), seed);
+        let share = [1, 2, 5, 20][seed as usize % 4];
+        let mixed: Vec<Observation> = observations
+            .into_iter()
+            .zip(scatter)
+            .enumerate()
+            .map(|(i, (sound, off))| if i % share == 0 { off } else { sound })
+            .collect();
+        let before = calibration(&model, &mixed);
+        let d = diagnosed(&model, &before, &mixed);
+        let silent = d.verdict == Verdict::NothingMissing;
+        assert!(!silent || before.times_floor() <= 1.5, "seed {seed}: {} floors", before.times_floor());
+    }
 }
 
 #[test]
