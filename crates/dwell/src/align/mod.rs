@@ -40,10 +40,10 @@ const POSITIONS: usize = 400;
 const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
 
 /// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
-const TRIED_ROWS: f64 = 8.0;
+const TRIED_ROWS: f64 = 5.0;
 
 /// Times the uncertain parameters are estimated anew, and the change at which they stay, in standard deviations.
-const MODEL_ROUNDS: usize = 4;
+const MODEL_ROUNDS: usize = 3;
 const MODEL_SETTLED: f64 = 0.05;
 
 /// The arm as it is known before it is calibrated.
@@ -102,7 +102,7 @@ fn estimate(
     let (scale, coarse) = streams.coarse()?;
     let ratio = streams.ratio(&coarse);
     check_units(ratio, coarse.correlation)?;
-    if coarse.correlation < config.min_correlation {
+    if coarse.correlation < config.min_correlation && !streams.in_two_parts(scale, &coarse) {
         return Err(streams.too_low(&coarse));
     }
     let (scale, found) = streams.fine(scale, &coarse, ratio)?;
