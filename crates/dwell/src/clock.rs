@@ -19,11 +19,13 @@ pub struct ClockAlignment {
     /// Sensor time at which the offset holds [ns], chosen so that the errors of offset and drift are
     /// uncorrelated (where that time lies inside the recording).
     pub reference_ns: i64,
-    /// Correlation of the two speed profiles after alignment, 0 to 1.
+    /// Correlation of the two speed profiles after alignment, 0 to 1; NaN where they could not be compared.
     pub correlation: f64,
     /// Median ratio of measured to predicted distances between positions of the tip; 1 up to a few percent
-    /// when units, model and tracked point are right.
+    /// when units, model and tracked point are right. NaN where they could not be compared.
     pub displacement_ratio: f64,
+    /// Whether offset and drift are those that the pipeline declares, rather than estimated.
+    pub declared: bool,
 }
 
 impl ClockAlignment {
@@ -56,6 +58,7 @@ mod tests {
             reference_ns: 1_000_000_000,
             correlation: 1.0,
             displacement_ratio: 1.0,
+            declared: false,
         }
     }
 

@@ -25,6 +25,28 @@ pub struct ClockConfig {
     pub min_speed_mm_s: f64,
     /// Least correlation of predicted and measured speed. Default 0.6.
     pub min_correlation: f64,
+    /// `"same"`: one clock stamps both streams. Nothing is estimated then; the motion may contradict.
+    pub known: Option<KnownClock>,
+    /// The offset, where it is known: sensor minus robot at the sensor's first stamp [ms]. Nothing is estimated then.
+    pub offset_ms: Option<f64>,
+    /// The drift beside a known offset [ppm]; 0 where it is not given.
+    pub drift_ppm: Option<f64>,
+}
+
+/// A relation of the two clocks that has a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum KnownClock {
+    /// Sensor and robot are stamped by one clock.
+    Same,
+}
+
+/// Offset and drift as a pipeline declares them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Declared {
+    /// Sensor minus robot at the sensor's first stamp [s].
+    pub offset_s: f64,
+    pub drift: f64,
 }
 
 impl Default for ClockConfig {
@@ -38,6 +60,9 @@ impl Default for ClockConfig {
             min_motion_s: 3.0,
             min_speed_mm_s: 5.0,
             min_correlation: 0.6,
+            known: None,
+            offset_ms: None,
+            drift_ppm: None,
         }
     }
 }
@@ -60,7 +85,34 @@ impl ClockConfig {
         within(s, "max_gap_s", self.max_gap_s, 0.0, 10.0, "must be between 0 and 10")?;
         within(s, "min_motion_s", self.min_motion_s, 0.0, f64::MAX, "must not be negative")?;
         within(s, "min_speed_mm_s", self.min_speed_mm_s, 0.0, f64::MAX, "must not be negative")?;
-        within(s, "min_correlation", self.min_correlation, 0.0, 1.0, "must be between 0 and 1")
+        within(s, "min_correlation", self.min_correlation, 0.0, 1.0, "must be between 0 and 1")?;
+        self.check_declared()
+    }
+
+    /// The relation of the clocks, where it is declared.
+    pub(crate) fn declared(&self) -> Option<Declared> {
+        let offset_s = self.offset_ms.map(|ms| ms * 1e-3).or(self.known.map(|KnownClock::Same| 0.0))?;
+        Some(Declared { offset_s, drift: self.drift_ppm.unwrap_or(0.0) * 1e-6 })
+    }
+
+    fn check_declared(&self) -> Result<(), DwellError> {
+        let s = "clock";
+        let refuse = |key, value, why| Err(DwellError::Config { section: s, key, value, why });
+        match (self.known, self.offset_ms, self.drift_ppm) {
+            (Some(_), Some(value), _) => {
+                refuse("offset_ms", value, "is not known beside known = \"same\": keep one")
+            }
+            (Some(_), _, Some(value)) => {
+                refuse("drift_ppm", value, "is not known beside known = \"same\": keep one")
+            }
+            (None, None, Some(value)) => refuse("drift_ppm", value, "needs offset_ms beside it"),
+            (_, offset_ms, drift_ppm) => {
+                let (offset_ms, drift_ppm) = (offset_ms.unwrap_or(0.0), drift_ppm.unwrap_or(0.0));
+                within(s, "offset_ms", offset_ms, -9e12, 9e12, "must be a finite number of milliseconds")?;
+                let most = self.max_drift_ppm;
+                within(s, "drift_ppm", drift_ppm, -most, most, "must be within max_drift_ppm")
+            }
+        }
     }
 }
 
@@ -94,6 +146,8 @@ pub struct DwellConfig {
     pub merge_gap_s: f64,
     /// Cut off both ends of a dwell [s], except where the stream itself begins or ends. Default 0.02.
     pub trim_s: f64,
+    /// How far a joint may creep while the arm rests [deg]: slowly, one way, and never faster than before. Default 0.3.
+    pub creep_deg: f64,
     /// How far a joint must have been away for its arrival direction to be known [deg]. Default 0.3.
     pub arrival_threshold_deg: f64,
     /// The same in encoder counts, for quantised encoders; the larger of both holds. Default 3.
@@ -122,6 +176,7 @@ impl Default for DwellConfig {
             tip_floor_mm: 0.05,
             merge_gap_s: 0.15,
             trim_s: 0.02,
+            creep_deg: 0.3,
             arrival_threshold_deg: 0.3,
             arrival_threshold_counts: 3.0,
             min_effective_samples: 4.0,
@@ -154,6 +209,7 @@ impl DwellConfig {
             ("tip_floor_mm", self.tip_floor_mm),
             ("merge_gap_s", self.merge_gap_s),
             ("trim_s", self.trim_s),
+            ("creep_deg", self.creep_deg),
             ("arrival_threshold_deg", self.arrival_threshold_deg),
             ("arrival_threshold_counts", self.arrival_threshold_counts),
             ("min_effective_samples", self.min_effective_samples),

@@ -47,7 +47,10 @@ pub fn detect_dwells(
         .rows
         .iter()
         .enumerate()
-        .map(|(dwell, rows)| summary.dwell(DwellId { recording, dwell }, rows, &history))
+        .map(|(dwell, rows)| {
+            let creeps = found.crept_rad.contains_key(&dwell);
+            summary.dwell(DwellId { recording, dwell }, rows, &history, creeps)
+        })
         .collect();
     let warnings = summary.warnings(&found, &dwells);
     Ok((dwells, warnings))
@@ -62,10 +65,10 @@ struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    fn dwell(&self, id: DwellId, rows: &Range<usize>, history: &History<'_>) -> Dwell {
+    fn dwell(&self, id: DwellId, rows: &Range<usize>, history: &History<'_>, creeps: bool) -> Dwell {
         let joints = &self.samples.joints;
         let (start_ns, end_ns) = (joints.time_ns[rows.start], joints.time_ns[rows.end - 1]);
-        let means = joint_means(joints, rows, &self.encoders.step_rad);
+        let means = joint_means(joints, rows, &self.encoders.step_rad, creeps);
         let joint_rad: Vec<f64> = means.iter().map(|m| m.mean).collect();
         let stream = self.samples.temperature.as_ref();
         Dwell {
@@ -81,14 +84,14 @@ impl Summary<'_> {
             path_memory_rad: history.path_memory(rows.start, &joint_rad),
             pair_memory_rad: history.pair_memory(rows.start, &joint_rad),
             joint_rad,
-            tip: self.tip_of(start_ns, end_ns),
+            tip: self.tip_of(start_ns, end_ns, creeps),
             temperature_c: stream
                 .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
         }
     }
 
     /// The tip frames whose time lies in the dwell for certain, the error of the alignment considered.
-    fn tip_of(&self, start_ns: i64, end_ns: i64) -> Option<TipMeasurement> {
+    fn tip_of(&self, start_ns: i64, end_ns: i64, creeps: bool) -> Option<TipMeasurement> {
         let tip = self.tip?;
         let margin_s = self.clock.map_or(0.0, |c| {
             let at =
@@ -100,7 +103,7 @@ impl Summary<'_> {
         let margin_ns = (margin_s * 1e9) as i64;
         let first = tip.robot_ns.partition_point(|t| *t < start_ns.saturating_add(margin_ns));
         let end = tip.robot_ns.partition_point(|t| *t <= end_ns.saturating_sub(margin_ns));
-        tip_measurement(tip.samples, first..end.max(first), self.config)
+        tip_measurement(tip.samples, first..end.max(first), self.config, creeps)
     }
 
     fn warnings(&self, found: &Pauses, dwells: &[Dwell]) -> Vec<Warning> {
@@ -122,6 +125,7 @@ impl Summary<'_> {
             warnings.push(say(Severity::Notice, "short-pauses", message));
         }
         warnings.extend(dwells.windows(2).filter_map(|pair| self.split(&pair[0], &pair[1])));
+        warnings.extend(self.creep(found));
         let few = |d: &&Dwell| d.effective_samples < self.config.min_effective_samples && d.samples > 1;
         let varying = |d: &&Dwell| d.joint_spread_rad.iter().any(|s| *s > 0.0);
         let poor: Vec<usize> = dwells.iter().filter(varying).filter(few).map(|d| d.id.dwell).collect();
@@ -146,6 +150,24 @@ impl Summary<'_> {
             warnings.push(say(Severity::Notice, "dwell-without-tip", message));
         }
         warnings
+    }
+
+    /// Dwells in which the arm gave way.
+    fn creep(&self, found: &Pauses) -> Option<Warning> {
+        let all = found.crept_rad.values().flat_map(|crept| crept.iter().copied().enumerate());
+        let (joint, by_rad) = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        let name =
+            self.samples.joints.names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1));
+        let which: Vec<usize> = found.crept_rad.keys().copied().collect();
+        let message = format!(
+            "in {} of {} dwells the readings creep while the arm rests, {name} by up to {:.3} deg ({}); their last half is \
+             taken, with what it still creeps in its standard error",
+            which.len(),
+            found.rows.len(),
+            by_rad.abs().to_degrees(),
+            list(&which)
+        );
+        Some(Warning::new(Severity::Notice, Stage::Dwell, "dwell-creeps", "dwells", message))
     }
 
     /// Two dwells at one pose with a broken stream between them were one.

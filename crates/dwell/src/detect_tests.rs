@@ -1,4 +1,5 @@
 use super::*;
+use crate::NominalArm;
 use crate::testkit::{Random, Session, ns, tip_m};
 use armcal_core::{Arrival, JointSamples, PoseSamples, ScalarSamples};
 use nalgebra::Vector3;
@@ -94,6 +95,82 @@ fn tremor_and_slow_settling_before_rest_are_left_out() {
     }
 }
 
+/// Every joint of every dwell given a way to creep, of the time since the dwell began and its length [s].
+fn with_creep(s: &Session, joints: &mut JointSamples, creep_rad: impl Fn(usize, f64, f64) -> f64) {
+    for (row, t) in joints.time_ns.iter().enumerate() {
+        let t_s = (t - ns(0.0)) as f64 * 1e-9;
+        if let Some(d) = s.dwells_s.iter().find(|d| (d.0..=d.1).contains(&t_s)) {
+            for (j, column) in joints.joint_rad.iter_mut().enumerate() {
+                column[row] += creep_rad(j, t_s - d.0, d.1 - d.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn dwells_of_an_arm_that_gives_way_are_kept_once_with_the_settled_reading() {
+    // Steadily by 0.05 deg a second in joint 1; by 0.25 deg with 0.8 s in joint 2.
+    for (name, steady_deg_s, settling_deg) in
+        [("steady", 0.05, 0.0), ("settling", 0.0, 0.25), ("both", 0.03, 0.2)]
+    {
+        for seed in 0..20 {
+            let mut r = Random::new(seed);
+            let s = Session::random(&mut r, 8, (1.6, 2.4), (0.6, 1.2));
+            let mut joints = s.encoders(&mut r, 100.0, 2e-5, 0.0);
+            let at = |j: usize, t_s: f64| -> f64 {
+                [steady_deg_s * t_s, settling_deg * ((-t_s / 0.8f64).exp() - 1.0), 0.0][j].to_radians()
+            };
+            with_creep(&s, &mut joints, |j, t_s, _| at(j, t_s));
+            let (dwells, warnings) = detect(&only_joints(joints));
+            assert_eq!(dwells.len(), 8, "{name} seed {seed}");
+            let said = warnings.iter().any(|w| w.code == "dwell-creeps");
+            assert!(said || steady_deg_s == 0.0, "{name} seed {seed}: {warnings:?}");
+            for (found, (d, pose)) in dwells.iter().zip(s.dwells_s.iter().zip(&s.poses_rad)) {
+                let since_s = |t: i64| (t - ns(d.0)) as f64 * 1e-9;
+                let (first_s, last_s) = (since_s(found.start_ns), since_s(found.end_ns));
+                // The settled end, not the way there.
+                assert!(
+                    last_s > d.1 - d.0 - 0.1 && first_s > 0.4 * (d.1 - d.0),
+                    "{name} seed {seed} {}",
+                    found.id
+                );
+                for j in 0..3 {
+                    let (from, to) = (pose[j] + at(j, first_s), pose[j] + at(j, last_s));
+                    let (mean, sigma) = (found.joint_rad[j], found.joint_sigma_rad[j]);
+                    let inside = from.min(to) - 2e-5..=from.max(to) + 2e-5;
+                    assert!(
+                        inside.contains(&mean),
+                        "{name} seed {seed} {} joint {j}: {mean} {inside:?}",
+                        found.id
+                    );
+                    // A uniform error over the way that is left has 0.29 of it as its standard deviation.
+                    let way = (to - from).abs();
+                    assert!(
+                        sigma >= 0.2 * way && sigma <= 0.5 * way + 1e-5,
+                        "{name} {}: {sigma} of {way}",
+                        found.id
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_creep_at_the_edge_of_stillness_splits_no_dwell() {
+    for seed in 0..30 {
+        let mut r = Random::new(seed);
+        let s = Session::random(&mut r, 6, (3.0, 4.0), (0.6, 1.2));
+        let speed_deg_s = r.between(0.005, 0.06);
+        let mut joints = s.encoders(&mut r, 100.0, 2e-5, 0.0);
+        with_creep(&s, &mut joints, |j, t_s, _| if j == 1 { (speed_deg_s * t_s).to_radians() } else { 0.0 });
+        let (dwells, _) = detect(&only_joints(joints));
+        let found: Vec<(f64, f64)> =
+            dwells.iter().map(|d| ((d.start_ns - ns(0.0)) as f64 * 1e-9, d.duration_s())).collect();
+        assert_eq!(dwells.len(), 6, "seed {seed} at {speed_deg_s} deg/s: {found:?} of {:?}", s.dwells_s);
+    }
+}
+
 #[test]
 fn two_poses_a_slow_milliradian_apart_are_two_dwells() {
     // Seen on a real arm: one second each, joined by a move of 1 mrad in 0.6 s.
@@ -146,6 +223,7 @@ fn the_tip_is_measured_on_its_own_clock() {
             reference_ns: ns(0.0),
             correlation: 1.0,
             displacement_ratio: 1.0,
+            declared: false,
         };
         let samples = Samples { joints, tip: Some(tip), ..Samples::default() };
         let (dwells, _) = detect_dwells(3, &samples, Some(&clock), &config).expect("detects");
@@ -329,7 +407,7 @@ proptest! {
         let _ = detect_dwells(0, &samples, None, &DwellConfig::default());
         if let Some(tip) = &samples.tip {
             let _ = crate::mean_pose(tip);
-            let _ = crate::align_clocks(&samples.joints, tip, &|q: &[f64]| Vector3::new(q[0], q[1], 0.0), &crate::ClockConfig::default());
+            let _ = crate::align_clocks(&samples.joints, tip, NominalArm { tip_m: &|q, _| Vector3::new(q[0], q[1], 0.0), uncertain: 0 }, &crate::ClockConfig::default());
         }
     }
 }

@@ -74,6 +74,28 @@ pub enum DwellError {
         /// Offset that would bring the starts together [s].
         suggested_offset_s: f64,
     },
+    /// A stream has too many breaks.
+    #[error(
+        "aligning the clocks: the {stream} stream has no unbroken stretch of {needed_s:.2} s{rows}; record it without \
+         losses, or raise clock.max_gap_s"
+    )]
+    Broken {
+        /// The stream.
+        stream: &'static str,
+        /// Length of a stretch that would do [s].
+        needed_s: f64,
+        /// What its stamps show: lost rows, rows in bursts.
+        rows: String,
+    },
+    /// Both streams cover the same time, but hardly ever both at once.
+    #[error(
+        "aligning the clocks: both streams are unbroken at the same time for less than two fifths of the recording{rows}; \
+         record them without losses, or raise clock.max_gap_s"
+    )]
+    RarelyTogether {
+        /// What the stamps show: lost rows, rows in bursts.
+        rows: String,
+    },
     /// Nothing to align by.
     #[error("aligning the clocks: {seen}; {advice}")]
     NoMotion {

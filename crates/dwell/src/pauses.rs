@@ -3,8 +3,10 @@
 use armcal_core::robust::median;
 use armcal_core::{JointSamples, PoseSamples};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
+use crate::creep;
 use crate::series::{breaking_gap_s, median_period_s, seconds_between, unbroken};
 use crate::stats::quantisation_step;
 use crate::stillness::{Channel, channels, hysteresis};
@@ -42,6 +44,8 @@ pub(crate) struct Tip<'a> {
 pub(crate) struct Pauses {
     /// Rows of each pause, in order of time.
     pub rows: Vec<Range<usize>>,
+    /// How far each joint crept while the arm rested, of the pauses in which one did [rad].
+    pub crept_rad: BTreeMap<usize, Vec<f64>>,
     /// Durations of still runs shorter than the minimum [s].
     pub too_short_s: Vec<f64>,
 }
@@ -119,31 +123,44 @@ pub(crate) fn pauses(encoders: &Encoders, tip: Option<&Tip>, config: &DwellConfi
     let time_ns = &encoders.joints.time_ns;
     let mut found = Pauses::default();
     for stretch in &encoders.stretches {
-        let mut settled: Vec<Range<usize>> = Vec::new();
-        let runs = hysteresis(&level, stretch.clone(), 1.0, leave);
-        for run in runs.into_iter().flat_map(|run| rest.without_creep(run)) {
-            let free = settled.last().map_or(stretch.start, |last| last.end)..stretch.end;
-            let Some(run) = rest.settle(run, free) else { continue };
-            match settled.last_mut() {
-                Some(last)
-                    if seconds_between(time_ns[last.end - 1], time_ns[run.start]) <= config.merge_gap_s
-                        && rest.same_pose(last, &run) =>
-                {
-                    last.end = run.end;
+        let mut settled: Vec<Still> = Vec::new();
+        for run in hysteresis(&level, stretch.clone(), 1.0, leave) {
+            for still in rest.stills(&run, config) {
+                let free = settled.last().map_or(stretch.start, |last| last.rows.end)..stretch.end;
+                let crept_rad = still.crept_rad;
+                let rows = if crept_rad.is_some() { Some(still.rows) } else { rest.settle(still.rows, free) };
+                let Some(rows) = rows else { continue };
+                match settled.last_mut() {
+                    Some(last)
+                        if last.crept_rad.is_none()
+                            && crept_rad.is_none()
+                            && seconds_between(time_ns[last.rows.end - 1], time_ns[rows.start])
+                                <= config.merge_gap_s
+                            && rest.same_pose(&last.rows, &rows) =>
+                    {
+                        last.rows.end = rows.end;
+                    }
+                    _ => settled.push(Still { rows, crept_rad }),
                 }
-                _ => settled.push(run),
             }
         }
-        for run in settled {
+        for Still { rows: run, crept_rad } in settled {
             let duration_s = seconds_between(time_ns[run.start], time_ns[run.end - 1]);
             if duration_s + 1e-9 < config.min_duration_s {
                 found.too_short_s.push(duration_s);
             } else {
+                found.crept_rad.extend(crept_rad.map(|crept| (found.rows.len(), crept)));
                 found.rows.push(trim(time_ns, run, stretch, config.trim_s));
             }
         }
     }
     found
+}
+
+/// Rows in which the arm rests, and how far each joint crept meanwhile, where one did [rad].
+struct Still {
+    rows: Range<usize>,
+    crept_rad: Option<Vec<f64>>,
 }
 
 /// Time over which slow motion is looked for [s], and how many standard errors make a slope.
@@ -168,6 +185,32 @@ struct RestPose {
 }
 
 impl Rest<'_> {
+    /// What of a still run is rest: its parts without creep; or, where the arm creeps so slowly and steadily that it can
+    /// only be giving way, the end of the whole, by when it has settled as far as it does.
+    fn stills(&self, run: &Range<usize>, config: &DwellConfig) -> Vec<Still> {
+        let (time_ns, joints) = (&self.encoders.joints.time_ns, &self.encoders.joints.joint_rad);
+        let long_enough = |rows: &Range<usize>| {
+            !rows.is_empty()
+                && seconds_between(time_ns[rows.start], time_ns[rows.end - 1]) >= config.min_duration_s
+        };
+        let parts = self.without_creep(run.clone());
+        let settles = |part: &&Range<usize>| {
+            self.settle((*part).clone(), (*part).clone()).is_some_and(|rows| long_enough(&rows))
+        };
+        let settled: Vec<&Range<usize>> = parts.iter().filter(settles).collect();
+        let (tolerance_rad, most_rad) = (&self.encoders.settled_rad, config.creep_deg.to_radians());
+        let crept = creep::of(time_ns, joints, run, tolerance_rad, most_rad).filter(|_| long_enough(run));
+        match (&settled[..], crept) {
+            // One part without creep is where it has settled; none, or several, are a rest that creeps throughout.
+            ([settled], Some(_)) => vec![Still { rows: (*settled).clone(), crept_rad: None }],
+            (_, Some(crept_rad)) => {
+                let rows = creep::end_of(time_ns, run, config.min_duration_s);
+                vec![Still { rows, crept_rad: Some(crept_rad) }]
+            }
+            (_, None) => parts.into_iter().map(|rows| Still { rows, crept_rad: None }).collect(),
+        }
+    }
+
     /// The parts of a run in which no joint creeps: moves too slowly for the spread of a short window, but
     /// over a longer one visibly. Arms do so between two neighbouring poses, and while they settle.
     fn without_creep(&self, run: Range<usize>) -> Vec<Range<usize>> {
@@ -302,17 +345,8 @@ impl Rest<'_> {
 /// How far a straight line through the values moves over their time, and the standard error of that for
 /// values of unit noise. None for fewer than five values.
 fn moved_within(time_ns: &[i64], values: &[f64]) -> Option<(f64, f64)> {
-    if values.len() < 5 {
-        return None;
-    }
-    let n = values.len() as f64;
-    let since = |t: &i64| seconds_between(time_ns[0], *t);
-    let span_s = since(&time_ns[time_ns.len() - 1]);
-    let middle_s = time_ns.iter().map(since).sum::<f64>() / n;
-    let square: f64 = time_ns.iter().map(|t| (since(t) - middle_s).powi(2)).sum();
-    let slope = time_ns.iter().zip(values).map(|(t, v)| (since(t) - middle_s) * (v - values[0])).sum::<f64>()
-        / square;
-    Some((slope * span_s, span_s / square.sqrt()))
+    let line = creep::line(time_ns, values)?;
+    Some((line.slope * line.span_s, line.span_s / line.square_s2.sqrt()))
 }
 
 /// Cuts `trim_s` off both ends, but not where the stream itself begins or ends, and never more than a half.

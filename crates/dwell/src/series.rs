@@ -1,7 +1,7 @@
 //! Small verbs on time columns: differences, median period, unbroken stretches.
 
 use crate::DwellError;
-use armcal_core::robust::median;
+use armcal_core::robust::{median, percentile};
 use armcal_core::{JointSamples, PoseSamples};
 use std::ops::Range;
 
@@ -16,10 +16,17 @@ pub(crate) fn median_period_s(time_ns: &[i64]) -> f64 {
     median(&periods)
 }
 
+/// Time between rows that nine in ten do not exceed, at least the median [s]: of a stream of which rows were lost at
+/// random, the median tells nothing.
+pub(crate) fn typical_period_s(time_ns: &[i64]) -> f64 {
+    let periods: Vec<f64> = time_ns.windows(2).map(|w| seconds_between(w[0], w[1])).collect();
+    percentile(&periods, 0.9).max(median(&periods))
+}
+
 /// The gap that breaks a stream: as configured, but at least 3.5 periods, so that jitter of a slow stream
-/// and a single lost row do not.
+/// and lost rows do not.
 pub(crate) fn breaking_gap_s(configured_s: f64, time_ns: &[i64]) -> f64 {
-    configured_s.max(3.5 * median_period_s(time_ns))
+    configured_s.max(3.5 * typical_period_s(time_ns))
 }
 
 /// Maximal runs of usable rows without a gap longer than `max_gap_s`.

@@ -3,6 +3,8 @@
 
 use armcal_core::robust::{mad_sigma, median};
 
+use crate::creep;
+
 /// Huber's tuning constant: 95 % efficiency on normal data (Huber 1981, section 4.5).
 pub(crate) const HUBER_K: f64 = 1.345;
 
@@ -42,6 +44,17 @@ impl Mean {
         let variance_of_mean = effective.map_or(0.0, |e| square / (e - 1.0).max(0.5));
         let sigma = (variance_of_mean + quantisation_sigma(step, square.sqrt()).powi(2)).sqrt();
         Some(Mean { mean, spread, sigma, effective })
+    }
+}
+
+impl Mean {
+    /// Mean of a column that creeps along a straight line. The rest may have been anywhere on the way: the line from
+    /// first to last is a uniform error, and only what is left beside it is noise.
+    pub(crate) fn of_creeping(time_ns: &[i64], values: &[f64], step: f64) -> Option<Mean> {
+        let Some((left, crept)) = creep::without(time_ns, values) else { return Mean::of(values, step) };
+        let level = Mean::of(&left, step)?;
+        let spread = level.spread.hypot(crept / 12f64.sqrt());
+        Some(Mean { spread, sigma: level.sigma.hypot(crept / 12f64.sqrt()), ..level })
     }
 }
 

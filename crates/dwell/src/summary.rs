@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Matrix4, SymmetricEigen, UnitQuaternion, Vector3, Vector
 use std::ops::Range;
 
 use crate::DwellConfig;
+use crate::creep;
 use crate::series::seconds_between;
 use crate::stats::{HUBER_K, Mean, effective_samples, huber_mean};
 
@@ -15,10 +16,18 @@ const MEDIAN_NORM_3: f64 = 1.538_172;
 /// Fewest frames that make a tip measurement.
 const MIN_TIP_FRAMES: usize = 3;
 
-/// Means of all joints over the rows of a pause.
-pub(crate) fn joint_means(joints: &JointSamples, rows: &Range<usize>, step_rad: &[f64]) -> Vec<Mean> {
-    let columns = joints.joint_rad.iter().zip(step_rad);
-    columns.filter_map(|(column, step)| Mean::of(&column[rows.clone()], *step)).collect()
+/// Means of all joints over the rows of a pause, in which they may creep.
+pub(crate) fn joint_means(
+    joints: &JointSamples,
+    rows: &Range<usize>,
+    step_rad: &[f64],
+    creeps: bool,
+) -> Vec<Mean> {
+    let mean = |(column, step): (&Vec<f64>, &f64)| {
+        let (time_ns, values) = (&joints.time_ns[rows.clone()], &column[rows.clone()]);
+        if creeps { Mean::of_creeping(time_ns, values, *step) } else { Mean::of(values, *step) }
+    };
+    joints.joint_rad.iter().zip(step_rad).filter_map(mean).collect()
 }
 
 /// Independent readings: the median over the joints whose readings vary; 1 when none does, because then
@@ -64,10 +73,29 @@ pub(crate) fn tip_measurement(
     samples: &PoseSamples,
     frames: Range<usize>,
     config: &DwellConfig,
+    creeps: bool,
 ) -> Option<TipMeasurement> {
     let floor_m = config.tip_sigma_floor_mm * 1e-3;
     let floor_rad = config.orientation_sigma_floor_deg.to_radians();
-    pose_mean(samples, frames, floor_m, floor_rad)
+    if !creeps {
+        return pose_mean(samples, frames, floor_m, floor_rad);
+    }
+    // The line that the tip creeps along is a uniform error, and only what is left beside it is noise.
+    let axis = |k: usize| {
+        let column: Vec<f64> = samples.position_m[frames.clone()].iter().map(|p| p[k]).collect();
+        creep::without(&samples.time_ns[frames.clone()], &column)
+    };
+    let (Some(x), Some(y), Some(z)) = (axis(0), axis(1), axis(2)) else {
+        return pose_mean(samples, frames, floor_m, floor_rad);
+    };
+    let mut level = samples.clone();
+    for (i, row) in frames.clone().enumerate() {
+        level.position_m[row] = Vector3::new(x.0[i], y.0[i], z.0[i]);
+    }
+    let crept_m = Vector3::new(x.1, y.1, z.1);
+    let mut mean = pose_mean(&level, frames, floor_m, floor_rad)?;
+    mean.covariance_m2 += crept_m * crept_m.transpose() / 12.0;
+    Some(mean)
 }
 
 /// Robust mean pose with the covariance of that mean, never below the floors.

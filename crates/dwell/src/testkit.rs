@@ -39,15 +39,36 @@ pub(crate) fn ar1(r: &mut Random, n: usize, rho: f64, sigma: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A three-joint arm; `wrong` = 1 shifts its lengths by up to 30 mm and its zeros by some degrees.
-pub(crate) fn tip_m(q: &[f64], wrong: f64) -> Vector3<f64> {
-    let q = [q[0] + 0.03 * wrong, q[1] - 0.04 * wrong, q[2] + 0.05 * wrong];
-    let upper = Vector3::new(0.0, 0.012 * wrong, 0.40 + 0.02 * wrong);
-    let fore = Vector3::new(0.3543 - 0.03 * wrong, 0.01 * wrong, 0.01 * wrong);
+/// How wrong a nominal arm is: zeros of its three joints [rad], then the y and z of its upper and the x, y and z of its
+/// fore arm [m].
+pub(crate) type Wrong = [f64; 8];
+
+/// Prior standard deviation of each.
+pub(crate) const WRONG_SIGMA: Wrong = [0.04, 0.04, 0.04, 0.02, 0.02, 0.02, 0.02, 0.02];
+
+/// Lengths off by up to 30 mm and zeros by some degrees.
+pub(crate) const VERY_WRONG: Wrong = [0.03, -0.04, 0.05, 0.012, 0.02, -0.03, 0.01, 0.01];
+
+/// A three-joint arm.
+pub(crate) fn tip_of(q: &[f64], wrong: &Wrong) -> Vector3<f64> {
+    let [w0, w1, w2, upper_y, upper_z, fore_x, fore_y, fore_z] = *wrong;
+    let q = [q[0] + w0, q[1] + w1, q[2] + w2];
+    let upper = Vector3::new(0.0, upper_y, 0.40 + upper_z);
+    let fore = Vector3::new(0.3543 + fore_x, fore_y, fore_z);
     let z = Rotation3::from_axis_angle(&Vector3::z_axis(), q[0]);
     let a = Rotation3::from_axis_angle(&Vector3::y_axis(), q[1]);
     let b = Rotation3::from_axis_angle(&Vector3::y_axis(), q[2]);
     z * (a * (upper + b * fore)) + Vector3::new(0.0, 0.0, 0.076)
+}
+
+/// The same arm; `wrong` = 1 is [`VERY_WRONG`].
+pub(crate) fn tip_m(q: &[f64], wrong: f64) -> Vector3<f64> {
+    tip_of(q, &VERY_WRONG.map(|w| w * wrong))
+}
+
+/// The nominal arm, with its errors in their standard deviations.
+pub(crate) fn nominal(q: &[f64], off: &[f64]) -> Vector3<f64> {
+    tip_of(q, &std::array::from_fn(|k| WRONG_SIGMA[k] * off.get(k).copied().unwrap_or(0.0)))
 }
 
 /// A session: dwells joined by smooth moves, as functions of robot time [s].
@@ -109,6 +130,19 @@ impl Session {
 
     /// Tip stream of the true arm (`wrong` = 1) on a clock that is late and drifts.
     pub fn tip(&self, r: &mut Random, rate_hz: f64, noise_m: f64, offset_s: f64, drift: f64) -> PoseSamples {
+        self.tip_of(r, &VERY_WRONG, rate_hz, noise_m, offset_s, drift)
+    }
+
+    /// The same of an arm that is wrong otherwise.
+    pub fn tip_of(
+        &self,
+        r: &mut Random,
+        wrong: &Wrong,
+        rate_hz: f64,
+        noise_m: f64,
+        offset_s: f64,
+        drift: f64,
+    ) -> PoseSamples {
         let n = (self.end_s() * rate_hz) as usize + 1;
         let mid_s = 0.5 * self.end_s();
         let mut samples = PoseSamples::default();
@@ -117,7 +151,7 @@ impl Session {
             let sensor_s = robot_s + offset_s + drift * (robot_s - mid_s);
             let noise = Vector3::from_fn(|_, _| noise_m * r.normal());
             samples.time_ns.push(ns(sensor_s));
-            samples.position_m.push(tip_m(&self.joints_rad(robot_s), 1.0) + noise);
+            samples.position_m.push(tip_of(&self.joints_rad(robot_s), wrong) + noise);
         }
         samples
     }

@@ -19,6 +19,7 @@ fn recorded(seed: u64, offset_s: f64) -> (Session, Samples, ClockAlignment) {
         reference_ns: ns(0.0),
         correlation: 1.0,
         displacement_ratio: 1.0,
+        declared: false,
     };
     (session, samples, clock)
 }

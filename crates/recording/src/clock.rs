@@ -18,6 +18,9 @@ const SPREAD_S: f64 = 1.0;
 /// Spread allowed as a share of the recording's duration: a sensor's clock may drift.
 const SPREAD_SHARE: f64 = 0.02;
 
+/// Where the two clocks differ, one whose steps are off by less than this share of the other's goes on evenly.
+const BLAMELESS: f64 = 0.1;
+
 /// A stamp must be this many times the spread allowed away from its neighbours before it is called stray.
 const STRAY_SPREADS: f64 = 10.0;
 
@@ -141,9 +144,28 @@ fn judge_spread(set: &[(i64, i64)]) -> Result<String, String> {
     let latency_s: Vec<f64> = set.iter().map(|(h, log)| log.saturating_sub(*h) as f64 * 1e-9).collect();
     let spread_s = percentile(&latency_s, 0.99) - percentile(&latency_s, 0.01);
     if spread_s > SPREAD_S.max(SPREAD_SHARE * duration_s) {
+        if log_is_to_blame(set) {
+            return Ok(format!(
+                "header stamps are set and evenly spaced; log time is not, it lags by up to {spread_s:.1} s as that of a \
+                 recorder that stalls"
+            ));
+        }
         return Err(format!("header stamps wander {spread_s:.3} s against log time"));
     }
     Ok(format!("header stamps are set, increase, and follow log time within {:.1} ms", spread_s * 1e3))
+}
+
+/// Whether, where the two clocks differ from row to row, the header goes on evenly and log time does not.
+fn log_is_to_blame(set: &[(i64, i64)]) -> bool {
+    let steps_of = |stamp: fn(&(i64, i64)) -> i64| -> Vec<f64> {
+        set.windows(2).map(|w| seconds(Some(stamp(&w[0])), Some(stamp(&w[1])))).collect()
+    };
+    let (header, log) = (steps_of(|s| s.0), steps_of(|s| s.1));
+    let (header_s, log_s) = (percentile(&header, 0.5), percentile(&log, 0.5));
+    let differ = || header.iter().zip(&log).filter(|(h, l)| (*h - *l).abs() > 0.5 * header_s);
+    let by_header: f64 = differ().map(|(h, _)| (h - header_s).abs()).sum();
+    let by_log: f64 = differ().map(|(_, l)| (l - log_s).abs()).sum();
+    by_header < BLAMELESS * by_log
 }
 
 fn judge_publish(stamps: &Stamps) -> Result<String, String> {
@@ -210,6 +232,20 @@ mod tests {
         log_two[..5].iter_mut().for_each(|t| *t -= 3_600_000_000_000);
         let mut time: Vec<Option<i64>> = log_two.iter().copied().map(Some).collect();
         assert_eq!(drop_stray(&mut time, &log_two), 0);
+    }
+
+    #[test]
+    fn a_recorder_that_stalls_does_not_cost_the_header_its_trust() {
+        // For 3 of 10 s nothing is written, then all at once: log time lags by up to 3 s.
+        let mut s = stamps(Some, |t| t);
+        let (from, to) = (s.log_ns[300], s.log_ns[600]);
+        s.log_ns.iter_mut().filter(|t| (from..to).contains(*t)).for_each(|t| *t = to - 1);
+        s.publish_ns.clone_from(&s.log_ns);
+        let (clock, why) = choose(&s);
+        assert!(clock == Clock::Header && why.contains("recorder that stalls"), "{why}");
+        // A header clock that is set by 3 s for a while is not evenly spaced.
+        let set = stamps(|t| Some(if (from..to).contains(&t) { t + 3_000_000_000 } else { t }), |t| t);
+        assert_eq!(choose(&set).0, Clock::Log);
     }
 
     #[test]

@@ -44,6 +44,7 @@ pub mod ros2;
 mod scalars;
 mod streams;
 mod sweep;
+mod temperature;
 mod url;
 
 pub use bytes::{Access, identity_of};

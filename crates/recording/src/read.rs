@@ -4,6 +4,7 @@ use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
 use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
+use crate::temperature::{Scale, like_fahrenheit};
 use crate::{
     Clock, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams,
 };
@@ -38,8 +39,8 @@ impl Recording {
                     samples.set_points = streams.set_points.as_ref().map(|s| stage.joints(s)).transpose()?
                 }
                 "temperature" => {
-                    samples.temperature =
-                        streams.temperature.as_ref().map(|s| stage.scalars(s)).transpose()?
+                    let read = streams.temperature.as_ref().map(|s| stage.temperature(s)).transpose()?;
+                    samples.temperature = read.flatten();
                 }
                 "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
                 "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
@@ -177,15 +178,36 @@ impl<'a> Reading<'a> {
         })
     }
 
-    fn scalars(&mut self, stream: &ScalarStream) -> Result<ScalarSamples, RecordingError> {
+    /// None where no reading can be a temperature: a thermometer that is broken costs its effects, not the recording.
+    fn temperature(&mut self, stream: &ScalarStream) -> Result<Option<ScalarSamples>, RecordingError> {
         let role = "temperature";
         self.refuse_undecoded(role)?;
         let value = &self.gathered.scalars.value;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
+        let scale = Scale::of(&rows.iter().map(|(_, i)| value[*i]).collect::<Vec<_>>());
+        let possible: Vec<bool> = rows.iter().map(|(_, i)| scale.celsius(value[*i]).is_some()).collect();
+        self.drop_impossible(&mut rows, |place| possible[place]);
         drop_duplicates(&mut rows, &mut counts);
         let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
-        self.finish(role, &time_ns, counts)?;
-        Ok(ScalarSamples { time_ns, value: rows.iter().map(|i| value[*i]).collect() })
+        let celsius: Vec<f64> = rows.iter().filter_map(|i| scale.celsius(value[*i])).collect();
+        if let Err(why) = self.finish(role, &time_ns, counts) {
+            let mixed = match scale {
+                Scale::Mixed => {
+                    "some readings look like kelvin and some like degrees Celsius, so none is believed; "
+                }
+                _ => "",
+            };
+            let text = format!("{mixed}nothing here depends on temperature: {why}");
+            self.say(Severity::DataLost, "temperature-unusable", text);
+            return Ok(None);
+        }
+        if scale == Scale::Kelvin {
+            let text = "looks like kelvin, every reading being one that no laboratory has in degrees Celsius: converted";
+            self.say(Severity::Notice, "temperature-kelvin", text.to_owned());
+        } else if let Some(text) = like_fahrenheit(&celsius) {
+            self.say(Severity::Notice, "temperature-fahrenheit", text);
+        }
+        Ok(Some(ScalarSamples { time_ns, value: celsius }))
     }
 
     /// A stream of which nothing decodes is an error with the first reason.
@@ -323,9 +345,12 @@ impl<'a> Reading<'a> {
 
     fn inadequate(&mut self, code: &'static str, text: Option<String>) {
         if let Some(text) = text {
-            let subject = subject(&self.report);
-            self.warnings.push(Warning::new(Severity::Inadequate, Stage::Recording, code, subject, text));
+            self.say(Severity::Inadequate, code, text);
         }
+    }
+
+    fn say(&mut self, severity: Severity, code: &'static str, text: String) {
+        self.warnings.push(Warning::new(severity, Stage::Recording, code, subject(&self.report), text));
     }
 }
 

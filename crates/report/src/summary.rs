@@ -183,6 +183,8 @@ impl<'a> Summary<'a> {
 
 fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
     let clock = r.clock.as_ref();
+    // What is declared has no standard error.
+    let estimated = clock.filter(|c| !c.declared);
     RecordingSummary {
         name: &r.name,
         path: r.paths.first().map(|p| path_text(p)).unwrap_or_default(),
@@ -198,9 +200,9 @@ fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
         rejected: r.rejections.iter().map(|x| RejectedDwell { dwell: x.dwell.dwell, why: &x.why }).collect(),
         places: r.dwells.iter().enumerate().map(|(i, d)| place(d, r.assignments().get(i))).collect(),
         clock_offset_ms: clock.map_or(0.0, |c| c.offset_s * 1e3),
-        clock_offset_sigma_ms: clock.map(|c| c.offset_sigma_s * 1e3),
+        clock_offset_sigma_ms: estimated.map(|c| c.offset_sigma_s * 1e3),
         clock_drift_ppm: clock.map(|c| c.drift * 1e6),
-        clock_drift_sigma_ppm: clock.map(|c| c.drift_sigma * 1e6),
+        clock_drift_sigma_ppm: estimated.map(|c| c.drift_sigma * 1e6),
         clock_reference_ns: clock.map(|c| c.reference_ns),
         warnings: r.all_warnings(),
     }

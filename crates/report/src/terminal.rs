@@ -59,6 +59,7 @@ fn recordings(pen: &Pen, run: &Run) -> String {
 
 fn clock_offset(recording: &RecordingRun) -> String {
     match &recording.clock {
+        Some(c) if c.declared => format!("{:.2} declared", c.offset_s * 1e3),
         Some(c) => format!("{:.2} ± {:.2}", c.offset_s * 1e3, c.offset_sigma_s * 1e3),
         None => "-".into(),
     }
@@ -66,6 +67,7 @@ fn clock_offset(recording: &RecordingRun) -> String {
 
 fn clock_drift(recording: &RecordingRun) -> String {
     match &recording.clock {
+        Some(c) if c.declared => format!("{:.1} declared", c.drift * 1e6),
         Some(c) => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
         None => "-".into(),
     }

@@ -4,12 +4,13 @@ use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, Rejection, Samples, Warning};
-use armcal_dwell::{ClockAlignment, MeanPose, align_clocks, detect_dwells, mean_pose};
+use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
+use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Frames, Model};
 use armcal_recording::{Recording, RecordingReport};
 use armcal_report::RecordingRun;
 use armcal_table::Association;
+use nalgebra::{Point3, Vector3};
 use std::path::PathBuf;
 
 /// What one recording showed before any table or fit is involved.
@@ -94,6 +95,50 @@ pub fn recording_runs(
         .collect()
 }
 
+/// Share of the half width of its bounds that a parameter without a prior may be off, 1 sigma.
+const BOUNDS_TO_SIGMA: f64 = 0.8;
+
+/// How far the nominal arm may be off: what the clocks have to be found in spite of.
+struct Doubts {
+    nominal: Vec<f64>,
+    /// Index and standard deviation of every parameter in doubt.
+    parameters: Vec<(usize, f64)>,
+    /// How far the tracked point may be from the tip of the chain, per axis [m]; 0 where that is given.
+    marker_m: f64,
+}
+
+impl Doubts {
+    fn of(pipeline: &Pipeline, model: &Model) -> Doubts {
+        let sigma =
+            |p: &Parameter| p.prior_sigma.unwrap_or(BOUNDS_TO_SIGMA * 0.5 * (p.upper - p.lower)).max(0.0);
+        let parameters = model.parameters().iter().enumerate().filter(|(_, p)| p.free);
+        let parameters =
+            parameters.map(|(k, p)| (k, sigma(p))).filter(|(_, sigma)| sigma.is_finite()).collect();
+        let tip = &pipeline.frames.tip;
+        let association = pipeline.table.as_ref().map(|t| t.association.clone()).unwrap_or_default();
+        let away_m = Vector3::from(tip.at.xyz_m).norm();
+        let given = tip.pose == FramePose::Given && away_m == 0.0;
+        let marker_m = if given { 0.0 } else { away_m + 1e-3 * association.marker_offset_sigma_mm };
+        Doubts { nominal: model.nominal(), parameters, marker_m }
+    }
+
+    fn count(&self) -> usize {
+        self.parameters.len() + if self.marker_m > 0.0 { 3 } else { 0 }
+    }
+
+    /// The tip in the base's frame, with everything in doubt off by so many standard deviations.
+    fn tip_m(&self, model: &Model, joint_rad: &[f64], off: &[f64]) -> Vector3<f64> {
+        let mut p = self.nominal.clone();
+        for ((k, sigma), off) in self.parameters.iter().zip(off) {
+            p[*k] += sigma * off;
+        }
+        let marker = off.get(self.parameters.len()..).filter(|axes| axes.len() == 3);
+        let marker_m =
+            marker.map_or_else(Vector3::zeros, |axes| self.marker_m * Vector3::from_column_slice(axes));
+        (model.tip_in_base(&p, joint_rad) * Point3::from(marker_m)).coords
+    }
+}
+
 fn dwells_of_one(
     pipeline: &Pipeline,
     speed_model: &Model,
@@ -108,10 +153,10 @@ fn dwells_of_one(
     let (samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
     let clock = match &samples.tip {
         Some(tip) if !tip.is_empty() => {
-            let nominal = speed_model.nominal();
-            let tip_of = |q: &[f64]| speed_model.tip_in_base(&nominal, q).translation.vector;
-            let (clock, said) =
-                align_clocks(&samples.joints, tip, &tip_of, &pipeline.clock).map_err(in_dwell)?;
+            let doubts = Doubts::of(pipeline, speed_model);
+            let tip_of = |q: &[f64], off: &[f64]| doubts.tip_m(speed_model, q, off);
+            let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
+            let (clock, said) = align_clocks(&samples.joints, tip, arm, &pipeline.clock).map_err(in_dwell)?;
             warnings.extend(said);
             Some(clock)
         }

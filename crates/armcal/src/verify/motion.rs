@@ -51,7 +51,8 @@ impl<'a> Judge<'a> {
         let one = Recorded { recording, seen, samples, dwell: &self.pipeline.dwell };
         let (mut clock, mut moments) = (seen.clock.clone(), one.moments(seen.clock.as_ref())?);
         for _ in 0..CLOCK_ROUNDS {
-            let Some(thought) = &clock else { break };
+            // A declared clock stays as declared.
+            let Some(thought) = clock.as_ref().filter(|c| !c.declared) else { break };
             let Some(found) = self.lateness(&one, thought, &moments) else { break };
             let corrected = corrected(thought, &found);
             moments = one.moments(Some(&corrected))?;

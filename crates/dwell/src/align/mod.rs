@@ -1,20 +1,29 @@
 //! Offset and drift between the robot's clock and the sensor's, from the motion both saw.
 
 mod coarse;
+mod declared;
 mod fine;
+mod jump;
 mod profile;
 mod scale;
+mod spread;
+mod stamps;
+mod steady;
+mod warnings;
 
 use armcal_core::robust::percentile;
-use armcal_core::{JointSamples, PoseSamples, Severity, Stage, Warning};
+use armcal_core::{JointSamples, PoseSamples, Warning};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
 use coarse::Coarse;
-use fine::{BEND_RAD, Fine, Start};
+use fine::{Point, Problem, Start};
+use profile::SpeedProfile;
 use scale::{Scale, Track};
+use spread::{Deviations, FURTHER, Fine};
+use stamps::Stamps;
 
 const DOING: &str = "aligning the clocks";
 
@@ -30,19 +39,37 @@ const POSITIONS: usize = 400;
 /// Lengths of the smoothing kernels, in units of the shortest.
 const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
 
-/// Estimates offset and drift of the sensor's clock against the robot's.
+/// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
+const TRIED_ROWS: f64 = 5.0;
+
+/// Times the uncertain parameters are estimated anew, and the change at which they stay, in standard deviations.
+const MODEL_ROUNDS: usize = 3;
+const MODEL_SETTLED: f64 = 0.05;
+
+/// The arm as it is known before it is calibrated.
+#[derive(Clone, Copy)]
+pub struct NominalArm<'a> {
+    /// Position of the tip in any fixed frame [m], of the joints' readings [rad] and of how far each uncertain parameter
+    /// is off, in standard deviations of its prior.
+    pub tip_m: &'a (dyn Fn(&[f64], &[f64]) -> Vector3<f64> + Sync),
+    /// Number of uncertain parameters.
+    pub uncertain: usize,
+}
+
+/// Estimates offset and drift of the sensor's clock against the robot's, or takes them as the configuration declares them
+/// and says whether the motion contradicts.
 ///
-/// `tip_from_joints` gives the tip predicted by the nominal model, in any fixed frame [m]; only its speed is
-/// compared, so base frame and tool direction do not matter and the model may be wrong by centimetres. The
-/// standard errors take the correlation of that model error along each movement into account.
+/// Only the speed of the predicted tip is compared, so base frame and tool direction do not matter and the model may be
+/// wrong by centimetres. The standard errors take in how far the arm's uncertain parameters may be off, and the
+/// correlation of what is left along each movement and between movements.
 ///
 /// Speeds are compared under kernels of three lengths. The shortest one times a motion best, but needs the
 /// predicted path; under the longest one only the displacement from pose to pose counts, which finds the
 /// motion even where the path between poses is not the predicted one. Then the logarithms of the speed time
 /// the beginnings and ends of motion whatever the path.
 ///
-/// Warnings: `clock-displacement-ratio`, `clock-ambiguous`, `clock-drift-unknown`, `clock-uncertain`,
-/// `clock-not-linear`.
+/// Warnings: `clock-displacement-ratio`, `clock-ambiguous`, `clock-drift-unknown`, `clock-drift-limited`,
+/// `clock-uncertain`, `clock-not-linear`, `clock-contradicted`, `clock-unchecked`.
 ///
 /// # Errors
 /// No rows, no common time, no or too little motion, no resemblance of the two speeds, an offset beyond the
@@ -50,7 +77,7 @@ const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
 pub fn align_clocks(
     joints: &JointSamples,
     tip: &PoseSamples,
-    tip_from_joints: &(dyn Fn(&[f64]) -> Vector3<f64> + Sync),
+    arm: NominalArm<'_>,
     config: &ClockConfig,
 ) -> Result<(ClockAlignment, Vec<Warning>), DwellError> {
     config.check()?;
@@ -59,21 +86,34 @@ pub fn align_clocks(
     if tip.is_empty() {
         return Err(DwellError::NoSamples { doing: DOING, stream: "tip" });
     }
-    let streams = Streams::of(joints, tip, tip_from_joints, config)?;
+    match config.declared() {
+        Some(declared) => declared::align(joints, tip, arm, config, declared),
+        None => estimate(joints, tip, arm, config),
+    }
+}
+
+fn estimate(
+    joints: &JointSamples,
+    tip: &PoseSamples,
+    arm: NominalArm<'_>,
+    config: &ClockConfig,
+) -> Result<(ClockAlignment, Vec<Warning>), DwellError> {
+    let streams = Streams::of(joints, tip, arm, config)?;
     let (scale, coarse) = streams.coarse()?;
     let ratio = streams.ratio(&coarse);
     check_units(ratio, coarse.correlation)?;
-    if coarse.correlation < config.min_correlation {
+    if coarse.correlation < config.min_correlation && !streams.in_two_parts(scale, &coarse) {
         return Err(streams.too_low(&coarse));
     }
-    let found = streams.fine(scale, &coarse, ratio)?;
-    let fine = &found.fine;
-    if fine.offset_s.abs() > config.max_offset_s {
-        let offset_s = config.initial_offset_s + fine.offset_s;
+    let (scale, found) = streams.fine(scale, &coarse, ratio)?;
+    let estimate = streams.finish(&scale, &found)?;
+    if estimate.fine.offset_s.abs() > config.max_offset_s {
+        let offset_s = config.initial_offset_s + estimate.fine.offset_s;
         return Err(DwellError::OffsetAtEdge { offset_s, max_offset_s: config.max_offset_s });
     }
-    let alignment = streams.alignment(&found, ratio);
-    let warnings = streams.warnings(&alignment, fine, &coarse);
+    let alignment = streams.alignment(&estimate, found.correlation, ratio);
+    let jump = streams.jump(&scale, &estimate, alignment.offset_sigma_s);
+    let warnings = streams.warnings(&alignment, &estimate, &coarse, jump.as_ref());
     Ok((alignment, warnings))
 }
 
@@ -82,6 +122,7 @@ pub fn align_clocks(
 struct Streams<'a> {
     joints: &'a JointSamples,
     tip: &'a PoseSamples,
+    arm: NominalArm<'a>,
     config: &'a ClockConfig,
     sensor: Track,
     robot: Track,
@@ -90,38 +131,43 @@ struct Streams<'a> {
     reference_s: f64,
 }
 
-/// A fine estimate, and the correlation of the profiles under it.
+/// A fine estimate before its last step, and the correlation of the profiles under it.
 struct Found {
-    fine: Fine,
+    start: Start,
     correlation: f64,
+}
+
+/// The estimate after its last step, and what became of the drift.
+struct Estimate {
+    fine: Fine,
+    drift: Drift,
+}
+
+/// What the data say of the drift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Drift {
+    /// It was estimated.
+    Estimated,
+    /// They tell it no better than the largest credible one: zero.
+    Unknown,
+    /// They want more than the largest credible one.
+    Limited { wanted: f64, sigma: f64 },
 }
 
 impl<'a> Streams<'a> {
     fn of(
         joints: &'a JointSamples,
         tip: &'a PoseSamples,
-        tip_from_joints: &(dyn Fn(&[f64]) -> Vector3<f64> + Sync),
+        arm: NominalArm<'a>,
         config: &'a ClockConfig,
     ) -> Result<Streams<'a>, DwellError> {
         let origin_ns = tip.time_ns[0];
         let robot_origin_ns = shifted(origin_ns, -config.initial_offset_s);
-        let predict = |bent: Option<usize>| -> Track {
-            let tip_m = |row: usize| {
-                let mut joint_rad = joints.row_rad(row);
-                if let Some(joint) = bent {
-                    joint_rad[joint] += BEND_RAD;
-                }
-                tip_from_joints(&joint_rad)
-            };
-            let predicted_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
-            Track::of(&joints.time_ns, robot_origin_ns, predicted_m, config)
-        };
         let sensor = Track::of(&tip.time_ns, origin_ns, tip.position_m.clone(), config);
-        let robot = predict(None);
-        let bent: Vec<Track> = (0..joints.joint_rad.len()).map(|joint| predict(Some(joint))).collect();
+        let robot = predicted(joints, robot_origin_ns, arm, &vec![0.0; arm.uncertain], config);
         // Two samples in each half of the kernel, or a slow stream would be smoothed differently.
         let h_s = (0.5 * config.smoothing_s).max(2.0 * sensor.period_s).max(2.0 * robot.period_s);
-        let tried = KERNELS.map(|times| Scale::of(&sensor, &robot, &bent, times * h_s, config));
+        let tried = KERNELS.map(|times| Scale::of(&sensor, &robot, times * h_s, config));
         let reference_s = 0.5 * seconds_between(origin_ns, tip.time_ns[tip.len() - 1]);
         let mut first_reason = None;
         let mut scales = Vec::new();
@@ -131,14 +177,24 @@ impl<'a> Streams<'a> {
                 Err(reason) => first_reason = first_reason.or(Some(reason)),
             }
         }
+        let streams = Streams { joints, tip, arm, config, sensor, robot, scales, reference_s };
         match first_reason {
-            Some(reason) if scales.is_empty() => Err(reason),
-            _ => Ok(Streams { joints, tip, config, sensor, robot, scales, reference_s }),
+            Some(DwellError::Broken { stream, needed_s, .. }) if streams.scales.is_empty() => {
+                Err(DwellError::Broken { stream, needed_s, rows: streams.rows_in_words() })
+            }
+            Some(reason) if streams.scales.is_empty() => Err(reason),
+            _ => Ok(streams),
         }
     }
 
     fn max_drift(&self) -> f64 {
         self.config.max_drift_ppm * 1e-6
+    }
+
+    /// What the stamps show of missing and late rows; empty where they show nothing.
+    fn rows_in_words(&self) -> String {
+        let streams = [(&self.joints.time_ns, "joint"), (&self.tip.time_ns, "tip")];
+        streams.map(|(time_ns, stream)| Stamps::of(time_ns).in_words(stream)).concat()
     }
 
     /// The scale at which the two speeds resemble each other most, and how they then lie.
@@ -156,48 +212,148 @@ impl<'a> Streams<'a> {
                 best = Some((scale, found));
             }
         }
-        best.ok_or_else(|| {
-            let (j, t) = (&self.joints.time_ns, &self.tip.time_ns);
-            let (j, t) = ((j[0], j[j.len() - 1]), (t[0], t[t.len() - 1]));
-            let on_robot = |ns: i64| shifted(ns, -config.initial_offset_s);
-            DwellError::NoOverlap {
-                joints_first_ns: j.0,
-                joints_last_ns: j.1,
-                tip_first_ns: t.0,
-                tip_last_ns: t.1,
-                overlap_s: seconds_between(j.0.max(on_robot(t.0)), j.1.min(on_robot(t.1))).max(0.0),
-                max_offset_s: config.max_offset_s,
-                suggested_offset_s: seconds_between(j.0, t.0),
-            }
-        })
+        best.ok_or_else(|| self.no_overlap())
     }
 
-    /// The fine estimate: from the sharp speeds where the model predicts the path well; else from their
+    fn no_overlap(&self) -> DwellError {
+        let (j, t) = (&self.joints.time_ns, &self.tip.time_ns);
+        let (j, t) = ((j[0], j[j.len() - 1]), (t[0], t[t.len() - 1]));
+        let on_robot = |ns: i64| shifted(ns, -self.config.initial_offset_s);
+        let overlap_s = seconds_between(j.0.max(on_robot(t.0)), j.1.min(on_robot(t.1))).max(0.0);
+        if overlap_s > 0.5 * seconds_between(t.0, t.1) {
+            return DwellError::RarelyTogether { rows: self.rows_in_words() };
+        }
+        DwellError::NoOverlap {
+            joints_first_ns: j.0,
+            joints_last_ns: j.1,
+            tip_first_ns: t.0,
+            tip_last_ns: t.1,
+            overlap_s,
+            max_offset_s: self.config.max_offset_s,
+            suggested_offset_s: seconds_between(j.0, t.0),
+        }
+    }
+
+    /// The fine estimate and its scale: from the sharp speeds where the model predicts the path well; else from their
     /// logarithms; else from the scale of the coarse estimate itself.
-    fn fine(&self, from: &Scale, coarse: &Coarse, ratio: f64) -> Result<Found, DwellError> {
-        let start = Start { offset_s: coarse.offset_s, drift: coarse.drift };
-        let own = self.found(from, start)?;
-        let start = Start { offset_s: own.fine.offset_s, drift: own.fine.drift };
-        let near = |found: &Found| (found.fine.offset_s - start.offset_s).abs() < from.h_s;
+    fn fine(&self, from: &Scale, coarse: &Coarse, ratio: f64) -> Result<(Scale, Found), DwellError> {
+        let own = self.found(from, Start { offset_s: coarse.offset_s, drift: coarse.drift })?;
+        let near = |found: &Found| (found.start.offset_s - own.start.offset_s).abs() < from.h_s;
         let sharp = &self.scales[..self.scales.len().min(KERNELS.len() - 1)];
         let best = sharp
             .iter()
-            .filter_map(|scale| self.found(scale, start).ok())
-            .filter(|found| near(found) && found.correlation >= PATH_PREDICTED)
-            .max_by(|a, b| a.correlation.total_cmp(&b.correlation));
-        if let Some(found) = best {
-            return Ok(found);
+            .filter_map(|scale| Some((scale, self.found(scale, own.start).ok()?)))
+            .filter(|(_, found)| near(found) && found.correlation >= PATH_PREDICTED)
+            .max_by(|a, b| a.1.correlation.total_cmp(&b.1.correlation));
+        if let Some((scale, found)) = best {
+            return Ok((scale.clone(), found));
         }
-        let logarithmic = self.scales.first().and_then(|s| self.found(&s.logarithmic(ratio), start).ok());
-        Ok(logarithmic.filter(|f| near(f) && f.correlation >= self.config.min_correlation).unwrap_or(own))
+        let logarithmic = self.scales.first().map(|s| s.logarithmic(ratio));
+        let found = logarithmic.and_then(|s| self.found(&s, own.start).ok().map(|found| (s, found)));
+        let good = |f: &Found| near(f) && f.correlation >= self.config.min_correlation;
+        Ok(found.filter(|(_, f)| good(f)).unwrap_or((from.clone(), own)))
     }
 
     fn found(&self, scale: &Scale, start: Start) -> Result<Found, DwellError> {
-        let fine = scale.solve(start, self.reference_s, self.max_drift())?;
+        let movements = scale.movements()?;
+        let fixed = (self.max_drift() == 0.0).then_some(0.0);
+        let problem = Problem::new(&scale.robot, &movements, self.reference_s, fixed);
+        let state = problem.solve(start).ok_or_else(undetermined)?;
+        let start = Start { offset_s: state.x, drift: state.y / problem.half_s };
         let points = scale.sensor.points(2);
         let correlation =
-            coarse::correlation(&points, &scale.robot, self.reference_s, fine.offset_s, fine.drift);
-        Ok(Found { fine, correlation })
+            coarse::correlation(&points, &scale.robot, self.reference_s, start.offset_s, start.drift);
+        Ok(Found { start, correlation })
+    }
+
+    /// The last steps, with the uncertain parameters. The drift is kept within what is credible.
+    fn finish(&self, scale: &Scale, found: &Found) -> Result<Estimate, DwellError> {
+        let movements = scale.movements()?;
+        let most = self.max_drift();
+        let solve = |fixed: Option<f64>| {
+            self.finish_with(scale, &movements, found.start, fixed).ok_or_else(undetermined)
+        };
+        if most == 0.0 {
+            return Ok(Estimate { fine: solve(Some(0.0))?, drift: Drift::Estimated });
+        }
+        let fine = solve(None)?;
+        let (wanted, sigma) = (fine.drift, fine.covariance[(1, 1)].sqrt());
+        if sigma.is_nan() || sigma > most {
+            Ok(Estimate { fine: solve(Some(0.0))?, drift: Drift::Unknown })
+        } else if wanted.abs() > most {
+            let fine = solve(Some(most.copysign(wanted)))?;
+            Ok(Estimate { fine, drift: Drift::Limited { wanted, sigma } })
+        } else {
+            Ok(Estimate { fine, drift: Drift::Estimated })
+        }
+    }
+
+    /// Clocks and uncertain parameters in turn, until the parameters stay.
+    fn finish_with(
+        &self,
+        scale: &Scale,
+        movements: &[Point],
+        mut start: Start,
+        fixed: Option<f64>,
+    ) -> Option<Fine> {
+        let mut parameters = vec![0.0; self.arm.uncertain];
+        let mut best = None;
+        for _ in 0..MODEL_ROUNDS {
+            let robot = self.robot_speeds(scale, &parameters);
+            let problem = Problem::new(&robot, movements, self.reference_s, fixed);
+            let Some(state) = problem.solve(start) else { break };
+            let deviations = self.deviations(scale, &parameters);
+            let Some(fine) = spread::finish(&problem, &state, deviations.as_ref()) else { break };
+            let by = parameters.iter().zip(&fine.parameters).map(|(was, is)| (is - was).abs());
+            let settled = by.fold(0.0, f64::max) < MODEL_SETTLED;
+            parameters.clone_from(&fine.parameters);
+            start = Start { offset_s: fine.offset_s, drift: fine.drift };
+            best = Some(fine);
+            if settled {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The speeds that the model with these parameters predicts.
+    fn robot_speeds(&self, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
+        if parameters.iter().all(|p| *p == 0.0) {
+            return scale.robot.clone();
+        }
+        let origin_ns = shifted(self.tip.time_ns[0], -self.config.initial_offset_s);
+        scale.like_robot(
+            predicted(self.joints, origin_ns, self.arm, parameters, self.config).speeds(scale.h_s),
+        )
+    }
+
+    /// Speeds with each uncertain parameter further off in turn; none where there are no such parameters.
+    fn deviations(&self, scale: &Scale, so_far: &[f64]) -> Option<Deviations> {
+        if so_far.is_empty() {
+            return None;
+        }
+        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS);
+        let thin = JointSamples {
+            time_ns: rows.iter().map(|row| self.joints.time_ns[*row]).collect(),
+            joint_rad: self
+                .joints
+                .joint_rad
+                .iter()
+                .map(|c| rows.iter().map(|row| c[*row]).collect())
+                .collect(),
+            ..JointSamples::default()
+        };
+        let origin_ns = shifted(self.tip.time_ns[0], -self.config.initial_offset_s);
+        let speeds = |parameters: &[f64]| {
+            scale.like_robot(predicted(&thin, origin_ns, self.arm, parameters, self.config).speeds(scale.h_s))
+        };
+        let further = |k: usize| {
+            let mut parameters = so_far.to_vec();
+            parameters[k] += FURTHER;
+            speeds(&parameters)
+        };
+        let deviated = (0..so_far.len()).into_par_iter().map(further).collect();
+        Some(Deviations { so_far: so_far.to_vec(), now: speeds(so_far), deviated })
     }
 
     /// Median ratio of measured to predicted distances of the tip between distant moments. Positions do not
@@ -254,78 +410,51 @@ impl<'a> Streams<'a> {
     }
 
     /// Moves the reference to where the errors of offset and drift are uncorrelated.
-    fn alignment(&self, found: &Found, displacement_ratio: f64) -> ClockAlignment {
-        let (fine, correlation) = (&found.fine, found.correlation);
-        let cov = &fine.covariance;
+    fn alignment(&self, found: &Estimate, correlation: f64, displacement_ratio: f64) -> ClockAlignment {
+        let (fine, cov) = (&found.fine, &found.fine.covariance);
         let last_s = 2.0 * self.reference_s;
-        let shift_s = -cov[(0, 1)] / cov[(1, 1)];
+        let estimated = found.drift == Drift::Estimated && self.max_drift() > 0.0;
+        let shift_s = if estimated { -cov[(0, 1)] / cov[(1, 1)] } else { 0.0 };
         let wished_s = self.reference_s + if shift_s.is_finite() { shift_s } else { 0.0 };
         let reference_s = wished_s.clamp(0.0, last_s);
         let shift_s = reference_s - self.reference_s;
         let variance = cov[(0, 0)] + 2.0 * shift_s * cov[(0, 1)] + shift_s * shift_s * cov[(1, 1)];
-        let drift_sigma = if fine.with_drift {
-            cov[(1, 1)].sqrt().max(SIGMA_FLOOR_S / last_s.max(1.0))
-        } else {
-            self.max_drift()
+        let drift_sigma = match found.drift {
+            Drift::Estimated => cov[(1, 1)].sqrt(),
+            Drift::Unknown => self.max_drift(),
+            // Where the data want it to be is not ruled out.
+            Drift::Limited { wanted, sigma } => sigma.hypot(wanted - fine.drift),
         };
         ClockAlignment {
             offset_s: self.config.initial_offset_s + fine.offset_s + fine.drift * shift_s,
             offset_sigma_s: variance.max(0.0).sqrt().max(SIGMA_FLOOR_S),
             drift: fine.drift,
-            drift_sigma,
+            drift_sigma: drift_sigma.max(SIGMA_FLOOR_S / last_s.max(1.0)),
             reference_ns: shifted(self.tip.time_ns[0], reference_s),
             correlation: if correlation.is_finite() { correlation.clamp(0.0, 1.0) } else { 0.0 },
             displacement_ratio,
+            declared: false,
         }
     }
+}
 
-    fn warnings(&self, found: &ClockAlignment, fine: &Fine, coarse: &Coarse) -> Vec<Warning> {
-        let say = |severity, code, message| Warning::new(severity, Stage::Dwell, code, "clock", message);
-        let mut warnings = Vec::new();
-        if !(0.8..=1.25).contains(&found.displacement_ratio) {
-            let message = format!(
-                "the tip moves {:.3} times as far as the nominal model predicts; check units, link lengths and \
-                 which point of the arm the sensor sees",
-                found.displacement_ratio
-            );
-            let far = !(0.5..=2.0).contains(&found.displacement_ratio);
-            let severity = if far { Severity::Inadequate } else { Severity::Notice };
-            warnings.push(say(severity, "clock-displacement-ratio", message));
-        }
-        if let Some(rival_s) = coarse.rival_s {
-            let message = format!(
-                "the motion repeats itself: an offset of {:+.2} s fits nearly as well as {:+.2} s; set \
-                 clock.initial_offset_s and a small clock.max_offset_s if it is known",
-                self.config.initial_offset_s + rival_s,
-                found.offset_s
-            );
-            warnings.push(say(Severity::Inadequate, "clock-ambiguous", message));
-        }
-        if !fine.with_drift && self.max_drift() > 0.0 {
-            let message = format!(
-                "the recording is too short to tell the drift better than clock.max_drift_ppm = {}; taken as \
-                 zero with that standard error",
-                self.config.max_drift_ppm
-            );
-            warnings.push(say(Severity::Notice, "clock-drift-unknown", message));
-        }
-        if found.offset_sigma_s > 0.02 {
-            let message = format!(
-                "the offset is known to {:.0} ms only; record more and faster moves",
-                found.offset_sigma_s * 1e3
-            );
-            warnings.push(say(Severity::Notice, "clock-uncertain", message));
-        }
-        let worst = fine.windows.iter().filter(|w| w.1.abs() > 6.0 * w.2 && w.1.abs() > 5e-3);
-        if let Some((at_s, off_s, _)) = worst.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) {
-            let message = format!(
-                "offset and drift do not describe the clocks: about {at_s:.0} s after the start the offset \
-                 differs by {:+.1} ms; a clock was probably set during the recording, split it there",
-                off_s * 1e3
-            );
-            warnings.push(say(Severity::Inadequate, "clock-not-linear", message));
-        }
-        warnings
+/// The path that a model predicts of the joints' readings.
+fn predicted(
+    joints: &JointSamples,
+    origin_ns: i64,
+    arm: NominalArm<'_>,
+    parameters: &[f64],
+    config: &ClockConfig,
+) -> Track {
+    let tip_m = |row| (arm.tip_m)(&joints.row_rad(row), parameters);
+    let path_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
+    Track::of(&joints.time_ns, origin_ns, path_m, config)
+}
+
+fn undetermined() -> DwellError {
+    DwellError::NoMotion {
+        seen: "the movements do not determine an offset".to_owned(),
+        advice: "record more moves between poses",
     }
 }
 

@@ -11,11 +11,13 @@ use std::ops::Range;
 /// integrals of the broken line through the samples, so the kernel is the same whatever the rate, the
 /// jitter or the phase of a stream, and two streams of one motion agree; central differences of single
 /// samples would not, and would be mostly noise.
+#[derive(Clone)]
 pub(crate) struct SpeedProfile {
     stretches: Vec<Stretch>,
     step_s: f64,
 }
 
+#[derive(Clone)]
 struct Stretch {
     start_s: f64,
     speed_m_s: Vec<f64>,

@@ -1,12 +1,12 @@
 //! The two streams seen through one smoothing kernel.
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use std::ops::Range;
 
-use super::fine::{Fine, MIN_MOVEMENTS, Problem, Start, movements};
+use super::fine::{Point, movements};
 use super::profile::SpeedProfile;
-use crate::series::{breaking_gap_s, median_period_s, seconds_between, unbroken};
+use super::spread::MIN_MOVEMENTS;
+use crate::series::{breaking_gap_s, seconds_between, typical_period_s, unbroken};
 use crate::{ClockConfig, DwellError};
 
 /// Movements shorter than this are counted together when errors are estimated [s].
@@ -25,7 +25,7 @@ pub(crate) struct Track {
     pub time_s: Vec<f64>,
     pub position_m: Vec<Vector3<f64>>,
     unbroken: Vec<Range<usize>>,
-    /// Median sample period [s].
+    /// Typical time between samples [s].
     pub period_s: f64,
 }
 
@@ -41,7 +41,7 @@ impl Track {
             time_s: time_ns.iter().map(|&t| seconds_between(origin_ns, t)).collect(),
             unbroken: unbroken(time_ns, gap_s, |i| position_m[i].iter().all(|v| v.is_finite())),
             position_m,
-            period_s: median_period_s(time_ns),
+            period_s: typical_period_s(time_ns),
         }
     }
 
@@ -55,18 +55,32 @@ impl Track {
         (distance(&row) <= 2.0 * self.period_s).then(|| self.position_m[row])
     }
 
-    fn speeds(&self, h_s: f64) -> SpeedProfile {
+    /// Rows no closer to each other than `apart_s`.
+    pub(crate) fn thinned(&self, apart_s: f64) -> Vec<usize> {
+        let mut kept: Vec<usize> = Vec::new();
+        for rows in &self.unbroken {
+            for row in rows.clone() {
+                if kept.last().is_none_or(|last| self.time_s[row] - self.time_s[*last] >= apart_s) {
+                    kept.push(row);
+                }
+            }
+        }
+        kept
+    }
+
+    pub(crate) fn speeds(&self, h_s: f64) -> SpeedProfile {
         SpeedProfile::new(&self.time_s, &self.position_m, &self.unbroken, h_s, 0.1 * h_s)
     }
 }
 
+#[derive(Clone)]
 /// Both speed profiles under a kernel of half-width `h_s`, and what counts as motion in them.
 pub(crate) struct Scale {
     pub h_s: f64,
     pub sensor: SpeedProfile,
     pub robot: SpeedProfile,
-    /// The robot's with each joint bent a little in turn.
-    bent: Vec<SpeedProfile>,
+    /// Where the robot's is a logarithm: the speed that counts as standing still [m/s].
+    pub robot_still_m_s: Option<f64>,
     /// Measured value above which the tip moves, in the unit of the profile.
     moving_above: f64,
     /// Shortest length of a movement [s].
@@ -78,28 +92,25 @@ impl Scale {
     pub(crate) fn of(
         sensor: &Track,
         robot: &Track,
-        bent: &[Track],
         h_s: f64,
         config: &ClockConfig,
     ) -> Result<Scale, DwellError> {
         let (sensor, robot) = (sensor.speeds(h_s), robot.speeds(h_s));
-        let bent = bent.par_iter().map(|track| track.speeds(h_s)).collect();
         let (measured, predicted) = (sensor.quantile_m_s(0.99), robot.quantile_m_s(0.99));
         let least = config.min_speed_mm_s * 1e-3;
-        let still = |what: &str, speed: f64| {
-            if speed.is_nan() {
-                format!("the {what} has no unbroken stretch of {:.2} s", 2.4 * h_s)
-            } else {
-                format!("the {what} never moves faster than {:.2} mm/s", speed * 1e3)
-            }
-        };
-        if predicted.is_nan() || predicted < least {
+        if predicted.is_nan() || measured.is_nan() {
+            let stream = if predicted.is_nan() { "joint" } else { "tip" };
+            return Err(DwellError::Broken { stream, needed_s: 2.4 * h_s, rows: String::new() });
+        }
+        let still =
+            |what: &str, speed: f64| format!("the {what} never moves faster than {:.2} mm/s", speed * 1e3);
+        if predicted < least {
             return Err(DwellError::NoMotion {
                 seen: still("arm, by its joint stream and the nominal model,", predicted),
                 advice: "record some moves between poses, or check the unit and order of the joints",
             });
         }
-        if measured.is_nan() || measured < least {
+        if measured < least {
             return Err(DwellError::NoMotion {
                 seen: still("tip stream", measured),
                 advice: "the arm does move: check the unit of the tip stream (\"m\" or \"mm\"), and that it shows the \
@@ -121,7 +132,7 @@ impl Scale {
         let seen_s = points.last().map_or(0.0, |p| p.0) - points.first().map_or(0.0, |p| p.0);
         let shortest_s =
             (moving_s / 12.0).min(SHORTEST_MOVEMENT_S).max(4.0 * h_s).max(seen_s / MOST_MOVEMENTS);
-        Ok(Scale { h_s, sensor, robot, bent, moving_above, shortest_s })
+        Ok(Scale { h_s, sensor, robot, robot_still_m_s: None, moving_above, shortest_s })
     }
 
     /// The same in logarithms. When something moves is then told by its beginning and end, however fast it
@@ -134,27 +145,37 @@ impl Scale {
             h_s: self.h_s,
             sensor: self.sensor.logarithm(still_m_s),
             robot: self.robot.logarithm(still_m_s / ratio),
-            bent: self.bent.iter().map(|b| b.logarithm(still_m_s / ratio)).collect(),
+            robot_still_m_s: Some(still_m_s / ratio),
             moving_above: 1.0,
             shortest_s: self.shortest_s,
         }
     }
 
-    /// The fine estimate; without drift where the data tell it no better than `max_drift`.
-    pub(crate) fn solve(&self, start: Start, reference_s: f64, max_drift: f64) -> Result<Fine, DwellError> {
-        let points = movements(&self.sensor.points(2), self.moving_above, self.shortest_s);
-        let solve = |with_drift: bool| {
-            let problem = Problem::new(&self.robot, &self.bent, &points, reference_s, with_drift);
-            problem.solve(start).ok_or_else(|| DwellError::NoMotion {
-                seen: format!(
-                    "there are {} separate movements, errors cannot be told from fewer than {MIN_MOVEMENTS}",
-                    points.last().map_or(0, |p| p.movement + 1)
-                ),
-                advice: "record more moves between poses",
-            })
-        };
-        let fine = solve(max_drift > 0.0)?;
-        let drift_known = fine.covariance[(1, 1)].sqrt() <= max_drift;
-        if fine.with_drift && !drift_known { solve(false) } else { Ok(fine) }
+    /// Speeds in the unit of the robot's profile.
+    pub(crate) fn like_robot(&self, speeds: SpeedProfile) -> SpeedProfile {
+        self.robot_still_m_s.map(|still| speeds.logarithm(still)).unwrap_or(speeds)
+    }
+
+    /// The sensor's points, grouped in movements; short movements are counted alone where there would be too few.
+    pub(crate) fn movements(&self) -> Result<Vec<Point>, DwellError> {
+        let points = self.sensor.points(2);
+        let mut shortest_s = self.shortest_s;
+        loop {
+            let grouped = movements(&points, self.moving_above, shortest_s);
+            let groups = grouped.last().map_or(0, |p| p.movement + 1);
+            if groups >= MIN_MOVEMENTS {
+                return Ok(grouped);
+            }
+            shortest_s *= 0.7;
+            if shortest_s < 2.0 * self.h_s {
+                return Err(DwellError::NoMotion {
+                    seen: format!(
+                        "there are {groups} separate movements, errors cannot be told from fewer than \
+                         {MIN_MOVEMENTS}"
+                    ),
+                    advice: "record more moves between poses",
+                });
+            }
+        }
     }
 }

@@ -323,21 +323,47 @@ fn bodies_are_chosen_by_name() {
     assert!(error.contains("did you mean \"tip\""), "{error}");
 }
 
-#[test]
-fn temperature_is_a_column() {
+/// Two joints, and what `cell_c` reads in the cell.
+fn with_thermometer(cell_c: impl Fn(i64) -> f64) -> (Samples, Vec<StreamReport>, Vec<Warning>) {
     let at = |i: i64| {
         let stamp_ns = START_NS + i * STEP_NS;
-        (
-            stamp_ns as u64,
-            stamp_ns as u64,
-            ros2::temperature(Header { stamp_ns, frame_id: "" }, 20.0 + i as f64, 0.0),
-        )
+        let data = ros2::temperature(Header { stamp_ns, frame_id: "" }, cell_c(i), 0.0);
+        (stamp_ns as u64, stamp_ns as u64, data)
     };
     let tracks = [joint_track(moving()), track("/cell", ros2::TEMPERATURE, (0..10).map(at).collect())];
     let temperature = Some(ScalarStream { topic: "/cell".into(), clock: None });
-    let (samples, reports, _) = ok(&tracks, &Streams { temperature, ..two_joints() });
+    ok(&tracks, &Streams { temperature, ..two_joints() })
+}
+
+#[test]
+fn temperature_is_a_column() {
+    let (samples, reports, _) = with_thermometer(|i| 20.0 + i as f64);
     assert_eq!(samples.temperature.expect("a column").value[9], 29.0);
     assert_eq!(reports[1].role, "temperature");
+}
+
+#[test]
+fn what_no_laboratory_has_is_no_temperature() {
+    let code = |warnings: &[Warning], code: &str| -> Option<Warning> {
+        warnings.iter().find(|w| w.code == code && w.subject.contains("/cell")).cloned()
+    };
+    let (samples, reports, warnings) =
+        with_thermometer(|i| if i % 3 == 0 { -999.0 } else { 20.0 + i as f64 });
+    assert_eq!(samples.temperature.expect("a column").value, [21.0, 22.0, 24.0, 25.0, 27.0, 28.0]);
+    assert_eq!((reports[1].rows, reports[1].impossible), (6, 4));
+    assert_eq!(code(&warnings, "impossible").expect("reported").severity, Severity::DataLost);
+    let (samples, _, warnings) = with_thermometer(|i| 293.15 + i as f64);
+    assert!((samples.temperature.expect("a column").value[9] - 29.0).abs() < 1e-9);
+    assert!(code(&warnings, "temperature-kelvin").expect("reported").message.contains("converted"));
+    // Nothing usable costs the temperature, not the recording.
+    for nothing in [|_| f64::NAN, |_| -999.0, |i| if i < 2 { 0.0 } else { 293.0 }] {
+        let (samples, _, warnings) = with_thermometer(nothing);
+        assert!(samples.temperature.is_none() && samples.joints.len() == 500);
+        assert_eq!(code(&warnings, "temperature-unusable").expect("reported").severity, Severity::DataLost);
+    }
+    let (samples, _, warnings) = with_thermometer(|i| 68.0 + i as f64);
+    assert_eq!(samples.temperature.expect("a column").value[0], 68.0);
+    assert!(code(&warnings, "temperature-fahrenheit").is_some());
 }
 
 #[test]

@@ -96,7 +96,8 @@ fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
     if errors.n > 0 {
         all.push(known("error.mean".into(), Unit::Metre, errors.mean_m));
     }
-    if let Some(clock) = run.recordings[0].clock.as_ref() {
+    // What is declared was not measured.
+    if let Some(clock) = run.recordings[0].clock.as_ref().filter(|c| !c.declared) {
         let drift = known("clock.drift".into(), Unit::One, clock.drift);
         all.push(Quantity { sigma: Some(clock.drift_sigma).filter(|s| s.is_finite()), ..drift });
     }

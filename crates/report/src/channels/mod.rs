@@ -179,6 +179,7 @@ mod tests {
             reference_ns: 1_700_000_000_000_000_000,
             correlation: 1.0,
             displacement_ratio: 1.0,
+            declared: false,
         };
         for sensor_ns in [1_700_000_000_000_000_000, 1_700_000_600_123_456_789, 1_699_999_000_000_000_000] {
             let there_and_back = to_sensor_ns(&clock, clock.to_robot_ns(sensor_ns));

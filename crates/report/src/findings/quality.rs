@@ -32,7 +32,11 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingQuality {
         damaged: count(r.report.files.iter().map(|f| f.damaged.len()).sum()),
         warnings: count(r.all_warnings().len()),
         clock_offset_ms: r.clock.as_ref().and_then(|c| finite(c.offset_s * 1e3)),
-        clock_offset_sigma_ms: r.clock.as_ref().and_then(|c| finite(c.offset_sigma_s * 1e3)),
+        clock_offset_sigma_ms: r
+            .clock
+            .as_ref()
+            .filter(|c| !c.declared)
+            .and_then(|c| finite(c.offset_sigma_s * 1e3)),
         clock_drift_ppm: r.clock.as_ref().and_then(|c| finite(c.drift * 1e6)),
         clock_correlation: r.clock.as_ref().and_then(|c| finite(c.correlation)),
     }

@@ -65,9 +65,14 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingRow {
         dwells: r.dwells.len(),
         used: run.used(r),
         rejected: r.rejections.len(),
-        clock: clock
-            .map_or("one clock".into(), |c| format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s))),
-        drift: clock.map_or("–".into(), |c| format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6)),
+        clock: clock.map_or("one clock".into(), |c| match c.declared {
+            true => format!("{:.2} declared", ms(c.offset_s)),
+            false => format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s)),
+        }),
+        drift: clock.map_or("–".into(), |c| match c.declared {
+            true => format!("{:.1} declared", c.drift * 1e6),
+            false => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
+        }),
         files: r
             .report
             .files

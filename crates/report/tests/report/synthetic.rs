@@ -188,6 +188,7 @@ fn recording_run(
             reference_ns: EPOCH_NS,
             correlation: 0.998,
             displacement_ratio: 1.003,
+            declared: false,
         }),
         dwells,
         association: Some(Association { assignments, board_in_world, warnings: Vec::new() }),

@@ -1,0 +1,297 @@
+//! What the errors of the nominal model do to offset and drift, and how far both may be off.
+//!
+//! The residuals of the speeds are not noise: the nominal arm is wrong by millimetres and degrees, and its error comes
+//! again wherever a path does. So the last step estimates the model's uncertain parameters along with the clocks, each
+//! held by its prior; a fifth of a millisecond hangs on a degree. Two things are then left. What the data cannot tell
+//! of the model stays in the offset, as large as the priors allow:
+//!
+//! ```text
+//! theta = A^-1 g,   A = N + phi P,   Cov = Cov_data + phi^2 A^-1 P A^-1
+//! ```
+//! with the normal equations `N`, `g`, the precision `P` of the priors, and the noise `phi`, which is the one that
+//! predicts movements left out best. The noise itself is correlated for as long as a movement lasts and, where stamps
+//! wander, for longer: `Cov_data` comes from leaving out one movement at a time, or neighbouring ones together where
+//! that shows more (cluster jackknife, CR3; MacKinnon, Nielsen and Webb, J. Appl. Econometrics 38, 2023, eq. 10).
+
+use armcal_core::robust::mad_sigma;
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector4};
+
+use super::fine::{Problem, Row};
+use super::profile::SpeedProfile;
+
+/// Fewest movements from which errors can be told.
+pub(crate) const MIN_MOVEMENTS: usize = 6;
+
+/// Largest last step [s]: beyond a peak of the speed the linearisation means nothing.
+const LONGEST_STEP_S: f64 = 0.1;
+
+/// Factors on the variance of the residuals that are tried for the noise: those of neighbouring points share the kernel.
+const NOISE_FACTORS: [f64; 8] = [3.0, 1e1, 3e1, 1e2, 3e2, 1e3, 3e3, 1e4];
+
+/// Neighbouring movements that are left out together.
+const TOGETHER: [usize; 3] = [1, 2, 4];
+
+/// Speeds predicted by the model with its uncertain parameters as they are taken to be so far.
+pub(crate) struct Deviations {
+    /// The parameters, in standard deviations of their priors.
+    pub so_far: Vec<f64>,
+    /// The speeds of that model.
+    pub now: SpeedProfile,
+    /// The same with each parameter further off by [`FURTHER`] standard deviations.
+    pub deviated: Vec<SpeedProfile>,
+}
+
+/// How much further a parameter is taken to see what it does, in standard deviations.
+pub(crate) const FURTHER: f64 = 0.3;
+
+/// The fine estimate. Offset at the reference time, drift about it.
+#[derive(Debug, Clone)]
+pub(crate) struct Fine {
+    pub offset_s: f64,
+    pub drift: f64,
+    /// Covariance of (offset [s], drift); of the offset alone where the drift was not estimated.
+    pub covariance: Matrix2<f64>,
+    /// What each movement alone would add to the offset, in order of time.
+    pub movements: Vec<MovementOffset>,
+    /// The uncertain parameters, in standard deviations of their priors.
+    pub parameters: Vec<f64>,
+}
+
+/// What one movement alone would add to the offset.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MovementOffset {
+    /// First and last sensor time of it [s].
+    pub from_s: f64,
+    pub to_s: f64,
+    /// Its offset less that of all [s].
+    pub offset_s: f64,
+    /// How well it determines one, in a unit that all share.
+    pub weight: f64,
+}
+
+/// Normal equations of one movement, and its weighted squares.
+struct Part {
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
+    squares: f64,
+}
+
+/// One more step from `state`, with the uncertain parameters, and the errors after it. `None` for too few movements, or
+/// where the equations are singular.
+pub(crate) fn finish(
+    problem: &Problem<'_>,
+    state: &Vector4<f64>,
+    deviations: Option<&Deviations>,
+) -> Option<Fine> {
+    let rows = problem.weighted_rows(state);
+    let by_movement: Vec<&[Row]> = rows.chunk_by(|a, b| a.point.movement == b.point.movement).collect();
+    if by_movement.len() < MIN_MOVEMENTS {
+        return None;
+    }
+    Wide::new(problem, state, &by_movement, deviations)?.fine(problem, state, deviations)
+}
+
+/// The linear problem: offset, scaled drift, gain and level, then one column an uncertain parameter.
+struct Wide {
+    parts: Vec<Part>,
+    times_s: Vec<(f64, f64)>,
+    whole: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// The uncertain parameters before the step, which the priors pull back.
+    so_far: DVector<f64>,
+    noise: f64,
+}
+
+impl Wide {
+    fn new(
+        problem: &Problem<'_>,
+        state: &Vector4<f64>,
+        by_movement: &[&[Row]],
+        deviations: Option<&Deviations>,
+    ) -> Option<Wide> {
+        let parts: Vec<Part> = by_movement.iter().map(|rows| part(state, rows, deviations)).collect();
+        let size = parts[0].gradient.len();
+        let (mut whole, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for part in &parts {
+            whole += &part.normal;
+            gradient += &part.gradient;
+        }
+        if problem.fixed_drift.is_some() {
+            whole[(1, 1)] = 1.0;
+        }
+        let so_far = DVector::from_vec(deviations.map_or_else(Vec::new, |d| d.so_far.clone()));
+        let ends = |rows: &[Row]| (rows[0].point.t_s, rows[rows.len() - 1].point.t_s);
+        let times_s = by_movement.iter().map(|rows| ends(rows)).collect();
+        let moving = by_movement.iter().flat_map(|rows| rows.iter()).filter(|r| r.point.moving);
+        let variance = mad_sigma(&moving.map(|r| r.residual).collect::<Vec<_>>()).powi(2);
+        let mut wide = Wide { parts, times_s, whole, gradient, so_far, noise: variance };
+        if size > 4 {
+            let tried = NOISE_FACTORS.map(|factor| {
+                wide.noise = factor * variance;
+                (wide.noise, wide.left_out(1).map_or(f64::INFINITY, |all| wide.squares_left_out(&all)))
+            });
+            wide.noise = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        }
+        Some(wide)
+    }
+
+    /// `N` with the precision of the priors.
+    fn held(&self) -> DMatrix<f64> {
+        let mut held = self.whole.clone();
+        for k in 4..held.nrows() {
+            held[(k, k)] += self.noise.max(f64::MIN_POSITIVE);
+        }
+        held
+    }
+
+    /// The pull of data and priors.
+    fn pull(&self) -> DVector<f64> {
+        let mut pull = self.gradient.clone();
+        for (k, so_far) in self.so_far.iter().enumerate() {
+            pull[4 + k] -= self.noise * so_far;
+        }
+        pull
+    }
+
+    /// The solution without each `together` neighbouring movements in turn.
+    fn left_out(&self, together: usize) -> Option<Vec<DVector<f64>>> {
+        let (held, pull) = (self.held(), self.pull());
+        let without = |parts: &[Part]| {
+            let (mut held, mut pull) = (held.clone(), pull.clone());
+            for part in parts {
+                held -= &part.normal;
+                pull -= &part.gradient;
+            }
+            held.lu().solve(&pull)
+        };
+        self.parts.chunks(together).map(without).collect()
+    }
+
+    /// Weighted squares that movements have under the solutions that never saw them.
+    fn squares_left_out(&self, solutions: &[DVector<f64>]) -> f64 {
+        let one =
+            |(p, x): (&Part, &DVector<f64>)| p.squares - 2.0 * p.gradient.dot(x) + (&p.normal * x).dot(x);
+        self.parts.iter().zip(solutions).map(one).sum()
+    }
+
+    fn fine(
+        &self,
+        problem: &Problem<'_>,
+        state: &Vector4<f64>,
+        deviations: Option<&Deviations>,
+    ) -> Option<Fine> {
+        let inverse = self.held().try_inverse()?;
+        let step = &inverse * self.pull();
+        if step[0].hypot(step[1]) > LONGEST_STEP_S || !step.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let scale = Matrix2::new(1.0, 0.0, 0.0, 1.0 / problem.half_s);
+        let so_far = deviations.map_or(&[][..], |d| &d.so_far);
+        Some(Fine {
+            offset_s: state.x + step[0],
+            drift: problem.fixed_drift.unwrap_or((state.y + step[1]) / problem.half_s),
+            covariance: scale * self.covariance(&inverse, &step)? * scale,
+            movements: self.movements(&step)?,
+            parameters: so_far.iter().zip(step.iter().skip(4)).map(|(so_far, by)| so_far + by).collect(),
+        })
+    }
+
+    fn covariance(&self, inverse: &DMatrix<f64>, step: &DVector<f64>) -> Option<Matrix2<f64>> {
+        let unknown = inverse.rows(0, 2).columns(4, inverse.ncols() - 4) * self.noise;
+        let unknown = &unknown * unknown.transpose();
+        let mut data = Matrix2::zeros();
+        for together in TOGETHER {
+            let groups = self.parts.len().div_ceil(together) as f64;
+            if together > 1 && groups < MIN_MOVEMENTS as f64 {
+                break;
+            }
+            let mut seen = Matrix2::zeros();
+            for left_out in self.left_out(together)? {
+                let change = left_out.fixed_rows::<2>(0) - step.fixed_rows::<2>(0);
+                seen += change * change.transpose();
+            }
+            seen *= (groups - 1.0) / groups * student_widening(groups - 1.0).powi(2);
+            // Neighbouring movements share the error of their stamps: then more together show more.
+            for k in 0..2 {
+                if seen[(k, k)] > data[(k, k)] {
+                    data[(k, k)] = seen[(k, k)];
+                    (data[(0, 1)], data[(1, 0)]) = (seen[(0, 1)], seen[(1, 0)]);
+                }
+            }
+        }
+        // The larger variances of two need not have either covariance.
+        let most = 0.95 * (data[(0, 0)] * data[(1, 1)]).sqrt();
+        let both = data[(0, 1)].clamp(-most, most);
+        (data[(0, 1)], data[(1, 0)]) = (both, both);
+        let seen = data + unknown.fixed_view::<2, 2>(0, 0);
+        // Paths that repeat hide from the jackknife what they cannot tell of the offset; the noise that predicts best
+        // does not.
+        let told = inverse[(0, 0)] * self.noise;
+        let widened = Matrix2::from_diagonal(&Vector2::new((told / seen[(0, 0)]).max(1.0).sqrt(), 1.0));
+        Some(widened * seen * widened)
+    }
+
+    /// What each movement alone would add to the offset after `step`, all but the clocks being as it says.
+    fn movements(&self, step: &DVector<f64>) -> Option<Vec<MovementOffset>> {
+        // How gain, level and model follow a change of the offset of one unit.
+        let mut others = self.held();
+        for k in 0..others.nrows() {
+            for c in 0..2 {
+                others[(k, c)] = 0.0;
+                others[(c, k)] = 0.0;
+            }
+        }
+        (others[(0, 0)], others[(1, 1)]) = (1.0, 1.0);
+        let mut pull = self.whole.column(0).into_owned();
+        (pull[0], pull[1]) = (0.0, 0.0);
+        let mut along = -others.lu().solve(&pull)?;
+        along[0] = 1.0;
+        let one = |(part, &(from_s, to_s)): (&Part, &(f64, f64))| {
+            let weight = (&part.normal * &along).dot(&along);
+            let left = &part.gradient - &part.normal * step;
+            MovementOffset { from_s, to_s, offset_s: left.dot(&along) / weight, weight }
+        };
+        Some(self.parts.iter().zip(&self.times_s).map(one).filter(|m| m.offset_s.is_finite()).collect())
+    }
+}
+
+fn part(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> Part {
+    let size = 4 + deviations.map_or(0, |d| d.deviated.len());
+    let mut part = Part { normal: DMatrix::zeros(size, size), gradient: DVector::zeros(size), squares: 0.0 };
+    let mut jacobian = DVector::zeros(size);
+    for r in rows {
+        jacobian.fixed_rows_mut::<4>(0).copy_from(&r.jacobian);
+        if let Some(d) = deviations {
+            let at = |profile: &SpeedProfile| profile.at(r.robot_s).map(|(speed, _)| speed);
+            let now = at(&d.now);
+            for (k, deviated) in d.deviated.iter().enumerate() {
+                let by = at(deviated).zip(now).map_or(0.0, |(then, now)| then - now);
+                jacobian[4 + k] = state.z * by / FURTHER;
+            }
+        }
+        part.normal.ger(r.weight, &jacobian, &jacobian, 1.0);
+        part.gradient.axpy(r.weight * r.residual, &jacobian, 1.0);
+        part.squares += r.weight * r.residual * r.residual;
+    }
+    part
+}
+
+/// Ratio of the 97.5 % points of Student's t and of the normal distribution (Cornish and Fisher's
+/// expansion; within 1 % from three degrees of freedom on).
+fn student_widening(free: f64) -> f64 {
+    let v = free.max(1.0);
+    1.0 + 1.2101 / v + 1.4402 / (v * v) + 1.3 / v.powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn student_widening_matches_the_table() {
+        // t(0.975): 3 -> 3.1824, 5 -> 2.5706, 10 -> 2.2281, 30 -> 2.0423.
+        for (free, t) in [(3.0, 3.1824), (5.0, 2.5706), (10.0, 2.2281), (30.0, 2.0423)] {
+            assert!((student_widening(free) * 1.959_964 / t - 1.0).abs() < 0.01, "{free}");
+        }
+    }
+}
