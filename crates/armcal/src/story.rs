@@ -71,6 +71,8 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
+    let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), &s.fingerprint)).collect();
+    perceive::refuse_repeated(&fingerprints)?;
 
     let mut geometry = frames::nominal_model(pipeline, &chain, board.as_ref(), &seen)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;

@@ -15,6 +15,7 @@ pub mod parameter;
 pub mod robust;
 pub mod samples;
 pub mod units;
+pub mod visited;
 pub mod warning;
 
 pub use dwell::{Arrival, Dwell, DwellId, TipMeasurement};
@@ -24,4 +25,5 @@ pub use observation::{Observation, Reference, Rejection};
 pub use parameter::{Parameter, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
 pub use units::Unit;
+pub use visited::Visited;
 pub use warning::{Severity, Stage, Warning, listed};
