@@ -66,6 +66,8 @@ pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Resul
 /// The channels of the output, and how many messages went into each topic.
 struct Kept {
     topics: Vec<(String, u64)>,
+    /// Place of each topic in `topics`.
+    places: BTreeMap<String, usize>,
     /// Id in the output and place in `topics`, by the address of the definition: comparing schemas with every message
     /// would take longer than writing it.
     known: BTreeMap<usize, (u16, usize)>,
@@ -74,7 +76,7 @@ struct Kept {
 impl Kept {
     /// Defines all channels first, so that those without messages are there too.
     fn of(channels: &[Arc<RawChannel>], output: &mut McapOutput) -> Result<Kept, RecordingError> {
-        let mut kept = Kept { topics: Vec::new(), known: BTreeMap::new() };
+        let mut kept = Kept { topics: Vec::new(), places: BTreeMap::new(), known: BTreeMap::new() };
         channels.iter().try_for_each(|channel| kept.place(channel, output).map(drop))?;
         Ok(kept)
     }
@@ -97,7 +99,7 @@ impl Kept {
         let schema =
             channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice()));
         let id = output.add_channel(&channel.topic, schema, &channel.message_encoding, &channel.metadata)?;
-        let place = self.topics.iter().position(|(topic, _)| *topic == channel.topic).unwrap_or_else(|| {
+        let place = *self.places.entry(channel.topic.clone()).or_insert_with(|| {
             self.topics.push((channel.topic.clone(), 0));
             self.topics.len() - 1
         });

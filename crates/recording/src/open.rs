@@ -11,7 +11,7 @@ use crate::{
 };
 use armcal_core::{Severity, Stage, Warning};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -35,6 +35,21 @@ pub(crate) struct RecordingFile {
     copied: Option<Copied>,
     pub layout: Layout,
     pub channels: BTreeMap<u16, Arc<RawChannel>>,
+}
+
+/// Channels that were not read whole.
+enum Unread {
+    All,
+    Some(BTreeSet<u16>),
+}
+
+impl Unread {
+    fn has(&self, channel: u16) -> bool {
+        match self {
+            Unread::All => true,
+            Unread::Some(ids) => ids.contains(&channel),
+        }
+    }
 }
 
 /// Where a copy came from.
@@ -158,6 +173,7 @@ impl Recording {
         type Key = (String, String, String, String);
         let mut merged: BTreeMap<Key, (Option<Tally>, Arc<RawChannel>)> = BTreeMap::new();
         for (file, survey) in self.files.iter().zip(surveys) {
+            let unread = file.unread(survey);
             for (id, channel) in &file.channels {
                 let (schema, encoding) = channel
                     .schema
@@ -165,7 +181,7 @@ impl Recording {
                     .map_or_else(Default::default, |s| (s.name.clone(), s.encoding.clone()));
                 let key = (channel.topic.clone(), schema, encoding, channel.message_encoding.clone());
                 let (tally, _) = merged.entry(key).or_insert_with(|| (None, channel.clone()));
-                if let Some(found) = file.tally(survey, *id) {
+                if let Some(found) = file.tally(survey, &unread, *id) {
                     tally.get_or_insert(Tally { messages: 0, ..found }).add(found);
                 }
             }
@@ -233,16 +249,24 @@ impl RecordingFile {
         }
     }
 
-    /// Whether every block that may hold messages of a channel was passed over.
-    fn all_read(&self, survey: &FileSurvey, channel: u16) -> bool {
+    /// Channels of which no pass has seen every block that may hold messages; one walk over the blocks, however many
+    /// channels there are.
+    fn unread(&self, survey: &FileSurvey) -> Unread {
         let blocks = self.layout.blocks.iter().enumerate();
-        let mut may_hold = blocks.filter(|(_, b)| b.holds.as_ref().is_none_or(|ids| ids.contains(&channel)));
-        may_hold.all(|(block, _)| survey.passed.contains(&block))
+        let mut unread = Unread::Some(BTreeSet::new());
+        for (_, block) in blocks.filter(|(block, _)| !survey.passed.contains(block)) {
+            match (&mut unread, &block.holds) {
+                (Unread::Some(ids), Some(holds)) => ids.extend(holds),
+                (_, None) => return Unread::All,
+                (Unread::All, _) => {}
+            }
+        }
+        unread
     }
 
     /// Messages of a channel: those found, or, where it was not read, those that the summary declares.
-    fn tally(&self, survey: &FileSurvey, channel: u16) -> Option<Tally> {
-        let tallies = if self.all_read(survey, channel) { &survey.tallies } else { &self.layout.declared };
+    fn tally(&self, survey: &FileSurvey, unread: &Unread, channel: u16) -> Option<Tally> {
+        let tallies = if unread.has(channel) { &self.layout.declared } else { &survey.tallies };
         tallies.get(&channel).copied()
     }
 
@@ -276,8 +300,8 @@ impl RecordingFile {
         let (declared, found): (u64, u64) = if survey.passed.len() == self.layout.blocks.len() {
             (statistics.message_count, survey.tallies.values().map(|t| t.messages).sum())
         } else {
-            let read =
-                || statistics.channel_message_counts.iter().filter(|(id, _)| self.all_read(survey, **id));
+            let unread = self.unread(survey);
+            let read = || statistics.channel_message_counts.iter().filter(|(id, _)| !unread.has(**id));
             (read().map(|(_, declared)| declared).sum(), read().map(|(id, _)| found(id)).sum())
         };
         let why = format!("its statistics declare {declared} messages, {found} are usable");

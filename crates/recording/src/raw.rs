@@ -7,11 +7,11 @@ use crate::{Recording, RecordingError};
 use mcap::records::op;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
 /// A schema as the file has it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RawSchema {
     /// Name, such as `sensor_msgs/msg/JointState`.
     pub name: String,
@@ -22,7 +22,7 @@ pub struct RawSchema {
 }
 
 /// A channel as the file has it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RawChannel {
     /// Topic.
     pub topic: String,
@@ -172,13 +172,9 @@ impl Recording {
 
     /// Every channel of the recording, in file order, each once.
     pub fn channels(&self) -> Vec<Arc<RawChannel>> {
-        let mut channels: Vec<Arc<RawChannel>> = Vec::new();
-        for channel in self.files.iter().flat_map(|file| file.channels.values()) {
-            if !channels.contains(channel) {
-                channels.push(channel.clone());
-            }
-        }
-        channels
+        let mut known: HashSet<&RawChannel> = HashSet::new();
+        let all = self.files.iter().flat_map(|file| file.channels.values());
+        all.filter(|channel| known.insert(channel)).cloned().collect()
     }
 }
 

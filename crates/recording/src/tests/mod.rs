@@ -2,6 +2,7 @@
 
 mod conformance;
 mod damage;
+mod many;
 mod memory;
 mod mutation;
 mod output;
