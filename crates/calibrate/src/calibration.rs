@@ -136,7 +136,8 @@ fn gathered(
     let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
     let (train, holdout_errors) = (errors(&seen), errors(&held));
     let mut warnings = last.fit.warnings.clone();
-    let of_turns: Vec<&Warning> = turns.iter().flat_map(|t| &t.warnings).collect();
+    let of_turns: Vec<&Warning> =
+        holdout.warnings.iter().chain(turns.iter().flat_map(|t| &t.warnings)).collect();
     for warning in of_turns {
         if !warnings.contains(warning) {
             warnings.push(warning.clone());

@@ -138,12 +138,12 @@ pub enum HoldoutConfig {
         /// 2 or more.
         k: usize,
     },
-    /// `k` groups of cavities, dealt out by hash, each held out in turn; a tracked dwell is dealt on its own.
+    /// `k` groups of cavities, dealt out by hash, each held out in turn; tracked dwells are dealt by poses.
     CavityFolds {
         /// 2 or more.
         k: usize,
     },
-    /// A share of the dwells, drawn by a hash of seed and dwell: the same on every machine.
+    /// A share of the dwells, drawn pose by pose by a hash of seed and dwell: the same on every machine.
     Random {
         /// Between 0 and 1.
         share: f64,

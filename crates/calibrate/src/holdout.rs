@@ -1,7 +1,8 @@
 //! Which observations are held out, in which turns.
 
+use crate::poses::{Sets, pairs, pose_groups};
 use crate::{CalibrateError, HoldoutConfig, RecordingKey};
-use armcal_core::Observation;
+use armcal_core::{Observation, Severity, Stage, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The hold-out of a calibration.
@@ -12,6 +13,8 @@ pub(crate) struct Holdout {
     /// Whether the written parameters come from all observations (every one is held out in some turn) rather than
     /// from those outside the only turn.
     pub in_turn: bool,
+    /// What is to be said about it.
+    pub warnings: Vec<Warning>,
 }
 
 /// Finds the observations a config means. `boards` are the names of the recordings' board frames.
@@ -20,9 +23,10 @@ pub(crate) fn resolve(
     observations: &[Observation],
     boards: &[String],
 ) -> Result<Holdout, CalibrateError> {
-    let once = |held: BTreeSet<usize>| Holdout { turns: vec![held.into_iter().collect()], in_turn: false };
-    let holdout = match config {
-        HoldoutConfig::None => Holdout { turns: Vec::new(), in_turn: false },
+    let holdout = |turns, in_turn| Holdout { turns, in_turn, warnings: Vec::new() };
+    let once = |held: BTreeSet<usize>| holdout(vec![held.into_iter().collect()], false);
+    let mut holdout = match config {
+        HoldoutConfig::None => holdout(Vec::new(), false),
         HoldoutConfig::Cavities { names } => once(by_cavities(names, observations)?),
         HoldoutConfig::EveryNthCavity { n, offset } => {
             if *n < 2 || offset >= n {
@@ -34,14 +38,12 @@ pub(crate) fn resolve(
             }
             let cavities = cavities_of(observations);
             let chosen = cavities.values().skip(*offset).step_by(*n);
-            once(chosen.flatten().copied().collect())
+            once(with_their_poses(chosen.flatten().copied().collect(), observations))
         }
         HoldoutConfig::Recordings { recordings } => once(by_recordings(recordings, observations, boards)?),
-        HoldoutConfig::EachRecording => Holdout { turns: of_recordings(observations), in_turn: true },
-        HoldoutConfig::RecordingFolds { k } => {
-            Holdout { turns: recording_folds(*k, observations)?, in_turn: true }
-        }
-        HoldoutConfig::CavityFolds { k } => Holdout { turns: folds(*k, observations)?, in_turn: true },
+        HoldoutConfig::EachRecording => holdout(of_recordings(observations), true),
+        HoldoutConfig::RecordingFolds { k } => holdout(recording_folds(*k, observations)?, true),
+        HoldoutConfig::CavityFolds { k } => holdout(folds(*k, observations)?, true),
         HoldoutConfig::Random { share, seed } => {
             if !(*share > 0.0 && *share < 1.0) {
                 return Err(bad("holdout.share", share.to_string(), "a number between 0 and 1"));
@@ -56,7 +58,38 @@ pub(crate) fn resolve(
             return Err(CalibrateError::NoObservations { context });
         }
     }
-    Ok(Holdout { turns: holdout.turns.into_iter().filter(|turn| !turn.is_empty()).collect(), ..holdout })
+    holdout.turns.retain(|turn| !turn.is_empty());
+    holdout.warnings.extend(poses_on_both_sides(&holdout.turns, observations));
+    Ok(holdout)
+}
+
+/// A hold-out that its config spells out may part dwells of one pose: it is done as told, and said.
+fn poses_on_both_sides(turns: &[Vec<usize>], observations: &[Observation]) -> Option<Warning> {
+    let mut turn_of: Vec<Option<usize>> = vec![None; observations.len()];
+    for (turn, held) in turns.iter().enumerate() {
+        held.iter().for_each(|i| turn_of[*i] = Some(turn));
+    }
+    let mut seen = vec![false; observations.len()];
+    pairs(observations, |a, b| {
+        if turn_of[a] != turn_of[b] {
+            seen[a] |= turn_of[a].is_some();
+            seen[b] |= turn_of[b].is_some();
+        }
+    });
+    let (parted, held) = (seen.iter().filter(|s| **s).count(), turn_of.iter().flatten().count());
+    let message = format!(
+        "{parted} of the {held} held-out dwells are at a pose at which the fit saw another dwell: there the error tells how well \
+         the pose is repeated, not how well other poses are predicted; hold out whole poses (`cavity-folds`, `random`) for that"
+    );
+    (parted > 0)
+        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, "pose-on-both-sides", "hold-out", message))
+}
+
+/// These observations and all others of their poses.
+fn with_their_poses(held: BTreeSet<usize>, observations: &[Observation]) -> BTreeSet<usize> {
+    let groups = pose_groups(observations);
+    let poses: BTreeSet<usize> = held.iter().map(|i| groups[*i]).collect();
+    (0..observations.len()).filter(|i| poses.contains(&groups[*i])).collect()
 }
 
 fn bad(key: &'static str, value: String, why: &str) -> CalibrateError {
@@ -145,12 +178,17 @@ fn recording_folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usi
     Ok(turns)
 }
 
-/// `k` groups of cavities, dealt out like cards in natural order, so that each group covers the whole board.
+/// `k` groups of cavities, dealt out like cards in natural order, so that each group covers the whole board. Tracked dwells
+/// go by their poses, and with the cavity whose pose they share.
 fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, CalibrateError> {
-    let mut groups: Vec<Vec<usize>> = cavities_of(observations).into_values().collect();
-    groups.extend((0..observations.len()).filter(|&i| observations[i].cavity().is_none()).map(|i| vec![i]));
+    let mut sets = Sets::new(observations.len());
+    for visits in cavities_of(observations).values() {
+        visits.windows(2).for_each(|pair| sets.join(pair[0], pair[1]));
+    }
+    pairs(observations, |a, b| sets.join(a, b));
+    let mut groups = members(&sets.numbered());
     if k < 2 || k > groups.len() {
-        let why = format!("a number from 2 to {}, the number of cavities and tracked dwells", groups.len());
+        let why = format!("a number from 2 to {}, the number of cavities and tracked poses", groups.len());
         return Err(bad("holdout.k", k.to_string(), &why));
     }
     // Dealt out in the order of their hashes: a round of poses repeated in the recording must not fill one turn.
@@ -168,13 +206,29 @@ fn dwell_hash(seed: u64, o: &Observation) -> u64 {
     mix(mix(mix(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64)
 }
 
-/// The dwells with the smallest hashes of (seed, recording, dwell): adding a dwell never reshuffles the others.
+/// The poses with the smallest hashes of (seed, recording, dwell), by the smallest of their dwells, until there are enough
+/// dwells: adding a dwell never reshuffles the others.
 fn random(share: f64, seed: u64, observations: &[Observation]) -> BTreeSet<usize> {
-    let mut ranked: Vec<(u64, usize)> =
-        observations.iter().enumerate().map(|(i, o)| (dwell_hash(seed, o), i)).collect();
-    ranked.sort_unstable();
+    let hash = |pose: &Vec<usize>| pose.iter().map(|i| dwell_hash(seed, &observations[*i])).min();
+    let mut ranked = members(&pose_groups(observations));
+    ranked.sort_by_key(hash);
     let count = (share * observations.len() as f64).round() as usize;
-    ranked.into_iter().take(count).map(|(_, i)| i).collect()
+    let mut held = BTreeSet::new();
+    for pose in ranked {
+        if held.len() >= count {
+            break;
+        }
+        held.extend(pose);
+    }
+    held
+}
+
+/// Members of each group, by its number.
+fn members(groups: &[usize]) -> Vec<Vec<usize>> {
+    let count = groups.iter().max().map_or(0, |last| last + 1);
+    let mut members = vec![Vec::new(); count];
+    groups.iter().enumerate().for_each(|(i, group)| members[*group].push(i));
+    members
 }
 
 /// Finaliser of SplitMix64 (Steele, Lea and Flood 2014).

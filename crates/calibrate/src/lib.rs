@@ -34,6 +34,7 @@ mod outcome;
 mod paired;
 mod paper;
 mod pooled;
+mod poses;
 pub mod problem;
 mod products;
 mod rigid_fit;

@@ -32,8 +32,14 @@ pub fn calibrate_closed_chain(
                        \"cavity-folds\" (dwells are dealt out) or \"dwells\"";
         return Err(CalibrateError::ClosedChain { problem: problem.into() });
     }
-    let first: Vec<Observation> = observations.iter().map(|o| o.arms[0].clone()).collect();
-    let holdout = holdout::resolve(holdout, &first, &[])?;
+    // A pose is one of both arms.
+    let both = |o: &ClosedObservation| {
+        let mut both = o.arms[0].clone();
+        both.joint_rad.extend(&o.arms[1].joint_rad);
+        both
+    };
+    let both: Vec<Observation> = observations.iter().map(both).collect();
+    let holdout = holdout::resolve(holdout, &both, &[])?;
     judged(&Judge { chain, observations, config }, &holdout, config)
 }
 

@@ -1,8 +1,10 @@
 use super::rig;
 use crate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, calibrate, fit};
-use armcal_core::{Observation, Pose, Reference};
+use armcal_core::{DwellId, Observation, Pose, Reference};
 use armcal_model::Model;
 use nalgebra::Vector3;
+use proptest::prelude::*;
+use std::collections::BTreeSet;
 
 fn run(model: &Model, observations: &[Observation], holdout: &str) -> Result<Calibration, CalibrateError> {
     let holdout: HoldoutConfig = toml::from_str(holdout).unwrap();
@@ -132,4 +134,81 @@ fn named_things_are_held_out_and_misspelt_ones_named() {
         let error = run(&model, &observations, holdout).unwrap_err().to_string();
         assert!(error.contains(hint), "{error}");
     }
+}
+
+/// A dwell: how the arm stood, and the cavity the tip was in, if any.
+fn stands(dwell: usize, joint_rad: Vec<f64>, cavity: Option<usize>) -> Observation {
+    let reference = match cavity {
+        Some(c) => Reference::Seated { cavity: format!("c{c}"), in_board_m: Vector3::zeros() },
+        None => Reference::position(Vector3::zeros()),
+    };
+    // Dwells of three recordings, as they come.
+    Observation::bare(DwellId { recording: dwell % 3, dwell }, joint_rad, reference)
+}
+
+fn turns(holdout: &str, observations: &[Observation]) -> (Vec<Vec<usize>>, usize) {
+    let config: HoldoutConfig = toml::from_str(holdout).unwrap();
+    let found = crate::holdout::resolve(&config, observations, &[]).unwrap();
+    let warned = found.warnings.iter().filter(|w| w.code == "pose-on-both-sides").count();
+    (found.turns, warned)
+}
+
+proptest! {
+    /// Some poses are visited again and again, each time a little differently; whichever hold-out draws the dwells itself
+    /// never shows the fit one of two dwells and asks for the other.
+    #[test]
+    fn no_pose_stands_on_both_sides_of_a_holdout_that_draws_its_dwells(
+        visits in proptest::collection::vec((0_usize..25, -4e-3..4e-3_f64, -4e-3..4e-3_f64), 30..120),
+        seated in 0_usize..4,
+        seed in 0_u64..1000,
+        share in 0.1..0.6_f64,
+        k in 2_usize..5,
+    ) {
+        // Poses of the first few numbers are cavities; 0.05 rad lie between poses, so that all are different.
+        let observations: Vec<Observation> = visits
+            .iter()
+            .enumerate()
+            .map(|(dwell, (pose, a, b))| {
+                let joint_rad = vec![0.05 * *pose as f64 + a, -0.07 * *pose as f64 + b];
+                stands(dwell, joint_rad, (*pose < 5 * seated && dwell % 4 > 0).then_some(*pose))
+            })
+            .collect();
+        let mut holdouts = vec![
+            format!("kind = \"random\"\nshare = {share}\nseed = {seed}"),
+            format!("kind = \"cavity-folds\"\nk = {k}"),
+        ];
+        if observations.iter().filter_map(Observation::cavity).collect::<BTreeSet<_>>().len() > 2 {
+            holdouts.push("kind = \"every-nth-cavity\"\nn = 3".into());
+        }
+        for holdout in holdouts {
+            let (turns, warned) = turns(&holdout, &observations);
+            prop_assert_eq!(warned, 0, "{}", holdout);
+            for turn in &turns {
+                let poses: BTreeSet<usize> = turn.iter().map(|i| visits[*i].0).collect();
+                let all = (0..visits.len()).filter(|i| poses.contains(&visits[*i].0));
+                prop_assert_eq!(turn, &all.collect::<Vec<usize>>(), "{}", holdout);
+            }
+            let held: usize = turns.iter().map(Vec::len).sum();
+            prop_assert!(holdout.starts_with("kind = \"random\"") || held > 0);
+        }
+    }
+}
+
+#[test]
+fn a_listed_holdout_that_parts_a_pose_is_done_and_said() {
+    let poses = [0.1, 0.1002, 0.5, 0.9, 0.9];
+    let observations: Vec<Observation> =
+        poses.iter().enumerate().map(|(dwell, q)| stands(dwell, vec![*q, 0.0], None)).collect();
+    assert_eq!(turns("kind = \"dwells\"\ndwells = [[1, 1], [2, 2]]", &observations), (vec![vec![1, 2]], 1));
+    assert_eq!(turns("kind = \"dwells\"\ndwells = [[0, 0], [1, 1]]", &observations), (vec![vec![0, 1]], 0));
+    // Dwells 0 and 1, 3 and 4 are of one pose, but of different recordings.
+    let config: HoldoutConfig = toml::from_str("kind = \"each-recording\"").unwrap();
+    let found = crate::holdout::resolve(&config, &observations, &[]).unwrap();
+    assert_eq!(found.turns, [vec![0, 3], vec![1, 4], vec![2]]);
+    assert!(found.warnings[0].message.starts_with("4 of the 5 held-out dwells"), "{:?}", found.warnings);
+    // Neighbouring cavities are different poses, however close.
+    let mut neighbours = observations;
+    neighbours[3].reference = Reference::Seated { cavity: "a".into(), in_board_m: Vector3::zeros() };
+    neighbours[4].reference = Reference::Seated { cavity: "b".into(), in_board_m: Vector3::zeros() };
+    assert_eq!(turns("kind = \"cavities\"\nnames = [\"a\"]", &neighbours).1, 0);
 }
