@@ -1,7 +1,7 @@
 //! Steps, outliers and trends of a campaign's quantities, with their sizes.
 
-use crate::line::{Line, Mean, Weighed, p_value, scale, t95, weighed};
-use crate::segment::{Shape, best};
+use crate::line::{Line, Mean, Weighed, p_value, scale, scatters, t95, weighed};
+use crate::segment::{Best, Shape, best};
 use crate::{Series, SeriesPoint};
 use armcal_core::Unit;
 use serde::Serialize;
@@ -21,7 +21,8 @@ pub struct Change {
     pub kind: ChangeKind,
     /// By how much: after minus before, outlier minus the others, or per day.
     pub size: f64,
-    /// 95 % interval of the size; `null` where there are too few recordings beside it.
+    /// 95 % interval of the size, with the same correction as `p`; `null` where the recordings do not say how much they
+    /// scatter: too few beside it, or all alike.
     pub ci95: Option<[f64; 2]>,
     /// Probability of such a change by chance, corrected for the points and quantities that were looked at.
     pub p: f64,
@@ -80,10 +81,39 @@ fn time_ns(series: &Series, change: &Change) -> i64 {
 #[derive(Default)]
 struct Found {
     stretches: Vec<Vec<Weighed>>,
-    /// First point after each step, and its probability by chance.
-    steps: Vec<(SeriesPoint, f64)>,
-    outliers: Vec<(Weighed, f64)>,
-    trends: Vec<(Line, [SeriesPoint; 2], usize, f64)>,
+    /// First point after each step.
+    steps: Vec<(SeriesPoint, Chance)>,
+    outliers: Vec<(Weighed, Chance)>,
+    trends: Vec<(Line, [SeriesPoint; 2], Vec<Weighed>, Chance)>,
+}
+
+/// How probable a shape is by chance, and in how many places it was looked for.
+#[derive(Debug, Clone, Copy)]
+struct Chance {
+    p: f64,
+    tries: usize,
+}
+
+/// How well a size is known.
+struct Known {
+    sigma: f64,
+    freedom: usize,
+    /// Whether the recordings' scatter says so.
+    scatters: bool,
+}
+
+impl Known {
+    /// By the scatter of `points`, whose weighted squares these are; `unit` is the standard error for unit scatter.
+    fn by<'a>(
+        mut points: impl Iterator<Item = &'a Weighed>,
+        unit: f64,
+        squares: f64,
+        freedom: usize,
+    ) -> Known {
+        let rounding = points.any(|p| p.finest_is_rounding);
+        let scatters = freedom > 0 && (scatters(squares, freedom) || !rounding);
+        Known { sigma: unit * scale(squares, freedom), freedom, scatters }
+    }
 }
 
 impl Found {
@@ -92,9 +122,12 @@ impl Found {
     fn search(&mut self, mut points: Vec<Weighed>, trends: bool, alpha: f64) {
         let n = points.len() as f64;
         let share = |part: &[Weighed]| alpha * part.len() as f64 / n;
-        match best(&points, trends, alpha) {
-            None => self.stretches.push(points),
-            Some((Shape::Step(k), p)) => {
+        let Some(Best { shape, p, tries }) = best(&points, trends, alpha) else {
+            return self.stretches.push(points);
+        };
+        let p = Chance { p, tries };
+        match shape {
+            Shape::Step(k) => {
                 self.steps.push((points[k].at, p));
                 let after = points.split_off(k);
                 for part in [points, after] {
@@ -102,7 +135,7 @@ impl Found {
                     self.search(part, trends, alpha);
                 }
             }
-            Some((Shape::Episode(i, j), p)) => {
+            Shape::Episode(i, j) => {
                 self.steps.extend([(points[i].at, p), (points[j].at, p)]);
                 let after = points.split_off(j);
                 let during = points.split_off(i);
@@ -111,14 +144,14 @@ impl Found {
                     self.search(part, trends, alpha);
                 }
             }
-            Some((Shape::Outlier(k), p)) => {
+            Shape::Outlier(k) => {
                 self.outliers.push((points.remove(k), p));
                 self.search(points, trends, alpha);
             }
-            Some((Shape::Trend, p)) => {
+            Shape::Trend => {
                 let ends = [points[0].at, points[points.len() - 1].at];
                 if let Some(line) = Line::through(&points) {
-                    self.trends.push((line, ends, points.len(), p));
+                    self.trends.push((line, ends, points.clone(), p));
                     points.iter_mut().for_each(|point| point.value -= line.at(point.day));
                 }
                 self.search(points, false, alpha);
@@ -140,37 +173,40 @@ impl Found {
         }
     }
 
-    fn changes(&self, series: &Series, tries: f64) -> Vec<Change> {
-        let change = |kind, size: f64, sigma: f64, freedom: usize, p: f64| Change {
-            quantity: series.quantity.clone(),
-            unit: series.unit,
-            kind,
-            size,
-            ci95: (freedom > 0).then(|| [-1.0, 1.0].map(|side| size + side * sigma * t95(freedom))),
-            p: (p * tries).min(1.0),
+    /// What was found, each with its interval; `series_tried` is how many series were looked at.
+    fn changes(&self, series: &Series, series_tried: f64) -> Vec<Change> {
+        let change = |kind, size: f64, known: Known, chance: Chance| {
+            let half = known.sigma * t95(known.freedom, chance.tries as f64 * series_tried);
+            Change {
+                quantity: series.quantity.clone(),
+                unit: series.unit,
+                kind,
+                size,
+                ci95: known.scatters.then(|| [size - half, size + half]),
+                p: (chance.p * series_tried).min(1.0),
+            }
         };
-        let steps = self.steps.iter().filter_map(|(first, p)| {
+        let steps = self.steps.iter().filter_map(|(first, chance)| {
             let at = self.stretches.iter().position(|s| s.first().is_some_and(|w| w.at == *first))?;
             let (before, after) = (self.stretches.get(at.checked_sub(1)?)?, &self.stretches[at]);
             let between = Between::of(before, after);
             let kind = ChangeKind::Step { before: before.last()?.at.row, after: first.row };
-            Some(change(kind, between.size, between.sigma, between.freedom, *p))
+            Some(change(kind, between.size, between.known, *chance))
         });
-        let outliers = self.outliers.iter().filter_map(|(point, p)| {
+        let outliers = self.outliers.iter().filter_map(|(point, chance)| {
             let around = |s: &&Vec<Weighed>| {
                 let ends = s.first().zip(s.last());
                 ends.is_some_and(|(a, b)| (a.at.time_ns..=b.at.time_ns).contains(&point.at.time_ns))
             };
             let others = self.stretches.iter().find(around)?;
             let (mean, freedom) = (Mean::of(others), others.len() - 1);
-            let sigma = (1.0 / mean.weight + 1.0 / point.weight).sqrt() * scale(mean.squares, freedom);
-            let kind = ChangeKind::Outlier { at: point.at.row };
-            Some(change(kind, point.value - mean.value, sigma, freedom, *p))
+            let unit = (1.0 / mean.weight + 1.0 / point.weight).sqrt();
+            let known = Known::by(others.iter(), unit, mean.squares, freedom);
+            Some(change(ChangeKind::Outlier { at: point.at.row }, point.value - mean.value, known, *chance))
         });
-        let trends = self.trends.iter().map(|(line, [from, to], n, p)| {
-            let sigma = line.sigma_per_day * scale(line.squares, n - 2);
-            let kind = ChangeKind::Trend { from: from.row, to: to.row };
-            change(kind, line.per_day, sigma, n - 2, *p)
+        let trends = self.trends.iter().map(|(line, [from, to], points, chance)| {
+            let known = Known::by(points.iter(), line.sigma_per_day, line.squares, points.len() - 2);
+            change(ChangeKind::Trend { from: from.row, to: to.row }, line.per_day, known, *chance)
         });
         steps.chain(outliers).chain(trends).collect()
     }
@@ -179,20 +215,21 @@ impl Found {
 /// What lies between two stretches.
 struct Between {
     size: f64,
-    sigma: f64,
-    freedom: usize,
+    known: Known,
 }
 
 impl Between {
     fn of(before: &[Weighed], after: &[Weighed]) -> Between {
         let (m, n) = (Mean::of(before), Mean::of(after));
         let freedom = (before.len() + after.len()).saturating_sub(2);
-        let sigma = (1.0 / m.weight + 1.0 / n.weight).sqrt() * scale(m.squares + n.squares, freedom);
-        Between { size: n.value - m.value, sigma, freedom }
+        let unit = (1.0 / m.weight + 1.0 / n.weight).sqrt();
+        let known = Known::by(before.iter().chain(after), unit, m.squares + n.squares, freedom);
+        Between { size: n.value - m.value, known }
     }
 
     /// Probability by chance of a step at this very place.
     fn p(&self) -> f64 {
-        if self.freedom == 0 { 1.0 } else { p_value(self.size / self.sigma, self.freedom) }
+        let Known { sigma, freedom, .. } = self.known;
+        if freedom == 0 { 1.0 } else { p_value(self.size / sigma, freedom) }
     }
 }

@@ -16,6 +16,8 @@ pub(crate) struct Weighed {
     /// What is left of the value after what was found before is taken out.
     pub value: f64,
     pub weight: f64,
+    /// Whether the finest difference that weights know is rounding, rather than the values' own standard errors.
+    pub finest_is_rounding: bool,
 }
 
 /// The values of a series, weighed against each other by their own standard errors and what they scatter beyond these.
@@ -24,6 +26,9 @@ pub(crate) struct Weighed {
 /// outlier touches one or two of them, a trend none by much. Only the relation of the weights counts. How sure anything
 /// is comes from the residuals: most of a standard error may be the same in every recording (how well markers represent
 /// a base, say) and says nothing about changes.
+///
+/// Where most recordings agree to the last digit (values at a bound, say), they do not scatter like measurements; then a
+/// difference is held against their own standard errors, where these are known.
 pub(crate) fn weighed(points: &[SeriesPoint]) -> Vec<Weighed> {
     let start_ns = points.first().map_or(0, |p| p.time_ns);
     // Median of a chi-square variable with one degree of freedom.
@@ -31,14 +36,18 @@ pub(crate) fn weighed(points: &[SeriesPoint]) -> Vec<Weighed> {
     let squares = points.windows(2).map(|w| (w[1].value - w[0].value).powi(2)).collect();
     let total = median(squares) / (2.0 * CHI2_MEDIAN);
     let own = |p: &SeriesPoint| p.sigma.unwrap_or(0.0).powi(2);
-    let extra = (total - median(points.iter().map(own).collect())).max(0.0);
+    let typical = median(points.iter().map(own).collect());
+    let extra = (total - typical).max(0.0);
     let variance = |p: &SeriesPoint| (own(p) + extra).max(FINEST * FINEST);
+    let finest_is_rounding = total > FINEST * FINEST || typical <= FINEST * FINEST;
+    let finest_square = if finest_is_rounding { FINEST * FINEST } else { typical };
     let least = points.iter().map(variance).fold(f64::INFINITY, f64::min);
     let weigh = |p: &SeriesPoint| Weighed {
         at: *p,
         day: p.time_ns.saturating_sub(start_ns) as f64 / NS_PER_DAY,
         value: p.value,
-        weight: least / variance(p) / (FINEST * FINEST),
+        weight: least / variance(p) / finest_square,
+        finest_is_rounding,
     };
     points.iter().map(weigh).collect()
 }
@@ -127,9 +136,16 @@ pub(crate) fn p_value(t: f64, freedom: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(1.0, |d| 2.0 * d.sf(t.abs()))
 }
 
-/// Half width of a 95 % interval in standard errors.
-pub(crate) fn t95(freedom: usize) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(0.975))
+/// Whether residuals say how much the recordings scatter: equal values do not.
+pub(crate) fn scatters(squares: f64, freedom: usize) -> bool {
+    freedom > 0 && squares > freedom as f64
+}
+
+/// Half width in standard errors of 95 % intervals that hold for all of `tries` at once (Bonferroni): what was chosen from
+/// many because it stood out has its scatter underestimated more often than one in twenty times.
+pub(crate) fn t95(freedom: usize, tries: f64) -> f64 {
+    let upper = 1.0 - 0.025 / tries.max(1.0);
+    StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(upper))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -18,20 +18,27 @@ pub(crate) enum Shape {
     Trend,
 }
 
-struct Candidate {
-    shape: Shape,
+/// A shape that a stretch shows.
+pub(crate) struct Best {
+    pub shape: Shape,
     /// Probability by chance, corrected for every place at which this shape was tried.
-    p: f64,
+    pub p: f64,
+    /// How many places these were.
+    pub tries: usize,
+}
+
+struct Candidate {
+    found: Best,
     squares: f64,
     /// Free numbers of this explanation.
     numbers: f64,
 }
 
-/// The most plausible shape that chance gives with less than `alpha`, and its probability by chance.
+/// The most plausible shape that chance gives with less than `alpha`.
 ///
 /// Shapes that pass are compared by the Bayesian information criterion (Schwarz 1978). Steps, outliers and episodes are tried
 /// everywhere, which Bonferroni's inequality pays for.
-pub(crate) fn best(points: &[Weighed], trends: bool, alpha: f64) -> Option<(Shape, f64)> {
+pub(crate) fn best(points: &[Weighed], trends: bool, alpha: f64) -> Option<Best> {
     let n = points.len();
     if n < SHORTEST {
         return None;
@@ -41,8 +48,8 @@ pub(crate) fn best(points: &[Weighed], trends: bool, alpha: f64) -> Option<(Shap
     let criterion = |c: &Candidate| {
         n as f64 * (c.squares / n as f64).max(f64::MIN_POSITIVE).ln() + c.numbers * (n as f64).ln()
     };
-    let passing = candidates.into_iter().flatten().filter(|c| c.p < alpha);
-    passing.min_by(|a, b| criterion(a).total_cmp(&criterion(b))).map(|c| (c.shape, c.p))
+    let passing = candidates.into_iter().flatten().filter(|c| c.found.p < alpha);
+    passing.min_by(|a, b| criterion(a).total_cmp(&criterion(b))).map(|c| c.found)
 }
 
 /// The split with the largest two-sample t.
@@ -105,12 +112,14 @@ fn largest(
     let with_t =
         judged.map(|(shape, one, other)| (shape, one.t_of(&other, freedom), one.squares + other.squares));
     let (shape, t, squares) = with_t.max_by(|(_, a, _), (_, b, _)| a.abs().total_cmp(&b.abs()))?;
-    Some(Candidate { shape, p: (tries as f64 * p_value(t, freedom)).min(1.0), squares, numbers })
+    let p = (tries as f64 * p_value(t, freedom)).min(1.0);
+    Some(Candidate { found: Best { shape, p, tries }, squares, numbers })
 }
 
 fn trend(points: &[Weighed]) -> Option<Candidate> {
     let n = points.len();
     let line = Line::through(points)?;
     let t = line.per_day / (line.sigma_per_day * scale(line.squares, n - 2));
-    Some(Candidate { shape: Shape::Trend, p: p_value(t, n - 2), squares: line.squares, numbers: 2.0 })
+    let found = Best { shape: Shape::Trend, p: p_value(t, n - 2), tries: 1 };
+    Some(Candidate { found, squares: line.squares, numbers: 2.0 })
 }

@@ -136,3 +136,57 @@ fn three_recordings_and_equal_values_say_nothing() {
     let all = [Series { quantity: "x".into(), unit: Unit::Metre, points: at_once }];
     assert!(changes(&all).iter().all(|c| !matches!(c.kind, ChangeKind::Trend { .. })));
 }
+
+/// A series of these values a week apart, the first recording in the first row.
+fn of_values(values: &[f64], sigma: Option<f64>) -> Series {
+    let point = |(row, value): (usize, &f64)| SeriesPoint {
+        row,
+        time_ns: row as i64 * 7 * DAY_NS,
+        value: *value,
+        sigma,
+    };
+    let points = values.iter().enumerate().map(point).collect();
+    Series { quantity: "joint1.theta".into(), unit: Unit::Radian, points }
+}
+
+#[test]
+fn values_that_are_all_alike_do_not_say_how_much_they_scatter() {
+    let stuck = [0.01, 0.01, 0.01, 0.03, 0.03, 0.03];
+    let found = changes(&[of_values(&stuck, None)]);
+    assert_eq!(found.iter().map(|c| c.ci95).collect::<Vec<_>>(), [None], "{found:?}");
+    // What each recording knows of itself is then all that is known.
+    let found = changes(&[of_values(&stuck, Some(1e-4))]);
+    let [low, high] = found[0].ci95.expect("an interval");
+    let sigma = 1e-4 * (2.0_f64 / 3.0).sqrt();
+    assert!(0.5 * (high - low) > 2.77 * sigma, "{low} to {high}");
+    // Six values that differ by less than they are known to: no change.
+    assert!(changes(&[of_values(&stuck, Some(0.1))]).is_empty());
+}
+
+/// The size of a step that was picked out of many series because it stood out lies in its interval as often as promised,
+/// though only two or three recordings stand on either side.
+#[test]
+fn intervals_of_steps_between_few_recordings_hold_what_they_promise() {
+    let (mut inside, mut all) = (0, 0);
+    for seed in 0..3000 {
+        let mut rng = ChaCha8Rng::seed_from_u64(9000 + seed);
+        let n = rng.random_range(4..7);
+        let at = n / 2;
+        // From steps that show by luck alone to those that mostly do: 3 to 40 times the scatter.
+        let size = 10_f64.powf(rng.random_range(0.5..1.6)) * 1e-4;
+        let truth = |series: usize| move |k: usize| if series == 0 && k >= at { size } else { 0.0 };
+        let many: Vec<Series> = (0..12).map(|i| recorded(n, [0.0, 1e-4], truth(i), &mut rng)).collect();
+        let right = ChangeKind::Step { before: n - at, after: n - 1 - at };
+        for change in changes(&many).iter().filter(|c| c.kind == right) {
+            let [low, high] = change.ci95.expect("an interval");
+            all += 1;
+            inside += usize::from(low < size && size < high);
+        }
+    }
+    println!("{inside} of {all} inside");
+    // Fewer would happen once in a thousand.
+    assert!(
+        all > 500 && inside as f64 > 0.95 * all as f64 - 3.1 * (0.0475 * all as f64).sqrt(),
+        "{inside} of {all}"
+    );
+}
