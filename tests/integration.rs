@@ -67,6 +67,9 @@ mod report_page;
 
 /// Do set-points computed through the calibrated model bring the rig to where it is sent?
 mod compensation;
+/// Is a recording that is there twice, in whatever encoding or in part, refused or counted once, and never another?
+mod counted_once;
+
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;
 

@@ -166,7 +166,7 @@ fn results_of_six_days_are_pooled_into_what_one_fit_of_their_recordings_gives() 
     refused(week.folder.path());
 }
 
-/// Other boards, arms and settings, doubled recordings and empty folders are named.
+/// Other boards, arms and settings and empty folders are named; a recording in two results counts once.
 fn refused(path: &Path) {
     let (week, results, out) = (path.join("week.toml"), path.join("results"), path.join("refused"));
     let text = std::fs::read_to_string(&week).expect("pipeline");
@@ -185,8 +185,13 @@ fn refused(path: &Path) {
     let copy = path.join("copy");
     std::fs::create_dir(&copy).expect("folder");
     std::fs::copy(results.join("friday/observations.json"), copy.join("observations.json")).expect("copy");
-    let message = refusal(&week, &[results.clone(), copy.clone()]);
-    assert!(message.contains("friday.mcap would count twice") && message.contains("copy"), "{message}");
+    let once = path.join("once");
+    let output = pool(&week, &[results.clone(), copy.clone()], &once);
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", said(&output));
+    let once = read_json(&once.join("pool.json"));
+    let twice = once["warnings"].as_array().and_then(|all| all.iter().find(|w| w["code"] == "counted-once"));
+    assert_eq!(twice.expect("a warning")["subject"], "friday");
+    assert_eq!(once["recordings"].as_array().map(Vec::len), Some(DAYS.len()));
 
     std::fs::write(copy.join("observations.json"), "{\"schema\": \"armcal.observations/9\"}").expect("file");
     let message = refusal(&week, &[copy]);

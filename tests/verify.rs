@@ -206,3 +206,115 @@ fn another_arm_is_refused_by_the_parameter_that_differs() {
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && words.contains("nothing"), "{words}");
 }
+
+/// The pipeline of the shipped verification, usable from any folder, with more appended.
+fn verifying(folder: &Path, name: &str, more: &str) -> PathBuf {
+    let text = std::fs::read_to_string(root().join("pipelines/paper-verify.toml")).expect("pipeline");
+    let pipelines = root().join("pipelines");
+    let text = text
+        .replace("\"../fixtures", &format!("\"{}/../fixtures", pipelines.display()))
+        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
+        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let path = folder.join(format!("{name}.toml"));
+    std::fs::write(&path, format!("{text}\n{more}")).expect("pipeline");
+    path
+}
+
+fn subject_of<'a>(verification: &'a Value, code: &str) -> Option<&'a str> {
+    let mut warnings = verification["warnings"].as_array().expect("warnings").iter();
+    warnings.find(|w| w["code"] == code).and_then(|w| w["subject"].as_str())
+}
+
+/// The tip of the result is moved by 50 mm, as if the tool were another one now: kept, both arms are wrong by it; declared,
+/// neither is.
+#[test]
+fn a_tool_mounted_anew_is_declared_and_treated_alike_for_both_arms() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    let out = folder.join("out");
+    run_pipeline(&root().join("pipelines/paper-normal.toml"), &out, &[0]);
+    let known = verify(&out, &verifying(folder, "known", ""), 0);
+    let moved = folder.join("model.json");
+    let mut model = read_json(&out.join("model.json"));
+    let parameters = model["parameters"].as_array_mut().expect("parameters");
+    let tip = parameters.iter_mut().find(|p| p["name"] == "tip.x").expect("the tip");
+    for value in ["nominal", "calibrated"] {
+        tip[value] = Value::from(tip[value].as_f64().expect("a number") + 0.05);
+    }
+    std::fs::write(&moved, model.to_string()).expect("written");
+
+    let estimated = "[frames.tip]\npose = \"estimated\"\n";
+    let kept = verify(&moved, &verifying(folder, "kept", estimated), 0);
+    assert_eq!(subject_of(&kept, "tip-kept"), Some("tip"));
+    assert_eq!(subject_of(&kept, "frame-fitted-on-verification"), None);
+    let remounted = format!("{estimated}\n[verify]\ntip = \"remounted\"\n");
+    let remounted = verify(&moved, &verifying(folder, "remounted", &remounted), 0);
+    assert_eq!(subject_of(&remounted, "frame-fitted-on-verification"), Some("tip"));
+    assert_eq!(subject_of(&remounted, "tip-kept"), None);
+
+    let points = |seen: &Value| means(&seen["points"], &[("by", "all")]);
+    let (known, kept, remounted) = (points(&known), points(&kept), points(&remounted));
+    println!("tip known {known:?}, moved and kept {kept:?}, moved and fitted {remounted:?} mm");
+    assert!((kept[1] - 50.0).abs() < 1.0, "the calibrated arm keeps the tip of its result");
+    assert!((kept[0] - known[0]).abs() > 5.0, "and so does the nominal one");
+    assert!(remounted[1] < known[1] + 0.05 && remounted[0] < known[0] + 0.05);
+    assert!(toml_refused(folder, &moved).contains("unknown variant `moved`"));
+}
+
+/// What `armcal verify` says to a tip that is neither kept nor remounted.
+fn toml_refused(folder: &Path, result: &Path) -> String {
+    let wrong = verifying(folder, "wrong", "[verify]\ntip = \"moved\"\n");
+    let output = armcal([Path::new("verify"), result, &wrong]);
+    assert_eq!(output.status.code(), Some(1));
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A joint that was calibrated in two places far apart is not known between them, whatever its smallest and largest reading.
+#[test]
+fn a_joint_between_its_calibrated_angles_is_told() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let summary = run_pipeline(&root().join("pipelines/paper-normal.toml"), &out, &[0]);
+    let visited = &summary["joints"][0];
+    assert_eq!((&visited["name"], &visited["unit"]), (&"joint1".into(), &"rad".into()));
+    let model = read_json(&out.join("model.json"));
+    assert_eq!(model["visited"][0]["intervals"], visited["intervals"]);
+
+    let pipeline = verifying(folder.path(), "known", "");
+    let everywhere: Vec<Value> =
+        (0..3).map(|_| serde_json::json!({ "bin": 0.0873, "intervals": [[-3.2, 3.2]] })).collect();
+    let with = |visited: Value| {
+        let path = folder.path().join("model.json");
+        let mut model = model.clone();
+        model["visited"] = visited;
+        std::fs::write(&path, model.to_string()).expect("written");
+        verify(&path, &pipeline, 0)
+    };
+    assert_eq!(subject_of(&with(everywhere.clone().into()), "beyond-calibrated-range"), None);
+    let mut ends = everywhere;
+    ends[1] = serde_json::json!({ "bin": 0.0873, "intervals": [[-3.2, -3.1], [3.1, 3.2]] });
+    let seen = with(ends.into());
+    assert_eq!(subject_of(&seen, "beyond-calibrated-range"), Some("joint2"));
+    // A result from before bins were kept says nothing about them.
+    assert_eq!(subject_of(&with(serde_json::json!([])), "beyond-calibrated-range"), None);
+}
+
+/// What a result cannot know it does not claim.
+#[test]
+fn a_result_without_dwells_claims_no_more_than_it_knows() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    run_pipeline(&root().join("pipelines/paper-normal.toml"), &out, &[0]);
+    let pipeline = verifying(folder.path(), "known", "");
+    let sentence = |seen: &Value| seen["conclusion"].as_str().expect("a sentence").to_owned();
+    let new = sentence(&verify(&out, &pipeline, 0));
+    assert!(new.starts_with("No dwell of these recordings was in the calibration: "), "{new}");
+    let mut model = read_json(&out.join("model.json"));
+    model["recordings"][0].as_object_mut().expect("facts").remove("dwells");
+    let path = folder.path().join("model.json");
+    std::fs::write(&path, model.to_string()).expect("written");
+    let old = sentence(&verify(&path, &pipeline, 0));
+    assert!(old.starts_with("No file of these recordings was in the calibration (an older result"), "{old}");
+    let told = verify(&path, &root().join("pipelines/paper.toml"), 3);
+    assert!(sentence(&told).contains("made from `normal` of these 3 recordings, so this is no"), "{told:#}");
+}

@@ -115,6 +115,20 @@ pub enum Error {
         /// Why.
         source: armcal_dwell::DwellError,
     },
+    /// The same readings in two recordings of a pipeline.
+    #[error(
+        "recordings `{first}` and `{second}` hold the same readings at the same times, {overlap_s:.1} s of them: counted \
+         twice they would make the result look surer than it is; remove one of them from [[recordings]], or cut what both hold \
+         out of one"
+    )]
+    RecordedTwice {
+        /// The earlier one in the pipeline.
+        first: String,
+        /// The later one.
+        second: String,
+        /// How long they are alike [s].
+        overlap_s: f64,
+    },
     /// Associating dwells to cavities.
     #[error("recording `{recording}`: {source}")]
     Association {
@@ -147,6 +161,21 @@ pub enum Error {
     /// Reading back the result of an earlier run.
     #[error(transparent)]
     PastRun(#[from] armcal_report::PastRunError),
+    /// Two results of different recordings.
+    #[error(
+        "{} and {} have no dwell in common ({why}): compare results of the same recordings, and use `armcal verify` to judge a \
+         result on others",
+        before.display(),
+        after.display()
+    )]
+    NothingInCommon {
+        /// One result.
+        before: PathBuf,
+        /// The other.
+        after: PathBuf,
+        /// Recording by recording.
+        why: String,
+    },
     /// A folder without results to pool.
     #[error(
         "{} holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones again",
@@ -163,20 +192,6 @@ pub enum Error {
         result: PathBuf,
         /// How it contradicts the pipeline.
         problem: String,
-    },
-    /// A recording in two results.
-    #[error(
-        "{file} would count twice: the same file is in {} and in {}; name only one of these results",
-        first.display(),
-        second.display()
-    )]
-    PooledTwice {
-        /// Path of the recording's file.
-        file: String,
-        /// One result.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
     },
     /// The result lacks a parameter of the arm.
     #[error(

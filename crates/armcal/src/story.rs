@@ -131,6 +131,8 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
+    let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), &s.fingerprint)).collect();
+    perceive::refuse_repeated(&fingerprints)?;
     let inputs = Inputs { pipeline: pipeline.clone(), chain, board, seen, changes: Vec::new() };
     let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
     progress.step("checking the setup");

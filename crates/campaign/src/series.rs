@@ -30,11 +30,11 @@ pub struct SeriesPoint {
 }
 
 /// The quantities that at least one recording determines, in the order in which the rows name them; values that a
-/// recording does not determine are left out.
-pub fn series(rows: &[Row]) -> Vec<Series> {
+/// recording does not determine are left out, and so are rows that do not count.
+pub fn series(rows: &[Row], counts: impl Fn(usize) -> bool) -> Vec<Series> {
     let mut order: BTreeMap<&str, usize> = BTreeMap::new();
     let mut found: Vec<Series> = Vec::new();
-    for (row, of) in rows.iter().enumerate() {
+    for (row, of) in rows.iter().enumerate().filter(|(row, _)| counts(*row)) {
         for q in of.quantities.iter().filter(|q| q.determined && q.value.is_finite()) {
             let at = *order.entry(&q.name).or_insert_with(|| {
                 found.push(Series { quantity: q.name.clone(), unit: q.unit, points: Vec::new() });

@@ -16,6 +16,7 @@ pub mod robust;
 pub mod samples;
 pub mod setup;
 pub mod units;
+pub mod visited;
 pub mod warning;
 
 pub use dwell::{Arrival, Dwell, DwellId, TipMeasurement};
@@ -26,4 +27,5 @@ pub use parameter::{Parameter, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
 pub use setup::{Certainty, SetupFinding, SetupReport};
 pub use units::Unit;
+pub use visited::Visited;
 pub use warning::{Severity, Stage, Warning, listed};

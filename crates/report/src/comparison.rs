@@ -1,12 +1,12 @@
 //! Two results on the same dwells, for the terminal and for programs.
 
+use crate::pairing::{Paired, Unpaired, paired};
 use crate::past_run::{PastParameter, PastResidual, PastRun};
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
 use comfy_table::Cell;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Dwells listed as most better and most worse.
 const LISTED: usize = 5;
@@ -24,6 +24,8 @@ pub struct Comparison {
     pub recordings: Vec<(String, Difference)>,
     /// Dwells in one result only.
     pub unmatched: usize,
+    /// Which these are, and why.
+    pub unpaired: Vec<Unpaired>,
     /// Dwells whose error changed most, most improved first.
     pub dwells: Vec<DwellChange>,
     /// Parameters that both have, free in one of them, largest change in standard errors first.
@@ -85,31 +87,20 @@ pub struct Moved {
     pub in_half_widths: f64,
 }
 
-/// Dwells that are in both results, before and after, in the order of the second.
-pub(crate) fn matched<'r>(
-    before: &'r PastRun,
-    after: &'r PastRun,
-) -> Vec<(&'r PastResidual, &'r PastResidual)> {
-    let key = |r: &PastResidual| (r.recording.clone(), r.dwell.dwell);
-    let first: BTreeMap<(String, usize), &PastResidual> =
-        before.residuals.iter().map(|r| (key(r), r)).collect();
-    after.residuals.iter().filter_map(|a| first.get(&key(a)).map(|b| (*b, a))).collect()
-}
-
 impl Comparison {
-    /// Compares dwell by dwell: same recording name, same index.
+    /// Compares dwell by dwell: the same time of the same recording, whatever it is called in each result.
     pub fn of(before: &PastRun, after: &PastRun) -> Comparison {
-        let matched = matched(before, after);
+        let Paired { pairs: matched, unpaired } = paired(before, after);
         let held: Vec<_> = matched.iter().copied().filter(|(b, a)| b.held_out && a.held_out).collect();
         let judged = if held.is_empty() { &matched } else { &held };
-        let unmatched = before.residuals.len() + after.residuals.len() - 2 * matched.len();
         let (added, removed) = (only_in(after, before), only_in(before, after));
         Comparison {
             effects: [before.effects.clone(), after.effects.clone()],
             held_out: difference(&held),
             all: difference(&matched),
             recordings: by_recording(judged),
-            unmatched,
+            unmatched: unpaired.iter().map(|u| u.dwells).sum(),
+            unpaired,
             dwells: most_changed(judged),
             moved: moved(before, after),
             added,
@@ -171,8 +162,8 @@ impl Comparison {
             ]);
         }
         let mut text = pen.render(&table);
-        if self.unmatched > 0 {
-            text.push_str(&format!(" {} dwells are in one result only and left out.\n", self.unmatched));
+        if !self.unpaired.is_empty() {
+            text.push_str(&pen.list(self.unpaired.iter().map(|u| ("left out", printable(&u.to_string())))));
         }
         text
     }

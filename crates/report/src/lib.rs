@@ -24,6 +24,7 @@ mod layouts;
 mod mcap_file;
 mod model_file;
 mod page;
+mod pairing;
 mod parameters;
 mod past_model;
 mod past_observations;
@@ -32,6 +33,7 @@ mod points;
 mod pooled;
 mod proto;
 mod run;
+mod same_dwells;
 mod summary;
 mod tables;
 mod terminal;
@@ -39,7 +41,9 @@ mod text;
 mod verification;
 mod write;
 
-pub use campaign::{Campaign, FailedRecording, campaign_json, campaign_row, campaign_text, write_campaign};
+pub use campaign::{
+    Campaign, FailedRecording, Repeat, campaign_json, campaign_row, campaign_text, write_campaign,
+};
 pub use closed_chain::{
     CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_summary_json, closed_terminal, write_closed,
 };
@@ -47,19 +51,21 @@ pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
+pub use pairing::{Side, Unpaired};
 pub use past_model::{PastArms, PastModel, RecordingFacts, Value};
 pub use past_observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedFile, ObservedRecording, PastObservations, StartFrame,
     observations_json, sha256,
 };
-pub use past_run::{PastParameter, PastResidual, PastRun, PastRunError};
+pub use past_run::{PastDwell, PastParameter, PastRecording, PastResidual, PastRun, PastRunError};
 pub use pooled::{POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_json, pooled_terminal, write_pooled};
 pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
+pub use same_dwells::{DwellMark, also_in};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
 pub use text::{conclusion, printable};
 pub use verification::{
-    IsoReport, On, PathSample, Published, Verification, VerifiedRecording, VerifyConfig, verification_files,
-    verification_json, verification_text,
+    IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
+    verification_files, verification_json, verification_text,
 };
 pub use write::{InputMessages, OutputConfig, write_all, write_brief};

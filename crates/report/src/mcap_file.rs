@@ -13,6 +13,9 @@ use std::path::Path;
 /// Beginning of the names of armcal's attachments and metadata records.
 const OWN: &str = "armcal/";
 
+/// Name of the metadata record with names and hashes of the input files.
+pub(crate) const INPUT_METADATA: &str = "armcal/input";
+
 /// A result file attached to the recording.
 pub(crate) struct Attachment<'a> {
     pub name: &'a str,
@@ -30,7 +33,7 @@ pub(crate) fn write_mcap(
     attachments: &[Attachment],
     path: &Path,
 ) -> Result<(), RecordingError> {
-    let about = [("armcal/run", about_run(run)), ("armcal/input", about_input(run))];
+    let about = [("armcal/run", about_run(run)), (INPUT_METADATA, about_input(run))];
     write_results(messages(run, points, findings), inputs, attachments, run_end_ns(run), &about, path)
 }
 

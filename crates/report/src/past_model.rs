@@ -5,9 +5,9 @@
 //! of the session; so the model is made again by the code that made it first.
 
 use crate::run::{RecordingRun, Run, VERSION};
-use crate::{PastRunError, ReportError};
+use crate::{DwellMark, PastRunError, ReportError};
 use armcal_calibrate::{Calibration, Estimate};
-use armcal_core::{Observation, Pose};
+use armcal_core::{Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
 use armcal_recording::{Recording, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -42,6 +42,9 @@ pub struct PastModel {
     pub postures_rad: Vec<Vec<f64>>,
     /// Smallest and largest reading of each joint [rad] (sliding: [m]).
     pub range_rad: Vec<[f64; 2]>,
+    /// What each joint visited between them; empty in a model written before this was kept.
+    #[serde(default)]
+    pub visited: Vec<Visited>,
     /// Mean error on points the fit did not see, else on those it saw [m]; `None` where it is not a number.
     pub mean_error_m: Option<f64>,
     /// What the diagnosis would add to the model, as `armcal add` takes it.
@@ -68,6 +71,9 @@ pub struct RecordingFacts {
     pub name: String,
     /// Hashes of its files.
     pub sha256: Vec<String>,
+    /// Its observed dwells, by which a copy of it is recognised; absent in a model written before this was kept.
+    #[serde(default)]
+    pub dwells: Option<Vec<DwellMark>>,
     /// Its last observed dwell.
     pub last_dwell: usize,
     /// When that was [ns], robot clock.
@@ -177,6 +183,7 @@ impl PastModel {
             recordings: recordings.map(|(i, (name, sha256))| recording(name, sha256, i, of)).collect(),
             postures_rad: thinned(of.observations),
             range_rad: (0..model.joint_count()).map(|j| range(of.observations, j)).collect(),
+            visited: visited(model, of.observations),
             mean_error_m: Some(judged.fitted.mean_m).filter(|mean| mean.is_finite()),
             missing: of.missing.iter().map(EffectSpec::to_string).collect(),
         }
@@ -296,6 +303,7 @@ fn recording(name: &str, sha256: &[String], index: usize, of: &Calibrated<'_>) -
     RecordingFacts {
         name: name.to_owned(),
         sha256: sha256.to_vec(),
+        dwells: Some(own.iter().map(|o| DwellMark::of(o.time_ns, &o.joint_rad)).collect()),
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
         last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(of.session.end_ns),
         load_kg: own.last().map_or(0.0, |o| o.load_kg),
@@ -306,6 +314,15 @@ fn recording(name: &str, sha256: &[String], index: usize, of: &Calibrated<'_>) -
 fn thinned(observations: &[Observation]) -> Vec<Vec<f64>> {
     let stride = observations.len().div_ceil(MOST_POSTURES).max(1);
     observations.iter().step_by(stride).map(|o| o.joint_rad.clone()).collect()
+}
+
+/// What each joint of the model visited in these observations.
+pub(crate) fn visited(model: &Model, observations: &[Observation]) -> Vec<Visited> {
+    let of_joint = |joint: usize| {
+        let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
+        Visited::of(readings, model.chain().joint_unit(joint) == Unit::Metre)
+    };
+    (0..model.joint_count()).map(of_joint).collect()
 }
 
 fn range(observations: &[Observation], joint: usize) -> [f64; 2] {

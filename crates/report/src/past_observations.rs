@@ -3,7 +3,7 @@
 //! [`observations_json`] of a run, [`PastObservations::open`] from its results. Every number comes back as it was.
 
 use crate::run::{RecordingRun, Run, VERSION};
-use crate::{PastRunError, ReportError};
+use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{Observation, Parameter, Pose, Role};
 use armcal_model::Session;
 use armcal_table::Board;
@@ -137,6 +137,13 @@ impl PastObservations {
             }
         }
         Ok(past)
+    }
+}
+
+impl ObservedRecording {
+    /// What its observed dwells are recognised by.
+    pub fn marks(&self) -> Vec<DwellMark> {
+        self.observations.iter().map(|o| DwellMark::of(o.time_ns, &o.joint_rad)).collect()
     }
 }
 

@@ -1,11 +1,13 @@
 //! A run read back from its `run.mcap`: what comparing and re-reading need, without the recordings it came from.
 
-use crate::proto;
-use crate::run::{Run, effects};
+use crate::mcap_file::INPUT_METADATA;
+use crate::run::{RecordingRun, Run, effects};
+use crate::{DwellMark, proto};
 use armcal_calibrate::{Estimate, Residual};
-use armcal_core::{DwellId, Observation};
-use armcal_recording::{Recording, RecordingError};
+use armcal_core::{Dwell, DwellId, Observation};
+use armcal_recording::{RawMetadata, Recording, RecordingError};
 use prost::Message as _;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Results of an earlier run.
@@ -17,12 +19,38 @@ pub struct PastRun {
     pub pipeline: String,
     /// Physical effects of its model beyond geometry.
     pub effects: Vec<String>,
+    /// The recordings, by their index.
+    pub recordings: Vec<PastRecording>,
     /// One entry an observation, in the order of the file.
     pub residuals: Vec<PastResidual>,
     /// All parameters, free and fixed.
     pub parameters: Vec<PastParameter>,
     /// Its `summary.json`; null for a run that has not been written.
     pub summary: serde_json::Value,
+}
+
+/// A recording that was calibrated on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PastRecording {
+    /// Its name.
+    pub name: String,
+    /// What its files hold, as hashes.
+    pub identities: Vec<String>,
+    /// Its dwells, used or not.
+    pub dwells: Vec<PastDwell>,
+}
+
+/// When a dwell was, and what it is recognised by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PastDwell {
+    /// Index in its recording.
+    pub index: usize,
+    /// Its beginning [ns], robot clock.
+    pub start_ns: i64,
+    /// Its end [ns].
+    pub end_ns: i64,
+    /// Its middle and what the joints read.
+    pub mark: DwellMark,
 }
 
 /// The error of one observation after calibration.
@@ -130,7 +158,13 @@ impl PastRun {
                 determined: e.determined,
             }
         };
+        let recording = |r: &RecordingRun| PastRecording {
+            name: r.name.clone(),
+            identities: r.report.files.iter().map(|f| f.identity()).collect(),
+            dwells: r.dwells.iter().map(PastDwell::of).collect(),
+        };
         PastRun {
+            recordings: run.recordings.iter().map(recording).collect(),
             path: PathBuf::new(),
             pipeline: run.pipeline_name.clone(),
             effects: effects(&run.calibration).into_iter().map(str::to_owned).collect(),
@@ -146,12 +180,14 @@ impl PastRun {
         let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
         let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
         let mut residuals = Vec::new();
+        let mut dwells = Vec::new();
         let mut parameters = Vec::new();
         let mut report = None;
         let each = &mut |message: armcal_recording::RawMessage<'_>| {
             // A message that cannot be decoded is not one of ours.
             match message.channel.topic.as_str() {
                 "/armcal/residuals" => residuals.extend(proto::Residual::decode(message.data).ok()),
+                "/armcal/dwells" => dwells.extend(proto::Dwell::decode(message.data).ok()),
                 "/armcal/parameters" => parameters.extend(proto::Parameters::decode(message.data).ok()),
                 "/armcal/report" => report = proto::Calibration::decode(message.data).ok().or(report.take()),
                 _ => {}
@@ -173,7 +209,9 @@ impl PastRun {
                 Ok(())
             })
             .map_err(at)?;
+        let inputs = recording.metadata().map_err(at)?;
         Ok(PastRun {
+            recordings: recordings(&inputs, &dwells),
             pipeline: report.pipeline,
             effects: report.effects,
             residuals: residuals.into_iter().map(PastResidual::from).collect(),
@@ -181,6 +219,48 @@ impl PastRun {
             summary: summary.unwrap_or_default(),
             path,
         })
+    }
+}
+
+/// The recordings, put together from the names and hashes of the input and the dwells.
+fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<PastRecording> {
+    let mut found: BTreeMap<usize, PastRecording> = BTreeMap::new();
+    let inputs = metadata.iter().filter(|(name, _)| name == INPUT_METADATA).flat_map(|(_, entries)| entries);
+    for (key, value) in inputs {
+        let Some((index, fact)) = key.strip_prefix("recording").and_then(|key| key.split_once('.')) else {
+            continue;
+        };
+        let Ok(index) = index.parse() else { continue };
+        let recording: &mut PastRecording = found.entry(index).or_default();
+        match fact {
+            "name" => recording.name.clone_from(value),
+            file if file.ends_with(".sha256") => recording.identities.push(value.clone()),
+            _ => {}
+        }
+    }
+    for d in dwells {
+        let recording = found.entry(d.recording_index as usize).or_default();
+        recording.name.clone_from(&d.recording);
+        recording.dwells.extend(PastDwell::read(d));
+    }
+    let count = found.keys().next_back().map_or(0, |last| last + 1);
+    (0..count).map(|index| found.remove(&index).unwrap_or_default()).collect()
+}
+
+impl PastDwell {
+    fn of(d: &Dwell) -> PastDwell {
+        let mark = DwellMark::of(d.mid_ns(), &d.joint_rad);
+        PastDwell { index: d.id.dwell, start_ns: d.start_ns, end_ns: d.end_ns, mark }
+    }
+
+    /// None where a time is missing.
+    fn read(d: &proto::Dwell) -> Option<PastDwell> {
+        let ns = |t: &Option<prost_types::Timestamp>| {
+            let t = t.as_ref()?;
+            t.seconds.checked_mul(1_000_000_000)?.checked_add(i64::from(t.nanos))
+        };
+        let mark = DwellMark::of(ns(&d.timestamp)?, &d.joint_rad);
+        Some(PastDwell { index: d.dwell as usize, start_ns: ns(&d.start)?, end_ns: ns(&d.end)?, mark })
     }
 }
 

@@ -9,10 +9,11 @@
 
 use crate::diagnosis_summary::DiagnosisSummary;
 use crate::parameters::{FrameEntry, frames};
+use crate::past_model::visited;
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
-use armcal_core::{Dwell, ErrorStats, SetupReport, Unit, Warning};
+use armcal_core::{Dwell, ErrorStats, SetupReport, Unit, Visited, Warning};
 use armcal_table::{Assignment, Place};
 use serde::Serialize;
 use std::path::Path;
@@ -34,6 +35,8 @@ struct Summary<'a> {
     status: Status,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
+    /// What each joint visited in the dwells that were calibrated or held out.
+    joints: Vec<JointSummary<'a>>,
     /// Base, tip and boards as calibrated.
     frames: Vec<FrameEntry>,
     /// The same observations and hold-out with more effects in the model: what was found, step by step, then the best
@@ -93,6 +96,15 @@ struct DwellPlace<'a> {
     place: &'static str,
     cavity: Option<&'a str>,
     confidence: Option<f64>,
+}
+
+/// Where a joint was: between the visited intervals, and beyond them, the calibration knows only what it knows elsewhere.
+#[derive(Debug, Clone, Serialize)]
+struct JointSummary<'a> {
+    name: &'a str,
+    unit: Unit,
+    #[serde(flatten)]
+    visited: Visited,
 }
 
 /// What the fit says.
@@ -169,6 +181,7 @@ impl<'a> Summary<'a> {
             status: run.status(),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
+            joints: joints(run),
             frames: frames(run),
             refits: run.refits().map(refit).collect(),
             setup: &run.setup,
@@ -179,6 +192,17 @@ impl<'a> Summary<'a> {
             warnings: run.overall_warnings(),
         }
     }
+}
+
+fn joints(run: &Run) -> Vec<JointSummary<'_>> {
+    let chain = run.model.chain();
+    let visited = visited(&run.model, &run.observations);
+    let joint = |(index, visited): (usize, Visited)| JointSummary {
+        name: chain.joint_names()[index].as_str(),
+        unit: chain.joint_unit(index),
+        visited,
+    };
+    visited.into_iter().enumerate().map(joint).collect()
 }
 
 fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {

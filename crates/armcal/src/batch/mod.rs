@@ -9,6 +9,7 @@
 mod key;
 mod manifest;
 mod memory;
+mod once;
 mod shard;
 mod store;
 mod work;
@@ -95,14 +96,19 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
 fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
     let (pipeline, done) = shard::together(receipts, out)?;
     let store = Store::open(out)?;
-    let (mut rows, mut failed) = (Vec::new(), Vec::new());
+    let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     for one in done {
         match one {
-            Done::Calibrated { folder, .. } => rows.push((store.row(&folder)?, store::relative(&folder))),
+            Done::Calibrated { folder, .. } => {
+                rows.push(store.row(&folder)?);
+                folders.push(folder);
+            }
             Done::Failed { failed: one, .. } => failed.push(one),
         }
     }
-    let campaign = Campaign::of(&pipeline, rows, failed);
+    let repeats = once::repeats(&store, &rows, &folders)?;
+    let results = rows.into_iter().zip(folders.iter().map(|folder| store::relative(folder))).collect();
+    let campaign = Campaign::of(&pipeline, results, failed, repeats);
     let written = write_campaign(&campaign, out)?;
     Ok((campaign, written))
 }

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use armcal_campaign::Row;
 use armcal_recording::atomic;
-use armcal_report::ReportError;
+use armcal_report::{DwellMark, OBSERVATIONS_FILE, PastObservations, ReportError};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -63,6 +63,15 @@ impl Store {
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
         let text = std::fs::read(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
         serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))
+    }
+
+    /// What the dwells of a result are recognised by.
+    ///
+    /// # Errors
+    /// Observations that are missing or not readable.
+    pub fn marks(&self, folder: &str) -> Result<Vec<DwellMark>, Error> {
+        let past = PastObservations::open(&self.results.join(folder).join(OBSERVATIONS_FILE))?;
+        Ok(past.recordings.iter().flat_map(|r| r.marks()).collect())
     }
 
     /// A place to make a result in.

@@ -4,7 +4,7 @@ use super::joined::{check_moves, join, of_arm};
 use super::pipeline::{ArmSection, ClosedPipeline, RecordingPaths};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::stages::frames;
+use crate::stages::{frames, perceive};
 use armcal_calibrate::{
     Calibration, ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, HoldoutConfig,
     calibrate_closed_chain, closed_chain_nominal, expected_norm_m,
@@ -12,7 +12,7 @@ use armcal_calibrate::{
 use armcal_core::{JointSamples, Rejection, Samples};
 use armcal_dwell::detect_dwells;
 use armcal_model::{Frames, Model, Session};
-use armcal_recording::{JointStream, Recording, RecordingReport, Streams};
+use armcal_recording::{Fingerprint, JointStream, Recording, RecordingReport, Streams};
 use armcal_report::{ClosedRecording, ClosedRun};
 use std::path::PathBuf;
 
@@ -32,13 +32,16 @@ pub fn run(pipeline: &ClosedPipeline, progress: &Progress) -> Result<(ClosedRun,
     }
     let [(first, first_text), (second, second_text)] = <[(ChainArm, String); 2]>::try_from(arms)
         .map_err(|_| two_arms("there must be two [[arms]]".into()))?;
-    let (mut seen, mut opened) = (Vec::new(), Vec::new());
+    let (mut seen, mut opened, mut fingerprints) = (Vec::new(), Vec::new(), Vec::new());
     for (index, entry) in pipeline.recordings.iter().enumerate() {
         progress.step(&format!("reading {}", entry.name()));
-        let (recording, found) = seen_in(pipeline, index, entry)?;
+        let (recording, found, fingerprint) = seen_in(pipeline, index, entry)?;
         opened.push(recording);
         seen.push(found);
+        fingerprints.push(fingerprint);
     }
+    let named: Vec<_> = seen.iter().map(|s| s.name.as_str()).zip(&fingerprints).collect();
+    perceive::refuse_repeated(&named)?;
     let count = [&first, &second].map(|arm| arm.model.joint_count());
     let all = observations(pipeline, &seen, count)?;
 
@@ -82,7 +85,7 @@ fn seen_in(
     pipeline: &ClosedPipeline,
     index: usize,
     entry: &RecordingPaths,
-) -> Result<(Recording, ClosedRecording), Error> {
+) -> Result<(Recording, ClosedRecording, Fingerprint), Error> {
     let name = entry.name();
     let in_recording = |source| Error::Recording { recording: name.clone(), source };
     let paths: Vec<PathBuf> =
@@ -113,7 +116,7 @@ fn seen_in(
     warnings.extend(said);
     let found =
         ClosedRecording { name, paths: entry.paths.clone(), report, dwells, open: Vec::new(), warnings };
-    Ok((recording, found))
+    Ok((recording, found, Fingerprint::of(&samples)))
 }
 
 fn joints_only(joints: &JointStream) -> Streams {

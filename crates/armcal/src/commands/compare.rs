@@ -10,6 +10,9 @@ use std::path::Path;
 pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Result<Outcome, Error> {
     let (before, after) = (PastRun::open(before)?, PastRun::open(after)?);
     let comparison = Comparison::of(&before, &after);
+    if comparison.all.is_none() {
+        return Err(Error::NothingInCommon { before: before.path, after: after.path, why: why(&comparison) });
+    }
     if let Some(path) = html {
         let page = comparison_html(&before, &after, &comparison)?;
         atomic::write(path, page.as_bytes()).map_err(Error::Output)?;
@@ -20,4 +23,10 @@ pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Resu
         print(&comparison.terminal(style()));
     }
     Ok(Outcome::Done)
+}
+
+/// Why no dwell of one result is in the other, recording by recording.
+fn why(comparison: &Comparison) -> String {
+    let reasons: Vec<String> = comparison.unpaired.iter().map(ToString::to_string).collect();
+    reasons.join("; ")
 }

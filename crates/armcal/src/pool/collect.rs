@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
 use armcal_core::{Observation, Pose, Severity, Stage, Warning};
 use armcal_report::{
-    BoardFacts, OBSERVATIONS_FILE, ObservedRecording, PastObservations, PooledRecordingRun, StartFrame,
-    sha256,
+    BoardFacts, DwellMark, OBSERVATIONS_FILE, ObservedRecording, PastObservations, PooledRecordingRun,
+    StartFrame, also_in, sha256,
 };
 use armcal_table::Board;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,7 +18,7 @@ pub struct Collected {
     pub recordings: Vec<CollectedRecording>,
     /// Their observations, in the same order and with the index of the recording in it.
     pub observations: Vec<Observation>,
-    /// What was left out.
+    /// What was left out, and what counts once.
     pub warnings: Vec<Warning>,
 }
 
@@ -42,7 +42,7 @@ struct Found {
 /// Reads every `observations.json` in `folders` and below.
 ///
 /// # Errors
-/// A folder without any, a result of another arm, board or setting than the pipeline's, a recording that is there twice.
+/// A folder without any, a result of another arm, board or setting than the pipeline's.
 pub fn collect(
     pipeline: &Pipeline,
     model_text: &str,
@@ -58,7 +58,6 @@ pub fn collect(
         }
         found.extend(past.recordings.into_iter().map(|r| Found { result: result.clone(), recording: r }));
     }
-    refuse_doubles(&found)?;
     let mut warnings = Vec::new();
     found.retain(|f| {
         let empty = f.recording.observations.is_empty();
@@ -73,6 +72,9 @@ pub fn collect(
         return Err(Error::NoObservations { dwells, hint });
     }
     let begins_ns = |f: &Found| f.recording.observations.iter().map(|o| o.time_ns).min();
+    found.sort_by_cached_key(|f| (begins_ns(f), f.recording.name.clone(), f.result.clone()));
+    let mut found = count_once(found, &mut warnings);
+    // One that lost its first dwells to another may begin later now.
     found.sort_by_cached_key(|f| (begins_ns(f), f.recording.name.clone(), f.result.clone()));
     Ok(joined(found, warnings))
 }
@@ -181,21 +183,42 @@ fn contradiction(
     None
 }
 
-/// A recording counts once.
-fn refuse_doubles(found: &[Found]) -> Result<(), Error> {
-    let mut first_with: BTreeMap<&str, &Found> = BTreeMap::new();
-    for f in found {
-        for file in &f.recording.files {
-            if let Some(first) = first_with.insert(&file.sha256, f) {
-                return Err(Error::PooledTwice {
-                    file: file.path.clone(),
-                    first: first.result.clone(),
-                    second: f.result.clone(),
-                });
+/// What two results both hold counts once, as the earlier of `found`: whole recordings by their files, and, re-encoded or
+/// cut, dwells by what their encoders read and when.
+fn count_once(found: Vec<Found>, warnings: &mut Vec<Warning>) -> Vec<Found> {
+    let mut kept: Vec<(Found, Vec<DwellMark>)> = Vec::new();
+    for mut f in found {
+        let all = f.recording.observations.len();
+        for (first, marks) in &kept {
+            let before = f.recording.observations.len();
+            let in_first = |hash: &str| first.recording.files.iter().any(|file| file.sha256 == hash);
+            if f.recording.files.iter().all(|file| in_first(&file.sha256)) {
+                f.recording.observations.clear();
+            } else {
+                let mut twice = also_in(&f.recording.marks(), marks).into_iter();
+                f.recording.observations.retain(|_| twice.next() != Some(true));
+            }
+            let twice = before - f.recording.observations.len();
+            if twice > 0 {
+                warnings.push(counted_once(&f, first, twice, all));
             }
         }
+        if !f.recording.observations.is_empty() {
+            let marks = f.recording.marks();
+            kept.push((f, marks));
+        }
     }
-    Ok(())
+    kept.into_iter().map(|(f, _)| f).collect()
+}
+
+fn counted_once(f: &Found, first: &Found, twice: usize, all: usize) -> Warning {
+    let message = format!(
+        "{twice} of its {all} dwells in {} are those of `{}` in {}: they count once",
+        f.result.display(),
+        first.recording.name,
+        first.result.display()
+    );
+    Warning::new(Severity::Notice, Stage::Calibrate, "counted-once", f.recording.name.clone(), message)
 }
 
 fn left_out(f: &Found) -> Warning {

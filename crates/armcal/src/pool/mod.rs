@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// Pools the results found in `folders` as the pipeline says; nothing is written.
 ///
 /// # Errors
-/// Results that are missing, doubled, or of another arm, board or setting than the pipeline's, each by name; and what can
+/// Results that are missing, or of another arm, board or setting than the pipeline's, each by name; and what can
 /// go wrong in a fit.
 pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<PooledRun, Error> {
     progress.step("reading results");

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use armcal_core::{Observation, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, catalogue};
-use armcal_report::{PastArms, PastModel};
+use armcal_report::{PastArms, PastModel, TipMount};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use std::path::Path;
 pub struct Placed {
     /// Its arm and effects between the frames of the new recordings.
     pub model: Model,
-    /// Nominal arm without effects, frames as the new recordings know them.
+    /// Nominal arm without effects, base and boards as the new recordings know them.
     pub nominal: Vec<f64>,
     /// The arm and its effects as calibrated, the same frames.
     pub calibrated: Vec<f64>,
@@ -49,7 +49,8 @@ impl PlacedBase<'_> {
 /// the pipeline of the new recordings knows them.
 ///
 /// What calibration learned about the base is kept: where the base is measured again, its correction relative to the
-/// measured pose; where it is to be estimated, its calibrated pose, to start from; a given pose stays as given.
+/// measured pose; where it is to be estimated, its calibrated pose, to start from; a given pose stays as given. The tip is
+/// alike for both arms: kept, each has the one that the calibration recordings gave it; remounted, the one of the pipeline.
 ///
 /// # Errors
 /// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.
@@ -68,12 +69,12 @@ pub fn place(
     } else {
         surroundings.with_effects(&lasting, past.session())?
     };
-    let nominal = model.nominal();
+    let mut nominal = model.nominal();
     let mut calibrated = nominal.clone();
     for (at, parameter) in model.parameters().iter().enumerate() {
-        let carried =
-            matches!(parameter.role, Role::Robot | Role::Effect) || parameter.name.starts_with("tip.");
-        if !carried {
+        let of_tip = parameter.name.starts_with("tip.");
+        let of_arm = matches!(parameter.role, Role::Robot | Role::Effect);
+        if !of_arm && !(of_tip && pipeline.verify.tip == TipMount::Kept) {
             continue;
         }
         let known = then.model.index(&parameter.name).ok_or_else(|| Error::NotInResult {
@@ -90,6 +91,9 @@ pub fn place(
             });
         }
         calibrated[at] = then.values[known];
+        if let Some(tip) = then.nominal_values.get(known).filter(|_| of_tip) {
+            nominal[at] = *tip;
+        }
     }
     put_base(&model, &base(&then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
     Ok(Placed { model, nominal, calibrated, warnings })

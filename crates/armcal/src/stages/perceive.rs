@@ -7,7 +7,7 @@ use armcal_core::robust::{median, percentile};
 use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Frames, Model};
-use armcal_recording::{Recording, RecordingReport};
+use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
 use armcal_report::RecordingRun;
 use armcal_table::Association;
 use nalgebra::{Point3, Vector3};
@@ -35,6 +35,18 @@ pub struct Seen {
     pub travels_m: Vec<(&'static str, f64)>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
+    /// What tells whether another recording holds the same readings.
+    pub fingerprint: Fingerprint,
+}
+
+/// Two recordings that hold the same readings over some time.
+pub struct Repeat {
+    /// The earlier one in the pipeline.
+    pub first: usize,
+    /// The later one.
+    pub second: usize,
+    /// When.
+    pub shared: SharedTime,
 }
 
 /// Opens every recording of the pipeline.
@@ -69,6 +81,33 @@ pub fn dwells_of_all(
             Ok(seen)
         })
         .collect()
+}
+
+/// Every two recordings that hold the same readings, in the order of the pipeline.
+pub fn repeats(fingerprints: &[&Fingerprint]) -> Vec<Repeat> {
+    let before = |second: usize| (0..second).map(move |first| (first, second));
+    let pairs = (0..fingerprints.len()).flat_map(before);
+    let repeat = |(first, second): (usize, usize)| {
+        let shared = fingerprints[first].shared(fingerprints[second])?;
+        Some(Repeat { first, second, shared })
+    };
+    pairs.filter_map(repeat).collect()
+}
+
+/// One recording counted twice would make every result look surer than it is.
+///
+/// # Errors
+/// Two recordings with the same readings, by their names.
+pub fn refuse_repeated(recordings: &[(&str, &Fingerprint)]) -> Result<(), Error> {
+    let fingerprints: Vec<&Fingerprint> = recordings.iter().map(|(_, fingerprint)| *fingerprint).collect();
+    match repeats(&fingerprints).first() {
+        None => Ok(()),
+        Some(repeat) => Err(Error::RecordedTwice {
+            first: recordings[repeat.first].0.to_owned(),
+            second: recordings[repeat.second].0.to_owned(),
+            overlap_s: repeat.shared.duration_s(),
+        }),
+    }
 }
 
 /// Joins what was seen, where each dwell turned out to be, and what was rejected.
@@ -175,7 +214,8 @@ fn dwells_of_one(
     let mut report = recording.report().clone();
     report.streams = streams;
     let name = name.to_owned();
-    let seen = Seen { name, load_kg, report, clock, dwells, base, table, travels_m, warnings };
+    let fingerprint = Fingerprint::of(&samples);
+    let seen = Seen { name, load_kg, report, clock, dwells, base, table, travels_m, warnings, fingerprint };
     Ok((samples, seen))
 }
 

@@ -4,7 +4,9 @@
 
 mod iso;
 mod motion;
+mod once;
 mod point;
+mod told;
 
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
@@ -15,11 +17,12 @@ use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::fit_frames_from;
 use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::{Chain, Model};
-use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
+use armcal_report::{PastModel, PathSample, TipMount, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
-use std::collections::{BTreeMap, BTreeSet};
+use once::Distinct;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Warnings about a clock that the nominal arm judged.
@@ -34,6 +37,8 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let mut samples = Vec::new();
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
     progress.step("comparing");
+    let Distinct { pipeline, seen, samples, warnings: once } = once::distinct(pipeline, seen, samples);
+    let pipeline = &pipeline;
     let surroundings =
         Surroundings { result, past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
     let (placed, observations, mut warnings) = surroundings.settle()?;
@@ -53,7 +58,10 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     };
     let iso9283 = shown.assess()?;
     let recordings = seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect();
-    warnings.extend(same_files(&past, &seen));
+    let told = told::told(&past, &seen);
+    warnings.extend(told.iter().map(told::not_held_out));
+    warnings.extend(once);
+    warnings.extend(told::beyond_calibrated(placed.model.chain(), &past.visited, &observations, &samples));
     warnings.extend(seen.iter().flat_map(of_recording));
     warnings.extend(placed.warnings.iter().cloned());
     Ok(Verification {
@@ -61,6 +69,8 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
         result: result.to_owned(),
         effects: placed.model.effects().iter().map(|e| e.spec.to_string()).collect(),
         recordings,
+        told,
+        recognises_copies: past.recordings.iter().all(|r| r.dwells.is_some()),
         points: armcal_verify::points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
         paths: rows(motions, &names),
@@ -123,8 +133,8 @@ struct Surroundings<'a> {
 impl Surroundings<'_> {
     /// The calibrated model in its place, and the dwells in theirs.
     ///
-    /// Frames that nobody could know without these dwells (a board or a base whose pose is estimated; for the nominal arm
-    /// also an estimated tip) are fitted to them, the arm left alone.
+    /// Frames that nobody could know without these dwells (a board or a base whose pose is estimated; an estimated tip that
+    /// was mounted anew) are fitted to them, for both arms, which are left alone.
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
@@ -135,7 +145,7 @@ impl Surroundings<'_> {
         }
         let mut observations = self.observations(&places)?;
         let fitted = self.fit_frames(&mut placed, &observations)?;
-        if !fitted.is_empty() {
+        if fitted.iter().any(|w| w.code == "frame-fitted-on-verification") {
             places = self.associate(&placed, true)?;
             observations = self.observations(&places)?;
             self.fit_frames(&mut placed, &observations)?;
@@ -154,50 +164,41 @@ impl Surroundings<'_> {
 
     fn fit_frames(&self, placed: &mut Placed, observations: &[Observation]) -> Result<Vec<Warning>, Error> {
         let (model, fit) = (&placed.model, &self.pipeline.fit);
+        let kept = self.pipeline.verify.tip == TipMount::Kept;
         let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        let around = |p: &Parameter| estimated(p) && !p.name.starts_with("tip.");
-        if !model.parameters().iter().any(estimated) {
-            return Ok(Vec::new());
+        let fitted = |p: &Parameter| estimated(p) && !(kept && p.name.starts_with("tip."));
+        let mut said = Vec::new();
+        if model.parameters().iter().any(fitted) {
+            placed.nominal = fit_frames_from(model, observations, placed.nominal.clone(), fit, &fitted)?;
+            placed.calibrated =
+                fit_frames_from(model, observations, placed.calibrated.clone(), fit, &fitted)?;
+            said.push(frames_fitted(&frames_of(model, &fitted)));
         }
-        placed.nominal = fit_frames_from(model, observations, placed.nominal.clone(), fit, &estimated)?;
-        placed.calibrated = fit_frames_from(model, observations, placed.calibrated.clone(), fit, &around)?;
-        Ok(vec![frames_fitted(model)])
+        if !frames_of(model, &|p| estimated(p) && !fitted(p)).is_empty() {
+            said.push(tip_kept());
+        }
+        Ok(said)
     }
 }
 
-fn frames_fitted(model: &Model) -> Warning {
-    let frames: Vec<&str> = model
-        .parameters()
-        .iter()
-        .filter(|p| p.role == Role::EstimatedFrame)
-        .filter_map(|p| p.name.strip_suffix(".x"))
-        .collect();
-    let message = "nobody knows this frame beforehand: it is fitted to the dwells that are judged, with the arm left alone \
-                   (for the nominal arm likewise)"
-        .to_owned();
-    Warning::new(
-        Severity::Notice,
-        Stage::Calibrate,
-        "frame-fitted-on-verification",
-        frames.join(", "),
-        message,
-    )
+/// Names of the frames of which a parameter is chosen.
+fn frames_of(model: &Model, chosen: &dyn Fn(&Parameter) -> bool) -> Vec<String> {
+    let chosen = model.parameters().iter().filter(|p| chosen(p));
+    chosen.filter_map(|p| p.name.strip_suffix(".x").map(str::to_owned)).collect()
 }
 
-/// A recording that the calibration saw proves nothing.
-fn same_files(past: &PastModel, seen: &[Seen]) -> Vec<Warning> {
-    let known: BTreeSet<&String> = past.recordings.iter().flat_map(|r| &r.sha256).collect();
-    let seen_before = |s: &&Seen| s.report.files.iter().any(|f| known.contains(&f.identity()));
-    let warn = |s: &Seen| {
-        let message =
-            "the calibration was made from this recording: its error here says nothing about new ones";
-        Warning::new(
-            Severity::Inadequate,
-            Stage::Recording,
-            "not-held-out",
-            format!("recording `{}`", s.name),
-            message.to_owned(),
-        )
-    };
-    seen.iter().filter(seen_before).map(warn).collect()
+fn notice(code: &'static str, subject: String, message: &str) -> Warning {
+    Warning::new(Severity::Notice, Stage::Calibrate, code, subject, message.to_owned())
+}
+
+fn frames_fitted(frames: &[String]) -> Warning {
+    let message = "nobody knows this beforehand: fitted to the dwells that are judged, for the nominal and the calibrated \
+                   arm alike; the arms themselves are left alone";
+    notice("frame-fitted-on-verification", frames.join(", "), message)
+}
+
+fn tip_kept() -> Warning {
+    let message = "as the calibration recordings gave it, to the nominal and to the calibrated arm; if tool or target were \
+                   mounted anew since, set tip = \"remounted\" in [verify]";
+    notice("tip-kept", "tip".to_owned(), message)
 }

@@ -2,8 +2,8 @@
 
 use super::page::CampaignPage;
 use super::terminal::conclusion;
-use super::words::{meaning, sentence};
-use super::{Campaign, FailedRecording};
+use super::words::{meaning, repeated, sentence};
+use super::{Campaign, FailedRecording, Repeat};
 use crate::ReportError;
 use crate::run::{Status, VERSION};
 use crate::tables::Columns;
@@ -27,6 +27,7 @@ struct File<'a> {
     conclusion: String,
     recordings: Vec<Recording<'a>>,
     failed: &'a [FailedRecording],
+    repeated: Vec<Repeated<'a>>,
     changes: Vec<Told<'a>>,
 }
 
@@ -35,6 +36,15 @@ struct Recording<'a> {
     folder: &'a str,
     #[serde(flatten)]
     row: &'a Row,
+}
+
+/// A recording that holds what an earlier one holds, with the words for it; both by their place in `recordings`.
+#[derive(Serialize)]
+struct Repeated<'a> {
+    #[serde(flatten)]
+    repeat: &'a Repeat,
+    counts_once: bool,
+    sentence: String,
 }
 
 /// A change, with the words for it; recordings by their place in `recordings`.
@@ -68,6 +78,15 @@ impl<'a> File<'a> {
                 .map(|(row, folder)| Recording { folder, row })
                 .collect(),
             failed: &campaign.failed,
+            repeated: campaign
+                .repeats
+                .iter()
+                .map(|repeat| Repeated {
+                    repeat,
+                    counts_once: repeat.counts_once(),
+                    sentence: repeated(campaign, repeat),
+                })
+                .collect(),
             changes: campaign.changes.iter().map(told).collect(),
         }
     }

@@ -28,6 +28,8 @@ pub struct Campaign {
     pub folders: Vec<String>,
     /// What could not be, in the same order.
     pub failed: Vec<FailedRecording>,
+    /// Recordings that hold what an earlier one holds.
+    pub repeats: Vec<Repeat>,
     /// Quantities over time; points name rows by index.
     pub series: Vec<Series>,
     /// What changes in them.
@@ -45,13 +47,44 @@ pub struct FailedRecording {
     pub why: String,
 }
 
+/// A recording with dwells that an earlier one of the campaign has too; both by their rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Repeat {
+    /// The recording.
+    pub row: usize,
+    /// The one that has them already.
+    pub of: usize,
+    /// How many dwells.
+    pub dwells: usize,
+    /// Of so many.
+    pub all: usize,
+}
+
+impl Repeat {
+    /// Whether the recording is no evidence of its own: at least half of it is in the other.
+    pub fn counts_once(&self) -> bool {
+        2 * self.dwells >= self.all
+    }
+}
+
 impl Campaign {
-    /// Puts recordings together and looks for changes.
-    pub fn of(pipeline: &str, results: Vec<(Row, String)>, failed: Vec<FailedRecording>) -> Campaign {
+    /// Puts recordings together and looks for changes; what repeats another recording does not count again.
+    pub fn of(
+        pipeline: &str,
+        results: Vec<(Row, String)>,
+        failed: Vec<FailedRecording>,
+        repeats: Vec<Repeat>,
+    ) -> Campaign {
         let (rows, folders): (Vec<Row>, Vec<String>) = results.into_iter().unzip();
-        let series = series(&rows);
+        let series = series(&rows, |row| counts(&repeats, row));
         let changes = changes(&series);
-        Campaign { pipeline: pipeline.to_owned(), rows, folders, failed, series, changes }
+        Campaign { pipeline: pipeline.to_owned(), rows, folders, failed, repeats, series, changes }
+    }
+
+    /// Rows that are evidence of their own.
+    pub(crate) fn counted(&self) -> impl Iterator<Item = &Row> {
+        let rows = self.rows.iter().enumerate();
+        rows.filter(|(row, _)| counts(&self.repeats, *row)).map(|(_, row)| row)
     }
 
     /// The gravest thing about any recording; one that failed counts as data lost.
@@ -63,4 +96,8 @@ impl Campaign {
             () => Status::Ok,
         }
     }
+}
+
+fn counts(repeats: &[Repeat], row: usize) -> bool {
+    !repeats.iter().any(|repeat| repeat.row == row && repeat.counts_once())
 }

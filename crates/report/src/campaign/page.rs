@@ -3,7 +3,7 @@
 use super::Campaign;
 use super::date::minute;
 use super::terminal::conclusion;
-use super::words::{meaning, sentence};
+use super::words::{meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
 use crate::run::VERSION;
@@ -30,6 +30,7 @@ pub(super) struct CampaignPage<'a> {
     changes: Vec<(String, &'static str)>,
     rows: Vec<Shown<'a>>,
     failed: &'a [super::FailedRecording],
+    repeats: Vec<String>,
 }
 
 struct Shown<'a> {
@@ -64,6 +65,7 @@ impl<'a> CampaignPage<'a> {
             changes: told.collect(),
             rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
             failed: &campaign.failed,
+            repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
         })
     }
 }

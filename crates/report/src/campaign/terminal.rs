@@ -2,7 +2,7 @@
 
 use super::Campaign;
 use super::date::minute;
-use super::words::{meaning, sentence};
+use super::words::{meaning, repeated, sentence};
 use crate::run::{Status, VERSION};
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
@@ -18,6 +18,14 @@ pub fn campaign_text(campaign: &Campaign, style: TerminalStyle) -> String {
     let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&campaign.pipeline))];
     if !campaign.rows.is_empty() {
         sections.push(pen.section("Recordings, each calibrated by itself", recordings(&pen, &campaign.rows)));
+    }
+    if !campaign.repeats.is_empty() {
+        let listed = campaign.repeats.iter().take(LISTED).map(|r| ("repeated", repeated(campaign, r)));
+        let mut text = pen.list(listed);
+        if let Some(more) = campaign.repeats.len().checked_sub(LISTED + 1) {
+            text.push_str(&format!(" and {} more in campaign.html and campaign.json\n", more + 1));
+        }
+        sections.push(pen.section("The same readings twice", text));
     }
     if !campaign.changes.is_empty() {
         let changes = campaign.changes.iter().map(|c| {
@@ -65,7 +73,7 @@ pub(super) fn conclusion(campaign: &Campaign) -> String {
     let (done, failed) = (campaign.rows.len(), campaign.failed.len());
     let of = done + failed;
     let median = |of: fn(&Row) -> &ErrorFigures| {
-        let mut means: Vec<f64> = campaign.rows.iter().filter_map(|r| of(r).mean_m).collect();
+        let mut means: Vec<f64> = campaign.counted().filter_map(|r| of(r).mean_m).collect();
         means.sort_by(f64::total_cmp);
         means.get(means.len() / 2).map(|m| millimetres(*m))
     };
@@ -78,5 +86,10 @@ pub(super) fn conclusion(campaign: &Campaign) -> String {
         1 => "1 change".to_owned(),
         n => format!("{n} changes"),
     };
-    format!("{done} of {of} recordings calibrated{errors}; {changes}.")
+    let once = match done - campaign.counted().count() {
+        0 => String::new(),
+        1 => ", 1 of them a repetition that counts once".to_owned(),
+        n => format!(", {n} of them repetitions that count once"),
+    };
+    format!("{done} of {of} recordings calibrated{once}{errors}; {changes}.")
 }

@@ -1,7 +1,7 @@
 //! A change in words.
 
-use super::Campaign;
 use super::date::minute;
+use super::{Campaign, Repeat};
 use crate::text::{in_display_unit, printable};
 use armcal_campaign::{Change, ChangeKind};
 use armcal_core::Unit;
@@ -30,6 +30,18 @@ pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {
             format!("{name} changes by {month} a month ({MONTH_DAYS} days) from {} to {}", row(from), row(to))
         }
     }
+}
+
+/// What two recordings have in common, and what follows.
+pub(super) fn repeated(campaign: &Campaign, repeat: &Repeat) -> String {
+    let name = |row: usize| printable(&campaign.rows[row].recording);
+    let (own, other, Repeat { dwells, all, .. }) = (name(repeat.row), name(repeat.of), repeat);
+    let follows = if repeat.counts_once() {
+        "it counts once, as the other"
+    } else {
+        "both count, though they are not independent"
+    };
+    format!("`{own}` holds the same readings as `{other}` in {dwells} of its {all} dwells: {follows}")
 }
 
 /// What a change of this quantity usually is.

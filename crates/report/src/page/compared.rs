@@ -2,7 +2,8 @@
 
 use super::embed;
 use crate::ReportError;
-use crate::comparison::{Comparison, Difference, matched};
+use crate::comparison::{Comparison, Difference};
+use crate::pairing::paired;
 use crate::past_run::PastRun;
 use crate::run::VERSION;
 use crate::text::millimetres;
@@ -108,7 +109,7 @@ impl Document {
     fn of(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Document {
         let mut recordings: Vec<RecordingName> = Vec::new();
         let mut pairs = Vec::new();
-        for (earlier, r) in matched(before, after) {
+        for (earlier, r) in paired(before, after).pairs {
             let recording =
                 recordings.iter().position(|known| known.name == r.recording).unwrap_or_else(|| {
                     recordings.push(RecordingName { name: r.recording.clone() });

@@ -1,7 +1,7 @@
 //! A verification for programs.
 
 use super::page::verification_html;
-use super::{IsoReport, PathSample, Published, Verification, VerifiedRecording};
+use super::{IsoReport, PathSample, Published, Told, Verification, VerifiedRecording};
 use crate::ReportError;
 use crate::past_model::Value;
 use crate::run::{Status, VERSION};
@@ -23,6 +23,8 @@ struct File<'a> {
     conclusion: String,
     effects: &'a [String],
     recordings: &'a [VerifiedRecording],
+    told: &'a [Told],
+    recognises_copies: bool,
     points: &'a [PointsRow],
     paths: &'a [PathRow],
     iso9283: &'a IsoReport,
@@ -43,6 +45,8 @@ pub fn verification_json(v: &Verification) -> String {
         conclusion: super::terminal::conclusion(v),
         effects: &v.effects,
         recordings: &v.recordings,
+        told: &v.told,
+        recognises_copies: v.recognises_copies,
         points: &v.points,
         paths: &v.paths,
         iso9283: &v.iso9283,

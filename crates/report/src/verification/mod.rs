@@ -29,6 +29,10 @@ pub struct Verification {
     pub effects: Vec<String>,
     /// The new recordings.
     pub recordings: Vec<VerifiedRecording>,
+    /// Those of them that the calibration saw.
+    pub told: Vec<Told>,
+    /// Whether the result would recognise a copy of a recording it was calibrated on, by its dwells; else by its bytes alone.
+    pub recognises_copies: bool,
     /// Errors at points (Table 4 of the source paper).
     pub points: Vec<PointsRow>,
     /// Errors along paths (Table 6, figures 6, 7 and 10).
@@ -51,6 +55,31 @@ pub struct Verification {
 pub struct VerifyConfig {
     /// Published numbers to print beside the own ones.
     pub published: Vec<Published>,
+    /// Whether the calibrated point is where it was during the calibration.
+    pub tip: TipMount,
+}
+
+/// Whether the calibrated point on the last link is where it was during the calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TipMount {
+    /// It is: both arms keep the tip that the calibration recordings gave them.
+    #[default]
+    Kept,
+    /// Another tool, or a target mounted anew: both arms take the tip of `[frames.tip]`, fitted to the judged dwells where
+    /// it is to be estimated.
+    Remounted,
+}
+
+/// A recording that the calibration saw, whole or in part.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Told {
+    /// Its name among the new recordings.
+    pub recording: String,
+    /// Its dwells in the time that the calibration saw.
+    pub dwells: usize,
+    /// Of so many.
+    pub all: usize,
 }
 
 /// One published row.

@@ -1,7 +1,7 @@
 //! A verification for people, at most 100 columns wide.
 
 use super::row::{Row, or_dash};
-use super::{On, Published, Verification, VerifiedRecording};
+use super::{On, Published, Told, Verification, VerifiedRecording};
 use crate::run::VERSION;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
@@ -55,7 +55,32 @@ pub(super) fn conclusion(v: &Verification) -> String {
         return "These recordings hold neither a dwell nor a motion of a tracked tip: nothing is verified."
             .into();
     }
-    format!("Calibration was not told of these recordings: {}.", parts.join("; "))
+    format!("{}: {}.", told(v), parts.join("; "))
+}
+
+/// What the calibration knew of the recordings that are judged.
+fn told(v: &Verification) -> String {
+    if v.told.is_empty() {
+        return if v.recognises_copies {
+            "No dwell of these recordings was in the calibration".into()
+        } else {
+            "No file of these recordings was in the calibration (an older result, which does not recognise copies)".into()
+        };
+    }
+    let one = |t: &Told| {
+        let name = printable(&t.recording);
+        if t.dwells == t.all {
+            format!("`{name}`")
+        } else {
+            format!("{} of {} dwells of `{name}`", t.dwells, t.all)
+        }
+    };
+    let seen = v.told.iter().map(one).collect::<Vec<_>>().join(", ");
+    let of = match v.recordings.len() {
+        1 => String::new(),
+        n => format!(" of these {n} recordings"),
+    };
+    format!("The calibration was made from {seen}{of}, so this is no verification on new ones")
 }
 
 fn part(what: &str, c: &Compared) -> String {

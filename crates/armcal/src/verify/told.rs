@@ -1,0 +1,85 @@
+//! What the result knows of the new recordings, and where they go beyond it.
+
+use crate::stages::perceive::Seen;
+use armcal_core::{Observation, Samples, Severity, Stage, Unit, Visited, Warning};
+use armcal_model::Chain;
+use armcal_report::{DwellMark, PastModel, Told, also_in};
+
+/// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.
+pub fn told(past: &PastModel, seen: &[Seen]) -> Vec<Told> {
+    let of = |s: &Seen| {
+        let marks: Vec<DwellMark> =
+            s.dwells.iter().map(|d| DwellMark::of(d.mid_ns(), &d.joint_rad)).collect();
+        let is_file = |identity: &String| past.recordings.iter().any(|r| r.sha256.contains(identity));
+        let identities: Vec<String> = s.report.files.iter().map(|f| f.identity()).collect();
+        if !identities.is_empty() && identities.iter().all(is_file) {
+            return Some(Told { recording: s.name.clone(), dwells: marks.len(), all: marks.len() });
+        }
+        let known = past.recordings.iter().filter_map(|r| r.dwells.as_ref());
+        let in_each: Vec<Vec<bool>> = known.map(|known| also_in(&marks, known)).collect();
+        let dwells = (0..marks.len()).filter(|i| in_each.iter().any(|in_one| in_one[*i])).count();
+        (dwells > 0).then(|| Told { recording: s.name.clone(), dwells, all: marks.len() })
+    };
+    seen.iter().filter_map(of).collect()
+}
+
+/// A recording that the calibration saw proves nothing.
+pub fn not_held_out(told: &Told) -> Warning {
+    let Told { recording, dwells, all } = told;
+    let part = if dwells == all { String::new() } else { format!(" in {dwells} of its {all} dwells") };
+    let message = format!(
+        "the calibration was made from this recording{part}: its error here says nothing about new ones"
+    );
+    let subject = format!("recording `{recording}`");
+    Warning::new(Severity::Inadequate, Stage::Recording, "not-held-out", subject, message)
+}
+
+/// One warning a joint that stands or moves where no dwell of the calibration was near.
+pub fn beyond_calibrated(
+    chain: &Chain,
+    visited: &[Visited],
+    observations: &[Observation],
+    samples: &[Samples],
+) -> Vec<Warning> {
+    let of_joint = |(joint, visited): (usize, &Visited)| {
+        let name = chain.joint_names().get(joint)?;
+        let unit = chain.joint_unit(joint);
+        let outside = |q: &f64| !visited.is_near(*q);
+        let dwells: Vec<f64> = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied()).collect();
+        let readings = || samples.iter().filter_map(|s| s.joints.joint_rad.get(joint)).flatten();
+        let (far_dwells, all) = (dwells.iter().filter(|q| outside(q)).count(), readings().count());
+        let far = readings().filter(|q| outside(q)).count();
+        if far_dwells == 0 && far == 0 {
+            return None;
+        }
+        let percent = 100.0 * far as f64 / all.max(1) as f64;
+        let percent = if percent < 1.0 { "less than 1".to_owned() } else { format!("{percent:.0}") };
+        let slides = unit == Unit::Metre;
+        let beyond = Visited::of(readings().chain(&dwells).copied().filter(|q| outside(q)), slides);
+        let message = format!(
+            "{far_dwells} of {} dwells and {percent} % of all readings are further than {} from every dwell of the \
+             calibration (bins {}; calibrated: {}): the error there is extrapolated, not covered by it",
+            dwells.len(),
+            shown(visited.bin, unit),
+            intervals(&beyond, unit),
+            intervals(visited, unit),
+        );
+        Some(Warning::new(
+            Severity::Notice,
+            Stage::Calibrate,
+            "beyond-calibrated-range",
+            name.clone(),
+            message,
+        ))
+    };
+    visited.iter().enumerate().filter_map(of_joint).collect()
+}
+
+fn intervals(visited: &Visited, unit: Unit) -> String {
+    let one = |[low, high]: &[f64; 2]| format!("{:.0} to {}", unit.to_display(*low), shown(*high, unit));
+    visited.intervals.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn shown(si: f64, unit: Unit) -> String {
+    format!("{:.0} {}", unit.to_display(si), unit.display_symbol())
+}
