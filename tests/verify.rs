@@ -252,6 +252,13 @@ fn a_tool_mounted_anew_is_declared_and_treated_alike_for_both_arms() {
     assert_eq!(subject_of(&remounted, "frame-fitted-on-verification"), Some("tip"));
     assert_eq!(subject_of(&remounted, "tip-kept"), None);
 
+    let elsewhere = "[frames.tip]\nat = { xyz_m = [0.0, 0.03, 0.0] }\n";
+    let overruled = verify(&moved, &verifying(folder, "overruled", elsewhere), 0);
+    assert_eq!(subject_of(&overruled, "tip-kept"), Some("tip"));
+    assert_eq!(
+        overruled["points"], kept["points"],
+        "a declared tip is not used while the calibration's is kept"
+    );
     let points = |seen: &Value| means(&seen["points"], &[("by", "all")]);
     let (known, kept, remounted) = (points(&known), points(&kept), points(&remounted));
     println!("tip known {known:?}, moved and kept {kept:?}, moved and fitted {remounted:?} mm");

@@ -72,9 +72,7 @@ pub fn place(
     let mut nominal = model.nominal();
     let mut calibrated = nominal.clone();
     for (at, parameter) in model.parameters().iter().enumerate() {
-        let of_tip = parameter.name.starts_with("tip.");
-        let of_arm = matches!(parameter.role, Role::Robot | Role::Effect);
-        if !of_arm && !(of_tip && pipeline.verify.tip == TipMount::Kept) {
+        if !matches!(parameter.role, Role::Robot | Role::Effect) {
             continue;
         }
         let known = then.model.index(&parameter.name).ok_or_else(|| Error::NotInResult {
@@ -91,12 +89,28 @@ pub fn place(
             });
         }
         calibrated[at] = then.values[known];
-        if let Some(tip) = then.nominal_values.get(known).filter(|_| of_tip) {
-            nominal[at] = *tip;
-        }
     }
-    put_base(&model, &base(&then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
+    if pipeline.verify.tip == TipMount::Kept {
+        put_frame(&model, "tip", &then.geometry.tip_in_last_link(&then.nominal_values), &mut nominal);
+        put_frame(&model, "tip", &then.model.tip_in_last_link(&then.values), &mut calibrated);
+    }
+    warnings.extend(tip_overruled(&then, pipeline, &model));
+    put_frame(&model, "base", &base(&then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
     Ok(Placed { model, nominal, calibrated, warnings })
+}
+
+/// A tip that is kept from the calibration although the pipeline declares another.
+fn tip_overruled(then: &PastArms, pipeline: &Pipeline, model: &Model) -> Option<Warning> {
+    let declared = pipeline.frames.tip.pose != FramePose::Estimated && pipeline.verify.tip == TipMount::Kept;
+    let tip_m = |model: &Model| model.tip_in_last_link(&model.nominal()).translation.vector;
+    let apart_m = (tip_m(model) - tip_m(&then.model)).norm();
+    let message = format!(
+        "kept as the calibration had it, although [frames.tip] of this pipeline declares it {:.2} mm from where the calibration's \
+         pipeline did; if tool or target were mounted anew since, set tip = \"remounted\" in [verify]",
+        apart_m * 1e3
+    );
+    let differs = declared && apart_m > 1e-9;
+    differs.then(|| Warning::new(Severity::Notice, Stage::Calibrate, "tip-kept", "tip", message))
 }
 
 /// Whether an effect holds beyond the recordings it was fitted on; what time does to it is doubtful.
@@ -135,21 +149,22 @@ fn base(then: &PastArms, pipeline: &Pipeline, now: &Pose) -> Pose {
     }
 }
 
-/// Writes a pose into the base's parameters: position, and the rotation vector that turns nominal into it.
-fn put_base(model: &Model, pose: &Pose, values: &mut [f64]) {
-    let nominal = model.base_in_world(&model.nominal());
+/// Writes a pose into the parameters of base or tip: position, and the rotation vector that turns nominal into it.
+fn put_frame(model: &Model, frame: &str, pose: &Pose, values: &mut [f64]) {
+    let start = model.nominal();
+    let nominal = if frame == "tip" { model.tip_in_last_link(&start) } else { model.base_in_world(&start) };
     let turn_rad = (nominal.rotation.inverse() * pose.rotation).scaled_axis();
     let at_m = pose.translation.vector;
     let entries = [
-        ("base.x", at_m.x),
-        ("base.y", at_m.y),
-        ("base.z", at_m.z),
-        ("base.rx", turn_rad.x),
-        ("base.ry", turn_rad.y),
-        ("base.rz", turn_rad.z),
+        ("x", at_m.x),
+        ("y", at_m.y),
+        ("z", at_m.z),
+        ("rx", turn_rad.x),
+        ("ry", turn_rad.y),
+        ("rz", turn_rad.z),
     ];
-    for (name, value) in entries {
-        if let Some(at) = model.index(name) {
+    for (quantity, value) in entries {
+        if let Some(at) = model.index(&format!("{frame}.{quantity}")) {
             values[at] = value;
         }
     }
