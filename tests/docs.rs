@@ -1,5 +1,8 @@
 use crate::support::root;
 use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Every key of the sections that have defaults, as the program itself spells them.
 fn keys<T: Serialize>(section: &T) -> Vec<String> {
@@ -63,4 +66,108 @@ fn the_limits_shown_in_the_guide_to_checks_are_understood() {
     let unset: Vec<&String> =
         all.as_object().expect("a table").iter().filter(|(_, v)| v.is_null()).map(|(k, _)| k).collect();
     assert!(unset.is_empty(), "docs/check.md does not show {unset:?}");
+}
+
+/// Stands before a block that quotes what a command prints.
+const PRINTS: &str = "<!-- prints: armcal ";
+
+/// README.md and the guides.
+fn documents() -> Vec<PathBuf> {
+    let guides =
+        std::fs::read_dir(root().join("docs")).expect("docs").map(|entry| entry.expect("entry").path());
+    let mut all: Vec<PathBuf> = guides.filter(|p| p.extension().is_some_and(|e| e == "md")).collect();
+    all.push(root().join("README.md"));
+    all.sort();
+    all
+}
+
+/// Line number from 1, what stands before it and the lines of every fenced block without a language.
+fn plain_blocks(text: &str) -> Vec<(usize, &str, Vec<&str>)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let (mut blocks, mut opened): (Vec<(usize, &str, Vec<&str>)>, Option<(usize, bool)>) = (Vec::new(), None);
+    for (i, line) in lines.iter().enumerate() {
+        match (line.strip_prefix("```"), opened) {
+            (Some(language), None) => opened = Some((i, language.is_empty())),
+            (Some(_), Some((from, plain))) => {
+                let before = from.checked_sub(1).map_or("", |before| lines[before]);
+                if plain {
+                    blocks.push((from + 1, before, lines[from + 1..i].to_vec()));
+                }
+                opened = None;
+            }
+            (None, _) => {}
+        }
+    }
+    blocks
+}
+
+/// What a command prints, run in the repository with its results elsewhere.
+fn printed(command: &str, out: &Path) -> String {
+    let mut armcal = Command::new(env!("CARGO_BIN_EXE_armcal"));
+    armcal.current_dir(root()).args(command.split(' '));
+    if command.starts_with("run ") {
+        armcal.arg("--out").arg(out);
+    }
+    let output = armcal.output().expect("starting armcal");
+    assert!(output.status.success(), "armcal {command}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The first quoted line that is not printed where it stands; `...` stands for any number of lines.
+fn first_misquote<'a>(quoted: &[&'a str], printed: &str) -> Option<&'a str> {
+    let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
+    let (mut at, mut anywhere) = (0, true);
+    for line in quoted {
+        if line.trim() == "..." {
+            anywhere = true;
+            continue;
+        }
+        let found = if anywhere {
+            printed[at..].iter().position(|p| p == line)
+        } else {
+            printed.get(at).filter(|p| *p == line).map(|_| 0)
+        };
+        match found {
+            Some(by) => at += by + 1,
+            None => return Some(line),
+        }
+        // Sections are quoted without what stands between them: an empty line ends one.
+        anywhere = line.is_empty();
+    }
+    None
+}
+
+#[test]
+fn a_misquote_is_found() {
+    let printed = "a 1\nb 2\n\nc 3\nd 4\n";
+    assert_eq!(first_misquote(&["a 1", "...", "d 4"], printed), None);
+    assert_eq!(first_misquote(&["b 2", "", "d 4"], printed), None);
+    assert_eq!(first_misquote(&["a 1", "c 3"], printed), Some("c 3"));
+    assert_eq!(first_misquote(&["a 1", "...", "d 5"], printed), Some("d 5"));
+    assert_eq!(first_misquote(&["...", "d 4", "...", "a 1"], printed), Some("a 1"));
+}
+
+#[test]
+fn what_the_documents_quote_is_what_the_commands_print() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (mut said, mut quotes): (BTreeMap<String, String>, usize) = (BTreeMap::new(), 0);
+    for path in documents() {
+        let text = std::fs::read_to_string(&path).expect("document");
+        for (line, before, quoted) in plain_blocks(&text) {
+            let at = format!("{}:{line}", path.display());
+            assert!(before.starts_with("<!-- prints"), "{at}: say what prints this, in a comment before it");
+            let Some(command) = before.strip_prefix(PRINTS).and_then(|c| c.strip_suffix(" -->")) else {
+                continue;
+            };
+            let out = folder.path().join(said.len().to_string());
+            let said = said.entry(command.to_owned()).or_insert_with(|| printed(command, &out));
+            let misquote = first_misquote(&quoted, said);
+            assert!(
+                misquote.is_none(),
+                "{at}: `armcal {command}` does not print {misquote:?} there, but\n{said}"
+            );
+            quotes += 1;
+        }
+    }
+    assert!(quotes >= 2, "only {quotes} quotes were found");
 }

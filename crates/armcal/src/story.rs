@@ -362,7 +362,7 @@ fn closing_warnings(rounds: usize, calibration: &Calibration) -> Vec<Warning> {
             "association",
             format!(
                 "after {MAX_ROUNDS} rounds of fitting and associating, dwells still change cavities; \
-                 give a visiting order or check the board file"
+                 give a visiting order, [table.association] visiting_order"
             ),
         ));
     }

@@ -93,7 +93,7 @@ pub enum TableError {
     },
     /// The board cannot be the one that was visited, or its pose is wrong.
     #[error(
-        "board `{board}` does not fit the dwells of this recording: {what}. Check that the board file is the board that was used, that its pose and tilt are right, and that the model's base and tool are right"
+        "board `{board}` does not fit the dwells of this recording: {what}. Check that the board file is the board that was used, that its pose and tilt are right, that the model's base and tool are right, and that the arm rested in its cavities"
     )]
     DoesNotFit {
         /// The board.

@@ -238,7 +238,8 @@ fn warnings(
         let message = format!(
             "{lost} of {near} dwells near the board belong to no cavity{}; see each dwell's reason",
             if many {
-                ", more than max_unassigned_share allows: check the board file and its pose"
+                ", more than max_unassigned_share allows; the board file may lack cavities, the board may be elsewhere, or \
+                 those dwells may be no rest in a cavity"
             } else {
                 ""
             }
