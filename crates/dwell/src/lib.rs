@@ -29,7 +29,7 @@ mod summary;
 mod testkit;
 mod track;
 
-pub use align::{NominalArm, align_clocks};
+pub use align::{NominalArm, TipOf, align_clocks};
 pub use clock::ClockAlignment;
 pub use config::{ClockConfig, DwellConfig, KnownClock};
 pub use detect::detect_dwells;

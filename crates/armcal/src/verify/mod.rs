@@ -26,7 +26,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Warnings about a clock that the nominal arm judged.
-const OF_NOMINAL_CLOCK: [&str; 3] = ["clock-not-linear", "clock-uncertain", "clock-drift-unknown"];
+const OF_NOMINAL_CLOCK: [&str; 4] =
+    ["clock-not-linear", "clock-uncertain", "clock-drift-unknown", "clock-drift-limited"];
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
 pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result<Verification, Error> {

@@ -46,12 +46,15 @@ const TRIED_ROWS: f64 = 5.0;
 const MODEL_ROUNDS: usize = 3;
 const MODEL_SETTLED: f64 = 0.05;
 
+/// A tip of the readings of all joints [rad] and of the deviations of all uncertain parameters.
+pub type TipOf<'a> = dyn Fn(&[f64], &[f64]) -> Vector3<f64> + Sync + 'a;
+
 /// The arm as it is known before it is calibrated.
 #[derive(Clone, Copy)]
 pub struct NominalArm<'a> {
     /// Position of the tip in any fixed frame [m], of the joints' readings [rad] and of how far each uncertain parameter
     /// is off, in standard deviations of its prior.
-    pub tip_m: &'a (dyn Fn(&[f64], &[f64]) -> Vector3<f64> + Sync),
+    pub tip_m: &'a TipOf<'a>,
     /// Number of uncertain parameters.
     pub uncertain: usize,
 }
@@ -397,8 +400,8 @@ impl<'a> Streams<'a> {
                 "a joint spans {widest:.0} rad, which looks like degrees: set unit = \"deg\" for the joint stream"
             )
         } else {
-            "check that both streams are of the same session, the order, unit and direction of the joints, and \
-             that the stream shows the tip; or raise clock.max_offset_s"
+            "check that both streams are of the same session, the order, unit and direction of the joints, that the \
+             stream shows the tip, and that no clock was set meanwhile; or raise clock.max_offset_s"
                 .to_string()
         };
         DwellError::CorrelationTooLow {

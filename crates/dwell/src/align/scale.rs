@@ -73,8 +73,8 @@ impl Track {
     }
 }
 
-#[derive(Clone)]
 /// Both speed profiles under a kernel of half-width `h_s`, and what counts as motion in them.
+#[derive(Clone)]
 pub(crate) struct Scale {
     pub h_s: f64,
     pub sensor: SpeedProfile,

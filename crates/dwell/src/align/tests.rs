@@ -59,8 +59,10 @@ fn intervals_of_offset_and_drift_hold_the_truth_as_often_as_they_say() {
     let error = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     println!("middle {middle}, end {end}, drift {rate} of {seeds}; sigma {typical}, error {error}");
     for (what, inside) in [("middle", middle), ("end", end), ("drift", rate)] {
-        assert!((180..=198).contains(&inside), "{what}: {inside} of {seeds}");
+        assert!(inside >= 180, "{what}: {inside} of {seeds}");
     }
+    // Nor are they wider than they need to be.
+    assert!(typical < 1.5 * error, "typical sigma {typical}, error {error}");
     assert!(typical < 2e-4 && error < 2e-4, "typical sigma {typical}, error {error}");
 }
 
@@ -328,7 +330,7 @@ fn an_offset_beyond_the_search_is_said() {
 
 #[test]
 fn a_clock_set_during_the_recording_is_noticed_with_its_size() {
-    for (seed, by_s, share) in [(10, 0.12_f64, 0.67), (11, -0.031, 0.67), (12, 1.0, 0.67)] {
+    for (seed, by_s, share) in [(10, 0.12_f64, 0.67), (11, -0.031, 0.67), (12, 1.0, 0.8)] {
         let (mut r, s) = session(seed);
         let (joints, mut tip) = (s.encoders(&mut r, 100.0, 2e-5, 0.0), s.tip(&mut r, 100.0, 1e-4, 0.1, 0.0));
         let half = (tip.len() as f64 * share) as usize;
