@@ -12,4 +12,5 @@ mod source;
 
 pub use bench::Bench;
 pub use server::serve;
+pub(crate) use source::FILE as SOURCE_FILE;
 pub use source::{pipeline_of, remember};

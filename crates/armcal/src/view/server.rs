@@ -13,14 +13,18 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde_json::json;
 use std::net::{Ipv4Addr, TcpListener};
-use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A question is a few names and a formula [bytes].
 const LARGEST_BODY: usize = 64 * 1024;
 
+/// Refits at a time, those that wait for their turn included. A page asks for one at a time.
+const MOST_ASKED: usize = 8;
+
 /// Serves a bench on 127.0.0.1 until the process ends; calls `ready` with the address when it listens. Port 0 takes any
 /// free one.
-pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Error> {
+pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Error>) -> Result<(), Error> {
     let failed = |what: &'static str| move |source| Error::Serve { what, port, source };
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed("listening"))?;
     let port = listener.local_addr().map_err(failed("listening"))?.port();
@@ -28,12 +32,13 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Er
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
     let html = bench.html()?;
-    let app = routes(Arc::new(Served { bench, html }), guard);
+    let app =
+        routes(Arc::new(Served { bench, html, turn: Mutex::new(()), asked: AtomicUsize::new(0) }), guard);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed("starting"))?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed("listening"))?;
-        ready(&address);
+        ready(&address)?;
         axum::serve(listener, app).await.map_err(failed("serving"))
     })
 }
@@ -41,6 +46,27 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Er
 struct Served {
     bench: Bench,
     html: String,
+    /// Held by the one refit that is computed: it takes all cores.
+    turn: Mutex<()>,
+    /// Refits that are computed or wait for their turn.
+    asked: AtomicUsize,
+}
+
+/// A place among the refits, given back when its answer is made, also where nobody waits for that any more.
+struct Place(Arc<Served>);
+
+impl Place {
+    /// A place, unless too many are taken.
+    fn of(served: Arc<Served>) -> Option<Place> {
+        let place = Place(served);
+        (place.0.asked.fetch_add(1, Ordering::SeqCst) < MOST_ASKED).then_some(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.asked.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 fn routes(served: Arc<Served>, guard: Guard) -> Router {
@@ -83,7 +109,15 @@ async fn choices(State(served): State<Arc<Served>>) -> Response {
 }
 
 async fn refit(State(served): State<Arc<Served>>, body: Bytes) -> Response {
-    asked(served, body, |bench, wanted| bench.refit(wanted)).await
+    let Some(place) = Place::of(served.clone()) else {
+        let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
+        return answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }));
+    };
+    asked(served, body, move |bench, wanted| {
+        let _turn = place.0.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        bench.refit(wanted)
+    })
+    .await
 }
 
 async fn keep(State(served): State<Arc<Served>>, body: Bytes) -> Response {
