@@ -37,7 +37,7 @@ const RECORDS: [(&str, &str); 4] = [
 ];
 
 /// Kind, beginning, and a part of the head of texts that are marked otherwise.
-const SIGNATURES: [(&str, &str, &str); 10] = [
+const SIGNATURES: [(&str, &str, &str); 11] = [
     ("parameters", "# Parameters of the calibrated arm. value, nominal, sigma and ci95", ""),
     ("pooled-parameters", "# Parameters of an arm calibrated on many recordings at once. ", ""),
     ("closed-chain-parameters", "# Parameters of two arms in a closed chain. ", ""),
@@ -47,6 +47,7 @@ const SIGNATURES: [(&str, &str, &str); 10] = [
     ("set-points", "name,kind,t_s,x_m,y_m,z_m,nominal.", "set_point."),
     ("junit", "<?xml ", "<testsuites name=\"armcal check\""),
     ("check-summary", "### ", "\n| check | measured | limit | |\n"),
+    ("check-summary", "### ", ": no check was made, the run failed\n"),
     (EARLIER_PAGE, "<!doctype html>\n", "– armcal</title>"),
 ];
 /// A page of a version that did not say which.
@@ -130,7 +131,13 @@ fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
         names.extend(parse_metadata(&ranged.read_one(range.clone())?).map(|(name, _)| name));
     }
     let borne = |(record, _): &&(&str, &str)| names.iter().any(|name| name == record);
-    Ok(RECORDS.iter().find(borne).map(|(_, kind)| Mark((*kind).to_owned())))
+    // Set-points of earlier versions have no record, but no other topics either.
+    let channels = layout.definitions.resolve();
+    let set_points = !channels.is_empty()
+        && names.is_empty()
+        && channels.values().all(|channel| channel.topic.starts_with("/joint_set_points"));
+    let earlier = || set_points.then_some(&RECORDS[2]);
+    Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| Mark((*kind).to_owned())))
 }
 
 fn of_parquet(file: &mut File) -> io::Result<Option<Mark>> {

@@ -109,14 +109,11 @@ pub fn write_all(
         InputMessages::Copy => recordings,
         InputMessages::Reference => &[],
     };
-    // Nothing gets its name where something else cannot.
-    may_commit(&staged)?;
     let mcap_path = out_dir.join(RUN);
-    write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
-
-    let mut written = vec![mcap_path];
-    written.extend(commit_all(staged)?);
-    Ok(written)
+    let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);
+    // The last to get its name: by what the old one holds, files of earlier versions are known.
+    staged.push(mcap.map_err(at(&mcap_path))?);
+    commit_all(staged)
 }
 
 /// The files that [`write_all`] writes into `out_dir`, for an arm whose nominal model is a URDF or a DH file: to look at
@@ -175,7 +172,7 @@ pub(crate) fn commit_all(staged: Vec<AtomicFile>) -> Result<Vec<PathBuf>, Report
 }
 
 /// Whether each of these may take its place.
-pub(crate) fn may_commit(staged: &[AtomicFile]) -> Result<(), ReportError> {
+fn may_commit(staged: &[AtomicFile]) -> Result<(), ReportError> {
     staged.iter().try_for_each(|file| file.may_commit().map_err(at(file.target())))
 }
 

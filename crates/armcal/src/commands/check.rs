@@ -30,11 +30,9 @@ pub struct Request<'a> {
 /// Runs the pipeline and judges it. A run that fails leaves its error in the files too, so that CI shows it where it
 /// shows the checks.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    // Loaded first, or not: either way the files it names are known as inputs.
+    // Loaded first: the files it names are inputs.
     let pipeline = Pipeline::load(request.pipeline);
-    let results = pipeline.iter().zip(request.out).flat_map(|(pipeline, out)| results(pipeline, out));
-    let reports = [request.junit, request.markdown].into_iter().flatten().map(Path::to_owned);
-    may_write(results.chain(reports))?;
+    may_write([request.junit, request.markdown].into_iter().flatten())?;
     match pipeline.and_then(|pipeline| judged(request, &pipeline)) {
         Ok(judged) => {
             write(request.junit, || junit::junit(&judged))?;
@@ -55,6 +53,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
 
 fn judged(request: &Request<'_>, pipeline: &Pipeline) -> Result<Judged, Error> {
     let limits = Limits::of(pipeline, request.pipeline)?;
+    may_write(request.out.map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
     let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &progress)?, pipeline, &progress)?;
     let judged = judge(&run, &limits)?;

@@ -3,6 +3,7 @@
 use super::bench::Bench;
 use super::guard::Guard;
 use super::requests::Wanted;
+use super::turns::{MOST_ASKED, Turns};
 use crate::error::Error;
 use axum::Router;
 use axum::body::Bytes;
@@ -13,14 +14,10 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde_json::json;
 use std::net::{Ipv4Addr, TcpListener};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// A question is a few names and a formula [bytes].
 const LARGEST_BODY: usize = 64 * 1024;
-
-/// Refits at a time, those that wait for their turn included. A page asks for one at a time.
-const MOST_ASKED: usize = 8;
 
 /// Serves a bench on 127.0.0.1 until the process ends; calls `ready` with the address when it listens. Port 0 takes any
 /// free one.
@@ -32,8 +29,7 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Err
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
     let html = bench.html()?;
-    let app =
-        routes(Arc::new(Served { bench, html, turn: Mutex::new(()), asked: AtomicUsize::new(0) }), guard);
+    let app = routes(Arc::new(Served { bench, html, turns: Arc::default() }), guard);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed("starting"))?;
     runtime.block_on(async {
@@ -46,27 +42,7 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Err
 struct Served {
     bench: Bench,
     html: String,
-    /// Held by the one refit that is computed: it takes all cores.
-    turn: Mutex<()>,
-    /// Refits that are computed or wait for their turn.
-    asked: AtomicUsize,
-}
-
-/// A place among the refits, given back when its answer is made, also where nobody waits for that any more.
-struct Place(Arc<Served>);
-
-impl Place {
-    /// A place, unless too many are taken.
-    fn of(served: Arc<Served>) -> Option<Place> {
-        let place = Place(served);
-        (place.0.asked.fetch_add(1, Ordering::SeqCst) < MOST_ASKED).then_some(place)
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        self.0.asked.fetch_sub(1, Ordering::SeqCst);
-    }
+    turns: Arc<Turns>,
 }
 
 fn routes(served: Arc<Served>, guard: Guard) -> Router {
@@ -109,12 +85,12 @@ async fn choices(State(served): State<Arc<Served>>) -> Response {
 }
 
 async fn refit(State(served): State<Arc<Served>>, body: Bytes) -> Response {
-    let Some(place) = Place::of(served.clone()) else {
+    let Some(place) = served.turns.place() else {
         let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
         return answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }));
     };
     asked(served, body, move |bench, wanted| {
-        let _turn = place.0.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let _turn = place.turn();
         bench.refit(wanted)
     })
     .await
