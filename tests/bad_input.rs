@@ -1,3 +1,4 @@
+use crate::support::world::{World, complaint};
 use crate::support::{armcal, paper_pipeline, read_json, root};
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -217,4 +218,94 @@ fn a_full_disk_leaves_nothing_half_written() {
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(!left.iter().any(|name| name == "run.mcap"), "a half-written run.mcap was left among {left:?}");
     assert!(!left.iter().any(|name| name.contains("tmp")), "temporary files were left: {left:?}");
+}
+
+/// Something else where a pipeline belongs is named for what it is, and what is wanted is said.
+#[test]
+fn what_is_no_pipeline_is_named_for_what_it_is() {
+    let world = World::new();
+    world.write("old.bag", "#ROSBAG V2.0\nxxxxxxxxxxxxxx");
+    world.write("new.db3", "SQLite format 3\0xxxxxxxxxxxxx");
+    std::fs::write(world.path("odd.toml"), [0xff, 0xfe, b'n', 0]).expect("written");
+    for (file, says) in [
+        ("normal.mcap", "normal.mcap is a recording (MCAP), where a pipeline belongs"),
+        ("normal.mcap", "armcal inspect normal.mcap"),
+        ("old.bag", "old.bag is a ROS 1 bag, where a pipeline belongs: convert it with `mcap convert"),
+        (
+            "new.db3",
+            "new.db3 is a rosbag2 database, where a pipeline belongs: convert it with `ros2 bag convert`",
+        ),
+        ("result", "result is a folder, where a pipeline belongs"),
+        ("odd.toml", "reading the pipeline odd.toml: it is not UTF-8 text"),
+        ("none.toml", "reading the pipeline none.toml: No such file"),
+    ] {
+        for arguments in
+            [&["run", file][..], &["add", "backlash:1", file], &["check", file], &["export", file]]
+        {
+            let output = world.armcal(arguments);
+            let said = complaint(&output);
+            assert!(output.status.code() == Some(1) && said.contains(says), "{arguments:?}: {said}");
+        }
+    }
+    for (arguments, says) in [
+        (vec!["simulate", "normal.mcap"], "is a recording (MCAP), where a lab file belongs"),
+        (
+            vec!["compensate", "result", "normal.mcap"],
+            "is a recording (MCAP), where a file of targets belongs",
+        ),
+    ] {
+        let said = complaint(&world.armcal(arguments));
+        assert!(said.contains(says), "{said}");
+    }
+}
+
+/// A name that the command line gets wrong is a mistake of usage (2), told before anything is computed, with the nearest
+/// name; the same name in a file is a mistake in that file (1).
+#[test]
+fn names_that_do_not_exist_are_usage_errors_with_the_nearest_name() {
+    let world = World::new();
+    for (arguments, says) in [
+        (&["effects", "backlas"][..], "did you mean \"backlash\"?"),
+        (&["add", "complience:2", "p.toml"], "did you mean \"compliance\"?"),
+        (&["add", "backlash:9", "p.toml"], "backlash:9"),
+        (&["plan", "p.toml", "--effects", "backlash:1,eccentricty:2"], "did you mean \"eccentricity\"?"),
+        (&["plan", "p.toml", "--range", "7=0..1"], "--range 7=0..1"),
+        (&["score", "nothing", "bcklash"], "did you mean `backlash`?"),
+        (&["score", "nothing", "--design", "free-pose"], "free-poses"),
+        (&["score", "backlash+gear_rato"], "did you mean `gear_ratio`?"),
+        (&["simulate", "--hide", "bcklash"], "did you mean `backlash`?"),
+        (&["simulate", "--hide", "nothing", "--size", "larg"], "large"),
+        (
+            &["extract", "normal.mcap", "--out", "x.mcap", "--topic", "/joint_state"],
+            "did you mean \"/joint_states\"?",
+        ),
+        (&["compensate", "result", "targets.csv", "--as-in", "nomal"], "normal"),
+        (&["compensate", "result", "targets.csv", "--frame", "board.nomal"], "normal"),
+        (&["map", "--manifest", "manifest.txt", "--pipeline", "p.toml", "--shard", "3/2"], "--shard"),
+    ] {
+        let output = world.armcal(arguments);
+        let said = complaint(&output);
+        assert!(output.status.code() == Some(2) && said.contains(says), "{arguments:?}: {said}");
+    }
+    let text = std::fs::read_to_string(world.path("p.toml")).expect("pipeline");
+    world.write("wrong.toml", &format!("{text}\n[[effects]]\nkind = \"backlas\"\ntarget = \"joint1\"\n"));
+    let output = world.armcal(["run", "wrong.toml"]);
+    assert_eq!(output.status.code(), Some(1), "{}", complaint(&output));
+}
+
+/// A recording in which nothing was recorded is no recording to look at.
+#[test]
+fn inspecting_a_recording_without_a_message_fails_and_says_so() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("zero.mcap"), b"").expect("written");
+    let mut empty =
+        mcap::Writer::new(std::fs::File::create(path("empty.mcap")).expect("created")).expect("begun");
+    empty.add_channel(0, "/joint_states", "cdr", &Default::default()).expect("a channel");
+    empty.finish().expect("finished");
+    for (name, says) in [("zero.mcap", "the file is empty"), ("empty.mcap", "`empty` holds no message")] {
+        let output = armcal([Path::new("inspect"), &path(name)]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains(says), "{name}: {said}");
+    }
 }

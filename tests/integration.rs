@@ -23,6 +23,9 @@ mod corrupt_recordings;
 /// Are results whole whatever happens to the disk, the folder or the process?
 mod write_faults;
 
+/// Is nothing written over that a command was given, or that armcal did not make?
+mod sacred_inputs;
+
 /// Do names out of a recording stay names?
 mod hostile_names;
 

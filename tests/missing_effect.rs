@@ -93,7 +93,7 @@ fn the_papers_backlash_is_named_and_adding_it_brings_the_error_down() {
 fn an_effect_that_does_not_exist_is_refused_with_the_nearest_name() {
     let pipeline = root().join("pipelines/paper.toml");
     let output = armcal([Path::new("add"), Path::new("backlsh:1"), &pipeline]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(words.contains("backlsh") && words.contains("backlash"), "{words}");
     assert!(!pipeline.with_file_name("paper+backlsh-1.toml").exists());

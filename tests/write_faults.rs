@@ -1,4 +1,6 @@
+use crate::support::world::{Place, World, cases, complaint, printing};
 use crate::support::{files_made, quick_pipeline, root};
+use clap::CommandFactory as _;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -304,4 +306,71 @@ fn killed_at_any_moment_results_are_whole() {
 
 fn changed(bench: &Bench) -> usize {
     bench.new.iter().filter(|(name, bytes)| bench.old.get(*name) != Some(*bytes)).count()
+}
+
+/// Every command prints something, and says so when nobody gets it. The page server would run on, so it is given the time
+/// of a test and no more.
+#[test]
+fn what_cannot_be_printed_fails_every_command() {
+    let world = World::new();
+    let shown: BTreeSet<String> = printing().iter().map(|arguments| arguments[0].to_owned()).collect();
+    for command in armcal::cli::Cli::command().get_subcommands() {
+        assert!(shown.contains(command.get_name()), "`{}` is not tried", command.get_name());
+    }
+    for arguments in printing() {
+        let full = std::fs::File::options().write(true).open("/dev/full").expect("/dev/full");
+        let output = world.command(&arguments).stdout(full).output().expect("starting armcal");
+        let said = complaint(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?} > /dev/full: {said}");
+        assert!(
+            said.contains("printing to stdout: No space left on device"),
+            "{arguments:?} > /dev/full: {said}"
+        );
+    }
+    for arguments in
+        [&["effects"][..], &["run", "p.toml", "--out", "fresh"], &["inspect", "normal.mcap"], &["--help"]]
+    {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "exec \"$0\" \"$@\" >&-", env!("CARGO_BIN_EXE_armcal")]).args(arguments);
+        let output = shell.current_dir(world.path("")).output().expect("starting sh");
+        let said = complaint(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?} >&-: {said}");
+        assert!(said.contains("printing to stdout: it is closed"), "{arguments:?} >&-: {said}");
+        // Nobody wants to read it, or somebody has read enough: that is no failure.
+        let mut shell = Command::new("sh");
+        shell
+            .args(["-c", "(\"$0\" \"$@\"; echo $? >code) | true; \"$0\" \"$@\" >/dev/null || echo $? >code"]);
+        shell.arg(env!("CARGO_BIN_EXE_armcal")).args(arguments).current_dir(world.path(""));
+        assert!(shell.status().expect("starting sh").success());
+        let code = std::fs::read_to_string(world.path("code")).expect("the exit code");
+        assert_eq!(code, "0\n", "{arguments:?} | true");
+    }
+    // The results that a run writes to files do not depend on who reads its table.
+    assert!(world.path("fresh/run.mcap").is_file());
+}
+
+/// A file beside the results that cannot be written is as bad as the results.
+#[test]
+fn every_output_that_cannot_be_written_is_named() {
+    let world = World::new();
+    std::fs::create_dir(world.path("taken")).expect("a folder in the way");
+    for case in cases() {
+        let _ = std::fs::remove_dir_all(world.path("out"));
+        let (out, named) = match &case.place {
+            Place::File => (world.path("no/such/folder/file"), "no/such/folder/file".to_owned()),
+            Place::Folder(names) => {
+                let out = world.path("out");
+                std::fs::create_dir_all(out.join(&names[0])).expect("a folder in the way");
+                (out, names[0].clone())
+            }
+        };
+        // Its own inputs are in it.
+        if case.name[0] == "reduce" {
+            continue;
+        }
+        let output = world.attempt(&case, &out);
+        let said = complaint(&output);
+        assert_eq!(output.status.code(), Some(1), "{:?} to {}: {said}", case.arguments, out.display());
+        assert!(said.contains(&named), "{:?} to {}: {said}", case.arguments, out.display());
+    }
 }

@@ -4,6 +4,7 @@ pub mod browser;
 pub mod conformance;
 pub mod damage;
 pub mod slurm;
+pub mod world;
 
 use serde_json::Value;
 use std::collections::BTreeMap;

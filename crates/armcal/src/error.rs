@@ -23,6 +23,29 @@ pub enum Error {
         /// The parser's message, with the line.
         source: Box<toml::de::Error>,
     },
+    /// Something else where a file that people write belongs: a recording, a folder.
+    #[error("{} is {found}, where a {wanted} belongs: {next}", path.display())]
+    NotText {
+        /// What was given.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+        /// What was wanted.
+        wanted: &'static str,
+        /// What to do.
+        next: String,
+    },
+    /// A recording without a message.
+    #[error(
+        "recording `{recording}` holds no message: there is nothing to calibrate with; was anything recorded?"
+    )]
+    NoMessages {
+        /// Its name.
+        recording: String,
+    },
+    /// A name on the command line that means nothing.
+    #[error(transparent)]
+    Usage(Box<Error>),
     /// Two parts of the pipeline contradict each other.
     #[error("pipeline {}: `{key}` {problem}", path.display())]
     PipelineContradiction {
@@ -275,12 +298,6 @@ pub enum Error {
         /// Name of the pipeline.
         pipeline: String,
     },
-    /// A pipeline file of another content is in the way.
-    #[error("{} exists and says something else; choose another file with --write", path.display())]
-    WouldOverwrite {
-        /// The file.
-        path: PathBuf,
-    },
     /// A folder of results does not say which pipeline made it.
     #[error(
         "{} does not say which pipeline made it (view.toml: {source}); name the pipeline file instead",
@@ -365,13 +382,25 @@ pub enum Error {
     /// Writing a result of a small command.
     #[error(transparent)]
     Output(armcal_recording::RecordingError),
+    /// Printing a result.
+    #[error("printing to stdout: {0}")]
+    Stdout(std::io::Error),
 }
 
 impl Error {
+    /// The same, as a mistake on the command line.
+    pub fn of_usage(error: impl Into<Error>) -> Error {
+        Error::Usage(Box::new(error.into()))
+    }
+
     /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::NoLimits { .. } => 2,
+            Error::NoLimits { .. }
+            | Error::Usage(_)
+            | Error::BadOption { .. }
+            | Error::Shard(_)
+            | Error::NoPipeline => 2,
             Error::Also { first, .. } => first.exit_code(),
             _ => 1,
         }

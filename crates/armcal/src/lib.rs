@@ -3,6 +3,8 @@
 //! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
 //! are what a user types. Two arms have a pipeline and a story of their own in [`closed_chain`].
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 pub mod batch;
 pub mod check;
 pub mod cli;
@@ -17,6 +19,7 @@ pub mod progress;
 pub mod score;
 pub mod setup;
 pub mod stages;
+pub mod stdout;
 pub mod story;
 pub mod verify;
 pub mod view;

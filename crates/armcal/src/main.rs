@@ -2,15 +2,26 @@
 
 use armcal::cli::Cli;
 use armcal::commands::{self, Outcome};
+use armcal::{Error, stdout};
 use armcal_report::TerminalStyle;
 use clap::Parser as _;
 use std::io::Write as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // clap prints usage errors itself and exits with 2.
-    let cli = Cli::parse();
-    match commands::dispatch(&cli) {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version are results; usage errors clap prints itself and exits with 2.
+        Err(asked) if !asked.use_stderr() => {
+            return ended(stdout::written(|_| asked.print()).map(|()| Outcome::Done));
+        }
+        Err(mistake) => mistake.exit(),
+    };
+    ended(commands::dispatch(&cli))
+}
+
+fn ended(result: Result<Outcome, Error>) -> ExitCode {
+    match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Doubtful) => ExitCode::from(3),
         Ok(Outcome::Broken) => ExitCode::FAILURE,
@@ -24,4 +35,24 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Asks whether stdout is open before the standard library hides that: it begins only after the constructors of the
+/// program.
+#[cfg(target_os = "linux")]
+mod begin {
+    use std::sync::atomic::Ordering;
+
+    extern "C" fn look() {
+        // SAFETY: it asks about a number and changes nothing.
+        #[allow(unsafe_code, reason = "no safe interface takes a descriptor that may be closed")]
+        let closed = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) } == -1;
+        armcal::stdout::WAS_CLOSED.store(closed, Ordering::Relaxed);
+    }
+
+    // SAFETY: the loader calls every function in this section once, before `main`; it needs nothing that is made later.
+    #[allow(unsafe_code, reason = "nothing else runs before the standard library")]
+    #[used]
+    #[unsafe(link_section = ".init_array")]
+    static LOOK: extern "C" fn() = look;
 }

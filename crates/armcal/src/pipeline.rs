@@ -12,10 +12,11 @@ use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
 use armcal_model::{Deviation, EffectTable};
-use armcal_recording::Streams;
+use armcal_recording::{Streams, input};
 use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
 use serde::Deserialize;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// A pipeline, as written.
@@ -287,12 +288,39 @@ impl Job {
     }
 }
 
+/// A pipeline's text.
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
-        what: "pipeline",
-        path: path.to_owned(),
-        source,
-    })
+    read_text("pipeline", path)
+}
+
+/// The text of a file that people write; a recording or a folder in its place is named for what it is.
+pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error> {
+    let failed = |source| Error::ReadFile { what, path: path.to_owned(), source };
+    let is = |found, next| Err(Error::NotText { path: path.to_owned(), found, wanted: what, next });
+    let own = "name it under [[recordings]] of a pipeline file (docs/pipeline-reference.md), and give that";
+    if path.is_dir() {
+        let next = "name the TOML file; recordings are listed in it, under [[recordings]]";
+        return is("a folder", next.to_owned());
+    }
+    let (mut bytes, mut file) = (Vec::new(), input::open(path).map_err(failed)?);
+    file.by_ref().take(16).read_to_end(&mut bytes).map_err(failed)?;
+    match bytes.as_slice() {
+        b if b.starts_with(b"\x89MCAP") => is(
+            "a recording (MCAP)",
+            format!("{own}; `armcal inspect {}` shows what is in it", path.display()),
+        ),
+        b if b.starts_with(b"#ROSBAG") => {
+            is("a ROS 1 bag", format!("convert it with `mcap convert in.bag out.mcap`, {own}"))
+        }
+        b if b.starts_with(b"SQLite format 3") => {
+            is("a rosbag2 database", format!("convert it with `ros2 bag convert` to MCAP, {own}"))
+        }
+        _ => {
+            file.read_to_end(&mut bytes).map_err(failed)?;
+            let text = String::from_utf8(bytes);
+            text.map_err(|_| failed(std::io::Error::other("it is not UTF-8 text")))
+        }
+    }
 }
 
 /// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
@@ -339,7 +367,21 @@ impl Pipeline {
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
+        pipeline.note_inputs();
         Ok(pipeline)
+    }
+
+    /// Notes every file that the pipeline names, so that no output is begun in its place.
+    fn note_inputs(&self) {
+        let model = [&self.model.dh, &self.model.urdf].into_iter().flatten();
+        let board = self.table.iter().map(|table| &table.board);
+        let recordings = self.recordings.iter().flat_map(|entry| &entry.paths);
+        model.chain(board).chain(recordings).for_each(|path| input::note(&self.resolve(path)));
+        if let Some(reference) = &self.check.reference {
+            let reference = self.resolve(reference);
+            let inside = ["summary.json", "run.mcap"].map(|name| reference.join(name));
+            inside.iter().chain([&reference]).for_each(|path| input::note(path));
+        }
     }
 
     /// A path of the pipeline file, resolved against its folder; a URL stays as it is.

@@ -148,7 +148,7 @@ pub fn drawing(path: &Path) -> Result<String, LabError> {
         return Ok(PAPER.to_owned());
     }
     let refused = |source| LabError::Read { what: "board file", path: path.to_owned(), source };
-    std::fs::read_to_string(path).map_err(refused)
+    armcal_recording::input::read_to_string(path).map_err(refused)
 }
 
 impl TiltMechanism {

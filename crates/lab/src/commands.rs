@@ -30,11 +30,8 @@ impl Commands {
     fn load(config: &LabConfig, told: &SetPointsConfig, base_dir: &Path) -> Result<Commands, LabError> {
         let path = base_dir.join(&told.file);
         let failed = |why: String| LabError::SetPoints { path: path.clone(), why };
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_path(&path)
-            .map_err(|e| failed(e.to_string()))?;
+        let file = armcal_recording::input::open(&path).map_err(|e| failed(e.to_string()))?;
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
         let header = reader.headers().map_err(|e| failed(e.to_string()))?.clone();
         let find = |name: &str| header.iter().position(|column| column == name);
         let columns = config.joints.names.iter().map(|joint| {

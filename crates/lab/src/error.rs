@@ -98,6 +98,9 @@ pub enum LabError {
         /// The writer's reason.
         source: Box<armcal_recording::RecordingError>,
     },
+    /// An output would replace what must stay.
+    #[error(transparent)]
+    InTheWay(#[from] armcal_recording::RecordingError),
     /// The truth file could not be written.
     #[error("writing the truth {path}: {why}", path = path.display())]
     Truth {

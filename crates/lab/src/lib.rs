@@ -18,6 +18,7 @@
 //! lines and turns points about them, where the models multiply matrices.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout))]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod arm;
 pub mod board;
@@ -50,6 +51,7 @@ pub use quick::{Nominal, NominalBoard, Observed, observe, observe_from};
 pub use trace::RestKind;
 pub use truth::{DwellTruth, RecordingTruth, SetPointTruth, Truth};
 
+use armcal_recording::input;
 use engine::Pace;
 use rig::Rig;
 use sensors::Log;
@@ -80,6 +82,8 @@ pub fn simulate_with(
     out_dir: &Path,
     mechanisms: &MechanismFactory<'_>,
 ) -> Result<Simulated, LabError> {
+    note_inputs(config, base_dir);
+    may_write(config.recordings.iter().map(|r| r.name.as_str()), out_dir, &out_dir.join(TRUTH))?;
     let (truth, logs) = run(config, base_dir, mechanisms)?;
     let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
     std::fs::create_dir_all(out_dir).map_err(refused)?;
@@ -89,9 +93,33 @@ pub fn simulate_with(
         record::write(&path, &config.name, &recording.name, log)?;
         recordings.push(path);
     }
-    let path = out_dir.join("truth.json");
+    let path = out_dir.join(TRUTH);
     truth.write(&path)?;
     Ok(Simulated { recordings, truth: path, facts: truth })
+}
+
+/// Name of the truth beside its recordings.
+pub(crate) const TRUTH: &str = "truth.json";
+
+/// The file of a recording.
+pub(crate) fn recording_file(name: &str) -> String {
+    format!("{name}.mcap")
+}
+
+/// The files that a configuration names are inputs, before anything is written.
+fn note_inputs(config: &LabConfig, base_dir: &Path) {
+    input::note(&base_dir.join(&config.board.file));
+    config.task.set_points.iter().for_each(|told| input::note(&base_dir.join(&told.file)));
+}
+
+/// Whether recordings of these names and their truth may be written, before they are made.
+pub(crate) fn may_write<'a>(
+    recordings: impl Iterator<Item = &'a str>,
+    folder: &Path,
+    truth: &Path,
+) -> Result<(), LabError> {
+    let recordings = recordings.map(|name| folder.join(recording_file(name)));
+    Ok(armcal_recording::may_write_all(recordings.chain([truth.to_owned()]))?)
 }
 
 /// Simulates a session without writing anything: the truth, and one log a recording.

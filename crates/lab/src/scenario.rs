@@ -100,8 +100,7 @@ impl Scenario {
             if design::worsen_noise(name, &mut config) {
                 continue;
             }
-            let all = families::FAMILIES.iter().chain(outside::FAMILIES);
-            let family = all.into_iter().find(|family| family.name == name).ok_or_else(|| unknown(name))?;
+            let family = family(name).ok_or_else(|| unknown(name))?;
             let draw = Stream::new(self.seed, Purpose::Scenario, part);
             let target = self.target.filter(|_| part == 0);
             let planted = Draw::new(draw, target, self.size, self.design).plant(family, &mut config)?;
@@ -150,9 +149,27 @@ fn rig(seed: u64) -> LabConfig {
     config
 }
 
+/// Whether these are families that can be hidden, one or several joined by `+`.
+///
+/// # Errors
+/// The first that is none, with the nearest that is one.
+pub fn check_family(words: &str) -> Result<(), LabError> {
+    let known = |name: &str| design::NOTHING.contains(&name) || family(name).is_some();
+    match words.split('+').map(str::trim).find(|name| !known(name)) {
+        Some(name) => Err(unknown(name)),
+        None => Ok(()),
+    }
+}
+
+fn family(name: &str) -> Option<&'static families::Family> {
+    families::FAMILIES.iter().chain(outside::FAMILIES).find(|family| family.name == name)
+}
+
 fn unknown(name: &str) -> LabError {
-    let known = families().into_iter().chain(nothing()).chain(outside()).collect::<Vec<_>>().join(", ");
-    value("scenario.family", format!("`{name}` is none of: {known}"))
+    let known: Vec<&str> = families().into_iter().chain(nothing()).chain(outside()).collect();
+    let nearest = armcal_recording::nearest(name, &known);
+    let nearest = nearest.map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default();
+    value("scenario.family", format!("there is no family `{name}`{nearest}; they are: {}", known.join(", ")))
 }
 
 #[cfg(test)]

@@ -226,7 +226,7 @@ impl RecordingTruth {
         let dwell = |rest: &Rest| DwellTruth::of_rest(rig, &session.trace, rest, start_ns);
         let mechanism = |m: &dyn Mechanism| MechanismTruth { name: m.name().into(), truth: m.truth() };
         RecordingTruth {
-            file: format!("{name}.mcap"),
+            file: crate::recording_file(&name),
             name,
             start_ns,
             duration_s: session.trace.duration_s(),

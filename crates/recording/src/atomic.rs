@@ -3,8 +3,13 @@
 //! A file is written under a hidden name beside its own, `.NAME.xxxxxx.part`, and renamed when it is complete. Its writer
 //! holds a lock on it, which the system lets go when the process ends, however it ends: whoever writes the same file
 //! next removes the parts that nobody holds any more.
+//!
+//! This is the one place that gives a file its name, and it asks the `guard` first: no input is written over, and nothing
+//! else that armcal did not make.
 
-use crate::RecordingError;
+#![allow(clippy::disallowed_methods, reason = "this is where outputs are written")]
+
+use crate::{RecordingError, guard, input};
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -26,9 +31,13 @@ pub struct AtomicFile {
 
 impl AtomicFile {
     /// Starts the file that will be at `target`. Its folder must exist.
+    ///
+    /// # Errors
+    /// As [`crate::may_write`], and a folder that cannot be written.
     pub fn create(target: &Path) -> Result<AtomicFile, RecordingError> {
         let refused = |why: String| RecordingError::Write { path: target.to_owned(), why };
-        let Some(name) = target.file_name().filter(|_| !target.is_dir()) else {
+        guard::may_write(target)?;
+        let Some(name) = target.file_name() else {
             return Err(refused("it is a folder, not a file name".into()));
         };
         let mut builder = tempfile::Builder::new();
@@ -55,12 +64,41 @@ impl AtomicFile {
         &self.target
     }
 
-    /// Syncs the file to disk and gives it its name, replacing whatever was there.
+    /// Whether the finished file may take its place; [`AtomicFile::commit`] asks again.
+    ///
+    /// # Errors
+    /// As [`crate::may_write`], and a result of another kind at the target.
+    pub fn may_commit(&self) -> Result<(), RecordingError> {
+        guard::may_replace(&self.target, self.temporary.path()).map(drop)
+    }
+
+    /// Syncs the file to disk and gives it its name, replacing an earlier result of the same kind.
+    ///
+    /// # Errors
+    /// As [`AtomicFile::may_commit`], and what the system refuses.
     pub fn commit(self) -> Result<(), RecordingError> {
-        let target = self.target;
+        let (target, mut temporary) = (self.target, self.temporary);
         let refused = |e: io::Error| RecordingError::Write { path: target.clone(), why: e.to_string() };
-        self.temporary.as_file().sync_all().map_err(refused)?;
-        self.temporary.persist(&target).map_err(|e| refused(e.error))?;
+        temporary.as_file().sync_all().map_err(refused)?;
+        let mut tries = 0..TRIES;
+        loop {
+            if guard::may_replace(&target, temporary.path())? {
+                temporary.persist(&target).map_err(|e| refused(e.error))?;
+                break;
+            }
+            // What somebody else puts there meanwhile is looked at as well.
+            match temporary.persist_noclobber(&target) {
+                Ok(_) => break,
+                Err(e) if e.error.kind() == io::ErrorKind::AlreadyExists && tries.next().is_some() => {
+                    temporary = e.file;
+                }
+                // Not every file system can rename only where nothing is.
+                Err(e) => {
+                    e.file.persist(&target).map_err(|e| refused(e.error))?;
+                    break;
+                }
+            }
+        }
         // The rename itself must survive a power cut too; not every file system can sync a folder.
         if let Ok(folder) = File::open(folder(&target)) {
             let _ = folder.sync_all();
@@ -85,8 +123,14 @@ impl Seek for AtomicFile {
     }
 }
 
-/// Writes a whole file atomically.
+/// Writes a whole file atomically. A file that has just this content already is left as it is.
+///
+/// # Errors
+/// As [`AtomicFile::create`] and [`AtomicFile::commit`].
 pub fn write(target: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
+    if guard::is_there(target, bytes)? {
+        return Ok(());
+    }
     let mut file = AtomicFile::create(target)?;
     let refused = |e: io::Error| RecordingError::Write { path: target.to_owned(), why: e.to_string() };
     file.write_all(bytes).map_err(refused)?;
@@ -101,7 +145,8 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
         let random = name.to_str().and_then(|n| n.strip_prefix(prefix)?.strip_suffix(SUFFIX));
         let is_part =
             random.is_some_and(|r| r.len() == RANDOM_BYTES && r.bytes().all(|b| b.is_ascii_alphanumeric()));
-        if !is_part || !entry.file_type().is_ok_and(|t| t.is_file()) {
+        let may_be_ours = is_part && entry.file_type().is_ok_and(|t| t.is_file());
+        if !may_be_ours || input::noted(&entry.path()).is_some() {
             continue;
         }
         if let Ok(file) = File::open(entry.path())
@@ -120,6 +165,11 @@ fn folder(target: &Path) -> &Path {
 mod tests {
     use super::*;
 
+    /// A file that says that it is of the same kind as the others.
+    fn marked(text: &str) -> Vec<u8> {
+        format!("# armcal.test/1\n{text}").into_bytes()
+    }
+
     fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).expect("the folder is there");
         entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
@@ -129,29 +179,30 @@ mod tests {
     fn a_dropped_file_leaves_the_old_one_and_nothing_else() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = folder.path().join("out.bin");
-        write(&target, b"old").expect("writable");
+        write(&target, &marked("old")).expect("writable");
         let mut file = AtomicFile::create(&target).expect("writable");
         file.write_all(b"half of the n").expect("written");
         assert_eq!(names(folder.path()).len(), 2);
         drop(file);
         assert_eq!(names(folder.path()), ["out.bin"]);
-        assert_eq!(std::fs::read(&target).expect("readable"), b"old");
-        write(&target, b"new").expect("writable");
-        assert_eq!(std::fs::read(&target).expect("readable"), b"new");
+        assert_eq!(std::fs::read(&target).expect("readable"), marked("old"));
+        write(&target, &marked("new")).expect("writable");
+        assert_eq!(std::fs::read(&target).expect("readable"), marked("new"));
     }
 
     #[test]
     fn parts_of_the_dead_are_removed_and_those_of_the_living_are_not() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
-        let alive = AtomicFile::create(&path("out.bin")).expect("writable");
+        let mut alive = AtomicFile::create(&path("out.bin")).expect("writable");
+        alive.write_all(&marked("living")).expect("written");
         // A part that nobody holds, and files that only look like one: another target's, a user's, a folder.
         for name in [".out.bin.abc123.part", ".other.bin.abc123.part", ".out.bin.notes.part", ".out.bin.part"]
         {
             std::fs::write(path(name), b"half").expect("writable");
         }
         std::fs::create_dir(path(".out.bin.folder.part")).expect("writable");
-        write(&path("out.bin"), b"whole").expect("writable");
+        write(&path("out.bin"), &marked("whole")).expect("writable");
         let mut left = names(folder.path());
         left.retain(|name| !alive.temporary.path().ends_with(name));
         left.sort();
@@ -159,7 +210,7 @@ mod tests {
         assert_eq!(left, [&kept[..], &["out.bin"]].concat());
         assert!(alive.temporary.path().exists());
         alive.commit().expect("the living one is still whole");
-        assert_eq!(std::fs::read(path("out.bin")).expect("readable"), b"");
+        assert_eq!(std::fs::read(path("out.bin")).expect("readable"), marked("living"));
     }
 
     #[test]
@@ -169,11 +220,13 @@ mod tests {
         std::thread::scope(|scope| {
             for writer in 0..8_u8 {
                 let target = &target;
-                scope.spawn(move || (0..50).for_each(|_| write(target, &[writer; 999]).expect("written")));
+                let text = marked(&char::from(b'a' + writer).to_string().repeat(999));
+                scope.spawn(move || (0..50).for_each(|_| write(target, &text).expect("written")));
             }
         });
         let bytes = std::fs::read(&target).expect("readable");
-        assert!(bytes.len() == 999 && bytes.iter().all(|b| *b == bytes[0]));
+        let text = &bytes[marked("").len()..];
+        assert!(text.len() == 999 && text.iter().all(|b| *b == text[0]));
         assert_eq!(names(folder.path()), ["out.bin"]);
     }
 

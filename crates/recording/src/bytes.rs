@@ -4,9 +4,8 @@
 
 use crate::map::Map;
 use crate::ranges::Ranged;
-use crate::{Fetched, RecordingError, url};
+use crate::{Fetched, RecordingError, input, url};
 use std::borrow::Cow;
-use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 
@@ -71,7 +70,7 @@ impl FileBytes {
         if !about.is_file() {
             return Err(refused("it is a pipe or a device; copy it into a file first"));
         }
-        let file = File::open(path).map_err(open)?;
+        let file = input::open(path).map_err(open)?;
         if file.metadata().map_err(open)?.len() == 0 {
             return Err(refused("the file is empty"));
         }

@@ -179,6 +179,29 @@ pub enum RecordingError {
         /// What failed.
         why: String,
     },
+    /// An output would replace an input.
+    #[error(
+        "{} is an input of this command (read as {}), and no input is ever written over: choose another output",
+        path.display(),
+        input.display()
+    )]
+    IsInput {
+        /// The output.
+        path: PathBuf,
+        /// The input, as it was named.
+        input: PathBuf,
+    },
+    /// An output would replace what armcal did not make, or made for something else.
+    #[error(
+        "{} is there and {what}, so it is not written over: choose another output, or move it away",
+        path.display()
+    )]
+    NotOurs {
+        /// The output.
+        path: PathBuf,
+        /// What is there.
+        what: String,
+    },
     /// A callback of [`crate::Recording::for_each_raw`] stopped the pass.
     #[error("{0}")]
     Stopped(String),
@@ -215,16 +238,18 @@ pub fn shortened(text: &str) -> Cow<'_, str> {
 }
 
 /// The candidate most like `wanted`, when one is like it at all.
-pub(crate) fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a String>) -> Option<String> {
+pub fn nearest<S: AsRef<str>>(wanted: &str, candidates: impl IntoIterator<Item = S>) -> Option<String> {
     let lower = wanted.to_lowercase();
+    let candidates: Vec<S> = candidates.into_iter().collect();
     candidates
-        .into_iter()
+        .iter()
+        .map(S::as_ref)
         // Likeness takes time and memory in proportion to both lengths.
         .filter(|c| c.len() <= LONGEST)
         .map(|c| (likeness(&lower, &c.to_lowercase()), c))
         .filter(|(likeness, _)| *likeness > 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
-        .map(|(_, c)| c.clone())
+        .map(|(_, c)| c.to_owned())
 }
 
 /// Common beginnings count (Jaro-Winkler), and so do few edits with transpositions (Damerau-Levenshtein).

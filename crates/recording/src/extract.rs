@@ -4,7 +4,7 @@
 //! Written once without camera images, the rest is small.
 
 use crate::output::McapOutput;
-use crate::{RawChannel, Recording, RecordingError, Source, error};
+use crate::{RawChannel, Recording, RecordingError, Source, error, may_write};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -36,10 +36,10 @@ pub struct Extracted {
 /// input gives the same bytes. Memory holds a few chunks and, with attachments, the largest of these.
 ///
 /// # Errors
-/// A topic that matches no channel, an output that is one of the inputs or cannot be written, an input that cannot be
+/// A topic that matches no channel, an output that is one of the inputs, is not armcal's or cannot be written, an input that cannot be
 /// read on. Damage is no error; it is in [`Recording::report`] afterwards.
 pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Result<Extracted, RecordingError> {
-    refuse_input(recording, out)?;
+    may_write(out)?;
     let channels = matching(recording.channels(), wanted.topics)?;
     let mut output = McapOutput::create(out, common_profile(recording))?;
     let mut kept = Kept::of(&channels, &mut output)?;
@@ -140,16 +140,6 @@ fn common_profile(recording: &Recording) -> &str {
     let mut profiles = recording.files.iter().map(|file| file.layout.profile.as_str());
     let first = profiles.next().unwrap_or_default();
     if profiles.all(|profile| profile == first) { first } else { "" }
-}
-
-/// Replacing a recording by a part of itself would lose the rest.
-fn refuse_input(recording: &Recording, out: &Path) -> Result<(), RecordingError> {
-    let Ok(real) = out.canonicalize() else { return Ok(()) };
-    if recording.files.iter().any(|file| file.path.canonicalize().is_ok_and(|path| path == real)) {
-        let why = "it is the recording to extract from; name another file".to_owned();
-        return Err(RecordingError::Write { path: out.to_owned(), why });
-    }
-    Ok(())
 }
 
 /// Where the thin recording comes from. Local files by their names only: where they lie is no part of the content.

@@ -11,7 +11,10 @@
 //! on bad input.
 //!
 //! Writing: [`output::McapOutput`] into an [`atomic::AtomicFile`]; same messages, same bytes. [`extract()`] does both: it
-//! writes a thin recording of the wanted channels.
+//! writes a thin recording of the wanted channels. What was read as an [`input`] is never written over, nor is anything
+//! else whose content does not say that armcal made it (`guard`, `mark`).
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod atomic;
 mod bytes;
@@ -24,10 +27,13 @@ mod error;
 mod extract;
 mod fingerprint;
 mod gather;
+mod guard;
 mod index;
+pub mod input;
 mod joints;
 mod layout;
 mod map;
+mod mark;
 #[cfg(any(test, not(feature = "s3")))]
 mod no_object;
 #[cfg(feature = "s3")]
@@ -49,9 +55,11 @@ mod temperature;
 mod url;
 
 pub use bytes::{Access, identity_of};
-pub use error::{RecordingError, shortened};
+pub use error::{RecordingError, nearest, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime, hash_of};
+pub use guard::{may_put, may_write, may_write_all};
+pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;

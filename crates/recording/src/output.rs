@@ -92,14 +92,16 @@ impl McapOutput {
     }
 
     /// Completes the file, syncs it and gives it its name.
-    pub fn finish(mut self) -> Result<(), RecordingError> {
+    pub fn finish(self) -> Result<(), RecordingError> {
+        self.stage()?.commit()
+    }
+
+    /// Completes the file, which has no name yet.
+    pub fn stage(mut self) -> Result<AtomicFile, RecordingError> {
         self.writer.finish().map_err(|e| self.failed(&e))?;
         let path = self.path;
         let buffered = self.writer.into_inner();
-        let file = buffered
-            .into_inner()
-            .map_err(|e| RecordingError::Write { path: path.clone(), why: e.error().to_string() })?;
-        file.commit()
+        buffered.into_inner().map_err(|e| RecordingError::Write { path, why: e.error().to_string() })
     }
 
     fn failed(&self, error: &mcap::McapError) -> RecordingError {

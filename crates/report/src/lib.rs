@@ -12,6 +12,8 @@
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod campaign;
 mod channels;
 mod closed_chain;
@@ -42,10 +44,11 @@ mod verification;
 mod write;
 
 pub use campaign::{
-    Campaign, FailedRecording, Repeat, campaign_json, campaign_row, campaign_text, write_campaign,
+    Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text, write_campaign,
 };
 pub use closed_chain::{
-    CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_summary_json, closed_terminal, write_closed,
+    CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_files, closed_summary_json, closed_terminal,
+    write_closed,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
@@ -58,7 +61,9 @@ pub use past_observations::{
     observations_json, sha256,
 };
 pub use past_run::{PastDwell, PastParameter, PastRecording, PastResidual, PastRun, PastRunError};
-pub use pooled::{POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_json, pooled_terminal, write_pooled};
+pub use pooled::{
+    POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_files, pooled_json, pooled_terminal, write_pooled,
+};
 pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
 pub use summary::{SCHEMA, summary_json};
@@ -66,6 +71,6 @@ pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, termin
 pub use text::{conclusion, printable};
 pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
-    verification_files, verification_json, verification_text,
+    verification_files, verification_json, verification_paths, verification_text,
 };
-pub use write::{InputMessages, OutputConfig, write_all, write_brief};
+pub use write::{InputMessages, OutputConfig, run_files, write_all, write_brief};

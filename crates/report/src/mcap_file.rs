@@ -5,6 +5,7 @@ use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::{Run, VERSION};
 use armcal_core::{Severity, Stage, Warning};
+use armcal_recording::atomic::AtomicFile;
 use armcal_recording::output::McapOutput;
 use armcal_recording::{RawChannel, Recording, RecordingError};
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ pub(crate) struct Attachment<'a> {
     pub text: &'a str,
 }
 
-/// Writes the file; it appears when everything is in it. Attachments carry the time of the last dwell, and nothing
+/// Writes the file, which has no name yet. Attachments carry the time of the last dwell, and nothing
 /// carries the time of day: the same run gives the same bytes.
 pub(crate) fn write_mcap(
     run: &Run,
@@ -32,7 +33,7 @@ pub(crate) fn write_mcap(
     inputs: &[Recording],
     attachments: &[Attachment],
     path: &Path,
-) -> Result<(), RecordingError> {
+) -> Result<AtomicFile, RecordingError> {
     let about = [("armcal/run", about_run(run)), (INPUT_METADATA, about_input(run))];
     write_results(messages(run, points, findings), inputs, attachments, run_end_ns(run), &about, path)
 }
@@ -45,7 +46,7 @@ pub(crate) fn write_results(
     end_ns: i64,
     about: &[(&str, BTreeMap<String, String>)],
     path: &Path,
-) -> Result<(), RecordingError> {
+) -> Result<AtomicFile, RecordingError> {
     // Neither `ros2` nor any other profile: those promise one encoding for all channels.
     let mut out = McapOutput::create(path, "")?;
     for input in inputs {
@@ -62,7 +63,7 @@ pub(crate) fn write_results(
     for (name, entries) in about {
         out.metadata(name, entries)?;
     }
-    out.finish()
+    out.stage()
 }
 
 /// Messages of the input that are left out because armcal itself wrote them, one warning a recording.

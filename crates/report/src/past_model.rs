@@ -9,7 +9,7 @@ use crate::{DwellMark, PastRunError, ReportError};
 use armcal_calibrate::{Calibration, Estimate};
 use armcal_core::{Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
-use armcal_recording::{Recording, RecordingError};
+use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -256,7 +256,7 @@ impl PastModel {
 }
 
 fn file(path: &Path) -> Result<String, PastRunError> {
-    std::fs::read_to_string(path)
+    input::read_to_string(path)
         .map_err(|e| PastRunError::NoModel { path: path.to_owned(), why: e.to_string() })
 }
 

@@ -6,6 +6,7 @@ use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{Observation, Parameter, Pose, Role};
 use armcal_model::Session;
+use armcal_recording::input;
 use armcal_table::Board;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -126,7 +127,7 @@ impl PastObservations {
     /// A file that cannot be read, is of another format, or contradicts itself.
     pub fn open(path: &Path) -> Result<PastObservations, PastRunError> {
         let bad = |why: String| PastRunError::BadObservations { path: path.to_owned(), why };
-        let text = std::fs::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let text = input::read_to_string(path).map_err(|e| bad(e.to_string()))?;
         let past: PastObservations = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
         if past.schema != SCHEMA {
             return Err(bad(format!("its schema is `{}`, not `{SCHEMA}`", past.schema)));

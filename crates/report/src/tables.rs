@@ -8,19 +8,20 @@ use armcal_calibrate::Estimate;
 use armcal_core::{Dwell, Observation};
 use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
-use polars::prelude::{Column, DataFrame, NamedFrom, ParquetWriter, PolarsError, PolarsResult, Series};
+use polars::prelude::{
+    Column, DataFrame, KeyValueMetadata, NamedFrom, ParquetWriter, PolarsError, PolarsResult, Series,
+};
+
+/// Names of the tables of a run.
+pub(crate) const FILES: [&str; 3] = ["dwells.parquet", "observations.parquet", "parameters.parquet"];
 
 /// File names and contents.
 pub(crate) fn parquet_files(
     run: &Run,
     points: &[Point],
 ) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
-    let tables = [
-        ("dwells.parquet", dwells(run, points)),
-        ("observations.parquet", observations(run, points)),
-        ("parameters.parquet", parameters(run)),
-    ];
-    tables.into_iter().map(|(name, columns)| Ok((name, columns.encode(name)?))).collect()
+    let tables = [dwells(run, points), observations(run, points), parameters(run)];
+    FILES.into_iter().zip(tables).map(|(name, columns)| Ok((name, columns.encode(name)?))).collect()
 }
 
 fn dwells(run: &Run, points: &[Point]) -> Columns {
@@ -183,7 +184,7 @@ impl Columns {
 
     pub fn encode(self, table: &'static str) -> Result<Vec<u8>, ReportError> {
         let failed = |e: PolarsError| ReportError::Parquet { table, source: Box::new(e) };
-        parquet(self.columns).map_err(failed)
+        parquet(self.columns, mark(table)).map_err(failed)
     }
 }
 
@@ -195,8 +196,21 @@ fn cavity(a: &Assignment) -> Option<&str> {
     }
 }
 
-fn parquet(columns: Vec<Column>) -> PolarsResult<Vec<u8>> {
+/// What the footer says the table is; `run.mcap` and `pool` have words of their own for parameters and campaigns.
+fn mark(table: &str) -> String {
+    let kind = match table {
+        "parameters.parquet" => "parameters-table",
+        "campaign.parquet" => "campaign-table",
+        other => other.trim_end_matches(".parquet"),
+    };
+    format!("armcal.{kind}/1")
+}
+
+fn parquet(columns: Vec<Column>, mark: String) -> PolarsResult<Vec<u8>> {
     let mut bytes = Vec::new();
-    ParquetWriter::new(&mut bytes).finish(&mut DataFrame::new_infer_height(columns)?)?;
+    let metadata = KeyValueMetadata::from_static(vec![("schema".into(), mark)]);
+    ParquetWriter::new(&mut bytes)
+        .with_key_value_metadata(Some(metadata))
+        .finish(&mut DataFrame::new_infer_height(columns)?)?;
     Ok(bytes)
 }

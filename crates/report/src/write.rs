@@ -3,13 +3,13 @@
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
-use crate::model_file::model_file;
+use crate::model_file::{self, model_file};
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
 use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
 use crate::points::points;
-use crate::tables::parquet_files;
+use crate::tables::{self, parquet_files};
 use crate::{ReportError, Run, summary_json};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError};
@@ -17,7 +17,10 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
+pub(crate) const RUN: &str = "run.mcap";
 const PAGE: &str = "report.html";
+const SUMMARY: &str = "summary.json";
+const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
 const LAYOUT: &str = "foxglove-layout.json";
 const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
@@ -77,8 +80,8 @@ pub fn write_all(
     let mut staged = Vec::new();
     let texts = [
         (PAGE, &page),
-        ("summary.json", &summary),
-        ("parameters.toml", &parameters),
+        (SUMMARY, &summary),
+        (PARAMETERS, &parameters),
         (model.name, &model.text),
         (past_model::FILE, &past_model),
         (OBSERVATIONS_FILE, &observations),
@@ -95,8 +98,8 @@ pub fn write_all(
     let attachments = [
         Attachment { name: "pipeline.toml", media_type: "application/toml", text: &run.pipeline_text },
         Attachment { name: PAGE, media_type: "text/html", text: &page },
-        Attachment { name: "summary.json", media_type: "application/json", text: &summary },
-        Attachment { name: "parameters.toml", media_type: "application/toml", text: &parameters },
+        Attachment { name: SUMMARY, media_type: "application/json", text: &summary },
+        Attachment { name: PARAMETERS, media_type: "application/toml", text: &parameters },
         Attachment { name: model.name, media_type: model.media_type, text: &model.text },
         Attachment { name: past_model::FILE, media_type: "application/json", text: &past_model },
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
@@ -106,12 +109,20 @@ pub fn write_all(
         InputMessages::Copy => recordings,
         InputMessages::Reference => &[],
     };
-    let mcap_path = out_dir.join("run.mcap");
-    write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path).map_err(at(&mcap_path))?;
+    let mcap_path = out_dir.join(RUN);
+    let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);
+    // The last to get its name: by what the old one holds, files of earlier versions are known.
+    staged.push(mcap.map_err(at(&mcap_path))?);
+    commit_all(staged)
+}
 
-    let mut written = vec![mcap_path];
-    written.extend(commit_all(staged)?);
-    Ok(written)
+/// The files that [`write_all`] writes into `out_dir`, for an arm whose nominal model is a URDF or a DH file: to look at
+/// before a run whether they may be written.
+pub fn run_files(out_dir: &Path, urdf: bool) -> Vec<PathBuf> {
+    let model = if urdf { model_file::URDF } else { model_file::DH };
+    let texts =
+        [PAGE, SUMMARY, PARAMETERS, model, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
+    std::iter::once(RUN).chain(texts).chain(tables::FILES).map(|name| out_dir.join(name)).collect()
 }
 
 /// Writes what a campaign keeps of each recording: `summary.json`, `parameters.toml`, `model.json` and
@@ -121,8 +132,8 @@ pub fn write_all(
 /// A file that cannot be written, or a run whose parts do not belong together.
 pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     let texts = [
-        ("summary.json", summary_json(run)),
-        ("parameters.toml", parameters_toml(run)?),
+        (SUMMARY, summary_json(run)),
+        (PARAMETERS, parameters_toml(run)?),
         (past_model::FILE, PastModel::of(run)?.json()?),
         (OBSERVATIONS_FILE, observations_json(run)?),
     ];
@@ -151,12 +162,18 @@ pub(crate) fn stage_pieces(
 }
 
 /// Gives complete files their names; returns their paths.
-pub(crate) fn commit_all(staged: impl IntoIterator<Item = AtomicFile>) -> Result<Vec<PathBuf>, ReportError> {
+pub(crate) fn commit_all(staged: Vec<AtomicFile>) -> Result<Vec<PathBuf>, ReportError> {
+    may_commit(&staged)?;
     let named = |file: AtomicFile| {
         let path = file.target().to_owned();
         file.commit().map_err(at(&path)).map(|()| path)
     };
     staged.into_iter().map(named).collect()
+}
+
+/// Whether each of these may take its place.
+fn may_commit(staged: &[AtomicFile]) -> Result<(), ReportError> {
+    staged.iter().try_for_each(|file| file.may_commit().map_err(at(file.target())))
 }
 
 /// What writing this file ran into.

@@ -86,7 +86,7 @@ fn main() -> Result<()> {
     }
     if named.is_empty() {
         let page = root.join("docs/performance.md");
-        armcal_recording::atomic::write(&page, page::page(&sections, &options).as_bytes())?;
+        std::fs::write(&page, page::page(&sections, &options))?;
         println!("{}", page.display());
     }
     Ok(())

@@ -3,7 +3,7 @@
 use super::Manifest;
 use crate::error::Error;
 use crate::pipeline::{Pipeline, RecordingEntry};
-use armcal_recording::{atomic, identity_of};
+use armcal_recording::{atomic, identity_of, input};
 use armcal_report::VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -12,6 +12,8 @@ use std::time::UNIX_EPOCH;
 
 /// Raised when results made from the same would be written differently.
 const FORMAT: &str = "armcal.batch/1";
+/// Format of what is remembered of a file.
+const SCHEMA: &str = "armcal.seen/1";
 /// Where the hashes of files are remembered, below the campaign's folder.
 const SEEN: &str = ".inputs";
 
@@ -25,6 +27,8 @@ pub(super) struct Keys {
 /// A file as it was when its hash was taken.
 #[derive(PartialEq, Serialize, Deserialize)]
 struct Seen {
+    #[serde(default)]
+    schema: String,
     path: String,
     bytes: u64,
     modified_ns: u128,
@@ -41,11 +45,8 @@ impl Keys {
         let board = pipeline.table.iter().map(|t| &t.board);
         for (what, path) in model.map(|p| ("model", p)).chain(board.map(|p| ("board", p))) {
             let path = pipeline.resolve(path);
-            parts.push(std::fs::read_to_string(&path).map_err(|source| Error::ReadFile {
-                what,
-                path,
-                source,
-            })?);
+            let text = input::read_to_string(&path);
+            parts.push(text.map_err(|source| Error::ReadFile { what, path, source })?);
         }
         Ok(Keys { common: hash(parts), seen: out.join(SEEN) })
     }
@@ -78,6 +79,8 @@ impl Keys {
             let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
             (about.len(), modified.map_or(0, |t| t.as_nanos()))
         });
+        // Armcal's own notes, to be written over: no input.
+        #[allow(clippy::disallowed_methods)]
         let known = std::fs::read(&memory).ok().and_then(|text| serde_json::from_slice::<Seen>(&text).ok());
         if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
             let same = known.path == name && known.bytes == bytes && known.modified_ns == modified_ns;
@@ -88,7 +91,8 @@ impl Keys {
         }
         let identity = identity_of(path)?;
         if let Some((bytes, modified_ns)) = now {
-            let seen = Seen { path: name, bytes, modified_ns, identity: identity.clone() };
+            let schema = SCHEMA.to_owned();
+            let seen = Seen { schema, path: name, bytes, modified_ns, identity: identity.clone() };
             // A memory that cannot be written costs time only.
             if let Ok(text) = serde_json::to_vec(&seen) {
                 let _ = std::fs::create_dir_all(&self.seen);

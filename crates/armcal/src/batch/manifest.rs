@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
-use armcal_recording::{is_url, list, resolve};
+use armcal_recording::{input, is_url, list, resolve};
 use armcal_table::Tilt;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ impl Manifest {
     /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
     pub fn read(path: &Path) -> Result<Manifest, Error> {
         let at = |source| Error::ReadFile { what: "manifest", path: path.to_owned(), source };
-        let text = std::fs::read_to_string(path).map_err(at)?;
+        let text = input::read_to_string(path).map_err(at)?;
         let folder = std::path::absolute(path).map_err(at)?;
         let folder = folder.parent().unwrap_or(Path::new("")).to_owned();
         let file = if path.extension().is_some_and(|e| e == "toml") {

@@ -58,6 +58,11 @@ pub fn map(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
     Ok(receipt)
 }
 
+/// The receipt that [`map`] leaves of a share.
+pub fn receipt_file(shard: Shard, out: &Path) -> PathBuf {
+    Receipt::file(shard, out)
+}
+
 /// Puts the shares of a folder together.
 ///
 /// # Errors

@@ -2,11 +2,12 @@
 
 use super::store;
 use crate::error::Error;
+use armcal_recording::input;
 use armcal_report::{FailedRecording, VERSION};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Where receipts are, below the campaign's folder.
@@ -128,12 +129,16 @@ impl Receipt {
         self.done.iter().filter(|d| matches!(d, Done::Failed { .. })).count()
     }
 
+    /// The receipt of a share in a campaign's folder.
+    pub(super) fn file(shard: Shard, out: &Path) -> PathBuf {
+        out.join(RECEIPTS).join(format!("{}-of-{}.json", shard.number, shard.of))
+    }
+
     pub(super) fn write(&self, out: &Path) -> Result<(), Error> {
         let folder = out.join(RECEIPTS);
         std::fs::create_dir_all(&folder).map_err(|source| Error::Folder { path: folder.clone(), source })?;
-        let name = format!("{}-of-{}.json", self.shard.number, self.shard.of);
         let text = serde_json::to_vec_pretty(self).map_err(Error::Json)?;
-        store::write_one(&folder.join(name), &text)
+        store::write_one(&Receipt::file(self.shard, out), &text)
     }
 }
 
@@ -149,9 +154,8 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, Error> {
     paths.sort();
     let read = |path: &std::path::PathBuf| {
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
-        let text = std::fs::read(path).map_err(|e| bad(e.to_string()))?;
-        let receipt: Receipt =
-            serde_json::from_slice(&text).map_err(|e| bad(format!("{e}; map it again")))?;
+        let text = input::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let receipt: Receipt = serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
         Ok(receipt)
     };
     paths.iter().map(read).collect()

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use armcal_campaign::Row;
-use armcal_recording::atomic;
+use armcal_recording::{atomic, input};
 use armcal_report::{DwellMark, OBSERVATIONS_FILE, PastObservations, ReportError};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,8 @@ const LOCK: &str = ".lock";
 /// Held while a folder under construction is made or taken away.
 const GATE: &str = ".gate";
 const UNFINISHED: &str = ".part";
+/// Random characters in the name of a folder under construction.
+const RANDOM_BYTES: usize = 6;
 
 /// The results of a campaign.
 pub(super) struct Store {
@@ -61,8 +63,8 @@ impl Store {
     pub fn row(&self, folder: &str) -> Result<Row, Error> {
         let path = self.results.join(folder).join(ROW);
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
-        let text = std::fs::read(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
-        serde_json::from_slice(&text).map_err(|e| bad(e.to_string()))
+        let text = input::read_to_string(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
+        serde_json::from_str(&text).map_err(|e| bad(e.to_string()))
     }
 
     /// What the dwells of a result are recognised by.
@@ -81,9 +83,14 @@ impl Store {
     pub fn begin(&self) -> Result<Unfinished, Error> {
         let at = |source| Error::Folder { path: self.results.clone(), source };
         let _gate = self.gate().map_err(at)?;
-        let folder =
-            tempfile::Builder::new().prefix(".").suffix(UNFINISHED).tempdir_in(&self.results).map_err(at)?;
-        let lock = File::create(folder.path().join(LOCK)).map_err(at)?;
+        let mut folder = tempfile::Builder::new();
+        let folder = folder
+            .prefix(".")
+            .suffix(UNFINISHED)
+            .rand_bytes(RANDOM_BYTES)
+            .tempdir_in(&self.results)
+            .map_err(at)?;
+        let lock = lock_file(&folder.path().join(LOCK)).map_err(at)?;
         lock.lock().map_err(at)?;
         Ok(Unfinished { folder, _lock: lock })
     }
@@ -97,15 +104,11 @@ impl Store {
         let target = self.results.join(folder);
         let at = |source| Error::Folder { path: target.clone(), source };
         write_one(&made.path().join(ROW), &serde_json::to_vec_pretty(row).map_err(Error::Json)?)?;
-        std::fs::remove_file(made.path().join(LOCK)).map_err(at)?;
         readable_by_all(made.path()).map_err(at)?;
-        match std::fs::rename(made.path(), &target) {
+        match named(made.path(), &target) {
             Ok(()) => {
                 // It has another name now, under which it stays.
                 let _ = made.folder.keep();
-                if let Ok(results) = File::open(&self.results) {
-                    let _ = results.sync_all();
-                }
                 Ok(())
             }
             Err(_) if self.has(folder) => Ok(()),
@@ -115,7 +118,7 @@ impl Store {
 
     /// Nobody sees a folder before its lock is held.
     fn gate(&self) -> std::io::Result<File> {
-        let gate = File::create(self.results.join(GATE))?;
+        let gate = lock_file(&self.results.join(GATE))?;
         gate.lock()?;
         Ok(gate)
     }
@@ -125,16 +128,10 @@ impl Store {
         let Ok(_gate) = self.gate() else { return };
         for entry in std::fs::read_dir(&self.results).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            if !(name.starts_with('.') && name.ends_with(UNFINISHED)) {
-                continue;
-            }
-            let free = match File::open(entry.path().join(LOCK)) {
-                Ok(lock) => lock.try_lock().is_ok(),
-                // Between removing the lock and renaming.
-                Err(_) => old(&entry.path()),
-            };
-            if free {
-                let _ = std::fs::remove_dir_all(entry.path());
+            let random = name.strip_prefix('.').and_then(|rest| rest.strip_suffix(UNFINISHED));
+            if random.is_some_and(|r| r.len() == RANDOM_BYTES && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+            {
+                remove_abandoned(&entry.path());
             }
         }
     }
@@ -155,6 +152,41 @@ pub(super) fn relative(folder: &str) -> String {
 pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let failed = |source| ReportError::Write { path: path.to_owned(), source: Box::new(source) };
     Ok(atomic::write(path, bytes).map_err(failed)?)
+}
+
+/// A file to be locked, made if need be; what is in it stays.
+#[allow(clippy::disallowed_methods, reason = "nothing is written to it")]
+fn lock_file(path: &Path) -> std::io::Result<File> {
+    File::options().create(true).truncate(false).write(true).open(path)
+}
+
+/// Gives a finished folder its name. A folder with anything in it is never replaced: the system refuses that.
+#[allow(clippy::disallowed_methods, reason = "the lock is armcal's own, and so is the folder")]
+fn named(made: &Path, target: &Path) -> std::io::Result<()> {
+    std::fs::remove_file(made.join(LOCK))?;
+    std::fs::rename(made, target)?;
+    // The rename itself must survive a power cut too; not every file system can sync a folder.
+    if let Some(Ok(results)) = target.parent().map(File::open) {
+        let _ = results.sync_all();
+    }
+    Ok(())
+}
+
+/// Removes a folder under construction whose maker is gone. It is known by its lock or, in the moment when that is removed
+/// already, by its row.
+#[allow(clippy::disallowed_methods, reason = "the folder is armcal's own")]
+fn remove_abandoned(folder: &Path) {
+    let free = match File::open(folder.join(LOCK)) {
+        Ok(lock) => lock.try_lock().is_ok(),
+        // Between removing the lock and renaming.
+        Err(_) => folder.join(ROW).is_file() && old(folder),
+    };
+    if free {
+        let _ = std::fs::remove_dir_all(folder);
+    } else if old(folder) {
+        // Killed before there was a lock: empty, or not ours.
+        let _ = std::fs::remove_dir(folder);
+    }
 }
 
 /// Older than any such moment takes.

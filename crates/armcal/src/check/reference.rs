@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use armcal_core::{Pose, RollPitchYaw};
+use armcal_recording::input;
 use armcal_report::{PastRun, Run, SCHEMA, summary_json};
 use serde::Deserialize;
 use std::path::Path;
@@ -64,7 +65,7 @@ impl Calibrated {
             serde_json::from_value(PastRun::open(path)?.summary)
         } else {
             let file = if path.is_dir() { path.join("summary.json") } else { path.to_owned() };
-            let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
+            let text = input::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
             serde_json::from_str(&text)
         };
         let calibrated =

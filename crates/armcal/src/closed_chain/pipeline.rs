@@ -5,7 +5,7 @@ use crate::pipeline::{FramePose, FrameSection, ModelSection, ParameterOverride, 
 use armcal_calibrate::{Closure, FitConfig, HoldoutConfig, LengthKnowledge};
 use armcal_dwell::DwellConfig;
 use armcal_model::EffectTable;
-use armcal_recording::JointStream;
+use armcal_recording::{JointStream, input, resolve};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -143,6 +143,9 @@ impl ClosedPipeline {
             .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
+        let models = pipeline.arms.iter().flat_map(|arm| [&arm.model.dh, &arm.model.urdf]).flatten();
+        let named = pipeline.recordings.iter().flat_map(|recording| &recording.paths).chain(models);
+        named.for_each(|path| input::note(&resolve(folder, path)));
         let said = pipeline.contradiction();
         said.map_or(Ok(pipeline), |(key, problem)| {
             Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem })
@@ -154,6 +157,12 @@ impl ClosedPipeline {
         let (arms, chain) = (self.arms.len(), &self.closed_chain);
         if arms != 2 {
             return Some(("arms", format!("has {arms} entries; a closed chain is made of two [[arms]]")));
+        }
+        // They name files.
+        let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_');
+        let is_file_name = |name: &str| !name.is_empty() && name != "parameters" && name.chars().all(plain);
+        if let Some(arm) = self.arms.iter().find(|arm| !is_file_name(&arm.name)) {
+            return Some(("arms.name", format!("`{}` cannot be the name of a file of results", arm.name)));
         }
         if self.arms[0].joints.topic == self.arms[1].joints.topic
             && self.arms[0].joints.names == self.arms[1].joints.names

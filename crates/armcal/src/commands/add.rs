@@ -1,6 +1,7 @@
 //! `armcal add`: puts an effect into the model and shows what that does on points the fit never saw.
 
-use super::{Outcome, print, style};
+use super::run::results;
+use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -9,7 +10,7 @@ use crate::story::{self, Diagnosed, Settled};
 use crate::view;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, effects_toml};
-use armcal_recording::atomic;
+use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -44,9 +45,14 @@ struct Added<'a> {
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(request.pipeline)?;
+    may_write(results(&pipeline, request.out))?;
+    let named = named(request.effects, &pipeline)?;
+    if let Some(new) = &named {
+        extend(&pipeline, request.pipeline, request.write, new)?;
+    }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
-    let new = requested(request.effects, &pipeline, &settled, &progress)?;
+    let new = named.map_or_else(|| suggested(&pipeline, &settled, &progress), Ok)?;
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
@@ -68,34 +74,36 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     if request.json {
         let remaining = &run.diagnosis;
         let value = Added { added, pipeline: &extended.path, comparison: &comparison, remaining };
-        print(&super::json_text(&value)?);
+        print(&super::json_text(&value)?)?;
     } else {
-        print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()));
-        print(&comparison.terminal(style()));
-        print(&format!("\n{}", diagnosis_text(&run, style())));
+        print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()))?;
+        print(&comparison.terminal(style()))?;
+        print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());
-        print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"));
+        print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"))?;
     }
     Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
 }
 
-/// The effects the user named, or those the diagnosis suggests.
-fn requested(
-    words: &[String],
-    pipeline: &Pipeline,
-    settled: &Settled,
-    progress: &Progress,
-) -> Result<Vec<EffectSpec>, Error> {
-    let joints = settled.geometry.chain().joint_names();
+/// The effects the user named; `None` for those that the diagnosis will suggest.
+fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>>, Error> {
     if words.iter().any(|word| word == SUGGESTED) {
-        let diagnosis = settled.diagnose(pipeline, progress)?;
-        let suggested = diagnosis.map(|d| d.suggested(joints)).transpose()?.unwrap_or_default();
-        if suggested.is_empty() {
-            return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });
-        }
-        return Ok(suggested);
+        return Ok(None);
     }
-    words.iter().map(|word| EffectSpec::parse(word, joints).map_err(Error::Model)).collect()
+    let (_, chain) = frames::nominal_chain(pipeline)?;
+    let parsed = words.iter().map(|word| EffectSpec::parse(word, chain.joint_names()));
+    parsed.collect::<Result<_, _>>().map(Some).map_err(Error::of_usage)
+}
+
+/// The effects that the diagnosis suggests.
+fn suggested(pipeline: &Pipeline, settled: &Settled, progress: &Progress) -> Result<Vec<EffectSpec>, Error> {
+    let diagnosis = settled.diagnose(pipeline, progress)?;
+    let joints = settled.geometry.chain().joint_names();
+    let suggested = diagnosis.map(|d| d.suggested(joints)).transpose()?.unwrap_or_default();
+    if suggested.is_empty() {
+        return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });
+    }
+    Ok(suggested)
 }
 
 /// A pipeline with more effects, and where it is written.
@@ -119,9 +127,7 @@ pub fn extend(
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
     let path = write.map_or_else(|| beside(original, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
-    if std::fs::read_to_string(&path).is_ok_and(|existing| existing != pipeline.text) {
-        return Err(Error::WouldOverwrite { path });
-    }
+    may_put(&path, pipeline.text.as_bytes()).map_err(Error::Output)?;
     Ok(Extended { pipeline, path })
 }
 

@@ -1,11 +1,12 @@
 //! `armcal batch`, `armcal map`, `armcal reduce`: a whole archive, on one machine or many.
 
-use super::{Outcome, print, style};
-use crate::batch::{self, Manifest, Request, Shard};
+use super::{Outcome, may_write, print, style};
+use crate::batch::{self, Manifest, Request, Shard, receipt_file};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use armcal_report::{Campaign, Status, campaign_json, campaign_text};
+use armcal_recording::input;
+use armcal_report::{Campaign, Status, campaign_files, campaign_json, campaign_text};
 use std::path::{Path, PathBuf};
 
 /// What a user asked for.
@@ -23,6 +24,11 @@ impl Job<'_> {
         Pipeline::load_for_others(path)
     }
 
+    /// Notes the recordings, so that no result is begun in the place of one.
+    fn note_inputs(&self) {
+        self.manifest.entries.iter().flat_map(|entry| &entry.paths).for_each(|path| input::note(path));
+    }
+
     fn request<'a>(&'a self, pipeline: &'a Pipeline) -> Request<'a> {
         let Job { manifest, out, full, jobs, .. } = self;
         Request { manifest, pipeline, out, full: *full, jobs: *jobs }
@@ -32,6 +38,8 @@ impl Job<'_> {
 /// All of it.
 pub(super) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
     let pipeline = job.pipeline()?;
+    job.note_inputs();
+    may_write(campaign_files(job.out))?;
     let progress = Progress::new();
     let (campaign, written, skipped) = batch::batch(&job.request(&pipeline), &progress)?;
     progress.finish();
@@ -51,26 +59,29 @@ pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
         }
     };
     let pipeline = job.pipeline()?;
+    job.note_inputs();
+    may_write([receipt_file(shard, job.out)])?;
     let progress = Progress::new();
     let receipt = batch::map(&job.request(&pipeline), shard, &progress)?;
     progress.finish();
     let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
-    print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"));
+    print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"))?;
     Ok(if failed > 0 { Outcome::Doubtful } else { Outcome::Done })
 }
 
 /// The shares together.
 pub(super) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
+    may_write(campaign_files(out))?;
     let (campaign, written) = batch::reduce(out)?;
     show(&campaign, out, &written, json)
 }
 
 fn show(campaign: &Campaign, out: &Path, written: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     if json {
-        print(&campaign_json(campaign));
+        print(&campaign_json(campaign))?;
     } else {
-        print(&campaign_text(campaign, style()));
-        super::print_written(out, written);
+        print(&campaign_text(campaign, style()))?;
+        super::print_written(out, written)?;
     }
     Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
 }

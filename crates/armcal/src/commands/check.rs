@@ -1,6 +1,7 @@
 //! `armcal check`: whether a result keeps the limits in its pipeline's `[check]`.
 
-use super::{Outcome, print};
+use super::run::results;
+use super::{Outcome, may_write, print};
 use crate::check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
@@ -29,11 +30,14 @@ pub struct Request<'a> {
 /// Runs the pipeline and judges it. A run that fails leaves its error in the files too, so that CI shows it where it
 /// shows the checks.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    match judged(request) {
+    // Loaded first: the files it names are inputs.
+    let pipeline = Pipeline::load(request.pipeline);
+    may_write([request.junit, request.markdown].into_iter().flatten())?;
+    match pipeline.and_then(|pipeline| judged(request, &pipeline)) {
         Ok(judged) => {
             write(request.junit, || junit::junit(&judged))?;
             write(request.markdown, || Ok(markdown::markdown(&judged)))?;
-            print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) });
+            print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) })?;
             Ok(match judged.judgement {
                 Judgement::Holds => Outcome::Done,
                 Judgement::Doubtful => Outcome::Doubtful,
@@ -47,14 +51,14 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     }
 }
 
-fn judged(request: &Request<'_>) -> Result<Judged, Error> {
-    let pipeline = Pipeline::load(request.pipeline)?;
-    let limits = Limits::of(&pipeline, request.pipeline)?;
+fn judged(request: &Request<'_>, pipeline: &Pipeline) -> Result<Judged, Error> {
+    let limits = Limits::of(pipeline, request.pipeline)?;
+    may_write(request.out.map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
-    let (mut run, recordings) = story::diagnosed(story::settle(&pipeline, &progress)?, &pipeline, &progress)?;
+    let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &progress)?, pipeline, &progress)?;
     let judged = judge(&run, &limits)?;
     if let Some(out) = request.out {
-        story::add_refits(&mut run, &pipeline, &progress)?;
+        story::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
         view::remember(out, request.pipeline)?;
@@ -72,9 +76,9 @@ fn report_failure(request: &Request<'_>, error: &Error) -> Result<(), Error> {
     let line = format!("{}: no check was made, the run failed", printable(&name));
     if request.json {
         let value = json!({ "schema": SCHEMA, "judgement": "failed", "line": line, "error": error });
-        print(&super::json_text(&value)?);
+        print(&super::json_text(&value)?)?;
     } else {
-        print(&format!("{line}\n"));
+        print(&format!("{line}\n"))?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `armcal compare`: two results on the same dwells.
 
-use super::{Outcome, print, style};
+use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use armcal_recording::atomic;
 use armcal_report::{Comparison, PastRun, comparison_html};
@@ -9,6 +9,7 @@ use std::path::Path;
 /// Compares two results, prints the table (or JSON), and writes the page if one is wanted.
 pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Result<Outcome, Error> {
     let (before, after) = (PastRun::open(before)?, PastRun::open(after)?);
+    may_write(html)?;
     let comparison = Comparison::of(&before, &after);
     if comparison.all.is_none() {
         return Err(Error::NothingInCommon { before: before.path, after: after.path, why: why(&comparison) });
@@ -18,9 +19,9 @@ pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Resu
         atomic::write(path, page.as_bytes()).map_err(Error::Output)?;
     }
     if json {
-        print(&super::json_text(&comparison)?);
+        print(&super::json_text(&comparison)?)?;
     } else {
-        print(&comparison.terminal(style()));
+        print(&comparison.terminal(style()))?;
     }
     Ok(Outcome::Done)
 }

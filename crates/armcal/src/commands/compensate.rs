@@ -1,6 +1,6 @@
 //! `armcal compensate`: set-points that bring the calibrated arm to Cartesian targets.
 
-use super::{Outcome, joint_range, print};
+use super::{Outcome, joint_range, may_write, print};
 use crate::compensate::table::Sheet;
 use crate::compensate::{
     Drive, TargetFrame, in_world_m, placed, prepare, recording, recording_index, target_frame, targets,
@@ -49,8 +49,10 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let past = PastModel::open(request.result)?;
     let arms = past.arms()?;
     let frame = target_frame(&past, request.frame)?;
+    let wanted = targets::read(request.targets)?;
+    may_write([Some(request.out), request.mcap].into_iter().flatten())?;
     let compensator = prepare(&past, &arms, frame, &drive(request, &past, &arms)?)?;
-    let mut targets = placed(&arms, frame, &targets::read(request.targets)?)?;
+    let mut targets = placed(&arms, frame, &wanted)?;
     if let Some(rate_hz) = request.rate_hz {
         if !(rate_hz > 0.0 && rate_hz <= 1e4) {
             return Err(bad("--rate", rate_hz.to_string(), "give points a second, up to 10000"));
@@ -73,9 +75,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         recording::write(path, chain.joint_names(), &points).map_err(Error::Output)?;
     }
     if request.json {
-        print(&super::json_text(&sheet.json())?);
+        print(&super::json_text(&sheet.json())?)?;
     } else {
-        print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()));
+        print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()))?;
     }
     Ok(if past.missing.is_empty() && points.iter().all(settled) { Outcome::Done } else { Outcome::Doubtful })
 }

@@ -13,9 +13,9 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     if input.extension().is_none_or(|e| e != "toml") {
         let past = PastRun::open(input)?;
         if json {
-            print(&super::json_text(&past.summary["diagnosis"])?);
+            print(&super::json_text(&past.summary["diagnosis"])?)?;
         } else {
-            print(&past_diagnosis(&past, style()));
+            print(&past_diagnosis(&past, style()))?;
         }
         return Ok(Outcome::Done);
     }
@@ -26,9 +26,9 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;
-        print(&super::json_text(&summary["diagnosis"])?);
+        print(&super::json_text(&summary["diagnosis"])?)?;
     } else {
-        print(&diagnosis_text(&run, style()));
+        print(&diagnosis_text(&run, style()))?;
     }
     Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
 }

@@ -13,11 +13,11 @@ pub fn run(name: Option<&str>, json: bool) -> Result<Outcome, Error> {
         (None, false) => overview(),
         (None, true) => super::json_text(&catalogue().iter().map(|k| entry(k)).collect::<Vec<Value>>())?,
         (Some(name), json) => {
-            let kind = EffectSpec::new(name).kind()?;
+            let kind = EffectSpec::new(name).kind().map_err(Error::of_usage)?;
             if json { super::json_text(&entry(kind))? } else { page(kind) }
         }
     };
-    print(&text);
+    print(&text)?;
     Ok(Outcome::Done)
 }
 

@@ -1,6 +1,6 @@
 //! `armcal export`: the residual problem of a pipeline, to solve it with another tool.
 
-use super::{Outcome, print};
+use super::{Outcome, may_write, print};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -16,13 +16,14 @@ use std::path::Path;
 /// Runs the pipeline and writes its least-squares problem with armcal's own answer beside it.
 pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(pipeline)?;
+    may_write([out])?;
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
     let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
     progress.finish();
     let text = format!("{:#}\n", problem(&run, &pipeline.fit)?);
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;
-    print(&format!("{}\n", out.display()));
+    print(&format!("{}\n", out.display()))?;
     Ok(Outcome::Done)
 }
 

@@ -4,7 +4,7 @@ use super::{Outcome, json_text, print};
 use crate::error::Error;
 use crate::pipeline::Job;
 use armcal_core::Severity;
-use armcal_recording::{Extract, Extracted, Recording, RecordingReport, extract};
+use armcal_recording::{Extract, Extracted, Recording, RecordingError, RecordingReport, extract, input};
 use armcal_report::printable;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,13 +30,19 @@ pub fn run(asked: &Request<'_>) -> Result<Outcome, Error> {
     let mut topics = asked.pipeline.map_or(Ok(Vec::new()), topics_of)?;
     topics.extend_from_slice(asked.topics);
     let name = asked.inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
+    asked.inputs.iter().for_each(|path| input::note(path));
+    super::may_write([asked.out])?;
     let recording = Recording::open(asked.inputs)
         .map_err(|source| Error::Recording { recording: name.clone(), source })?;
     let wanted = Extract { topics: &topics, attachments: asked.attachments };
-    let extracted = extract(&recording, &wanted, asked.out)
-        .map_err(|source| Error::Recording { recording: name, source })?;
+    let extracted = extract(&recording, &wanted, asked.out).map_err(|source| match source {
+        RecordingError::NoSuchTopic { ref pattern, .. } if asked.topics.contains(pattern) => {
+            Error::of_usage(Error::Recording { recording: name, source })
+        }
+        source => Error::Recording { recording: name, source },
+    })?;
     let report = recording.report();
-    print(&if asked.json { json(&extracted, report)? } else { text(asked.out, &extracted, report) });
+    print(&if asked.json { json(&extracted, report)? } else { text(asked.out, &extracted, report) })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
 }

@@ -21,11 +21,18 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
             .iter()
             .map(|(name, report)| serde_json::json!({"name": name, "report": report}))
             .collect();
-        print(&format!("{:#}\n", serde_json::Value::from(value)));
+        print(&format!("{:#}\n", serde_json::Value::from(value)))?;
     } else {
         for (name, report) in &reports {
-            print(&text(name, report));
+            print(&text(name, report))?;
         }
+    }
+    let empty = |(_, report): &&(String, RecordingReport)| {
+        report.warnings.iter().all(|w| w.severity < Severity::DataLost)
+            && report.channels.iter().all(|channel| channel.messages == 0)
+    };
+    if let Some((name, _)) = reports.iter().find(empty) {
+        return Err(Error::NoMessages { recording: name.clone() });
     }
     let lost = reports.iter().flat_map(|(_, r)| &r.warnings).any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })

@@ -23,9 +23,10 @@ pub(crate) use compensate::Request as CompensateRequest;
 use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
 use crate::error::Error;
+use crate::stdout::print;
 use armcal_report::TerminalStyle;
 use std::borrow::Cow;
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 /// How a command ended when it did not fail.
@@ -93,6 +94,11 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     }
 }
 
+/// Whether outputs may be written at all, asked before long computations.
+fn may_write(paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Result<(), Error> {
+    armcal_recording::may_write_all(paths).map_err(Error::Output)
+}
+
 /// `JOINT=LOW..HIGH`: the joint by number from 1 or by name, and its range as written; `None` where it is not that.
 fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
     let (joint, range) = words.split_once('=')?;
@@ -102,12 +108,6 @@ fn joint_range(words: &str, joints: &[String]) -> Option<(usize, [f64; 2])> {
     let (low, high) = (low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?);
     let usable = joint < joints.len() && low.is_finite() && low < high && high.is_finite();
     usable.then_some((joint, [low, high]))
-}
-
-/// Prints a result; a reader that closed the pipe is not an error.
-fn print(text: &str) {
-    let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(harmless(text, style()).as_bytes()).and_then(|()| stdout.flush());
 }
 
 /// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and, where
@@ -141,14 +141,15 @@ fn colour_code(text: &str) -> Option<&str> {
 }
 
 /// Says which files were written where.
-fn print_written(out: &Path, written: &[PathBuf]) {
+fn print_written(out: &Path, written: &[PathBuf]) -> Result<(), Error> {
     let names: Vec<String> =
         written.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into()).collect();
-    print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")));
+    print(&format!("\nWritten to {}: {}\n", out.display(), names.join(", ")))
 }
 
 /// Colours on a terminal, unless the user asked for none.
-fn style() -> TerminalStyle {
+pub(crate) fn style() -> TerminalStyle {
+    #[allow(clippy::disallowed_methods, reason = "nothing is written")]
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     if colour { TerminalStyle::Colour } else { TerminalStyle::Plain }
 }

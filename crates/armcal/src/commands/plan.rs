@@ -9,7 +9,7 @@ use crate::stages::frames;
 use crate::story::{self, Settled};
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::Arrival;
-use armcal_model::Model;
+use armcal_model::{EffectSpec, Model};
 use armcal_report::{number, plain_table, table_text};
 use comfy_table::Cell;
 use nalgebra::Matrix3;
@@ -40,13 +40,18 @@ pub struct Request<'a> {
 /// Calibrates, diagnoses, and proposes the dwells that tell apart what stands.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(request.pipeline)?;
+    let (_, chain) = frames::nominal_chain(&pipeline)?;
+    let joints = chain.joint_names();
+    let allowed = allowed(request, joints)?;
+    let words = request.effects.as_deref().map(split);
+    for word in words.iter().flatten() {
+        EffectSpec::parse(word, joints).map_err(Error::of_usage)?;
+    }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
-    let joints = settled.geometry.chain().joint_names();
-    let allowed = allowed(request, joints)?;
     let diagnosis = settled.diagnose(&pipeline, &progress)?;
-    let open = match (request.effects, &diagnosis) {
-        (Some(words), _) => named(&split(words), diagnosis.as_ref(), joints)?,
+    let open = match (&words, &diagnosis) {
+        (Some(words), _) => named(words, diagnosis.as_ref(), joints)?,
         (None, Some(diagnosis)) => standing(diagnosis, joints)?,
         (None, None) => return Err(Error::NotDiagnosed),
     };
@@ -65,7 +70,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     };
     let proposal = propose(&known, &open, &allowed, &pipeline.diagnosis)?;
     progress.finish();
-    print(&if request.json { super::json_text(&proposal)? } else { text(&proposal, joints) });
+    print(&if request.json { super::json_text(&proposal)? } else { text(&proposal, joints) })?;
     Ok(Outcome::Done)
 }
 

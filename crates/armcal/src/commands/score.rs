@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::progress::Progress;
 use crate::score::{Judgement, rows, score, table};
 use armcal_lab::LabError;
-use armcal_lab::scenario::{Design, Scenario, Size, families, nothing, outside};
+use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside};
 use serde::de::DeserializeOwned;
 use serde_json::json;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -42,9 +42,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     progress.finish();
     let rows = rows(&scored);
     if request.json {
-        print(&super::json_text(&json!({ "rows": rows, "scenarios": scored }))?);
+        print(&super::json_text(&json!({ "rows": rows, "scenarios": scored }))?)?;
     } else {
-        print(&table(&rows));
+        print(&table(&rows))?;
         let wrong = scored.iter().filter(|s| s.judgement == Judgement::Wrong).count();
         let (first, last) = (request.from, request.from + request.seeds.saturating_sub(1));
         let slowest = scored.iter().map(|s| s.answer.seconds).fold(0.0, f64::max);
@@ -52,7 +52,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
             "\n{} scenarios, seeds {first} to {last}, size {}; {wrong} confidently wrong; slowest diagnosis {slowest:.2} s\n",
             scored.len(),
             request.size,
-        ));
+        ))?;
     }
     Ok(Outcome::Done)
 }
@@ -64,7 +64,10 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
             "catalogue" => names.extend(families().into_iter().map(str::to_owned)),
             "nothing" => names.extend(nothing().into_iter().map(str::to_owned)),
             "outside" => names.extend(outside().into_iter().map(str::to_owned)),
-            name => names.push(name.to_owned()),
+            name => {
+                known_families(name)?;
+                names.push(name.to_owned());
+            }
         }
     }
     let size: Size = word("size", request.size)?;
@@ -83,5 +86,10 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
 /// A word of the laboratory's own vocabulary.
 pub(super) fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, Error> {
     let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
-    parsed.map_err(|e| Error::Lab(LabError::Value { key: key.to_owned(), why: e.to_string() }))
+    parsed.map_err(|e| Error::of_usage(LabError::Value { key: key.to_owned(), why: e.to_string() }))
+}
+
+/// A family that can be hidden, or several joined by `+`; otherwise the mistake is the user's.
+pub(super) fn known_families(words: &str) -> Result<(), Error> {
+    check_family(words).map_err(Error::of_usage)
 }

@@ -1,8 +1,9 @@
 //! `armcal simulate`: the virtual rig.
 
-use super::score::word;
+use super::score::{known_families, word};
 use super::{Outcome, print};
 use crate::error::Error;
+use crate::pipeline::read_text;
 use armcal_lab::pair::{self, PairConfig};
 use armcal_lab::scenario::{Scenario, seal};
 use armcal_lab::{LabConfig, simulate};
@@ -11,37 +12,34 @@ use std::path::{Path, PathBuf};
 /// Simulates the rig that `lab` describes, of one arm or (with `[[arms]]`) of two, and writes its recordings and their truth to `out`.
 pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> {
     let lab = lab.unwrap_or(Path::new(""));
-    let text = std::fs::read_to_string(lab).map_err(|source| Error::ReadFile {
-        what: "lab file",
-        path: lab.to_owned(),
-        source,
-    })?;
+    let text = read_text("lab file", lab)?;
     if text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms")) {
         let mut config = PairConfig::from_toml(&text, lab)?;
         config.seed = seed.unwrap_or(config.seed);
         let simulated = pair::simulate(&config, out)?;
-        list(simulated.recordings.iter().chain([&simulated.truth]));
+        list(simulated.recordings.iter().chain([&simulated.truth]))?;
         return Ok(Outcome::Done);
     }
     let mut config = LabConfig::from_toml(&text, lab)?;
     config.seed = seed.unwrap_or(config.seed);
     let folder = lab.parent().unwrap_or(Path::new(""));
     let simulated = simulate(&config, folder, out)?;
-    list(simulated.recordings.iter().chain([&simulated.truth]));
+    list(simulated.recordings.iter().chain([&simulated.truth]))?;
     Ok(Outcome::Done)
 }
 
 /// Draws a rig that hides `family`, and writes what the product may see to `out` and the truth beside it.
 pub fn hide(family: &str, design: &str, size: &str, out: &Path, seed: u64) -> Result<Outcome, Error> {
+    known_families(family)?;
     let size = word("size", size)?;
     let scenario = Scenario { size, ..Scenario::new(family, word("design", design)?, seed) };
     let mut truth = out.as_os_str().to_owned();
     truth.push("-truth.json");
     let sealed = seal(&scenario, out, Path::new(&truth))?;
-    list(sealed.recordings.iter().chain([&sealed.pipeline, &sealed.truth]));
+    list(sealed.recordings.iter().chain([&sealed.pipeline, &sealed.truth]))?;
     Ok(Outcome::Done)
 }
 
-fn list<'p>(paths: impl Iterator<Item = &'p PathBuf>) {
-    paths.for_each(|path| print(&format!("{}\n", path.display())));
+fn list<'p>(mut paths: impl Iterator<Item = &'p PathBuf>) -> Result<(), Error> {
+    paths.try_for_each(|path| print(&format!("{}\n", path.display())))
 }

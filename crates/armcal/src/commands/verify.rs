@@ -1,17 +1,18 @@
 //! `armcal verify`: a calibrated model on recordings it never saw.
 
-use super::{Outcome, print, style};
+use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::verify::verify;
 use armcal_recording::atomic;
-use armcal_report::{Status, verification_files, verification_json, verification_text};
+use armcal_report::{Status, verification_files, verification_json, verification_paths, verification_text};
 use std::path::Path;
 
 /// Verifies a result, prints the tables (or JSON), and writes files where a folder is given.
 pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(pipeline)?;
+    may_write(out.map(verification_paths).into_iter().flatten())?;
     let progress = Progress::new();
     let verification = verify(result, &pipeline, &progress)?;
     let files = out.map(|_| verification_files(&verification)).transpose()?;
@@ -19,14 +20,15 @@ pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Re
     if let (Some(folder), Some(files)) = (out, files) {
         std::fs::create_dir_all(folder)
             .map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
-        for (name, bytes) in files {
-            atomic::write(&folder.join(name), &bytes).map_err(Error::Output)?;
-        }
+        files
+            .into_iter()
+            .try_for_each(|(name, bytes)| atomic::write(&folder.join(name), &bytes))
+            .map_err(Error::Output)?;
     }
     if json {
-        print(&verification_json(&verification));
+        print(&verification_json(&verification))?;
     } else {
-        print(&verification_text(&verification, style()));
+        print(&verification_text(&verification, style()))?;
     }
     Ok(if verification.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
 }

@@ -13,15 +13,13 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let bench = Bench::of(&path, &progress)?;
     progress.finish();
-    let written = std::fs::read_to_string(input.join("summary.json"));
+    let written = armcal_recording::input::read_to_string(&input.join("summary.json"));
     if written.is_ok_and(|text| text != summary_json(bench.run())) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
             input.display()
-        ));
+        ))?;
     }
-    serve(bench, port, |address| {
-        print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display()));
-    })?;
+    serve(bench, port, |address| print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display())))?;
     Ok(Outcome::Done)
 }

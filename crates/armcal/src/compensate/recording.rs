@@ -1,9 +1,9 @@
 //! Set-points as a ROS 2 recording: `sensor_msgs/msg/JointState`, to play back or to look at.
 
 use armcal_compensate::SetPoint;
-use armcal_recording::RecordingError;
 use armcal_recording::output::McapOutput;
 use armcal_recording::ros2::{self, Header};
+use armcal_recording::{RecordingError, SET_POINTS_METADATA};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,5 +30,7 @@ pub fn write(path: &Path, joints: &[String], points: &[SetPoint]) -> Result<(), 
             output.put(*id, i as u32, log_ns, log_ns, &data)?;
         }
     }
+    let about = [("generator", "armcal compensate")].map(|(k, v)| (k.to_owned(), v.to_owned()));
+    output.metadata(SET_POINTS_METADATA, &about.into_iter().collect())?;
     output.finish()
 }

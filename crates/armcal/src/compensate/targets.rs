@@ -5,6 +5,7 @@
 //! ```
 
 use crate::error::Error;
+use crate::pipeline::read_text;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 use std::path::Path;
@@ -40,11 +41,7 @@ struct File {
 
 /// Reads and checks the file.
 pub fn read(path: &Path) -> Result<Vec<Wanted>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
-        what: "targets",
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = read_text("file of targets", path)?;
     let bad = |problem: String| Error::BadTargets { path: path.to_owned(), problem };
     let toml = path.extension().is_some_and(|e| e == "toml");
     let parsed = if toml {

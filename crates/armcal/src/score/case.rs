@@ -96,7 +96,7 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
 }
 
 fn truth(path: &Path) -> Result<Truth, Error> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::ReadFile {
+    let text = armcal_recording::input::read_to_string(path).map_err(|source| Error::ReadFile {
         what: "truth",
         path: path.to_owned(),
         source,

@@ -9,6 +9,7 @@ use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
+use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
@@ -123,7 +124,7 @@ pub fn start_frames(pipeline: &Pipeline, model: &mut Model, places: &[Option<Ass
 }
 
 fn read(what: &'static str, path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
+    input::read_to_string(path).map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
 }
 
 /// A frame as its section has it.

@@ -2,14 +2,17 @@
 //! hold-out is refitted as it is chosen.
 //!
 //! * [`Bench`]: the run, ready to be refitted; `requests`: what the page may ask of it;
-//! * `guard`: who may ask; `server`: the few routes; `source`: which pipeline made a folder of results.
+//! * `guard`: who may ask; `server`: the few routes; `source`: which pipeline made a folder of results;
+//! * `turns`: one refit at a time, and not too many that wait.
 
 mod bench;
 mod guard;
 mod requests;
 mod server;
 mod source;
+mod turns;
 
 pub use bench::Bench;
 pub use server::serve;
+pub(crate) use source::FILE as SOURCE_FILE;
 pub use source::{pipeline_of, remember};

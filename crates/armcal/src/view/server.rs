@@ -3,6 +3,7 @@
 use super::bench::Bench;
 use super::guard::Guard;
 use super::requests::Wanted;
+use super::turns::{MOST_ASKED, Turns};
 use crate::error::Error;
 use axum::Router;
 use axum::body::Bytes;
@@ -20,7 +21,7 @@ const LARGEST_BODY: usize = 64 * 1024;
 
 /// Serves a bench on 127.0.0.1 until the process ends; calls `ready` with the address when it listens. Port 0 takes any
 /// free one.
-pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Error> {
+pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Error>) -> Result<(), Error> {
     let failed = |what: &'static str| move |source| Error::Serve { what, port, source };
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed("listening"))?;
     let port = listener.local_addr().map_err(failed("listening"))?.port();
@@ -28,12 +29,12 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Er
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
     let html = bench.html()?;
-    let app = routes(Arc::new(Served { bench, html }), guard);
+    let app = routes(Arc::new(Served { bench, html, turns: Arc::default() }), guard);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed("starting"))?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed("listening"))?;
-        ready(&address);
+        ready(&address)?;
         axum::serve(listener, app).await.map_err(failed("serving"))
     })
 }
@@ -41,6 +42,7 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str)) -> Result<(), Er
 struct Served {
     bench: Bench,
     html: String,
+    turns: Arc<Turns>,
 }
 
 fn routes(served: Arc<Served>, guard: Guard) -> Router {
@@ -83,7 +85,15 @@ async fn choices(State(served): State<Arc<Served>>) -> Response {
 }
 
 async fn refit(State(served): State<Arc<Served>>, body: Bytes) -> Response {
-    asked(served, body, |bench, wanted| bench.refit(wanted)).await
+    let Some(place) = served.turns.place() else {
+        let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
+        return answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }));
+    };
+    asked(served, body, move |bench, wanted| {
+        let _turn = place.turn();
+        bench.refit(wanted)
+    })
+    .await
 }
 
 async fn keep(State(served): State<Arc<Served>>, body: Bytes) -> Response {

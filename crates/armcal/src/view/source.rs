@@ -1,12 +1,12 @@
 //! Which pipeline made a folder of results.
 
 use crate::error::Error;
-use armcal_recording::atomic;
+use armcal_recording::{atomic, input};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Name of the file in the folder.
-const FILE: &str = "view.toml";
+pub(crate) const FILE: &str = "view.toml";
 
 #[derive(Serialize, Deserialize)]
 struct Source {
@@ -30,7 +30,7 @@ pub fn pipeline_of(input: &Path) -> Result<PathBuf, Error> {
         return Ok(input.to_owned());
     }
     let path = input.join(FILE);
-    let text = std::fs::read_to_string(&path)
+    let text = input::read_to_string(&path)
         .map_err(|source| Error::NoSource { folder: input.to_owned(), source: Box::new(source) })?;
     let source: Source = toml::from_str(&text)
         .map_err(|e| Error::NoSource { folder: input.to_owned(), source: Box::new(e) })?;

@@ -62,6 +62,8 @@ pub struct ObservedPair {
 /// Simulates a pair and writes `<recording>.mcap` and `truth.json` into `out_dir`, made if need be.
 pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, LabError> {
     config.check()?;
+    let truth_path = out_dir.join(crate::TRUTH);
+    crate::may_write(config.recordings.iter().map(String::as_str), out_dir, &truth_path)?;
     let pair = Pair::build(config);
     let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
     std::fs::create_dir_all(out_dir).map_err(refused)?;
@@ -70,14 +72,13 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, La
     for (recording, name) in config.recordings.iter().enumerate() {
         let motion = Motion::perform(config, &pair, recording)?;
         let log = recorded::log(config, &pair, &motion, recording)?;
-        let path = out_dir.join(format!("{name}.mcap"));
+        let path = out_dir.join(crate::recording_file(name));
         crate::record::write(&path, &config.name, name, &log)?;
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
         recordings.push(path);
     }
-    let path = out_dir.join("truth.json");
-    truth.write(&path)?;
-    Ok(SimulatedPair { recordings, truth: path, facts: truth })
+    truth.write(&truth_path)?;
+    Ok(SimulatedPair { recordings, truth: truth_path, facts: truth })
 }
 
 /// Observes a pair without recording it.

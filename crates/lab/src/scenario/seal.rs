@@ -2,7 +2,8 @@
 
 use super::Scenario;
 use crate::config::{LabConfig, value};
-use crate::{LabError, Nominal, board, nothing_hidden, record, run};
+use crate::{LabError, Nominal, board, may_write, nothing_hidden, record, run};
+use armcal_recording::may_write_all;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,9 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
     }
     let planted = scenario.plant()?;
     let config = &planted.config;
+    let [arm, drawing, pipeline] = ["arm.toml", "board.toml", "pipeline.toml"].map(|name| folder.join(name));
+    may_write(config.recordings.iter().map(|r| r.name.as_str()), folder, truth)?;
+    may_write_all([&arm, &drawing, &pipeline])?;
     let (mut facts, logs) = run(config, Path::new(""), &nothing_hidden)?;
     facts.scenario = Some(scenario.clone());
     facts.hidden = planted.hidden;
@@ -38,10 +42,9 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
         record::write(&path, &config.name, &recording.name, log)?;
         recordings.push(path);
     }
-    write(&folder.join("arm.toml"), &Nominal::dh_toml(config))?;
-    write(&folder.join("board.toml"), &board::drawing(&config.board.file)?)?;
-    let pipeline = folder.join("pipeline.toml");
-    write(&pipeline, &pipeline_toml(config))?;
+    write(&arm, "arm", &Nominal::dh_toml(config))?;
+    write(&drawing, "board", &board::drawing(&config.board.file)?)?;
+    write(&pipeline, "pipeline", &pipeline_toml(config))?;
     if let Some(parent) = truth.parent() {
         make_folder(parent)?;
     }
@@ -53,7 +56,9 @@ fn make_folder(path: &Path) -> Result<(), LabError> {
     std::fs::create_dir_all(path).map_err(|source| LabError::Folder { path: path.to_owned(), source })
 }
 
-fn write(path: &Path, text: &str) -> Result<(), LabError> {
+/// Writes a text that says in its first line by whom it was made.
+fn write(path: &Path, kind: &str, text: &str) -> Result<(), LabError> {
+    let text = format!("# armcal.simulated-{kind}/1\n{text}");
     armcal_recording::atomic::write(path, text.as_bytes())
         .map_err(|source| LabError::Recording { path: path.to_owned(), source: Box::new(source) })
 }

@@ -35,6 +35,7 @@ fn peak_memory_is_that_of_a_small_recording() {
     let path = folder.path().join("recording.mcap");
     let mut peaks_mb = BTreeMap::new();
     for images in [24, 240] {
+        let _ = std::fs::remove_file(&path);
         generate(&path, images);
         for access in ["mapped", "ranges"] {
             let output = Command::new(std::env::current_exe().expect("this program"))

@@ -98,9 +98,8 @@ impl<'a> File<'a> {
 /// # Errors
 /// A page or table that cannot be made, a file that cannot be written.
 pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let [html, json, parquet] =
-        ["campaign.html", "campaign.json", "campaign.parquet"].map(|name| folder.join(name));
-    let staged = [
+    let [html, json, parquet] = campaign_files(folder);
+    let staged = vec![
         {
             let page = CampaignPage::of(campaign)?;
             stage_pieces(&html, |out| page.write_into(out))?
@@ -112,6 +111,11 @@ pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>
         stage(&parquet, &columns(campaign).encode("campaign.parquet")?)?,
     ];
     commit_all(staged)
+}
+
+/// The files that [`write_campaign`] writes into `folder`.
+pub fn campaign_files(folder: &Path) -> [PathBuf; 3] {
+    ["campaign.html", "campaign.json", "campaign.parquet"].map(|name| folder.join(name))
 }
 
 fn columns(campaign: &Campaign) -> Columns {

@@ -10,7 +10,7 @@ mod row;
 mod terminal;
 mod words;
 
-pub use files::{campaign_json, write_campaign};
+pub use files::{campaign_files, campaign_json, write_campaign};
 pub use row::campaign_row;
 pub use terminal::campaign_text;
 

@@ -11,10 +11,11 @@ use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
 use crate::run::{Status, VERSION};
 use crate::summary::{FitSummary, fit};
 use crate::text::conclusion_about;
-use crate::write::{at, commit_all, stage};
+use crate::write::{RUN, at, commit_all, stage};
 use armcal_calibrate::Residual;
 use armcal_core::Warning;
 use armcal_recording::Recording;
+use armcal_recording::atomic::AtomicFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -115,19 +116,26 @@ pub fn write_closed(
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let staged = texts.iter().map(|(name, text)| stage(&out_dir.join(name), text.as_bytes()));
-    let staged = staged.collect::<Result<Vec<_>, ReportError>>()?;
-    let mut written = vec![write_run(run, recordings, &texts, out_dir)?];
-    written.extend(commit_all(staged)?);
-    Ok(written)
+    let mut staged = staged.collect::<Result<Vec<_>, ReportError>>()?;
+    // The last to get its name, as in `write_all`.
+    staged.push(stage_run(run, recordings, &texts, out_dir)?);
+    commit_all(staged)
+}
+
+/// The files that [`write_closed`] writes into `out_dir`, of arms by name, each with a URDF or a DH file.
+pub fn closed_files<'a>(out_dir: &Path, arms: impl IntoIterator<Item = (&'a str, bool)>) -> Vec<PathBuf> {
+    let models = arms.into_iter().map(|(arm, urdf)| format!("{arm}.{}", if urdf { "urdf" } else { "toml" }));
+    let fixed = [RUN, "summary.json", "parameters.toml"].map(str::to_owned);
+    fixed.into_iter().chain(models).map(|name| out_dir.join(name)).collect()
 }
 
 /// Writes `run.mcap` with the other files attached.
-fn write_run(
+fn stage_run(
     run: &ClosedRun,
     recordings: &[Recording],
     texts: &[(String, String)],
     out_dir: &Path,
-) -> Result<PathBuf, ReportError> {
+) -> Result<AtomicFile, ReportError> {
     let attachment = |(name, text): &'_ (String, String)| {
         let media_type = match name.rsplit_once('.').map(|(_, form)| form) {
             Some("json") => "application/json",
@@ -142,11 +150,10 @@ fn write_run(
         files.iter().map(|(name, media_type, text)| Attachment { name, media_type, text }).collect();
     let about = [("version", VERSION), ("pipeline", &run.pipeline_name), ("summary_schema", CLOSED_SCHEMA)];
     let about = about.map(|(key, value)| (key.to_owned(), value.to_owned())).into_iter().collect();
-    let path = out_dir.join("run.mcap");
+    let path = out_dir.join(RUN);
     let about = [("armcal/run", about)];
     write_results(closed_messages(run), recordings, &attachments, run.end_ns(), &about, &path)
-        .map_err(at(&path))?;
-    Ok(path)
+        .map_err(at(&path))
 }
 
 /// The summary of a run: indented JSON with a final newline.

@@ -6,7 +6,7 @@
 mod files;
 mod terminal;
 
-pub use files::{CLOSED_SCHEMA, closed_summary_json, write_closed};
+pub use files::{CLOSED_SCHEMA, closed_files, closed_summary_json, write_closed};
 pub use terminal::closed_terminal;
 
 use crate::run::{Status, status_of, without_repeats};

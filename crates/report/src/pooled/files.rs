@@ -93,15 +93,17 @@ struct Parameters<'a> {
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn write_pooled(run: &PooledRun, out_dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let texts = [
-        ("pool.json", pooled_json(run)?),
-        ("parameters.toml", parameters_toml(run)?),
-        (past_model::FILE, model(run).json()?),
-    ];
+    let texts = [pooled_json(run)?, parameters_toml(run)?, model(run).json()?];
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
-    let staged = texts.iter().map(|(name, text)| stage(&out_dir.join(name), text.as_bytes()));
+    let staged =
+        pooled_files(out_dir).into_iter().zip(&texts).map(|(path, text)| stage(&path, text.as_bytes()));
     commit_all(staged.collect::<Result<Vec<_>, ReportError>>()?)
+}
+
+/// The files that [`write_pooled`] writes into `out_dir`.
+pub fn pooled_files(out_dir: &Path) -> [PathBuf; 3] {
+    ["pool.json", "parameters.toml", past_model::FILE].map(|name| out_dir.join(name))
 }
 
 /// The summary of a pool: indented JSON with a final newline.

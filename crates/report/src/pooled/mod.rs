@@ -5,7 +5,7 @@
 mod files;
 mod terminal;
 
-pub use files::{POOL_SCHEMA, pooled_json, write_pooled};
+pub use files::{POOL_SCHEMA, pooled_files, pooled_json, write_pooled};
 pub use terminal::pooled_terminal;
 
 use crate::past_observations::ObservedFile;

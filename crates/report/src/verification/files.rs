@@ -9,6 +9,7 @@ use crate::tables::Columns;
 use armcal_core::Warning;
 use armcal_verify::{PathRow, PointsRow};
 use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 /// Version of the contract of `verification.json`.
 const SCHEMA: &str = "armcal.verification/1";
@@ -56,6 +57,11 @@ pub fn verification_json(v: &Verification) -> String {
     };
     let json = serde_json::to_string_pretty(&file);
     json.expect("strings, numbers and lists under literal names always serialise") + "\n"
+}
+
+/// The files that `armcal verify` writes into a folder.
+pub fn verification_paths(folder: &Path) -> [PathBuf; 3] {
+    ["verification.html", "verification.json", "paths.parquet"].map(|name| folder.join(name))
 }
 
 /// Files of a verification, by name: `verification.html` to look at, `verification.json`, and `paths.parquet` with the moving

@@ -6,7 +6,7 @@ mod page;
 mod row;
 mod terminal;
 
-pub use files::{verification_files, verification_json};
+pub use files::{verification_files, verification_json, verification_paths};
 pub use terminal::verification_text;
 
 use crate::past_model::Value;

@@ -3,7 +3,8 @@
 function live() {
   const chosen = new Map(doc.own_effects.map((spec) => [spec, { spec, on: true }]));
   for (const c of doc.candidates) for (const spec of c.spec.split("+")) if (!chosen.has(spec)) chosen.set(spec, { spec, on: false });
-  let asked = 0;
+  let running = false, wanted = false;
+  let accepted = null; // What the last refit that was not refused was asked with.
 
   const draw = () => {
     $("effects").replaceChildren(...[...chosen.entries()].map(([name, effect]) => {
@@ -25,21 +26,45 @@ function live() {
   const ask = async (what, body) => {
     const answer = await fetch(what, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
     const value = await answer.json();
-    if (!answer.ok) throw new Error(value.error);
+    if (!answer.ok) throw Object.assign(new Error(value.error), { refused: answer.status < 500 });
     return value;
   };
-  const refit = async () => {
-    const own = ++asked;
-    $("live-status").textContent = "refitting …";
+  const state = () => ({ on: new Set([...chosen].filter(([, e]) => e.on).map(([name]) => name)), known: new Set(chosen.keys()), holdout: $("holdout").value });
+  // What was refused is no choice: back to what was accepted last.
+  const restore = () => {
+    for (const [name, effect] of chosen) {
+      if (!accepted.known.has(name)) chosen.delete(name);
+      effect.on = accepted.on.has(name);
+    }
+    $("holdout").value = accepted.holdout;
+    draw();
+  };
+  const refitOnce = async () => {
+    const own = state();
     try {
       const value = await ask("refit", request());
-      if (own !== asked) return; // Somebody clicked on.
+      accepted = own;
+      if (wanted) return; // Somebody clicked on.
       $("live-status").textContent = "refitted in " + value.milliseconds.toFixed(0) + " ms";
       const names = value.shown.effects.join(" + ");
       show(value.shown, names ? "with " + names : "geometry alone");
     } catch (error) {
-      if (own === asked) $("live-status").textContent = error.message;
+      if (wanted) return;
+      if (error.refused && accepted) restore();
+      $("live-status").textContent = error.message;
     }
+  };
+  // One at a time; of what is clicked meanwhile only the last is asked for.
+  const refit = async () => {
+    wanted = true;
+    $("live-status").textContent = "refitting …";
+    if (running) return;
+    running = true;
+    while (wanted) {
+      wanted = false;
+      await refitOnce();
+    }
+    running = false;
   };
   const parameters = (text) => Object.fromEntries(text.split(";").map((p) => p.trim().split(/\s+/)).filter((p) => p[0])
     .map(([name, unit, prior]) => [name, { unit, prior: Number(prior) }]));
@@ -71,6 +96,7 @@ function live() {
   fetch("choices").then((answer) => answer.json()).then((choices) => {
     $("catalogue").replaceChildren(...choices.effects.map((spec) => { const option = document.createElement("option"); option.value = spec; return option; }));
     $("holdout").replaceChildren(...choices.holdouts.map(([name, value]) => { const option = element("option", name); option.value = JSON.stringify(value); return option; }));
+    accepted = state();
   });
   draw();
 }
