@@ -1,5 +1,5 @@
 use crate::support::world::{World, complaint};
-use crate::support::{armcal, paper_pipeline, read_json, root};
+use crate::support::{armcal, paper_pipeline, read_json, root, skip};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use tempfile::TempDir;
@@ -204,7 +204,7 @@ fn a_full_disk_leaves_nothing_half_written() {
         .status()
         .is_ok_and(|s| s.success());
     if !mounted {
-        eprintln!("SKIPPED: this machine lets nobody mount a tmpfs, so a full disk was not tested");
+        skip("this machine lets nobody mount a tmpfs");
         return;
     }
     let output = bench.run();

@@ -14,6 +14,9 @@ mod paper_rig;
 /// Does geometry alone bring real robots as far as independent solvers bring them?
 mod real_robots;
 
+/// Does every shipped pipeline run, from a clone or with the data that it names?
+mod shipped_pipelines;
+
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
 

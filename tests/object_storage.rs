@@ -18,7 +18,8 @@ struct Store {
 }
 
 impl Store {
-    /// Starts the server with the files that `fill` puts into a folder; `None`, loudly, without the Python for it.
+    /// Starts the server with the files that `fill` puts into a folder; `None` without the Python for it, and the test is skipped.
+    #[track_caller]
     fn start(fill: impl FnOnce(&Path)) -> Option<Store> {
         let python = python_with("moto.server, boto3, werkzeug, flask")?;
         let folder = tempfile::tempdir().expect("temporary folder");

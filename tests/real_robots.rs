@@ -42,12 +42,22 @@ fn panda_unit_1_without_a_camera() {
     assert_every_dwell(&summary, &real.join("mukca_panda"));
 }
 
+/// The shipped fixture. An independent numpy least squares reaches 3.90 -> 0.255 mm rms about the socket's mean with one
+/// placement left out; armcal, which also has the 50 mm between the sockets to keep, may be a tenth off either.
 #[test]
-fn panda_unit_4_without_a_camera() {
-    let Some((real, summary)) = run("mukca-panda4.toml") else { return };
+fn panda_unit_4_from_the_fixtures_without_a_camera() {
+    let out = tempfile::tempdir().expect("temporary folder");
+    let summary = run_pipeline(&root().join("pipelines/mukca-panda4.toml"), out.path(), &[0, 3]);
+    let rms = |side: &str| number(&summary, &format!("/fit/holdout/{side}_mm/rms"));
+    println!("mukca-panda4.toml: held out {:.3} -> {:.3} mm rms", rms("nominal"), rms("fitted"));
+    assert!((rms("nominal") / 3.90 - 1.0).abs() < 0.1, "{} mm rms", rms("nominal"));
+    assert!(rms("fitted") < 1.1 * 0.255, "{} mm rms", rms("fitted"));
+    // No model without effects can be better on all of these dwells than the 0.21 mm of the fit to them.
+    assert!(rms("fitted") > 0.21, "{} mm rms", rms("fitted"));
+    assert_eq!(number(&summary, "/fit/holdout/n"), 207.0);
     let [nominal, fitted] = held_out_mm(&summary);
     assert!(fitted <= 0.25 && nominal > 5.0 * fitted, "{nominal} -> {fitted} mm");
-    assert_every_dwell(&summary, &real.join("mukca_panda4"));
+    assert_every_dwell(&summary, &root().join("fixtures/mukca-panda4"));
 }
 
 #[test]

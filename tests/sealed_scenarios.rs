@@ -1,6 +1,7 @@
 use crate::support::{armcal, number, run_pipeline};
 use serde_json::Value;
 use std::ffi::OsStr;
+use std::process::Command;
 
 /// Scenarios scored by the program itself, on seeds nobody looked at while the rules were made. The truth is read by
 /// the scorer alone, after the answer.
@@ -109,4 +110,67 @@ fn the_pasted_table_of_something_unlisted_removes_most_of_the_error() {
     let error = |summary| number(summary, "/fit/holdout/fitted_mm/mean");
     println!("{table}\nheld out {:.3} -> {:.3} mm", error(&before), error(&after));
     assert!(error(&after) < 0.5 * error(&before));
+}
+
+/// docs/confusion.md in small: the page says what was answered, scenario by scenario, and how to make it again.
+#[test]
+fn the_page_of_scores_says_what_was_answered() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let file = folder.path().join("confusion.md");
+    let words = "gear_ratio gravity_backlash outside:twist nothing:white backlash+eccentricity --seeds 1 --from 7001 --sealed-seeds 1";
+    let output = armcal(
+        ["score", "--json", "--page"]
+            .map(OsStr::new)
+            .into_iter()
+            .chain([file.as_os_str()])
+            .chain(words.split(' ').map(OsStr::new)),
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let scenarios = |key: &str| report[key].as_array().expect("scenarios").clone();
+    let (quick, whole) = (scenarios("scenarios"), scenarios("whole_way"));
+    assert_eq!((quick.len(), whole.len()), (5, 2));
+    let text = std::fs::read_to_string(&file).expect("the page");
+    println!("{text}");
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(
+        text.contains(&format!("Written in one go by armcal {version}: 7 scenarios, seeds 7001 to 7001.\n"))
+    );
+    assert!(text.contains(&format!("```sh\narmcal score {words} --page docs/confusion.md\n```\n")));
+
+    let all: Vec<&Value> = quick.iter().chain(&whole).collect();
+    let right = ["rightly_silent", "first", "in_set", "placed", "nearest", "not_shown"];
+    let (held, missed): (Vec<&Value>, Vec<&Value>) =
+        all.iter().partition(|s| right.iter().any(|judgement| s["judgement"] == *judgement));
+    assert!(text.contains(&format!("Missed or answered wrongly: {}", missed.len())));
+    let misses = text.split("## Misses").nth(1).expect("the misses");
+    for s in &missed {
+        let family = s["scenario"]["family"].as_str().expect("a family");
+        assert!(misses.contains(&format!("| `{family}`")), "{family} is missing among the misses");
+    }
+    assert_eq!(misses.lines().filter(|line| line.starts_with("| `")).count(), missed.len());
+    // The bars of the whole page, on these few: nothing wrong, no claim without a cause, and the unmistakable found.
+    assert_eq!(all.iter().filter(|s| s["judgement"] == "wrong" || s["judgement"] == "wrong_set").count(), 0);
+    for family in ["gear_ratio", "outside:twist", "nothing:white", "backlash+eccentricity"] {
+        let of = |s: &&&Value| s["scenario"]["family"] == family;
+        assert_eq!(held.iter().filter(of).count(), all.iter().filter(of).count(), "{family}");
+    }
+}
+
+/// Scenarios run beside each other, and the page is the same.
+#[test]
+fn the_page_of_scores_is_the_same_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let page = |threads: &str| {
+        let file = folder.path().join(threads);
+        let output = Command::new(env!("CARGO_BIN_EXE_armcal"))
+            .args(["score", "gear_ratio", "gravity_backlash", "--seeds", "2", "--from", "7001", "--page"])
+            .arg(&file)
+            .env("RAYON_NUM_THREADS", threads)
+            .output()
+            .expect("starting armcal");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        std::fs::read_to_string(&file).expect("the page")
+    };
+    assert_eq!(page("1"), page("4"));
 }

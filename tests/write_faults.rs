@@ -1,5 +1,5 @@
 use crate::support::world::{Place, World, cases, complaint, printing};
-use crate::support::{files_made, quick_pipeline, root};
+use crate::support::{files_made, quick_pipeline, root, skip};
 use clap::CommandFactory as _;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -137,7 +137,7 @@ fn a_disk_that_fills_up_at_any_byte_leaves_the_old_results() {
         let _ = std::fs::create_dir(&out);
         let size = format!("size={}k", old_kib + free_kib);
         let Some(mounted) = Mounted::new(&out, &["-t", "tmpfs", "-o", &size, "tmpfs"]) else {
-            eprintln!("SKIPPED: this machine lets nobody mount a tmpfs, so a full disk was not tested");
+            skip("this machine lets nobody mount a tmpfs");
             return;
         };
         for (name, bytes) in &bench.old {
@@ -184,7 +184,7 @@ fn a_folder_that_may_not_be_written_is_named() {
         read_only = Mounted::new(&out, &["--bind", &out.to_string_lossy()]);
         let remounted = Mounted::new(&out, &["-o", "remount,ro,bind"]).map(std::mem::forget);
         if remounted.is_none() {
-            eprintln!("SKIPPED: root may not mount here, so a folder without permission was not tested");
+            skip("root may not mount here");
             return;
         }
     }

@@ -1,6 +1,6 @@
 //! A real browser over the pages, driven by Playwright from node.
 
-use super::root;
+use super::{root, skip};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -9,7 +9,8 @@ pub struct Browser {
     scripts: PathBuf,
 }
 
-/// Node, Playwright and Chromium, if this machine has them; says so loudly if not. `.ci/run` installs them.
+/// Node, Playwright and Chromium, if this machine has them; without them the test is skipped. `.ci/run` installs them.
+#[track_caller]
 pub fn browser() -> Option<Browser> {
     let scripts = root().join("tests/browser");
     let found = Command::new("node")
@@ -27,7 +28,7 @@ pub fn browser() -> Option<Browser> {
         Err(e) => format!("node: {e}"),
     };
     assert!(std::env::var_os("ARMCAL_NEED_BROWSER").is_none(), "no browser: {why}");
-    eprintln!("SKIPPED: no browser on this machine ({why}); `npm ci` in tests/browser and install chromium");
+    skip(&format!("no browser on this machine ({why}); `npm ci` in tests/browser and install chromium"));
     None
 }
 

@@ -7,6 +7,7 @@ pub mod slurm;
 pub mod world;
 
 use serde_json::Value;
+pub use skipped_tests::skip;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -16,29 +17,32 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the repository's root")
 }
 
-/// The folder of real recordings beside the repository, if this machine has it; says so loudly if not.
+/// The folder of real recordings beside the repository, if this machine has it; without it the test is skipped.
+#[track_caller]
 pub fn real_recordings() -> Option<PathBuf> {
     let shared = root().join("../shared/real");
     if shared.is_dir() {
         return Some(shared);
     }
-    eprintln!("SKIPPED: no {} on this machine, so nothing was tested on real recordings", shared.display());
+    skip("no real recordings in ../shared/real beside the repository");
     None
 }
 
-/// A Python with the packages that read results back: `$ARMCAL_PYTHON`, else `python3`; says so loudly if there is none.
+/// A Python with the packages that read results back: `$ARMCAL_PYTHON`, else `python3`; without it the test is skipped.
+#[track_caller]
 pub fn python() -> Option<PathBuf> {
     python_with("scipy, numpy, mcap, mcap_ros2, mcap_protobuf")
 }
 
-/// A Python that can import these packages of `tests/requirements.txt`; says so loudly if there is none.
+/// A Python that can import these packages of `tests/requirements.txt`; without it the test is skipped.
+#[track_caller]
 pub fn python_with(packages: &str) -> Option<PathBuf> {
     let python = PathBuf::from(std::env::var_os("ARMCAL_PYTHON").unwrap_or_else(|| "python3".into()));
     let import = format!("import {packages}");
     if Command::new(&python).args(["-c", &import]).output().is_ok_and(|o| o.status.success()) {
         return Some(python);
     }
-    eprintln!("SKIPPED: {} lacks {packages} of tests/requirements.txt; set ARMCAL_PYTHON", python.display());
+    skip(&format!("{} lacks {packages} of tests/requirements.txt; set ARMCAL_PYTHON", python.display()));
     None
 }
 

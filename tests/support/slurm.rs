@@ -1,5 +1,6 @@
 //! Slurm on this machine alone, without systemd: munged, slurmctld and slurmd in a folder of their own.
 
+use super::skip;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -10,14 +11,15 @@ pub struct Slurm {
     folder: tempfile::TempDir,
 }
 
-/// Starts it, if Debian's `slurm-wlm` and `munge` are here and this is root; says so loudly if not.
+/// Starts it, if Debian's `slurm-wlm` and `munge` are here and this is root; otherwise the test is skipped.
+#[track_caller]
 pub fn slurm() -> Option<Slurm> {
     let missing = ["munged", "slurmctld", "slurmd", "sbatch"].into_iter().find(|name| which(name).is_none());
     // The daemons change to their users, which only root may.
     let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout == b"0\n");
     if missing.is_some() || !root {
         let why = missing.map_or("not root".to_owned(), |name| format!("no {name}"));
-        eprintln!("SKIPPED: no Slurm on this machine ({why}); as root, apt-get install slurm-wlm munge");
+        skip(&format!("no Slurm on this machine ({why}); as root, apt-get install slurm-wlm munge"));
         return None;
     }
     let slurm = Slurm { folder: tempfile::tempdir().expect("temporary folder") };

@@ -224,7 +224,7 @@ pub enum Command {
     },
     /// How often the diagnosis is right: sealed scenarios, diagnosed without their truth, then judged by it.
     Score {
-        /// Families, or `catalogue`, `nothing`, `outside`; several hidden at once are joined by +.
+        /// Families, or `catalogue`, `nothing`, `outside`, `pairs`; several hidden at once are joined by +.
         #[arg(default_values = ["catalogue", "nothing", "outside"])]
         families: Vec<String>,
         /// Designs of motion.
@@ -242,6 +242,12 @@ pub enum Command {
         /// Write recordings to disk and run the whole pipeline on them, instead of handing over observations.
         #[arg(long)]
         sealed: bool,
+        /// Write the tables, with intervals and every miss, as Markdown: docs/confusion.md.
+        #[arg(long, value_name = "FILE")]
+        page: Option<PathBuf>,
+        /// For the page: so many of the seeds of what is in the catalogue also the whole way, as recordings on disk.
+        #[arg(long, default_value_t = 0, requires = "page", conflicts_with = "sealed")]
+        sealed_seeds: u64,
         /// Print JSON, every scenario with its answer.
         #[arg(long)]
         json: bool,

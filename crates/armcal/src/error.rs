@@ -15,6 +15,14 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file of the pipeline is not there, and the pipeline says where its data come from.
+    #[error("{source}; the pipeline's data: {data}")]
+    MissingData {
+        /// Which file.
+        source: Box<Error>,
+        /// The pipeline's own sentence.
+        data: String,
+    },
     /// The pipeline file is not what it should be.
     #[error("pipeline {}: {source}", path.display())]
     PipelineSyntax {
@@ -391,6 +399,18 @@ impl Error {
     /// The same, as a mistake on the command line.
     pub fn of_usage(error: impl Into<Error>) -> Error {
         Error::Usage(Box::new(error.into()))
+    }
+
+    /// Whether it is about a file of the pipeline that is not there.
+    pub(crate) fn is_missing_file(&self) -> bool {
+        let missing = |source: &std::io::Error| source.kind() == std::io::ErrorKind::NotFound;
+        match self {
+            Error::ReadFile { source, .. } => missing(source),
+            Error::Recording { source: armcal_recording::RecordingError::Open { source, .. }, .. } => {
+                missing(source)
+            }
+            _ => false,
+        }
     }
 
     /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.

@@ -25,6 +25,8 @@ use std::path::{Path, PathBuf};
 pub struct Pipeline {
     /// Name shown in every output.
     pub name: String,
+    /// Where the recordings and models come from: told when one of these files is not there.
+    pub data: Option<String>,
     /// The recordings, in order; a recording may consist of several split files. `armcal batch` brings its own.
     #[serde(default)]
     pub recordings: Vec<RecordingEntry>,
@@ -387,6 +389,16 @@ impl Pipeline {
     /// A path of the pipeline file, resolved against its folder; a URL stays as it is.
     pub fn resolve(&self, path: &Path) -> PathBuf {
         armcal_recording::resolve(&self.folder, path)
+    }
+
+    /// An error about a file that is not there, with what the pipeline says about where its data come from.
+    pub fn where_data_come_from(&self, error: Error) -> Error {
+        match &self.data {
+            Some(data) if error.is_missing_file() => {
+                Error::MissingData { source: Box::new(error), data: data.clone() }
+            }
+            _ => error,
+        }
     }
 
     /// Recordings that contradict each other.

@@ -84,6 +84,28 @@ pub fn outside() -> Vec<&'static str> {
     outside::FAMILIES.iter().map(|family| family.name).collect()
 }
 
+/// Families to hide two at a time: a large effect beside a small one, two of one driver, two events.
+pub fn pairs() -> Vec<&'static str> {
+    PAIRS.to_vec()
+}
+
+const PAIRS: [&str; 14] = [
+    "backlash+compliance",
+    "backlash+eccentricity",
+    "backlash+link_bending",
+    "backlash+base_compliance",
+    "backlash+axis_tilt",
+    "backlash+thermal_growth",
+    "backlash+frame_shift",
+    "gear_ratio+eccentricity",
+    "zero_drift+second_harmonic",
+    "compliance+tool_shift",
+    "link_bending+zero_slip",
+    "belt_coupling+frame_shift@dwell",
+    "axis_tilt+gear_ratio",
+    "zero_slip+thermal_growth",
+];
+
 impl Scenario {
     /// A scenario with everything else drawn by the seed.
     pub fn new(family: &str, design: Design, seed: u64) -> Scenario {

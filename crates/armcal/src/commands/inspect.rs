@@ -45,7 +45,7 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
         .map(|entry| {
             let name = entry.name();
             let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.resolve(p)).collect();
-            let recording = open(&name, &paths)?;
+            let recording = open(&name, &paths).map_err(|e| pipeline.where_data_come_from(e))?;
             let (_, streams, warnings) = recording
                 .read(&pipeline.streams)
                 .map_err(|source| Error::Recording { recording: name.clone(), source })?;

@@ -67,9 +67,12 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             add::run(&add::Request { effects, pipeline, write: write.as_deref(), out, json: *json })
         }
         Command::Effects { name, json } => effects::run(name.as_deref(), *json),
-        Command::Score { families, designs, size, seeds, from, sealed, json } => {
-            let (seeds, from, sealed, json) = (*seeds, *from, *sealed, *json);
-            score::run(&score::Request { families, designs, size, seeds, from, sealed, json })
+        Command::Score { families, designs, size, seeds, from, sealed, page, sealed_seeds, json } => {
+            let (seeds, from, sealed, sealed_seeds, json) = (*seeds, *from, *sealed, *sealed_seeds, *json);
+            let page = page.as_deref();
+            let request =
+                score::Request { families, designs, size, seeds, from, sealed, page, sealed_seeds, json };
+            score::run(&request)
         }
         Command::Plan { pipeline, dwells, effects, loads, margin, ranges, json } => {
             let (dwells, margin_deg, json) = (*dwells, *margin, *json);

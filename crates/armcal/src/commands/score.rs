@@ -3,17 +3,19 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::score::{Judgement, rows, score, table};
+use crate::score::{Campaign, Judgement, page, rows, score, table};
 use armcal_lab::LabError;
-use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside};
+use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs};
+use armcal_recording::atomic;
 use serde::de::DeserializeOwned;
 use serde_json::json;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What to score.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
-    /// Families, or the words `catalogue`, `nothing`, `outside`.
+    /// Families, or the words `catalogue`, `nothing`, `outside`, `pairs`.
     pub families: &'a [String],
     /// Designs of motion.
     pub designs: &'a [String],
@@ -25,6 +27,10 @@ pub struct Request<'a> {
     pub from: u64,
     /// Recordings on disk and the whole pipeline.
     pub sealed: bool,
+    /// File for the tables as Markdown.
+    pub page: Option<&'a Path>,
+    /// Seeds of the catalogue's families that go the whole way beside, for the page.
+    pub sealed_seeds: u64,
     /// One JSON document.
     pub json: bool,
 }
@@ -32,17 +38,24 @@ pub struct Request<'a> {
 /// Runs the scenarios and prints the confusion table.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let scenarios = scenarios(request)?;
+    let whole_way = whole_way(request, &scenarios);
     let progress = Progress::new();
-    let finished = AtomicUsize::new(0);
+    let (finished, all) = (AtomicUsize::new(0), scenarios.len() + whole_way.len());
     let done = || {
         let n = finished.fetch_add(1, Ordering::Relaxed) + 1;
-        progress.step(&format!("scenario {n} of {}", scenarios.len()));
+        progress.step(&format!("scenario {n} of {all}"));
     };
     let scored = score(&scenarios, request.sealed, &done)?;
+    let whole_way = score(&whole_way, true, &done)?;
     progress.finish();
+    if let Some(file) = request.page {
+        let campaign = Campaign { command: command(request), scored: &scored, whole_way: &whole_way };
+        atomic::write(file, page(&campaign).as_bytes()).map_err(Error::Output)?;
+    }
     let rows = rows(&scored);
     if request.json {
-        print(&super::json_text(&json!({ "rows": rows, "scenarios": scored }))?)?;
+        let all = json!({ "rows": rows, "scenarios": scored, "whole_way": whole_way });
+        print(&super::json_text(&all)?)?;
     } else {
         print(&table(&rows))?;
         let wrong = scored.iter().filter(|s| s.judgement == Judgement::Wrong).count();
@@ -63,6 +76,7 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
         match word.as_str() {
             "catalogue" => names.extend(families().into_iter().map(str::to_owned)),
             "nothing" => names.extend(nothing().into_iter().map(str::to_owned)),
+            "pairs" => names.extend(pairs().into_iter().map(str::to_owned)),
             "outside" => names.extend(outside().into_iter().map(str::to_owned)),
             name => {
                 known_families(name)?;
@@ -81,6 +95,36 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
         }
     }
     Ok(all)
+}
+
+/// The first seeds of single effects of the catalogue, again.
+fn whole_way(request: &Request<'_>, scenarios: &[Scenario]) -> Vec<Scenario> {
+    let last = request.from + request.sealed_seeds.min(request.seeds);
+    let listed = families();
+    let again = scenarios.iter().filter(|s| s.seed < last && listed.contains(&s.family.as_str()));
+    again.cloned().collect()
+}
+
+/// The command that makes the page again.
+fn command(request: &Request<'_>) -> String {
+    let mut words = vec!["armcal".to_owned(), "score".to_owned()];
+    words.extend(request.families.iter().cloned());
+    if request.designs != ["free-poses"] {
+        words.extend(request.designs.iter().map(|design| format!("--design {design}")));
+    }
+    if request.size != "drawn" {
+        words.push(format!("--size {}", request.size));
+    }
+    words.push(format!("--seeds {} --from {}", request.seeds, request.from));
+    if request.sealed {
+        words.push("--sealed".to_owned());
+    }
+    if request.sealed_seeds > 0 {
+        words.push(format!("--sealed-seeds {}", request.sealed_seeds));
+    }
+    // Where it was written to is no part of what was found.
+    words.push("--page docs/confusion.md".to_owned());
+    words.join(" ")
 }
 
 /// A word of the laboratory's own vocabulary.

@@ -6,7 +6,7 @@ use armcal_lab::scenario::Hidden;
 use serde::Serialize;
 
 /// Dwells by which the moment of an event may be missed: between two dwells, nobody can tell.
-const DWELLS: usize = 2;
+pub(super) const DWELLS: usize = 2;
 
 /// A held-out error within this factor of the floor is at the floor.
 pub(super) const AT_FLOOR: f64 = 1.1;

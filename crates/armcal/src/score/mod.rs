@@ -1,19 +1,22 @@
 //! How often the diagnosis is right: many scenarios whose truth only this module reads.
 //!
-//! `Scenario -> case (calibrated and diagnosed without the truth) -> judge (with it) -> table`. The quick way hands the
+//! `Scenario -> case (calibrated and diagnosed without the truth) -> judge (with it) -> table, page`. The quick way hands the
 //! observations over as the pipeline would have made them; the sealed way writes recordings to disk and runs the whole
 //! pipeline on them.
 
 mod case;
+mod interval;
 mod judge;
+mod page;
 mod table;
 
 pub use case::{Answer, nominal_model, quick, sealed};
 pub use judge::{Judgement, judge};
+pub use page::{Campaign, page};
 pub use table::{Row, rows, table};
 
 use crate::error::Error;
-use armcal_lab::scenario::Scenario;
+use armcal_lab::scenario::{Hidden, Scenario};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -24,6 +27,8 @@ pub struct Scored {
     pub scenario: Scenario,
     /// What the tool said, knowing nothing.
     pub answer: Answer,
+    /// What was hidden.
+    pub hidden: Vec<Hidden>,
     /// How right that was.
     pub judgement: Judgement,
 }
@@ -40,7 +45,7 @@ pub fn score(
             let (answer, hidden) = if whole_pipeline { sealed(scenario)? } else { quick(scenario)? };
             let judgement = judge(&answer, &hidden);
             done();
-            Ok(Scored { scenario: scenario.clone(), answer, judgement })
+            Ok(Scored { scenario: scenario.clone(), answer, hidden, judgement })
         })
         .collect()
 }

@@ -1,8 +1,9 @@
 //! The confusion table.
 
 use super::judge::AT_FLOOR;
-use super::{Judgement, Scored};
+use super::{Answer, Judgement, Scored};
 use armcal_core::robust::median;
+use armcal_diagnose::Verdict;
 use armcal_report::{number, plain_table, table_text};
 use comfy_table::Cell;
 use serde::Serialize;
@@ -82,12 +83,7 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
     let right = [Judgement::RightlySilent, Judgement::First, Judgement::Placed];
     let mut instead: Vec<(String, usize)> = Vec::new();
     for s in own.iter().filter(|s| !right.contains(&s.judgement)) {
-        let a = &s.answer;
-        let words = match (&a.unknown, a.sets.is_empty()) {
-            (Some((channel, driver)), true) => format!("{channel} <- {driver}"),
-            (_, true) => "nothing".to_owned(),
-            _ => a.sets.iter().map(|set| set.join("|")).collect::<Vec<_>>().join(" + "),
-        };
+        let words = said(&s.answer);
         match instead.iter_mut().find(|(w, _)| *w == words) {
             Some((_, n)) => *n += 1,
             None => instead.push((words, 1)),
@@ -104,6 +100,19 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
         at_floor: at_floor as f64 / own.len() as f64,
         removed: if removed.is_empty() { f64::NAN } else { median(&removed) },
         instead,
+    }
+}
+
+/// An answer in a few words: the sets of names, else where the unlisted enters, else the verdict alone.
+pub(super) fn said(answer: &Answer) -> String {
+    match (&answer.unknown, answer.sets.is_empty()) {
+        (Some((channel, driver)), true) => format!("{channel} <- {driver}"),
+        (None, true) if answer.verdict == Verdict::NothingMissing => "nothing".to_owned(),
+        (None, true) => serde_json::to_value(answer.verdict)
+            .ok()
+            .and_then(|verdict| verdict.as_str().map(str::to_owned))
+            .unwrap_or_default(),
+        _ => answer.sets.iter().map(|set| set.join("|")).collect::<Vec<_>>().join(" + "),
     }
 }
 

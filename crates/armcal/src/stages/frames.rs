@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// Reads the DH or URDF file of the pipeline: its text and the chain in it.
 pub fn nominal_chain(pipeline: &Pipeline) -> Result<(String, Chain), Error> {
-    chain_of(&pipeline.model, &pipeline.folder)
+    chain_of(&pipeline.model, &pipeline.folder).map_err(|e| pipeline.where_data_come_from(e))
 }
 
 /// Reads the DH or URDF file of a model section: its text and the chain in it.
@@ -39,7 +39,8 @@ pub fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), 
 pub fn board(pipeline: &Pipeline) -> Result<Option<Board>, Error> {
     let Some(table) = &pipeline.table else { return Ok(None) };
     let path = pipeline.resolve(&table.board);
-    Ok(Some(Board::from_toml(&read("board", &path)?, &path)?))
+    let text = read("board", &path).map_err(|e| pipeline.where_data_come_from(e))?;
+    Ok(Some(Board::from_toml(&text, &path)?))
 }
 
 /// The model before calibration, every frame where it is known or assumed to be.

@@ -58,7 +58,8 @@ pub fn open_all(pipeline: &Pipeline, progress: &Progress) -> Result<Vec<Recordin
         .map(|entry| {
             progress.step(&format!("opening {}", entry.name()));
             let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.resolve(p)).collect();
-            Recording::open(&paths).map_err(|source| Error::Recording { recording: entry.name(), source })
+            let failed = |source| Error::Recording { recording: entry.name(), source };
+            Recording::open(&paths).map_err(|source| pipeline.where_data_come_from(failed(source)))
         })
         .collect()
 }

@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
+use skipped_tests::skip;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -113,13 +114,14 @@ fn paths(noise: &mut Noise) -> Vec<PathTest> {
     vec![rectangle, seam]
 }
 
-/// `$ARMCAL_PYTHON`, else `python3`, if it has numpy; says so loudly if not.
+/// `$ARMCAL_PYTHON`, else `python3`, if it has numpy; otherwise the test is skipped.
+#[track_caller]
 fn python() -> Option<PathBuf> {
     let python = PathBuf::from(std::env::var_os("ARMCAL_PYTHON").unwrap_or_else(|| "python3".into()));
     if Command::new(&python).args(["-c", "import numpy"]).output().is_ok_and(|o| o.status.success()) {
         return Some(python);
     }
-    eprintln!("SKIPPED: {} lacks numpy; set ARMCAL_PYTHON", python.display());
+    skip(&format!("{} lacks numpy; set ARMCAL_PYTHON", python.display()));
     None
 }
 

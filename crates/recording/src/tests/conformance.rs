@@ -5,12 +5,13 @@
 
 use crate::Recording;
 use serde_json::Value;
+use skipped_tests::skip;
 use std::path::{Path, PathBuf};
 
 #[test]
 fn conformance_files_give_the_declared_messages() {
     let Some(folder) = std::env::var_os("ARMCAL_MCAP_CONFORMANCE").map(PathBuf::from) else {
-        eprint_skip();
+        skip("ARMCAL_MCAP_CONFORMANCE names no folder of conformance files (*.mcap with *.json)");
         return;
     };
     let mut files = Vec::new();
@@ -28,11 +29,6 @@ fn conformance_files_give_the_declared_messages() {
         assert_eq!((messages, attachments, metadata), expected, "{}", path.display());
         assert!(recording.report().files[0].damaged.is_empty(), "{:?}", recording.report().files[0]);
     }
-}
-
-#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
-fn eprint_skip() {
-    eprintln!("SKIPPED: set ARMCAL_MCAP_CONFORMANCE to a folder of conformance files (*.mcap with *.json)");
 }
 
 /// Messages, attachments and metadata records that the JSON beside the file lists.
