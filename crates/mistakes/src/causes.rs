@@ -158,7 +158,16 @@ pub const CAUSES: &[Cause] = &[
     row(
         "stale-encoder",
         &["stale", "latency", "filter", "low-rate", "creep"],
-        &["stale", "repeat", "refresh", "lag", "late by", "creep", "updated every"],
+        &[
+            "stale",
+            "repeats the same",
+            "repeated reading",
+            "refresh",
+            "lag",
+            "late by",
+            "creep",
+            "updated every",
+        ],
         &[],
     ),
     row(
@@ -427,7 +436,16 @@ pub const CAUSES: &[Cause] = &[
     row(
         "stuck-sensor",
         &["stuck", "frozen", "zero-filled", "stale", "repeats"],
-        &["stuck", "frozen", "same pose", "repeat", "zeros", "does not move"],
+        &[
+            "stuck",
+            "frozen",
+            "same pose",
+            "repeats the same",
+            "repeated pose",
+            "all zero",
+            "zeros",
+            "does not move",
+        ],
         &[],
     ),
     row("marker-swapped", &["marker", "suspect-dwell", "outlier"], &["marker", "set aside"], &["tool_shift"]),

@@ -142,9 +142,8 @@ fn slips(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
 /// A counter that is too short: the reading jumps back by what it holds, which is no whole turn of the joint.
 fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let joint = some_joint(session, draw);
-    let (low, high) = range(session, joint);
-    let holds = (high - low) * draw.uniform(0.55, 0.8);
-    let top = high - (high - low) * draw.uniform(0.3, 0.45);
+    let [top, high, low] = quantiles(session, joint, [draw.uniform(0.45, 0.7), 0.98, 0.02]);
+    let holds = (high - low) * draw.uniform(0.6, 1.1);
     session.joints(|_, q| {
         if q[joint] > top {
             q[joint] -= holds;
@@ -155,16 +154,17 @@ fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
 
 fn saturates(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let joint = some_joint(session, draw);
-    let (low, high) = range(session, joint);
-    let top = high - (high - low) * draw.uniform(0.25, 0.4);
+    let [top] = quantiles(session, joint, [draw.uniform(0.5, 0.75)]);
     session.joints(|_, q| q[joint] = q[joint].min(top));
     about(session, &[joint])
 }
 
-fn range(session: &mut Session, joint: usize) -> (f64, f64) {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    session.joints(|_, q| (low, high) = (low.min(q[joint]), high.max(q[joint])));
-    (low, high)
+/// Quantiles of the readings of a joint.
+fn quantiles<const N: usize>(session: &mut Session, joint: usize, shares: [f64; N]) -> [f64; N] {
+    let mut readings = Vec::new();
+    session.joints(|_, q| readings.push(q[joint]));
+    readings.sort_by(f64::total_cmp);
+    shares.map(|share| readings[((readings.len() as f64 * share) as usize).min(readings.len() - 1)])
 }
 
 fn coarse(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
