@@ -1,7 +1,7 @@
 //! Sound recordings, half of them with a physical effect hidden in the rig: nothing is wrong with their setup.
 
 use crate::judge::{NOTHING, SHOWN};
-use crate::rigs::{session_of, six_axis};
+use crate::rigs::{Hidden, session_of, six_axis};
 use crate::run::{Place, Said};
 use crate::{Draw, Error, Rig, Session, draw, run};
 use armcal_lab::scenario::{Design, Scenario, families};
@@ -55,7 +55,7 @@ fn session(number: usize, seed: u64) -> Result<(Rig, String, Session), Error> {
     }
     let seed = draw::mixed(seed, &case, rig);
     if rig == Rig::Poses {
-        let hidden = six_axis::Hidden::draw(&mut draw);
+        let hidden = Hidden::draw(&mut draw);
         let lab = six_axis::Lab { hidden: Some(hidden), ..six_axis::Lab::new(seed) };
         return Ok((rig, hidden.word().to_owned(), six_axis::session(lab)?));
     }
