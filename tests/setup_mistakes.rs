@@ -12,7 +12,7 @@ const NAMED: &[(&str, Rig)] = &[
     ("joint-name-misspelt", Rig::Poses),
     ("topic-misspelt", Rig::Table),
     ("file-cut", Rig::Sockets),
-    ("joint-stamps-zero", Rig::Poses),
+    ("degrees-read-as-radians", Rig::Poses),
 ];
 
 fn answer(name: &str, rig: Rig) -> Case {

@@ -1,16 +1,15 @@
 //! Encoders and drivers that fail, and readings that are no readings.
 
-use super::{ALL, Kind, about, anything, kind};
-use crate::session::{JOINTS, Rest, Session};
+use super::{ALL, Kind, about, anything, kind, set_points};
+use crate::session::{Rest, Session};
 use crate::{Draw, Error};
-use armcal_lab::sensors::{Channel, Kind as MessageKind, Message, Payload};
 
 pub const KINDS: &[Kind] = &[
     kind("joint-frozen-throughout", "joint-stuck", ALL, |s, d| frozen(s, d, 0.0)),
     kind("joint-frozen-from-the-middle", "joint-stuck", ALL, |s, d| frozen(s, d, 0.45)),
     kind("joint-always-zero", "joint-stuck", ALL, always_zero),
-    kind("set-points-recorded", "setpoints-recorded", ALL, set_points_recorded),
-    kind("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_point_topic),
+    kind("set-points-recorded", "setpoints-recorded", ALL, set_points::recorded),
+    kind("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::named),
     kind("encoder-slips-once", "joint-zero-event", ALL, slips),
     kind("encoder-wraps-early", "encoder-wrap", ALL, wraps),
     kind("encoder-saturates", "saturated-joint", ALL, saturates),
@@ -47,90 +46,6 @@ fn always_zero(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Er
     about(session, &[joint])
 }
 
-fn set_points_recorded(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let commanded = set_points(session, draw);
-    let mut next = commanded.into_iter();
-    session.joints(|_, q| *q = next.next().unwrap_or_else(|| q.clone()));
-    anything()
-}
-
-fn set_point_topic(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let commanded = set_points(session, draw);
-    let mut next = commanded.into_iter();
-    for recorded in &mut session.recordings {
-        let log = &mut recorded.log;
-        let joints = log.channels.iter().position(|c| c.topic == JOINTS);
-        let asked = log.channels.len();
-        let names = joints.map(|j| log.channels[j].names.clone()).unwrap_or_default();
-        let topic = "/controller/command".to_owned();
-        log.channels.push(Channel { topic, kind: MessageKind::JointState, frame_id: String::new(), names });
-        let messages: Vec<Message> = std::mem::take(&mut log.messages);
-        for message in messages {
-            let twin =
-                (Some(message.channel) == joints).then(|| next.next()).flatten().map(|position| Message {
-                    channel: asked,
-                    payload: Payload::Joints { position, velocity: Vec::new() },
-                    ..message.clone()
-                });
-            log.messages.push(message);
-            log.messages.extend(twin);
-        }
-    }
-    session.set(&["streams", "joints", "topic"], "/controller/command");
-    anything()
-}
-
-/// What a controller without integral action would have asked for, message by message: it stays short of it by gravity's
-/// droop and by friction, another amount in each rest; asked for without noise.
-fn set_points(session: &mut Session, draw: &mut Draw) -> Vec<Vec<f64>> {
-    let joints = session.joint_names().len();
-    let droop: Vec<f64> = (0..joints).map(|_| draw.signed(0.4, 1.2).to_radians()).collect();
-    let rests: Vec<Vec<Rest>> = session.recordings.iter().map(|r| r.rests.clone()).collect();
-    let mut means: Vec<Vec<(Vec<f64>, f64)>> =
-        rests.iter().map(|r| vec![(vec![0.0; joints], 0.0); r.len() + 1]).collect();
-    session.joints(|at, q| {
-        let k = rests[at.recording].partition_point(|r| r.start_ns <= at.stamp_ns);
-        if k > 0 && at.stamp_ns <= rests[at.recording][k - 1].end_ns {
-            let (sum, n) = &mut means[at.recording][k];
-            sum.iter_mut().zip(q.iter()).for_each(|(sum, q)| *sum += q);
-            *n += 1.0;
-        }
-    });
-    let error: Vec<Vec<Vec<f64>>> = means
-        .iter()
-        .map(|means| {
-            let one = |(sum, n): &(Vec<f64>, f64)| {
-                let friction: Vec<f64> = (0..joints).map(|_| 0.3_f64.to_radians() * draw.normal()).collect();
-                (0..joints).map(|j| droop[j] * (sum[j] / n.max(1.0)).cos() + friction[j]).collect()
-            };
-            means.iter().map(one).collect()
-        })
-        .collect();
-    let mut asked = Vec::new();
-    session.joints(|at, q| {
-        let rests = &rests[at.recording];
-        let k = rests.partition_point(|r| r.start_ns <= at.stamp_ns);
-        let error = &error[at.recording];
-        let resting = k > 0 && at.stamp_ns <= rests[k - 1].end_ns;
-        let next = error.get(k + 1).unwrap_or(&error[k]);
-        let end_ns = if k > 0 { rests[k - 1].end_ns } else { at.stamp_ns };
-        let until_ns = rests.get(k).map_or(at.stamp_ns + 1, |r| r.start_ns);
-        let u = ((at.stamp_ns - end_ns) as f64 / (until_ns - end_ns).max(1) as f64).clamp(0.0, 1.0);
-        asked.push(
-            (0..joints)
-                .map(|j| {
-                    let (sum, n) = &means[at.recording][k];
-                    match resting && *n > 0.0 {
-                        true => sum[j] / n + error[k][j],
-                        false => q[j] + (1.0 - u) * error[k][j] + u * next[j],
-                    }
-                })
-                .collect(),
-        );
-    });
-    asked
-}
-
 fn slips(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let joint = 1 + draw.pick(session.joint_names().len() - 1);
     let angle = draw.signed(1.0, 4.0).to_radians();
@@ -142,9 +57,8 @@ fn slips(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
 /// A counter that is too short: the reading jumps back by what it holds, which is no whole turn of the joint.
 fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let joint = some_joint(session, draw);
-    let (low, high) = range(session, joint);
-    let holds = (high - low) * draw.uniform(0.55, 0.8);
-    let top = high - (high - low) * draw.uniform(0.3, 0.45);
+    let [top, high, low] = quantiles(session, joint, [draw.uniform(0.45, 0.7), 0.98, 0.02]);
+    let holds = (high - low) * draw.uniform(0.6, 1.1);
     session.joints(|_, q| {
         if q[joint] > top {
             q[joint] -= holds;
@@ -155,16 +69,17 @@ fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
 
 fn saturates(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let joint = some_joint(session, draw);
-    let (low, high) = range(session, joint);
-    let top = high - (high - low) * draw.uniform(0.25, 0.4);
+    let [top] = quantiles(session, joint, [draw.uniform(0.5, 0.75)]);
     session.joints(|_, q| q[joint] = q[joint].min(top));
     about(session, &[joint])
 }
 
-fn range(session: &mut Session, joint: usize) -> (f64, f64) {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    session.joints(|_, q| (low, high) = (low.min(q[joint]), high.max(q[joint])));
-    (low, high)
+/// Quantiles of the readings of a joint.
+fn quantiles<const N: usize>(session: &mut Session, joint: usize, shares: [f64; N]) -> [f64; N] {
+    let mut readings = Vec::new();
+    session.joints(|_, q| readings.push(q[joint]));
+    readings.sort_by(f64::total_cmp);
+    shares.map(|share| readings[((readings.len() as f64 * share) as usize).min(readings.len() - 1)])
 }
 
 fn coarse(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {

@@ -9,6 +9,7 @@ mod models;
 mod noise;
 mod poses;
 mod rigging;
+mod set_points;
 
 use crate::rigs::Rig;
 use crate::session::Session;

@@ -1,5 +1,6 @@
 //! Three sound rigs.
 
+mod hidden;
 pub mod six_axis;
 mod table;
 
@@ -9,6 +10,7 @@ use armcal_lab::LabConfig;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+pub use hidden::Hidden;
 pub use table::{session_of, small_lab};
 
 /// A rig.

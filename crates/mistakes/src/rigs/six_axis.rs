@@ -3,9 +3,10 @@
 //! Its joints are lines in space, turned about one after the other from the flange to the base: no formula is shared with
 //! the models that are fitted. The built arm's lines lie a little off the drawn ones.
 
+use super::hidden::Hidden;
 use super::{Rig, Source, joints_toml, parsed, topic};
+use crate::Error;
 use crate::session::{Body, JOINTS, Recorded, Rest, Session};
-use crate::{Draw, Error};
 use armcal_lab::random::{Purpose, Stream};
 use armcal_lab::screw::Line;
 use armcal_lab::sensors::{Channel, Kind, Log, Message, Payload, SensorClock};
@@ -42,7 +43,7 @@ const FLANGE_M: [f64; 3] = [-1.1843, -0.256141, 0.0116];
 const RANGE_DEG: [[f64; 2]; 6] =
     [[-110.0, 110.0], [-150.0, -30.0], [-130.0, 130.0], [-170.0, 10.0], [-120.0, 120.0], [-160.0, 160.0]];
 
-const POSES: usize = 64;
+const POSES: usize = 44;
 const REST_S: f64 = 1.0;
 const MOVE_S: f64 = 1.1;
 const RATE_HZ: f64 = 50.0;
@@ -67,51 +68,6 @@ pub struct Lab {
     pub flange_from_target: Isometry3<f64>,
     /// What is hidden between the encoders and the links.
     pub hidden: Option<Hidden>,
-}
-
-/// A physical effect between encoders and links.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hidden {
-    /// An encoder disc off its centre: `a sin(q + phase)` at a joint.
-    OffCentre(usize, f64, f64),
-    /// Shoulder and elbow sag with the torque of gravity, that of a link being the cosine of its elevation [rad].
-    Sag(f64, f64),
-    /// Play in a gear: half of it against the last move of a joint.
-    Play(usize, f64),
-}
-
-impl Hidden {
-    /// One of a realistic size.
-    pub fn draw(draw: &mut Draw) -> Hidden {
-        let (which, joint) = (draw.pick(3), draw.pick(NAMES.len()));
-        match which {
-            0 => Hidden::OffCentre(joint, draw.uniform(0.02, 0.1).to_radians(), draw.uniform(0.0, TAU)),
-            1 => Hidden::Sag(draw.uniform(0.02, 0.08).to_radians(), draw.uniform(0.01, 0.05).to_radians()),
-            _ => Hidden::Play(joint, draw.uniform(0.03, 0.12).to_radians()),
-        }
-    }
-
-    /// Its name.
-    pub fn word(self) -> &'static str {
-        match self {
-            Hidden::OffCentre(..) => "encoder off centre",
-            Hidden::Sag(..) => "sag",
-            Hidden::Play(..) => "play",
-        }
-    }
-
-    /// Adds it to the joints, which came to where they are from `before`.
-    fn act(self, q: &mut [f64; 6], before: &[f64; 6]) {
-        match self {
-            Hidden::OffCentre(joint, size, phase) => q[joint] += size * (q[joint] + phase).sin(),
-            Hidden::Sag(shoulder, elbow) => {
-                let (upper, fore) = (q[1].cos(), (q[1] + q[2]).cos());
-                q[1] += shoulder * (0.6 * upper + 0.4 * fore);
-                q[2] += elbow * fore;
-            }
-            Hidden::Play(joint, width) => q[joint] -= 0.5 * width * (q[joint] - before[joint]).signum(),
-        }
-    }
 }
 
 impl Lab {
