@@ -44,7 +44,8 @@ mod verification;
 mod write;
 
 pub use campaign::{
-    Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text, write_campaign,
+    Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text,
+    write_campaign,
 };
 pub use closed_chain::{
     CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_files, closed_summary_json, closed_terminal,
