@@ -222,22 +222,5 @@ fn varimax(mut basis: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn varimax_unmixes_sparse_directions() {
-        // Two sparse unit directions, mixed by 0.7 rad.
-        let s = 0.5_f64.sqrt();
-        let sparse =
-            DMatrix::from_row_slice(6, 2, &[s, 0.0, -s, 0.0, 0.0, 0.6, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0]);
-        let (sin, cos) = 0.7_f64.sin_cos();
-        let mixed = &sparse * DMatrix::from_row_slice(2, 2, &[cos, -sin, sin, cos]);
-        let found = varimax(mixed);
-        let overlap = (sparse.transpose() * found).abs();
-        // Each found direction is one of the sparse ones, up to sign and order.
-        for c in 0..2 {
-            assert!((overlap.column(c).amax() - 1.0).abs() < 1e-9, "{overlap}");
-        }
-    }
-}
+#[path = "tests/undetermined.rs"]
+mod tests;
