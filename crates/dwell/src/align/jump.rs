@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::coarse::{self, Coarse};
+use super::coarse;
 use super::fine::{Point, Start};
 use super::scale::Scale;
 use super::spread::MovementOffset;
@@ -86,17 +86,6 @@ impl Streams<'_> {
                 Jump { after_s: before(first), from_s, until_s, by_s: total_s, sigma_s }
             }
         })
-    }
-
-    /// Whether the recording resembles the prediction as two parts with an offset each, rather than not at all.
-    pub(super) fn in_two_parts(&self, scale: &Scale, coarse: &Coarse) -> bool {
-        let start = Start { offset_s: coarse.offset_s, drift: coarse.drift };
-        let Ok(points) = scale.movements() else { return false };
-        let Some((from_s, to_s, _)) = self.far_stretch(scale, &points, start) else { return false };
-        let outside =
-            points.iter().filter(|p| !(from_s..=to_s).contains(&p.t_s)).map(|p| (p.t_s, p.measured));
-        let outside: Vec<(f64, f64)> = outside.collect();
-        coarse::correlation(&outside, &scale.robot, self.reference_s, start.offset_s, start.drift) >= ALIKE
     }
 
     /// What the movements say with the points as they are now stamped.

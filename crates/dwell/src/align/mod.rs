@@ -105,7 +105,7 @@ fn estimate(
     let (scale, coarse) = streams.coarse()?;
     let ratio = streams.ratio(&coarse);
     check_units(ratio, coarse.correlation)?;
-    if coarse.correlation < config.min_correlation && !streams.in_two_parts(scale, &coarse) {
+    if coarse.correlation < config.min_correlation {
         return Err(streams.too_low(&coarse));
     }
     let (scale, found) = streams.fine(scale, &coarse, ratio)?;
