@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::coarse::{self, Coarse};
+use super::coarse;
 use super::fine::{Point, Start};
 use super::scale::Scale;
 use super::spread::MovementOffset;
@@ -15,7 +15,7 @@ const LEAST_S: f64 = 5e-3;
 /// Standard errors of the alignment that the change must be.
 const ALIGNMENT_SIGMAS: f64 = 4.0;
 /// Rounds in which the change is found again with what is known of it taken out.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 3;
 /// Share of its best correlation that a stretch with another offset has at most at the offset of all, and the least
 /// best one.
 const APART_SHARE: f64 = 0.6;
@@ -43,12 +43,13 @@ impl Streams<'_> {
         let least_s = LEAST_S.max(ALIGNMENT_SIGMAS * offset_sigma_s);
         let fixed = (!with_drift).then_some(0.0);
         let mut start = Start { offset_s: estimate.fine.offset_s, drift: estimate.fine.drift };
+        let mut model = estimate.fine.parameters.clone();
         let mut movements = estimate.fine.movements.clone();
         let (mut total_s, mut stretch) = (0.0, None);
         if let Some((from_s, to_s, late_s)) = self.far_stretch(scale, &points, start) {
             shift(&mut points, from_s, to_s, late_s);
             total_s = late_s;
-            movements = self.again(scale, &points, &mut start, fixed)?;
+            movements = self.again(scale, &points, &mut start, &mut model, fixed)?;
             stretch = Some((from_s, to_s));
         }
         for _ in 0..ROUNDS {
@@ -66,7 +67,7 @@ impl Streams<'_> {
             if found.by_s.abs() < 0.2 * found.sigma_s {
                 break;
             }
-            movements = self.again(scale, &points, &mut start, fixed)?;
+            movements = self.again(scale, &points, &mut start, &mut model, fixed)?;
         }
         let (from_s, to_s) = stretch?;
         let (first, end) = inside(&movements, from_s, to_s);
@@ -88,26 +89,17 @@ impl Streams<'_> {
         })
     }
 
-    /// Whether the recording resembles the prediction as two parts with an offset each, rather than not at all.
-    pub(super) fn in_two_parts(&self, scale: &Scale, coarse: &Coarse) -> bool {
-        let start = Start { offset_s: coarse.offset_s, drift: coarse.drift };
-        let Ok(points) = scale.movements() else { return false };
-        let Some((from_s, to_s, _)) = self.far_stretch(scale, &points, start) else { return false };
-        let outside =
-            points.iter().filter(|p| !(from_s..=to_s).contains(&p.t_s)).map(|p| (p.t_s, p.measured));
-        let outside: Vec<(f64, f64)> = outside.collect();
-        coarse::correlation(&outside, &scale.robot, self.reference_s, start.offset_s, start.drift) >= ALIKE
-    }
-
     /// What the movements say with the points as they are now stamped.
     fn again(
         &self,
         scale: &Scale,
         points: &[Point],
         start: &mut Start,
+        model: &mut Vec<f64>,
         fixed: Option<f64>,
     ) -> Option<Vec<MovementOffset>> {
-        let fine = self.finish_with(scale, points, *start, fixed)?;
+        let fine = self.finish_with(scale, points, *start, model.clone(), fixed)?;
+        model.clone_from(&fine.parameters);
         *start = Start { offset_s: fine.offset_s, drift: fine.drift };
         Some(fine.movements)
     }

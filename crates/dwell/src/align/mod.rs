@@ -105,7 +105,7 @@ fn estimate(
     let (scale, coarse) = streams.coarse()?;
     let ratio = streams.ratio(&coarse);
     check_units(ratio, coarse.correlation)?;
-    if coarse.correlation < config.min_correlation && !streams.in_two_parts(scale, &coarse) {
+    if coarse.correlation < config.min_correlation {
         return Err(streams.too_low(&coarse));
     }
     let (scale, found) = streams.fine(scale, &coarse, ratio)?;
@@ -274,7 +274,8 @@ impl<'a> Streams<'a> {
         let movements = scale.movements()?;
         let most = self.max_drift();
         let solve = |fixed: Option<f64>| {
-            self.finish_with(scale, &movements, found.start, fixed).ok_or_else(undetermined)
+            self.finish_with(scale, &movements, found.start, vec![0.0; self.arm.uncertain], fixed)
+                .ok_or_else(undetermined)
         };
         if most == 0.0 {
             return Ok(Estimate { fine: solve(Some(0.0))?, drift: Drift::Estimated });
@@ -297,9 +298,9 @@ impl<'a> Streams<'a> {
         scale: &Scale,
         movements: &[Point],
         mut start: Start,
+        mut parameters: Vec<f64>,
         fixed: Option<f64>,
     ) -> Option<Fine> {
-        let mut parameters = vec![0.0; self.arm.uncertain];
         let mut best = None;
         for _ in 0..MODEL_ROUNDS {
             let robot = self.robot_speeds(scale, &parameters);
