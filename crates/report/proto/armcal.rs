@@ -645,12 +645,14 @@ pub struct NotTestable {
     #[prost(string, tag = "4")]
     pub why: ::prost::alloc::string::String,
 }
-/// Which effect is missing (topic /armcal/diagnosis), one message a run that was diagnosed.
+/// Which effect is missing (topic /armcal/diagnosis), one message a run that was diagnosed or whose setup contradicts
+/// the data.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Diagnosis {
     #[prost(message, optional, tag = "1")]
     pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
-    /// nothing_missing, identified, ambiguous, unknown.
+    /// nothing_missing, identified, ambiguous, unknown, unexplained; setup, where the setup contradicts the data and
+    /// nothing physical was looked for; not_diagnosed.
     #[prost(string, tag = "2")]
     pub verdict: ::prost::alloc::string::String,
     /// The answer in a sentence.

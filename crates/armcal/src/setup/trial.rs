@@ -13,9 +13,9 @@ use std::collections::BTreeSet;
 /// An error of this many times its expectation is as bad as no error at all: a dwell that finds no place counts as much.
 const CAP: f64 = 300.0;
 /// What is wrong need not converge.
-const MOST_ITERATIONS: usize = 40;
+const MOST_ITERATIONS: usize = 25;
 /// Dwells that take part in trials; of more, as many are drawn evenly over time.
-const MOST_DWELLS: usize = 300;
+const MOST_DWELLS: usize = 150;
 
 /// Everything in which a mistake of the setup could be.
 #[derive(Clone)]

@@ -4,13 +4,13 @@
 use crate::input::input;
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors, Status, UndeterminedDirection};
 use armcal_core::{
-    Arrival, Dwell, DwellId, ErrorStats, Observation, Pose, Reference, Rejection, Severity, Stage,
-    TipMeasurement, Warning,
+    Arrival, Dwell, DwellId, ErrorStats, Observation, Pose, Reference, Rejection, SetupReport, Severity,
+    Stage, TipMeasurement, Warning,
 };
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Chain, Frame, Frames, Model, Session};
 use armcal_recording::Recording;
-use armcal_report::{RecordingRun, Run};
+use armcal_report::{RecordingRun, Run, Undiagnosed};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
@@ -101,7 +101,9 @@ pub fn synthetic() -> Synthetic {
         session: Session::of(&observations),
         observations,
         calibration,
+        setup: SetupReport::default(),
         diagnosis: None,
+        undiagnosed: Some(Undiagnosed::NotAsked),
         steps: Vec::new(),
         alternatives: Vec::new(),
         warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
