@@ -84,7 +84,8 @@ fn documents() -> Vec<PathBuf> {
 /// Line number from 1, what stands before it and the lines of every fenced block without a language.
 fn plain_blocks(text: &str) -> Vec<(usize, &str, Vec<&str>)> {
     let lines: Vec<&str> = text.lines().collect();
-    let (mut blocks, mut opened): (Vec<(usize, &str, Vec<&str>)>, Option<(usize, bool)>) = (Vec::new(), None);
+    let mut blocks: Vec<(usize, &str, Vec<&str>)> = Vec::new();
+    let mut opened: Option<(usize, bool)> = None;
     for (i, line) in lines.iter().enumerate() {
         match (line.strip_prefix("```"), opened) {
             (Some(language), None) => opened = Some((i, language.is_empty())),

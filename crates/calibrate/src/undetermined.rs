@@ -222,5 +222,6 @@ fn varimax(mut basis: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
 #[path = "tests/undetermined.rs"]
 mod tests;

@@ -182,7 +182,7 @@ impl Found {
                 unit: series.unit,
                 kind,
                 size,
-                ci95: known.scatters.then(|| [size - half, size + half]),
+                ci95: known.scatters.then_some([size - half, size + half]),
                 p: (chance.p * series_tried).min(1.0),
             }
         };

@@ -183,7 +183,6 @@ fn intervals_of_steps_between_few_recordings_hold_what_they_promise() {
             inside += usize::from(low < size && size < high);
         }
     }
-    println!("{inside} of {all} inside");
     // Fewer would happen once in a thousand.
     assert!(
         all > 500 && inside as f64 > 0.95 * all as f64 - 3.1 * (0.0475 * all as f64).sqrt(),

@@ -142,6 +142,8 @@ pub struct Unexplained {
     pub times_floor: f64,
     /// In which dwells it is largest, the clearest first; empty where it is alike everywhere.
     pub places: Vec<ErrorPlace>,
+    /// How the scatter repeats, where that is beyond doubt: `repeated at every visit to a place`.
+    pub scatter: Option<String>,
     /// What was tried and did not explain it: the number of listed effects and of unlisted shapes, and names with what
     /// became of them.
     pub tried: Tried,

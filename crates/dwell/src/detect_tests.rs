@@ -134,8 +134,8 @@ fn dwells_of_an_arm_that_gives_way_are_kept_once_with_the_settled_reading() {
                     "{name} seed {seed} {}",
                     found.id
                 );
-                for j in 0..3 {
-                    let (from, to) = (pose[j] + at(j, first_s), pose[j] + at(j, last_s));
+                for (j, rest) in pose.iter().enumerate() {
+                    let (from, to) = (rest + at(j, first_s), rest + at(j, last_s));
                     let (mean, sigma) = (found.joint_rad[j], found.joint_sigma_rad[j]);
                     let inside = from.min(to) - 2e-5..=from.max(to) + 2e-5;
                     assert!(

@@ -5,6 +5,7 @@ use crate::error::Error;
 use armcal_campaign::Row;
 use armcal_report::{DwellMark, Repeat, also_in};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Every recording with dwells of an earlier one of the manifest: the same files, or, re-encoded or cut, the same readings
 /// at the same times. Only recordings that overlap in time are looked into.
@@ -27,8 +28,8 @@ pub(super) fn repeats(store: &Store, rows: &[Row], folders: &[String]) -> Result
         };
         for first in originals.iter().filter(overlapping) {
             for index in [*first, at] {
-                if !marks.contains_key(&index) {
-                    marks.insert(index, store.marks(&folders[index])?);
+                if let Entry::Vacant(unread) = marks.entry(index) {
+                    unread.insert(store.marks(&folders[index])?);
                 }
             }
             let own = &marks[&at];

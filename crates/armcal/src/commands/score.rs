@@ -1,6 +1,6 @@
 //! `armcal score`: how often the diagnosis is right on sealed scenarios.
 
-use super::{Outcome, print};
+use super::{Outcome, may_write, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::score::{Campaign, Judgement, page, rows, score, table};
@@ -38,6 +38,7 @@ pub struct Request<'a> {
 /// Runs the scenarios and prints the confusion table.
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let scenarios = scenarios(request)?;
+    may_write(request.page)?;
     let whole_way = whole_way(request, &scenarios);
     let progress = Progress::new();
     let (finished, all) = (AtomicUsize::new(0), scenarios.len() + whole_way.len());

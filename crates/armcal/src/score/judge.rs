@@ -44,6 +44,8 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
     if hidden.is_empty() {
         return match answer.verdict {
             Verdict::NothingMissing => Judgement::RightlySilent,
+            // That errors above the floor do not agree with the declared noise is true, and names nothing.
+            Verdict::Unexplained if answer.before_mm > AT_FLOOR * answer.floor_mm => Judgement::RightlySilent,
             _ => Judgement::Wrong,
         };
     }

@@ -70,7 +70,7 @@ pub fn page(campaign: &Campaign<'_>) -> String {
 fn introduction(campaign: &Campaign<'_>) -> String {
     let (n, seeds) = (campaign.scored.len() + campaign.whole_way.len(), seeds(campaign));
     format!(
-        "# How often the diagnosis is right\n\n\
+        "<!-- armcal.confusion/1 -->\n\n# How often the diagnosis is right\n\n\
          Written in one go by armcal {VERSION}: {n} scenarios, {seeds}.\n\n\
          ```sh\n{}\n```\n\n\
          Sealed scenarios of the simulated rig (`crates/lab`): the paper's geometry errors, masses up to 25 % off, one \

@@ -30,7 +30,7 @@ const EXPLAINED: f64 = 10.0;
 const FAR_M: f64 = 0.01;
 const FAR_RAD: f64 = 0.05;
 /// The same of a parameter that leaves its bounds: this many times its bound.
-const FAR_BOUNDS: f64 = 2.0;
+const FAR_BOUNDS: f64 = 1.1;
 
 /// A hypothesis and how well the inputs fit with it.
 struct Tried {

@@ -57,7 +57,6 @@ fn intervals_of_offset_and_drift_hold_the_truth_as_often_as_they_say() {
     }
     let typical = percentile(&sigmas, 0.5);
     let error = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-    println!("middle {middle}, end {end}, drift {rate} of {seeds}; sigma {typical}, error {error}");
     for (what, inside) in [("middle", middle), ("end", end), ("drift", rate)] {
         assert!(inside >= 180, "{what}: {inside} of {seeds}");
     }

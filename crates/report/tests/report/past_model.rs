@@ -62,8 +62,9 @@ fn the_calibrated_model_predicts_from_its_file_as_it_did() {
     s.run.model = model;
     let with = predictions_m(&s.run.model, &s.run.calibration.fit.values(), &s.run);
     assert!(rigid.iter().zip(&with).any(|(a, b)| (a - b).norm() > 1e-5), "the effects do nothing");
-    write_all(&s.run, &s.recordings, &out, &OutputConfig::default()).unwrap();
-    agree(&s.run, &out);
+    let again = s.folder.path().join("again");
+    write_all(&s.run, &s.recordings, &again, &OutputConfig::default()).unwrap();
+    agree(&s.run, &again);
 }
 
 /// Files written before the session was written as it is say the same.

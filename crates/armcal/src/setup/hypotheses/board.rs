@@ -84,7 +84,8 @@ fn tilts(inputs: &Inputs) -> Vec<Hypothesis> {
     let declared: Vec<Tilt> = inputs.pipeline.recordings.iter().map(|r| r.tilt).collect();
     let mut all: Vec<(Vec<Tilt>, String)> = Vec::new();
     let each = |of: fn(Tilt) -> Tilt| declared.iter().map(|t| of(*t)).collect::<Vec<Tilt>>();
-    let changes: [(fn(Tilt) -> Tilt, &str); 6] = [
+    type Turned = fn(Tilt) -> Tilt;
+    let changes: [(Turned, &str); 6] = [
         (|t| Tilt { roll_rad: -t.roll_rad, ..t }, "the sign of every roll reversed"),
         (|t| Tilt { pitch_rad: -t.pitch_rad, ..t }, "the sign of every pitch reversed"),
         (|t| Tilt { roll_rad: -t.roll_rad, pitch_rad: -t.pitch_rad }, "the sign of every tilt reversed"),

@@ -186,7 +186,7 @@ mod tests {
         let right = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
         // Written w, x, y, z into fields that are read as x, y, z, w.
         let wrong = renamed([right.k, right.w, right.i, right.j]);
-        let [(_, ..), (second, ..), _] = quaternions();
+        let [_, (second, ..), _] = quaternions();
         assert!(second(wrong).angle_to(&right) < 1e-12);
         let wrong = renamed([right.i, right.j, right.k, right.w]);
         let [(first, ..), ..] = quaternions();
