@@ -17,6 +17,9 @@ const MOST_CAVITIES: usize = 5_000;
 /// A coordinate beyond this is taken for metres or micrometres written where millimetres belong [mm].
 const LARGEST_MM: f64 = 10_000.0;
 
+/// A board on which no coordinate reaches this is written in metres [mm].
+const SMALLEST_BOARD_MM: f64 = 2.0;
+
 /// A calibration board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Board {
@@ -116,6 +119,13 @@ impl BoardFile {
                     c.name, c.xyz_mm
                 )));
             }
+        }
+        let largest_mm = self.cavities.iter().flat_map(|c| c.xyz_mm).fold(0.0, |a: f64, v| a.max(v.abs()));
+        if self.cavities.len() > 1 && largest_mm < SMALLEST_BOARD_MM {
+            return Err(invalid(format!(
+                "all cavities lie within {largest_mm} mm of the board's origin: the positions look like metres, and \
+                 xyz_mm is in millimetres"
+            )));
         }
         let mechanism = self.mechanism.map(|m| m.check(path)).transpose()?;
         let cavities: Vec<Cavity> = self

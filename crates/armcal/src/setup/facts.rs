@@ -2,8 +2,10 @@
 //! moves, tilts that are not the declared ones, frames far from their declaration, set-points read as readings.
 
 use super::trial::Inputs;
+use crate::stages::perceive::Seen;
 use crate::story::Fitted;
-use armcal_core::{Certainty, Pose, Role, SetupFinding};
+use armcal_core::{Certainty, Dwell, Pose, Role, SetupFinding};
+use armcal_dwell::MeanPose;
 use armcal_table::Tilt;
 
 /// The tip's path is long against this where an arm moves, and short where something else was tracked [m].
@@ -11,26 +13,60 @@ const MOVES_M: f64 = 0.05;
 const STANDS_M: f64 = 0.005;
 /// A joint that moved less than this over all dwells did not move [rad].
 const STUCK_RAD: f64 = 2e-4;
+/// Fewest dwells in a row that make a joint stuck.
+const MANY_STILL: usize = 8;
+/// A joint that turned by this much did move [rad].
+const TURNS_RAD: f64 = 0.1;
 /// Tilts differ from their declaration by less than this, with the mechanism as it is [rad].
-const TILT_RAD: f64 = 0.05;
+const TILT_RAD: f64 = 0.07;
 /// A frame this many standard errors from where it was measured to be contradicts its declaration, if it is off by as
 /// much as this too [m], [rad].
 const SIGMAS: f64 = 8.0;
 const OFF: f64 = 5e-3;
 /// Errors below this many times the floor say that nothing of importance is wrong.
-const SOUND: f64 = 2.0;
+const SOUND: f64 = 1.5;
 
 /// Everything that can be looked at directly; tilts and frames only where no other mistake was found.
 pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding> {
     let mut all = streams(inputs);
-    if alone {
+    // Poses that are fitted to errors say nothing of tilts and frames.
+    let sound = fitted.calibration.times_floor() <= SOUND;
+    if alone && sound {
         all.extend(tilts(inputs, fitted));
         all.extend(declared_frames(fitted));
     }
-    if fitted.calibration.times_floor() > SOUND {
+    if !sound {
         all.extend(stuck(inputs));
+        all.extend(no_quaternion(inputs));
     }
     all
+}
+
+/// Orientations that are exactly the identity in every recording: the field was never filled in.
+fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
+    let unturned = |angle_rad: f64| angle_rad < 1e-12;
+    let body = |of: fn(&Seen) -> &Option<MeanPose>| {
+        let mut poses = inputs.seen.iter().filter_map(|s| of(s).as_ref()).peekable();
+        poses.peek().is_some() && poses.all(|p| unturned(p.pose.rotation.angle()))
+    };
+    let mut turns = inputs.dwells().filter_map(|d| d.tip.as_ref()?.orientation).peekable();
+    let of_tip = inputs.pipeline.fit.use_orientation && turns.peek().is_some();
+    let tip = of_tip && turns.all(|q| unturned(q.angle()));
+    let bodies = [("base", body(|s| &s.base)), ("table", body(|s| &s.table)), ("tip", tip)];
+    bodies
+        .into_iter()
+        .filter(|(_, missing)| *missing)
+        .map(|(role, _)| {
+            mistake(
+                "quaternion-missing",
+                format!("the {role}"),
+                format!(
+                    "the orientation of the {role} is exactly the identity in every recording: its quaternion is not filled \
+                     in; mend what publishes [streams.{role}]"
+                ),
+            )
+        })
+        .collect()
 }
 
 /// Streams whose motion is not that of what they are said to be.
@@ -40,12 +76,12 @@ pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
         let tips: Vec<_> = seen.dwells.iter().filter_map(|d| d.tip.as_ref().map(|t| t.position_m)).collect();
         let Some(first) = tips.first() else { continue };
         let tip_m = tips.iter().map(|t| (t - first).norm()).fold(0.0, f64::max);
-        let moved = |d: &armcal_core::Dwell| {
+        let moved = |d: &Dwell| {
             let joints = d.joint_rad.iter().zip(&seen.dwells[0].joint_rad);
             joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
         let turned_rad = seen.dwells.iter().map(moved).fold(0.0, f64::max);
-        if tips.len() > 2 && tip_m < STANDS_M && turned_rad > 0.1 {
+        if tips.len() > 2 && tip_m < STANDS_M && turned_rad > TURNS_RAD {
             all.push(mistake(
                 "streams-swapped",
                 format!("recording `{}`", seen.name),
@@ -83,25 +119,49 @@ fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
         high - low
     };
     let ranges: Vec<f64> = (0..names.len()).map(range).collect();
-    let others_move = ranges.iter().any(|r| *r > 0.1);
-    let stuck = (0..names.len()).filter(|&j| others_move && ranges[j] < STUCK_RAD);
-    stuck
-        .map(|j| {
-            mistake(
-                "joint-stuck",
-                format!("joint {} ({})", j + 1, names[j]),
-                format!(
-                    "joint {} ({}) reads the same in all {} dwells (within {:.4} deg) while others move, and the errors \
-                     are far above the floor: its reading is stuck, or read from the wrong field; mend [streams.joints] or \
-                     the driver",
-                    j + 1,
-                    names[j],
-                    inputs.dwells().count(),
-                    ranges[j].to_degrees()
-                ),
-            )
-        })
-        .collect()
+    let others_move = ranges.iter().any(|r| *r > TURNS_RAD);
+    let mut all = Vec::new();
+    for (j, name) in names.iter().enumerate().filter(|_| others_move) {
+        let still = inputs.seen.iter().map(|s| (s, longest_still(&s.dwells, j)));
+        let Some((recording, still)) = still.max_by_key(|(_, n)| *n) else { continue };
+        if still < MANY_STILL.max(recording.dwells.len() / 4) {
+            continue;
+        }
+        all.push(mistake(
+            "joint-stuck",
+            format!("joint {} ({name})", j + 1),
+            format!(
+                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move, and the \
+                 errors are above the floor: its reading is stuck, or read from the wrong field; mend the stream of the \
+                 joints or the driver",
+                j + 1,
+                recording.name,
+                recording.dwells.len()
+            ),
+        ));
+    }
+    all
+}
+
+/// The most dwells in a row in which a joint reads the same while another one turns.
+fn longest_still(dwells: &[Dwell], joint: usize) -> usize {
+    let (mut longest, mut from) = (0, 0);
+    for i in 1..=dwells.len() {
+        let first = &dwells[from];
+        let same = |d: &Dwell| (d.joint_rad[joint] - first.joint_rad[joint]).abs() < STUCK_RAD;
+        if dwells.get(i).is_some_and(same) {
+            continue;
+        }
+        let turned = |d: &Dwell| {
+            let pairs = d.joint_rad.iter().zip(&first.joint_rad);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        if dwells[from..i].iter().map(turned).fold(0.0, f64::max) > TURNS_RAD {
+            longest = longest.max(i - from);
+        }
+        from = i;
+    }
+    longest
 }
 
 /// Declared tilts against the board's poses: between two recordings the board turns as its tilts say.

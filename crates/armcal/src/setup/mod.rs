@@ -7,11 +7,13 @@
 //!
 //! No physical effect is looked for while a mistake stands: its name would be that of the mistake.
 
+mod clocks;
 mod facts;
 mod hypotheses;
 mod search;
 mod trial;
 
+pub use clocks::joints_that_align;
 pub use trial::{Change, Inputs};
 
 use crate::story::Fitted;

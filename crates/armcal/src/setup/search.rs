@@ -5,6 +5,7 @@ use super::trial::{Inputs, Misfit};
 use crate::story::Fitted;
 use armcal_calibrate::Calibration;
 use armcal_core::{Certainty, Role, SetupFinding, SetupReport};
+use armcal_model::{EffectSpec, EffectTable};
 use rayon::prelude::*;
 
 /// Errors below this many times the floor give no reason to look.
@@ -163,12 +164,11 @@ fn explains(before: &Misfit, after: &Misfit) -> bool {
 fn best(tried: &[Tried]) -> Option<usize> {
     let lowest = tried.iter().map(|t| t.misfit.log).min_by(f64::total_cmp)?;
     let near = (0..tried.len()).filter(|k| tried[*k].misfit.log <= lowest + LEAST_FACTOR.ln() / 2.0);
-    near.min_by(|a, b| {
-        let (a, b) = (&tried[*a], &tried[*b]);
-        (a.hypothesis.freedom, a.misfit.log)
-            .partial_cmp(&(b.hypothesis.freedom, b.misfit.log))
-            .unwrap_or(std::cmp::Ordering::Equal)
-    })
+    let least = near.clone().map(|k| tried[k].hypothesis.freedom).min()?;
+    let free: Vec<usize> = near.filter(|k| tried[*k].hypothesis.freedom == least).collect();
+    let lowest = free.iter().map(|k| tried[*k].misfit.log).min_by(f64::total_cmp)?;
+    // Of what cannot be told apart the first in the list: a joint's sign is wrong more often than a row of the model.
+    free.into_iter().find(|k| tried[*k].misfit.log <= lowest + ALIKE_FACTOR.ln())
 }
 
 fn at_bound(fitted: &Fitted) -> Vec<String> {
@@ -206,12 +206,28 @@ fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool {
                     let poses = a.board_in_world(&p, r).zip(b.board_in_world(&q, r));
                     poses.is_some_and(|(from, to)| moved(from, to))
                 }),
-                // Without a recording that merely lies off by an effect, the others would fit no better than this.
-                "recordings-disagree" => before.calibration.train.fitted.mean_m > FAR_M,
+                "recordings-disagree" => {
+                    t.misfit.times_floor() < WORTH_LOOKING && !one_effect_explains(now, &t.hypothesis)
+                }
                 _ => true,
             }
         }),
     }
+}
+
+/// Whether one effect that begins with the recording explains how it differs: a tool or frame that was shifted, a zero that
+/// slipped. Then it is physics, and the diagnosis will name it.
+fn one_effect_explains(now: &Inputs, h: &Hypothesis) -> bool {
+    let Some(recording) = h.recording else { return false };
+    let joints = now.chain.joint_names();
+    let zeros = (1..=joints.len()).map(|j| format!("zero_slip:{j}@{recording}"));
+    let shifts = ["tool_shift", "frame_shift"].map(|kind| format!("{kind}@{recording}"));
+    shifts.into_iter().chain(zeros).any(|name| {
+        let mut inputs = now.clone();
+        let Ok(spec) = EffectSpec::parse(&name, joints) else { return false };
+        inputs.pipeline.effects.push(EffectTable::from(&spec));
+        inputs.fit().is_ok_and(|fitted| inputs.misfit(&fitted).times_floor() < WORTH_LOOKING)
+    })
 }
 
 fn finding(

@@ -3,8 +3,9 @@
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
+use crate::setup;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
+use armcal_core::{Dwell, JointSamples, Parameter, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Frames, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
@@ -197,7 +198,13 @@ fn dwells_of_one(
             let doubts = Doubts::of(pipeline, speed_model);
             let tip_of = |q: &[f64], off: &[f64]| doubts.tip_m(speed_model, q, off);
             let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
-            let (clock, said) = align_clocks(&samples.joints, tip, arm, &pipeline.clock).map_err(in_dwell)?;
+            let aligned = align_clocks(&samples.joints, tip, arm, &pipeline.clock);
+            let (clock, said) = aligned.map_err(|source| {
+                let with = |joints: &JointSamples| {
+                    align_clocks(joints, tip, arm, &pipeline.clock).ok().map(|(clock, _)| clock.correlation)
+                };
+                misread(in_dwell(source), name, &samples.joints, &with)
+            })?;
             warnings.extend(said);
             Some(clock)
         }
@@ -219,6 +226,21 @@ fn dwells_of_one(
     let name = name.to_owned();
     let seen = Seen { name, load_kg, report, clock, dwells, base, table, travels_m, warnings, fingerprint };
     Ok((samples, seen))
+}
+
+/// The error of clocks that cannot be aligned, with the reading of the joints that would align them.
+fn misread(
+    source: Error,
+    name: &str,
+    joints: &JointSamples,
+    correlation: &dyn Fn(&JointSamples) -> Option<f64>,
+) -> Error {
+    match setup::joints_that_align(joints, correlation) {
+        Some(mistakes) => {
+            Error::Setup { source: Box::new(source), mistakes: format!("recording `{name}`: {mistakes}") }
+        }
+        None => source,
+    }
 }
 
 /// Distance from the median position that all but the worst hundredth of the frames keep [m].

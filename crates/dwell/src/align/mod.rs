@@ -470,7 +470,12 @@ fn shifted(t_ns: i64, by_s: f64) -> i64 {
 /// Ratios of measured to predicted distance that only a wrong unit explains.
 fn check_units(ratio: f64, correlation: f64) -> Result<(), DwellError> {
     let near = |unit: f64| (ratio / unit).ln().abs() < 2f64.ln();
-    let advice = if near(1e3) {
+    let at = |unit: f64| (ratio / unit).ln().abs() < 0.05;
+    let advice = if at(1.0 / 0.0254) {
+        "the tip's positions look like inches read as metres: set their unit, or convert them where they are published"
+    } else if at(25.4) {
+        "the lengths of the model look like inches where millimetres belong, or the tip's positions are 25.4 times too large"
+    } else if near(1e3) {
         "its positions look like millimetres: set unit = \"mm\" for the tip stream"
     } else if near(1e-3) {
         "the lengths of the model look like millimetres, or the tip stream is in metres but declared unit = \"mm\""

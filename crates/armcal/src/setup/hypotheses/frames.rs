@@ -36,7 +36,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             let change = format!("{subject} left out");
             let without = move |i: &mut Inputs| i.seen[r].dwells.clear();
             let hypothesis = Hypothesis::new("recordings-disagree", subject, change, RECORDINGS, without);
-            all.push(hypothesis.with(Freedom::Frame));
+            all.push(Hypothesis { recording: Some(r), ..hypothesis.with(Freedom::Frame) });
         }
     }
     all

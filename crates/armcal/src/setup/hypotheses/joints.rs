@@ -5,9 +5,11 @@ use crate::setup::trial::Inputs;
 use armcal_core::{Arrival, Dwell, Unit};
 use std::f64::consts::FRAC_PI_2;
 
-/// Where the streams of joints are described.
-const STREAM: &str =
-    "mend [streams.joints] (names, unit, sign, counts_per_turn, zero) or the driver that records it";
+const SIGN: &str = "mend the direction of its encoder in [streams.joints], or in the driver that records it";
+const ORDER: &str = "mend `names` in [streams.joints], or the driver that records them";
+const UNIT: &str = "mend `unit` in [streams.joints], or the driver that records it";
+const COUNTS: &str = "mend `counts_per_turn` in [streams.joints], or the driver that records it";
+const ZERO: &str = "mend `zero_counts` in [streams.joints], or theta of the model";
 
 /// Joints beyond which only neighbours and ends are exchanged, not every two.
 const FEW: usize = 3;
@@ -21,14 +23,14 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for set in sign_sets(n) {
         let subject = set.iter().map(|&j| joint(j)).collect::<Vec<_>>().join(", ");
         let change = format!("the sign of {subject} reversed");
-        all.push(Hypothesis::new("joint-sign", subject, change, STREAM, move |i| {
+        all.push(Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
             i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, -1.0)));
         }));
     }
     for order in orders(n) {
         let words: Vec<String> = order.iter().map(|j| (j + 1).to_string()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
-        all.push(Hypothesis::new("joint-order", "the joints", change, STREAM, move |i| {
+        all.push(Hypothesis::new("joint-order", "the joints", change, ORDER, move |i| {
             i.each_dwell(|d| reorder(d, &order));
         }));
     }
@@ -40,7 +42,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let each = turning.iter().map(|&j| (vec![j], joint(j)));
         for (set, subject) in each.chain([(turning.clone(), "all joints".to_owned())]) {
             let change = format!("{subject} {words}");
-            all.push(Hypothesis::new("joint-unit", subject, change, STREAM, move |i| {
+            all.push(Hypothesis::new("joint-unit", subject, change, UNIT, move |i| {
                 i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
             }));
         }
@@ -49,7 +51,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let each = (0..n).map(|j| (vec![j], joint(j)));
         for (set, subject) in each.chain([((0..n).collect(), "all joints".to_owned())]) {
             let change = format!("{factor} times the reading of {subject}");
-            all.push(Hypothesis::new("joint-scale", subject, change, STREAM, move |i| {
+            all.push(Hypothesis::new("joint-scale", subject, change, COUNTS, move |i| {
                 i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
             }));
         }
@@ -57,7 +59,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for &j in &turning {
         for quarters in [1.0, 2.0, 3.0] {
             let change = format!("{} deg added to the reading of {}", 90.0 * quarters, joint(j));
-            all.push(Hypothesis::new("joint-zero", joint(j), change, STREAM, move |i| {
+            all.push(Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
                 i.each_dwell(|d| shift(d, j, quarters * FRAC_PI_2));
             }));
         }

@@ -24,6 +24,8 @@ pub struct Hypothesis {
     pub freedom: Freedom,
     /// The number that the change holds, where it holds one.
     pub number: Option<Number>,
+    /// The recording that it is about, where it is about one.
+    pub recording: Option<usize>,
     /// The change itself.
     pub apply: Arc<dyn Fn(&mut Inputs) + Send + Sync>,
 }
@@ -70,6 +72,7 @@ impl Hypothesis {
             remedy,
             freedom: Freedom::Discrete,
             number: None,
+            recording: None,
             apply: Arc::new(apply),
         }
     }

@@ -6,6 +6,7 @@ use crate::setup::trial::Inputs;
 use armcal_core::Pose;
 use armcal_dwell::MeanPose;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use std::f64::consts::FRAC_PI_2;
 
 const STREAMS: &str = "mend the [streams] of the bodies or what publishes them";
 
@@ -36,6 +37,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             all.push(Hypothesis::new(code, "the sensor's axes", change, STREAMS, move |i| {
                 map_positions(i, matrix, false);
             }));
+            if base || table {
+                let change = format!("the {words} in the stream of the tip");
+                all.push(Hypothesis::new(code, "the tip", change, STREAMS, move |i| {
+                    map_tips(i, matrix, false)
+                }));
+            }
         }
         if oriented || base || table {
             let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
@@ -74,6 +81,13 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }
     }
     for (body, present, name) in [(Body::Base, base, "the base"), (Body::Table, table, "the table")] {
+        for (turn, words) in [(FRAC_PI_2, "y up"), (-FRAC_PI_2, "y down")].into_iter().filter(|_| present) {
+            let change = format!("the pose of {name} taken from a frame with {words} instead of z");
+            all.push(Hypothesis::new("axes-permuted", name, change, STREAMS, move |i| {
+                let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turn);
+                map_bodies(i, body, |p| p.pose = Pose::from_parts(Vector3::zeros().into(), turned) * p.pose);
+            }));
+        }
         if present {
             let change = format!("the pose of {name} inverted");
             all.push(Hypothesis::new("pose-inverted", name, change, STREAMS, move |i| {
@@ -151,27 +165,32 @@ fn map_bodies(inputs: &mut Inputs, body: Body, change: impl Fn(&mut MeanPose)) {
     }
 }
 
-/// Maps the positions of all bodies; orientations too where the sensor's frame itself is another.
-fn map_positions(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
-    // A reflection M maps a rotation R to M R M.
-    let turned = |q: UnitQuaternion<f64>| {
-        let r = matrix * q.to_rotation_matrix().matrix() * matrix.transpose();
-        UnitQuaternion::from_matrix(&r)
-    };
+/// A reflection M maps a rotation R to M R M'.
+fn turned(matrix: &Matrix3<f64>, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_matrix(&(matrix * q.to_rotation_matrix().matrix() * matrix.transpose()))
+}
+
+/// Maps what the sensor saw of the tip.
+fn map_tips(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
     inputs.each_dwell(|d| {
         if let Some(tip) = &mut d.tip {
             tip.position_m = matrix * tip.position_m;
             tip.covariance_m2 = matrix * tip.covariance_m2 * matrix.transpose();
             if orientations {
-                tip.orientation = tip.orientation.map(turned);
+                tip.orientation = tip.orientation.map(|q| turned(&matrix, q));
             }
         }
     });
+}
+
+/// Maps the positions of all bodies; orientations too where the sensor's frame itself is another.
+fn map_positions(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
+    map_tips(inputs, matrix, orientations);
     for body in [Body::Base, Body::Table] {
         map_bodies(inputs, body, |p| {
             p.pose.translation.vector = matrix * p.pose.translation.vector;
             if orientations {
-                p.pose.rotation = turned(p.pose.rotation);
+                p.pose.rotation = turned(&matrix, p.pose.rotation);
             }
         });
     }
