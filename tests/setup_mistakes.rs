@@ -13,6 +13,10 @@ const NAMED: &[(&str, Rig)] = &[
     ("topic-misspelt", Rig::Table),
     ("file-cut", Rig::Sockets),
     ("degrees-read-as-radians", Rig::Poses),
+    ("first-joint-reversed", Rig::Table),
+    ("half-turn-off", Rig::Table),
+    ("tip-axis-mirrored", Rig::Table),
+    ("joint-frozen-from-the-middle", Rig::Sockets),
 ];
 
 fn answer(name: &str, rig: Rig) -> Case {

@@ -221,7 +221,7 @@ pub fn cases() -> Vec<Case> {
         ),
         of(["simulate", "out"], "--out", &["simulate", "--hide", "backlash"], vec![], folder(&hidden)),
         of(["extract", "out"], "--out", &thin, vec!["normal.mcap", "p.toml"], Place::File),
-        of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec!["p.toml"], Place::File),
+        of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec![], Place::File),
         of(["export", "out"], "--out", &["export", "p.toml"], with(&[]), Place::File),
     ]
 }

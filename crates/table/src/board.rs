@@ -121,7 +121,7 @@ impl BoardFile {
             }
         }
         let largest_mm = self.cavities.iter().flat_map(|c| c.xyz_mm).fold(0.0, |a: f64, v| a.max(v.abs()));
-        if self.cavities.len() > 1 && largest_mm < SMALLEST_BOARD_MM {
+        if self.cavities.len() > 2 && largest_mm < SMALLEST_BOARD_MM {
             return Err(invalid(format!(
                 "all cavities lie within {largest_mm} mm of the board's origin: the positions look like metres, and \
                  xyz_mm is in millimetres"
@@ -235,6 +235,23 @@ mod tests {
         assert!(message(text).contains("`cavities.xyz_m`, did you mean `xyz_mm`?"));
         let text = PAPER.replace("max_roll_deg", "maxroll_deg");
         assert!(message(&text).contains("`mechanism.maxroll_deg`, did you mean `max_roll_deg`?"));
+    }
+
+    #[test]
+    fn a_board_in_metres_is_named() {
+        let metres = |line: &str| match line.strip_prefix("xyz_mm = [") {
+            Some(rest) => {
+                let mm = rest
+                    .trim_end()
+                    .trim_end_matches(']')
+                    .split(',')
+                    .map(|v| v.trim().parse::<f64>().unwrap());
+                format!("xyz_mm = {:?}", mm.map(|v| v * 1e-3).collect::<Vec<_>>())
+            }
+            None => line.to_owned(),
+        };
+        let text: Vec<String> = PAPER.lines().map(metres).collect();
+        assert!(message(&text.join("\n")).contains("look like metres"));
     }
 
     #[test]

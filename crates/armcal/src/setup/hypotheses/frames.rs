@@ -6,7 +6,8 @@ use crate::setup::trial::Inputs;
 
 const FRAMES: &str = "mend the pose in [frames], or estimate it (pose = \"estimated\")";
 const TABLE: &str = "mend [table] (`at`, `markers_on`, the streams), or estimate it (pose = \"estimated\")";
-const RECORDINGS: &str = "give it a pipeline of its own, with its own arm or tool";
+const RECORDINGS: &str =
+    "it looks like a recording of another arm or tool: give it a pipeline of its own, with that arm and tool";
 
 pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let mut all = Vec::new();
