@@ -7,20 +7,14 @@
 //! * what is neither explained nor at the floor is `unexplained`, and says how much, where, and what was tried.
 
 use crate::config::DiagnosisConfig;
-use crate::diagnosis::{
-    BeforeAfter, Diagnosis, JudgedOn, NoiseReport, Refitted, Tried, Unexplained, Verdict,
-};
+use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
 use crate::error_places::{DwellError, error_places};
 use crate::explain::explanations;
-use crate::noise::Noise;
 use armcal_calibrate::Calibration;
 use armcal_core::{Observation, Severity, Stage, Warning};
 
 /// A refit that leaves more than this share of the error, on either side of the hold-out, has not confirmed anything.
 const CONFIRMED_SHARE: f64 = 0.95;
-
-/// A kind of noise this probable is reported.
-const CERTAIN: f64 = 0.95;
 
 /// What the verdict is settled with.
 pub(crate) struct Evidence<'a> {
@@ -99,7 +93,7 @@ impl Diagnosis {
                 floor_mm: settled.noise_floor_m * 1e3,
                 times_floor: settled.times_floor(),
                 places: error_places(&errors, joint_names),
-                scatter: scatter(&self.noise),
+                scatter: self.noise.correlated().map(|(kind, _)| kind.to_owned()),
                 tried: Tried {
                     listed: self.candidates.len(),
                     unlisted: self.tried_unlisted,
@@ -135,12 +129,6 @@ fn left_over(calibration: &Calibration) -> f64 {
         true => calibration.times_floor().min(fitted.mean_m / calibration.noise_floor_m),
         false => calibration.times_floor(),
     }
-}
-
-/// The kind of noise that is beyond doubt, unless it is plain.
-fn scatter(noise: &NoiseReport) -> Option<String> {
-    let (kind, p) = noise.kinds.first()?;
-    (*p > CERTAIN && *kind != Noise::White.word()).then(|| kind.clone())
 }
 
 /// Errors far above the floor that nothing explains make a result inadequate, whatever was named beside them.

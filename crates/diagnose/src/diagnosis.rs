@@ -3,6 +3,7 @@
 use crate::contrasts::Contrast;
 use crate::crossval::HeldOut;
 use crate::error_places::ErrorPlace;
+use crate::noise::Noise;
 use crate::structure::Structure;
 use armcal_calibrate::Calibration;
 use armcal_core::{DwellId, Unit, Warning};
@@ -350,6 +351,17 @@ pub struct NoiseReport {
     pub sigma_ratio: f64,
     /// Kind of correlation with its probability, most probable first.
     pub kinds: Vec<(String, f64)>,
+}
+
+/// A kind of noise this probable is beyond doubt.
+const CERTAIN: f64 = 0.95;
+
+impl NoiseReport {
+    /// The kind of correlation that is beyond doubt, with its probability; none of plain noise.
+    pub(crate) fn correlated(&self) -> Option<(&str, f64)> {
+        let (kind, p) = self.kinds.first()?;
+        (*p > CERTAIN && *kind != Noise::White.word()).then_some((kind.as_str(), *p))
+    }
 }
 
 /// A number of the verdict, in a plain sentence.

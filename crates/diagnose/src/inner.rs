@@ -226,10 +226,7 @@ fn warnings(
             ),
         );
     }
-    if let Some((kind, p)) = noise.kinds.first()
-        && *p > 0.95
-        && *kind != crate::noise::Noise::White.word()
-    {
+    if let Some((kind, p)) = noise.correlated() {
         let message =
             format!("the scatter is {kind} (probability {p:.2}); more repeats of the same kind average less");
         add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
