@@ -86,6 +86,18 @@ pub enum Error {
         /// `table`, `base`.
         role: &'static str,
     },
+    /// Another number of joints is read than the model has.
+    #[error(
+        "recording `{recording}`: {read} joints are read for a model of {expected}; mend `names` in [streams.joints], or the rows of the model file: the number of joints differs"
+    )]
+    JointCount {
+        /// Name of the recording.
+        recording: String,
+        /// Joints read.
+        read: usize,
+        /// Joints of the model.
+        expected: usize,
+    },
     /// What a batch should work on.
     #[error("recordings `{what}`: {why}")]
     Manifest {

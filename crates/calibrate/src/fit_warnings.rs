@@ -9,7 +9,7 @@ const OUTLIER_WEIGHT: f64 = 0.25;
 /// Residual scale from which on the declared noise is questioned.
 const LARGE_SCALE: f64 = 1.5;
 /// Residual scale from which on the model cannot be called adequate.
-const INADEQUATE_SCALE: f64 = 5.0;
+const INADEQUATE_SCALE: f64 = 2.0;
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
 

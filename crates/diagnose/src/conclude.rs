@@ -16,6 +16,11 @@ use armcal_core::{Observation, Severity, Stage, Warning};
 /// A refit that leaves more than this share of the error, on either side of the hold-out, has not confirmed anything.
 const CONFIRMED_SHARE: f64 = 0.95;
 
+/// Where more than this many times the floor remains, a name stays only if it explains at least this share of what lay above
+/// the floor: what leaves the most unexplained has only leaned on another cause.
+const LARGE_REST: f64 = 2.0;
+const LEAST_EXPLAINED: f64 = 0.5;
+
 /// What the verdict is settled with.
 pub(crate) struct Evidence<'a> {
     /// The calibration that was diagnosed.
@@ -41,7 +46,11 @@ impl Diagnosis {
         let mut refuted = Vec::new();
         let left = left_over(after.unwrap_or(before));
         let withheld = match after {
-            Some(after) => !confirms(before, after) || left > config.unexplained_factor,
+            Some(after) => {
+                !confirms(before, after)
+                    || left > config.unexplained_factor
+                    || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
+            }
             None => false,
         };
         if withheld {
@@ -122,6 +131,16 @@ fn confirms(before: &Calibration, after: &Calibration) -> bool {
     mean(after) < mean(before) || after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m
 }
 
+/// Share of the squared error above the floor that a refit with more effects explains, on the side of the hold-out that shows
+/// more of it.
+fn explained(before: &Calibration, after: &Calibration) -> f64 {
+    let floor = |c: &Calibration| c.noise_floor_m.powi(2);
+    let share = |b: f64, a: f64| (b.powi(2) - a.powi(2)) / (b.powi(2) - floor(before)).max(f64::MIN_POSITIVE);
+    let judged = share(before.judged().fitted.mean_m, after.judged().fitted.mean_m);
+    let fitted = share(before.train.fitted.mean_m, after.train.fitted.mean_m);
+    judged.max(fitted)
+}
+
 /// How many times the floor the errors are; of a hold-out that cannot learn an effect, those of the fitted side.
 fn left_over(calibration: &Calibration) -> f64 {
     let fitted = calibration.train.fitted;
@@ -141,7 +160,7 @@ fn warning(
     let alone = verdict == Verdict::Unexplained;
     let inadequate = match alone {
         true => unexplained.times_floor > config.floor_factor,
-        false => times_floor > 2.0 * config.floor_factor,
+        false => times_floor > LARGE_REST,
     };
     if !alone && !inadequate {
         return None;

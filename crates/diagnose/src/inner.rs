@@ -9,42 +9,30 @@ use crate::diagnosis::{
 use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
 use crate::judge::{Grade, Judged};
-use crate::outliers::{flipped, suspects};
+use crate::outliers::{Cleaned, flipped, set_aside};
 use crate::problem::Problem;
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
 use crate::structure::structure;
 use crate::unknown::unknown_report;
-use crate::weigh::{Weighed, weigh};
+use crate::weigh::Weighed;
 use crate::{DiagnoseError, next};
 use armcal_core::{Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DMatrix;
 
-/// Rounds of setting outliers aside.
-const ROUNDS: usize = 3;
 /// Noise this far above the declaration is worth a word.
 const SIGMA_RATIO: f64 = 1.4;
+/// So is noise that much below it.
+const OVERDECLARED: f64 = 2.0;
 
 /// Diagnoses a problem. `refit` gives it, and gives it again with effects in the base model.
 pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
     config.check()?;
     let whole = refit.problem(&[])?;
     whole.check()?;
-    let mut keep = vec![true; whole.dwells.len()];
-    let mut problem = whole.clone();
-    let mut weighed = weigh(&problem, config);
-    for _ in 0..ROUNDS {
-        let found = suspects(&problem, &weighed, config);
-        if found.is_empty() {
-            break;
-        }
-        let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
-        found.iter().for_each(|i| keep[kept[*i]] = false);
-        problem = whole.without(&keep);
-        weighed = weigh(&problem, config);
-    }
+    let Cleaned { keep, problem, weighed } = set_aside(&whole, config);
     let mut rooms = Rooms::new(refit, keep.clone(), (problem, weighed), config);
     let first = rooms.with(&[])?;
     let top = first.weighed.ranking().first().map(|top| first.judge(*top, config));
@@ -226,12 +214,28 @@ fn warnings(
             ),
         );
     }
+    if noise.sigma_ratio < 1.0 / OVERDECLARED {
+        let message = format!(
+            "what remains scatters only {:.2} times as much as declared: the noise is declared too large, and small effects hide \
+             below it; declare what the sensor and the seats scatter",
+            noise.sigma_ratio
+        );
+        add(Severity::Notice, "noise-overdeclared", "noise".to_string(), message);
+    }
     if let Some((kind, p)) = noise.correlated() {
         let message =
             format!("the scatter is {kind} (probability {p:.2}); more repeats of the same kind average less");
         add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
     }
     for a in &search.accepted {
+        if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
+            let message = format!(
+                "{}: something changed between dwells; a load that is put on and not declared changes them too: check `load_kg` of \
+                 the recordings",
+                a.candidate.spec
+            );
+            add(Severity::Notice, "event-or-load", a.candidate.spec.clone(), message);
+        }
         if a.candidate.toggle == Toggle::Direction {
             let wrong = direction_suspects(a);
             if !wrong.is_empty() {
@@ -247,6 +251,11 @@ fn warnings(
         }
     }
     all
+}
+
+/// Whether all dwells are declared to bear the same load.
+fn one_load(problem: &Problem) -> bool {
+    problem.dwells.iter().all(|d| d.load_kg == problem.dwells[0].load_kg)
 }
 
 /// Dwells whose arrival direction an accepted direction effect contradicts.

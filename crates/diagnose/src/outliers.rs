@@ -3,46 +3,145 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{Group, left_out};
 use crate::drivers::standardised_joints;
-use crate::problem::Problem;
+use crate::problem::{DwellRow, Problem};
 use crate::special::chi2_tail;
-use crate::weigh::Weighed;
+use crate::weigh::{Weighed, weigh};
 use armcal_core::robust::median;
 use nalgebra::DVector;
+use std::collections::BTreeSet;
 
-/// More suspects than this share are no outliers but structure.
+/// Rounds of setting dwells aside.
+const ROUNDS: usize = 3;
+/// More dwells than this share, over all rounds, are no outliers but structure.
 const MAX_SHARE: f64 = 0.1;
 /// Suspects that err alike above this mean cosine are structure too.
 const MAX_AGREEMENT: f64 = 0.4;
 /// Fewest suspects for which that is asked.
 const MIN_AGREEING: usize = 4;
+/// Dwells in a row that err are an event, which has a name of its own.
+const RUN: usize = 3;
+/// What sets dwells apart, a joint's angle say, keeps at least this share of its variance.
+const KEPT_VARIANCE: f64 = 0.5;
+
+/// A problem without the dwells that fit nothing.
+pub(crate) struct Cleaned {
+    /// Which dwells of the whole problem are kept.
+    pub keep: Vec<bool>,
+    /// The problem of these.
+    pub problem: Problem,
+    /// How it weighs.
+    pub weighed: Weighed,
+}
+
+/// Sets dwells aside in rounds, each with the explanations that the dwells before it did not spoil.
+pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
+    let mut keep = vec![true; whole.dwells.len()];
+    let mut problem = whole.clone();
+    let mut weighed = weigh(&problem, config);
+    for _ in 0..ROUNDS {
+        let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
+        let found = suspects(&problem, &weighed, config);
+        let found = accidents(whole, &keep, found.into_iter().map(|i| kept[i]).collect());
+        if found.is_empty() {
+            break;
+        }
+        found.iter().for_each(|i| keep[*i] = false);
+        problem = whole.without(&keep);
+        weighed = weigh(&problem, config);
+    }
+    Cleaned { keep, problem, weighed }
+}
 
 /// Dwells whose residual, predicted without them by the most flexible explanation at hand, is as rare as
-/// `outlier_sigma`.
-pub(crate) fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
+/// `outlier_sigma`, what that prediction does not know allowed for.
+fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0);
     let effect = best.map(|b| weighed.tamed(b.0, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let left = left_out(problem, effect.as_ref(), &alone);
+    let fitted = left_out(problem, effect.as_ref(), &[]);
+    let square = studentised(problem, &left, &fitted);
     // Wilson-Hilferty: the median of chi-square with k degrees of freedom is about k (1 - 2/(9k))^3.
     let reduced: Vec<f64> = problem
         .dwells
         .iter()
-        .map(|d| {
+        .zip(&square)
+        .map(|(d, square)| {
             let k = d.rows as f64;
-            left.rows(d.first_row, d.rows).norm_squared() / (k * (1.0 - 2.0 / (9.0 * k)).powi(3))
+            square / (k * (1.0 - 2.0 / (9.0 * k)).powi(3))
         })
         .collect();
-    let variance = median(&reduced);
+    let variance = median(&reduced).max(1e-300);
     let rare = chi2_tail(config.outlier_sigma.powi(2), 1.0);
-    let found: Vec<usize> = (0..reduced.len())
-        .filter(|i| {
-            let d = &problem.dwells[*i];
-            let square = left.rows(d.first_row, d.rows).norm_squared() / variance.max(1e-300);
-            chi2_tail(square, d.rows as f64) < rare
-        })
+    let found: Vec<usize> = (0..square.len())
+        .filter(|i| chi2_tail(square[*i] / variance, problem.dwells[*i].rows as f64) < rare)
         .collect();
-    let few = found.len() as f64 <= MAX_SHARE * problem.dwells.len() as f64;
-    if few && agreement(problem, &left, &found) < MAX_AGREEMENT { found } else { Vec::new() }
+    if agreement(problem, &left, &found) < MAX_AGREEMENT { found } else { Vec::new() }
+}
+
+/// `r' (I - H)^-1 r` of each dwell: the square of its left-out residual in units of what that scatters. A dwell that
+/// alone determines something is predicted badly without it, and that is no sign against it (Cook, Weisberg 1982, 2.2).
+fn studentised(problem: &Problem, left: &DVector<f64>, fitted: &DVector<f64>) -> Vec<f64> {
+    let rows = |of: &DVector<f64>, d: &DwellRow| of.rows(d.first_row, d.rows).into_owned();
+    problem.dwells.iter().map(|d| rows(left, d).dot(&rows(fitted, d)).max(0.0)).collect()
+}
+
+/// Of the suspects, those that can be accidents: few, with all that were set aside before; not in a row; and not what
+/// alone shows a joint, a direction, a load or a temperature.
+fn accidents(whole: &Problem, keep: &[bool], found: Vec<usize>) -> Vec<usize> {
+    let mut all: BTreeSet<usize> =
+        (0..keep.len()).filter(|i| !keep[*i]).chain(found.iter().copied()).collect();
+    let few = all.len() as f64 <= MAX_SHARE * whole.dwells.len() as f64;
+    if !few {
+        return Vec::new();
+    }
+    let rows = in_a_row(whole, &all);
+    all.retain(|i| !rows.contains(i));
+    let needed = needed(whole, &all);
+    found.into_iter().filter(|i| all.contains(i) && !needed.contains(i)).collect()
+}
+
+/// Those of the suspects that follow each other in time, at least [`RUN`] of them.
+fn in_a_row(whole: &Problem, suspects: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let mut order: Vec<usize> = (0..whole.dwells.len()).collect();
+    order.sort_by_key(|i| whole.dwells[*i].id);
+    let same = |a: &usize, b: &usize| {
+        suspects.contains(a) == suspects.contains(b)
+            && whole.dwells[*a].id.recording == whole.dwells[*b].id.recording
+    };
+    let runs = order.chunk_by(same).filter(|run| run.len() >= RUN && suspects.contains(&run[0]));
+    runs.flatten().copied().collect()
+}
+
+/// Those of the suspects without which something that sets dwells apart would hardly vary.
+fn needed(whole: &Problem, suspects: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let mut needed = BTreeSet::new();
+    for value in what_varies(whole) {
+        let kept: Vec<f64> = (0..value.len()).filter(|i| !suspects.contains(i)).map(|i| value[i]).collect();
+        let ((_, all), (middle, rest)) = (mean_and_variance(&value), mean_and_variance(&kept));
+        if rest < KEPT_VARIANCE * all {
+            needed.extend(suspects.iter().filter(|i| (value[**i] - middle).powi(2) > all));
+        }
+    }
+    needed
+}
+
+/// Joint angles, arrival directions, load and temperature of the dwells.
+fn what_varies(whole: &Problem) -> Vec<Vec<f64>> {
+    let column = |f: &dyn Fn(&DwellRow) -> f64| whole.dwells.iter().map(f).collect::<Vec<f64>>();
+    let mut all = vec![column(&|d| d.load_kg)];
+    all.extend(whole.dwells.iter().map(|d| d.temperature_c).collect::<Option<Vec<f64>>>());
+    for j in 0..whole.joints() {
+        all.push(column(&|d| d.joint_rad[j]));
+        all.push(column(&|d| d.arrival[j]));
+    }
+    all
+}
+
+fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n)
 }
 
 /// Mean cosine between the residual of each suspect and that of the suspect next to it in joint space. Accidents point
@@ -76,3 +175,7 @@ pub(crate) fn flipped(problem: &Problem, residual: &[f64], signature: &[f64]) ->
         .filter(|i| change(*i) > 25.0 && problem.dwells[*i].arrival.iter().any(|s| *s != 0.0))
         .collect()
 }
+
+#[cfg(test)]
+#[path = "tests/outliers.rs"]
+mod tests;

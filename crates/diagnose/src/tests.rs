@@ -1,7 +1,7 @@
 //! Formulas against brute force, on a small arm of its own.
 
 #[path = "../tests/arm/mod.rs"]
-mod arm;
+pub(crate) mod arm;
 
 use crate::noise::{Noise, Whitener};
 use crate::projection::Projection;

@@ -137,9 +137,16 @@ pub fn run(armcal: &Path, session: &Session, folder: &Path) -> Result<Said, Erro
     if !matches!(exit, Some(0 | 3)) {
         let text = std::fs::read(&errors).map_err(Error::file("reading", &errors))?;
         let text = String::from_utf8_lossy(&text).replace(&*folder.to_string_lossy(), "");
-        said.statements.push(Statement { place: Place::Error, code: String::new(), text });
+        said.statements.push(Statement { place: Place::Error, code: bracketed(&text), text });
     }
     Ok(Said { exit, ..said })
+}
+
+/// The codes of findings that an error message names, in brackets: `[joint-order]`. A section of a file has no hyphen.
+fn bracketed(text: &str) -> String {
+    let inside = text.split('[').skip(1).filter_map(|rest| rest.split_once(']').map(|(inside, _)| inside));
+    let code = |s: &&str| s.contains('-') && s.chars().all(|c| c.is_ascii_lowercase() || c == '-');
+    inside.filter(code).collect::<Vec<_>>().join(" ")
 }
 
 /// The program beside this one, as cargo puts them.

@@ -157,7 +157,7 @@ pub enum ModelError {
     },
     /// An observation does not fit the chain.
     #[error(
-        "{dwell}: {actual} joint readings for a chain of {expected} joints; check the joint names of the pipeline"
+        "{dwell}: {actual} joint readings for a chain of {expected} joints; mend the joint names of the pipeline, or the rows of the model file"
     )]
     JointCount {
         /// The dwell.

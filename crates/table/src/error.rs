@@ -46,7 +46,7 @@ pub enum TableError {
         second: usize,
     },
     /// Two cavities in one place.
-    #[error("reading the board file {}: cavities `{first}` and `{second}` are only {distance_mm:.3} mm apart; a tip cannot tell them apart, so remove one or correct its xyz_mm", path.display())]
+    #[error("reading the board file {}: cavities `{first}` and `{second}` are only {distance_mm:.3} mm apart; a tip cannot tell them apart, so remove one or correct its xyz_mm (in millimetres, not metres or inches)", path.display())]
     Coincident {
         /// The board file.
         path: PathBuf,

@@ -17,6 +17,15 @@ const STUCK_RAD: f64 = 2e-4;
 const MANY_STILL: usize = 8;
 /// A joint that turned by this much did move [rad].
 const TURNS_RAD: f64 = 0.1;
+/// Two bodies nearer to each other than this are one [m], [rad].
+const SAME_M: f64 = 1e-3;
+const SAME_RAD: f64 = 5e-3;
+/// Share of the dwells that is nearly all of them.
+const NEARLY_ALL: f64 = 0.9;
+/// Readings nearer to each other than this are one [rad].
+const EXACT_RAD: f64 = 1e-9;
+/// The steps of an encoder are at most so many times finer than the nearest two readings.
+const FINEST: u32 = 12;
 /// Tilts differ from their declaration by less than this, with the mechanism as it is [rad].
 const TILT_RAD: f64 = 0.07;
 /// A frame this many standard errors from where it was measured to be contradicts its declaration, if it is off by as
@@ -28,7 +37,7 @@ const SOUND: f64 = 1.5;
 
 /// Everything that can be looked at directly; tilts and frames only where no other mistake was found.
 pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding> {
-    let mut all = streams(inputs);
+    let mut all = Vec::new();
     // Poses that are fitted to errors say nothing of tilts and frames.
     let sound = fitted.calibration.times_floor() <= SOUND;
     if alone && sound {
@@ -38,6 +47,7 @@ pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding>
     if !sound {
         all.extend(stuck(inputs));
         all.extend(no_quaternion(inputs));
+        all.extend(set_points(inputs));
     }
     all
 }
@@ -71,7 +81,8 @@ fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
 
 /// Streams whose motion is not that of what they are said to be.
 pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
-    let mut all = Vec::new();
+    let mut all: Vec<SetupFinding> = same_body(inputs).into_iter().collect();
+    all.extend(speeds(inputs));
     for seen in &inputs.seen {
         let tips: Vec<_> = seen.dwells.iter().filter_map(|d| d.tip.as_ref().map(|t| t.position_m)).collect();
         let Some(first) = tips.first() else { continue };
@@ -110,8 +121,75 @@ pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
     all
 }
 
+/// Base and table that are one body in every recording.
+fn same_body(inputs: &Inputs) -> Option<SetupFinding> {
+    let apart = |s: &Seen| {
+        let by = s.base.as_ref()?.pose.inverse() * s.table.as_ref()?.pose;
+        Some((by.translation.vector.norm(), by.rotation.angle()))
+    };
+    let all: Option<Vec<(f64, f64)>> = inputs.seen.iter().map(apart).collect();
+    let all =
+        all.filter(|all| !all.is_empty() && all.iter().all(|(m, rad)| *m < SAME_M && *rad < SAME_RAD))?;
+    let apart_mm = all.iter().map(|(m, _)| m * 1e3).fold(0.0, f64::max);
+    Some(mistake(
+        "streams-equal",
+        "base and table".to_owned(),
+        format!(
+            "the bodies read as base and as table are the same body: their poses differ by {apart_mm:.3} mm at most; mend \
+             [streams.base] or [streams.table]"
+        ),
+    ))
+}
+
+/// Joints that read nearly zero most of the time: speeds do, angles do not.
+fn speeds(inputs: &Inputs) -> Option<SetupFinding> {
+    let all = !inputs.seen.is_empty() && inputs.seen.iter().all(|s| s.readings.mostly_zero);
+    all.then(|| {
+        let message = "every joint reads nearly zero most of the time, and not always: these are speeds, or another field than \
+                       the angles; mend [streams.joints]";
+        mistake("wrong-field", "the joints".to_owned(), message.to_owned())
+    })
+}
+
+/// Readings without any scatter in nearly all dwells, not on the steps of an encoder: what was asked for, not what was read.
+fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
+    let exact: Vec<&Vec<f64>> = inputs.seen.iter().flat_map(|s| &s.readings.exact_rad).collect();
+    let dwells = inputs.dwells().count();
+    if exact.len() < MANY_STILL || (exact.len() as f64) < NEARLY_ALL * dwells as f64 {
+        return None;
+    }
+    let on_steps = (0..inputs.chain.joint_names().len()).any(|j| {
+        let mut read: Vec<f64> = exact.iter().map(|q| q[j]).collect();
+        read.sort_by(f64::total_cmp);
+        read.dedup_by(|a, b| (*a - *b).abs() < EXACT_RAD);
+        read.len() < 2 || steps_of(&read)
+    });
+    let finding = mistake(
+        "setpoints-recorded",
+        "the joints".to_owned(),
+        format!(
+            "no joint's reading scatters in {} of {dwells} dwells, nor lies on the steps of an encoder, and the errors are above the \
+             floor: these look like set-points, not readings; look at the topic in [streams.joints]",
+            exact.len()
+        ),
+    );
+    (!on_steps).then_some(SetupFinding { certainty: Certainty::Possible, ..finding })
+}
+
+/// Whether sorted readings lie on steps of one size, up to [`FINEST`] times finer than the least distance between two.
+fn steps_of(sorted: &[f64]) -> bool {
+    let gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    (1..=FINEST).map(|n| least / f64::from(n)).any(|step| {
+        gaps.iter().all(|gap| {
+            let steps = gap / step;
+            (steps - steps.round()).abs() < 0.05
+        })
+    })
+}
+
 /// Joints that did not move while others did.
-fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
     let names = inputs.chain.joint_names();
     let range = |j: usize| {
         let all = inputs.dwells().map(|d| d.joint_rad[j]);
@@ -131,8 +209,7 @@ fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
             "joint-stuck",
             format!("joint {} ({name})", j + 1),
             format!(
-                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move, and the \
-                 errors are above the floor: its reading is stuck, or read from the wrong field; mend the stream of the \
+                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move: its reading is stuck, or read from the wrong field; mend the stream of the \
                  joints or the driver",
                 j + 1,
                 recording.name,

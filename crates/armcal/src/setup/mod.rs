@@ -13,7 +13,7 @@ mod hypotheses;
 mod search;
 mod trial;
 
-pub use clocks::joints_that_align;
+pub use clocks::{Reading, what_would_align};
 pub use trial::{Change, Inputs};
 
 use crate::story::Fitted;
@@ -21,8 +21,11 @@ use armcal_core::SetupReport;
 
 /// Looks for mistakes in the inputs of a calibration.
 pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
-    let mut report = SetupReport::default();
-    search::search(inputs, Some(fitted), &mut report);
+    let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
+    // Of what is not what it is said to be, a change elsewhere takes a share of the errors, and says nothing.
+    if report.findings.is_empty() {
+        search::search(inputs, Some(fitted), &mut report);
+    }
     // What a mistake does to tilts and frames is its consequence.
     let alone = report.findings.is_empty();
     report.findings.extend(facts::facts(inputs, fitted, alone));
@@ -33,6 +36,11 @@ pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
 /// The same for inputs that could not be calibrated at all.
 pub fn examine_failed(inputs: &Inputs) -> SetupReport {
     let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
-    search::search(inputs, None, &mut report);
+    if report.findings.is_empty() {
+        report.findings.extend(facts::stuck(inputs));
+    }
+    if report.findings.is_empty() {
+        search::search(inputs, None, &mut report);
+    }
     report
 }

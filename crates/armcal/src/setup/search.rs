@@ -1,10 +1,11 @@
 //! Every hypothesis against the inputs as they are: which one change explains the errors?
 
-use super::hypotheses::{Freedom, Hypothesis, Number, hypotheses};
+use super::hypotheses::{Estimated, Freedom, Hypothesis, Number, hypotheses};
 use super::trial::{Inputs, Misfit};
+use crate::pipeline::FramePose;
 use crate::story::Fitted;
 use armcal_calibrate::Calibration;
-use armcal_core::{Certainty, Role, SetupFinding, SetupReport};
+use armcal_core::{Certainty, Parameter, Pose, Role, SetupFinding, SetupReport};
 use armcal_model::{EffectSpec, EffectTable};
 use rayon::prelude::*;
 
@@ -26,12 +27,12 @@ const SEATED_FACTOR: f64 = 1.4;
 const REFINEMENTS: usize = 10;
 /// With a change that explains the errors they come within this many times the floor.
 const EXPLAINED: f64 = 10.0;
+/// The same of a change that estimates something.
+const ESTIMATED_EXPLAINED: f64 = 3.0;
 /// A frame that is estimated is a mistake of the setup only if it lies this far from where it was taken to be, beyond
 /// what any effect of the catalogue moves it [m], [rad].
 const FAR_M: f64 = 0.01;
 const FAR_RAD: f64 = 0.05;
-/// The same of a parameter that leaves its bounds: this many times its bound.
-const FAR_BOUNDS: f64 = 1.1;
 
 /// A hypothesis and how well the inputs fit with it.
 struct Tried {
@@ -55,12 +56,14 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
     let begun = before;
     while found.len() < MOST_MISTAKES && in_doubt(&before) {
         let at_bound = first.as_ref().map(at_bound).unwrap_or_default();
-        let all = hypotheses(&now, &at_bound);
-        report.tried += all.len();
-        let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(&now, h)).collect();
-        refine_numbers(&now, &before, &mut tried);
-        tried.retain(|t| explains(&before, &t.misfit) && beyond_physics(&now, first.as_ref(), t));
-        tried.retain(|t| t.misfit.times_floor() < EXPLAINED || t.misfit.log < before.log - EXPLAINED.ln());
+        let mut tried = Vec::new();
+        for some in hypotheses(&now, &at_bound) {
+            // A frame that is let go takes a share of anything: what is rarer may still fit better.
+            if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
+                report.tried += some.len();
+                tried.extend(explaining(&now, first.as_ref(), &before, some));
+            }
+        }
         let Some(best) = best(&tried) else { break };
         let alike = |t: &&Tried| {
             t.hypothesis.freedom == tried[best].hypothesis.freedom
@@ -77,17 +80,83 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
         (now, first, before) = (inputs, Some(fitted), misfit);
     }
     if found.is_empty() {
+        report.findings.extend(fitted.and_then(|fitted| each_alone(inputs, fitted, &begun)));
+        return;
+    }
+    if let [(only, _)] = &found[..]
+        && only.recording.is_some()
+        && let Some(finding) = fitted.and_then(|fitted| each_alone(inputs, fitted, &begun))
+    {
+        report.findings.push(finding);
         return;
     }
     // Everything together on all dwells and the pipeline's own hold-out: the numbers that are reported.
     let mut mended = inputs.clone();
     found.iter().for_each(|(h, _)| mended = h.undone(&mended));
-    let after = mended.fit().ok().map(|f| f.calibration);
+    let after_fit = mended.fit().ok();
+    let after = after_fit.as_ref().map(|f| f.calibration.clone());
     let together = found.iter().map(|(h, _)| h.change.as_str()).collect::<Vec<_>>().join(" and ");
     for (h, alternatives) in &found {
         let (before, after) = ((judged, begun), (after.as_ref(), before));
-        report.findings.push(finding(h, &together, alternatives, before, after));
+        let ends = match (fitted, &after_fit) {
+            (Some(from), Some(to)) => moved_frame(&mended, h, from, to),
+            _ => None,
+        };
+        report.findings.push(finding(h, &together, alternatives, ends, before, after));
     }
+}
+
+/// Whether each recording fits by itself with a base of its own, where all together do not: something moved between them,
+/// further than any effect of the catalogue moves it.
+fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option<SetupFinding> {
+    if inputs.seen.len() < 2 || before.times_floor() < EXPLAINED {
+        return None;
+    }
+    let alone = |r: usize| {
+        let mut own = inputs.for_trials();
+        own.pipeline.frames.base.pose = FramePose::Estimated;
+        own.seen.iter_mut().enumerate().filter(|(k, _)| *k != r).for_each(|(_, s)| s.dwells.clear());
+        let fitted = own.fit().ok()?;
+        let misfit = own.misfit(&fitted);
+        let base = fitted.model.base_in_world(&fitted.calibration.fit.values());
+        (misfit.times_floor() < WORTH_LOOKING).then_some((misfit, base))
+    };
+    let alone: Vec<(Misfit, Pose)> =
+        (0..inputs.seen.len()).into_par_iter().map(alone).collect::<Option<_>>()?;
+    let by = |a: &Pose, b: &Pose| {
+        let by = a.inverse() * b;
+        (by.translation.vector.norm(), by.rotation.angle())
+    };
+    let apart: Vec<(f64, f64)> = alone.windows(2).map(|w| by(&w[0].1, &w[1].1)).collect();
+    let k = (0..apart.len()).max_by(|a, b| apart[*a].0.total_cmp(&apart[*b].0))?;
+    let (m, rad) = apart[k];
+    if m < FAR_M && rad < FAR_RAD {
+        return None;
+    }
+    let n = alone.iter().map(|a| a.0.used).sum::<usize>().max(1) as f64;
+    let after_mm = alone.iter().map(|a| a.0.mean_m * a.0.used as f64).sum::<f64>() / n * 1e3;
+    let before_mm = together.calibration.judged().fitted.mean_m * 1e3;
+    let names = [&inputs.seen[k].name, &inputs.seen[k + 1].name];
+    Some(SetupFinding {
+        code: "frame-moved",
+        subject: format!("recordings `{}` and `{}`", names[0], names[1]),
+        message: format!(
+            "each recording fits by itself (mean error {} mm), all together leave {} mm: between `{}` and `{}` the arm's base moved \
+             by {} mm and turned by {:.2} deg as the sensor or the board sees it; the arm, the sensor or the board was moved, or \
+             it is another arm or tool: give \
+             what was recorded after that a pipeline of its own (`armcal pool` fits them together)",
+            millimetres(after_mm),
+            millimetres(before_mm),
+            names[0],
+            names[1],
+            millimetres(m * 1e3),
+            rad.to_degrees()
+        ),
+        certainty: Certainty::Mistake,
+        before_mm: Some(before_mm),
+        after_mm: Some(after_mm),
+        alternatives: Vec::new(),
+    })
 }
 
 /// The logarithmic misfit of nothing fitted at all.
@@ -100,14 +169,32 @@ fn in_doubt(m: &Misfit) -> bool {
     m.mean_m.is_infinite() || m.times_floor() >= WORTH_LOOKING || homeless
 }
 
+/// Those of the hypotheses that explain the errors, fitted.
+fn explaining(now: &Inputs, first: Option<&Fitted>, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
+    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, h)).collect();
+    refine_numbers(now, before, &mut tried);
+    tried.retain(|t| explains(before, &t.misfit) && beyond_physics(now, first, t) && far_enough(before, t));
+    tried
+}
+
+/// Whether a change comes near the floor, or divides the errors so much that the rest is another mistake. What estimates
+/// a number always takes a share of an error that is not its own.
+fn far_enough(before: &Misfit, t: &Tried) -> bool {
+    let near = match t.hypothesis.freedom {
+        Freedom::Discrete => EXPLAINED,
+        Freedom::Number | Freedom::Frame => ESTIMATED_EXPLAINED,
+    };
+    t.misfit.times_floor() < near || t.misfit.log < before.log - EXPLAINED.ln()
+}
+
 /// Of each number the value that fits best, refined; the other values are dropped.
 fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
     let of_number = |t: &Tried| t.hypothesis.number.is_some();
-    let mut codes: Vec<&'static str> =
-        tried.iter().filter(|t| of_number(t)).map(|t| t.hypothesis.code).collect();
-    codes.dedup();
-    for code in codes {
-        let own = |t: &Tried| of_number(t) && t.hypothesis.code == code;
+    let name = |t: &Tried| (t.hypothesis.code, t.hypothesis.subject.clone());
+    let mut numbers: Vec<(&'static str, String)> = tried.iter().filter(|t| of_number(t)).map(name).collect();
+    numbers.dedup();
+    for number in numbers {
+        let own = |t: &Tried| of_number(t) && name(t) == number;
         let values = tried.iter().filter(|t| own(t));
         let Some(best) = values.min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log)) else { continue };
         let refined = (best.misfit.log < before.log).then(|| refined(now, best)).flatten();
@@ -152,7 +239,11 @@ fn attempt(now: &Inputs, hypothesis: Hypothesis) -> Option<Tried> {
 
 /// Whether a change divides the errors as only the right one does; or lets far more dwells be used, no worse.
 fn explains(before: &Misfit, after: &Misfit) -> bool {
-    let falls = before.log - after.log >= LEAST_FACTOR.ln() && after.mean_m <= before.mean_m / LEAST_FACTOR;
+    // Dwells that fit as they are, and dwells that no change can place, hide in a mean of logarithms what happens to the
+    // rest: then no dwell may be lost for it.
+    let keeps = after.used >= before.used && after.homeless <= before.homeless && after.log < before.log;
+    let all = before.log - after.log >= LEAST_FACTOR.ln();
+    let falls = after.mean_m <= before.mean_m / LEAST_FACTOR && (all || keeps);
     let seats = after.seated as f64 >= SEATED_FACTOR * before.seated as f64
         && before.seated > 0
         && after.homeless < before.homeless
@@ -171,10 +262,10 @@ fn best(tried: &[Tried]) -> Option<usize> {
     free.into_iter().find(|k| tried[*k].misfit.log <= lowest + ALIKE_FACTOR.ln())
 }
 
-fn at_bound(fitted: &Fitted) -> Vec<String> {
+fn at_bound(fitted: &Fitted) -> Vec<Parameter> {
     let estimates = &fitted.calibration.fit.estimates;
     let own = estimates.iter().filter(|e| e.at_bound && e.parameter.role == Role::Robot);
-    own.map(|e| e.parameter.name.clone()).collect()
+    own.map(|e| e.parameter.clone()).collect()
 }
 
 /// Whether what was estimated lies further off than any effect of the catalogue could move it; a sign or an order always
@@ -183,36 +274,52 @@ fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool {
     let estimates = &t.fitted.calibration.fit.estimates;
     match t.hypothesis.freedom {
         Freedom::Discrete => true,
-        Freedom::Number if t.hypothesis.code == "parameter-bound" => {
-            estimates.iter().filter(|e| e.parameter.name == t.hypothesis.subject).any(|e| {
-                let own = before.iter().flat_map(|f| &f.calibration.fit.estimates);
-                let bound = own.filter(|b| b.parameter.name == e.parameter.name);
-                let off = (e.value - e.parameter.nominal).abs();
-                bound.into_iter().any(|b| off > FAR_BOUNDS * (b.parameter.upper - b.parameter.nominal).abs())
+        Freedom::Number | Freedom::Frame if !t.hypothesis.estimated.is_empty() => {
+            t.hypothesis.estimated.iter().any(|own| {
+                let of = estimates.iter().filter(|e| e.parameter.name == own.parameter);
+                of.into_iter().any(|e| (e.value - own.nominal).abs() > own.far)
             })
         }
         Freedom::Number => t.hypothesis.number.as_ref().is_none_or(|n| (n.value - n.nothing).abs() >= n.far),
-        Freedom::Frame => before.is_none_or(|before| {
-            let moved = |from: armcal_core::Pose, to: armcal_core::Pose| {
-                let by = from.inverse() * to;
-                by.translation.vector.norm() > FAR_M || by.rotation.angle() > FAR_RAD
-            };
-            let (a, b) = (&before.model, &t.fitted.model);
-            let (p, q) = (before.calibration.fit.values(), t.fitted.calibration.fit.values());
-            match t.hypothesis.code {
-                "base-frame" => moved(a.base_in_world(&p), b.base_in_world(&q)),
-                "tool-frame" => moved(a.tip_in_last_link(&p), b.tip_in_last_link(&q)),
-                "board-pose" => (0..now.seen.len()).any(|r| {
-                    let poses = a.board_in_world(&p, r).zip(b.board_in_world(&q, r));
-                    poses.is_some_and(|(from, to)| moved(from, to))
-                }),
-                "recordings-disagree" => {
-                    t.misfit.times_floor() < WORTH_LOOKING && !one_effect_explains(now, &t.hypothesis)
-                }
-                _ => true,
+        Freedom::Frame => before.is_none_or(|before| match t.hypothesis.code {
+            "recordings-disagree" => {
+                t.misfit.times_floor() < WORTH_LOOKING && !one_effect_explains(now, &t.hypothesis)
             }
+            "target-offset" => before.calibration.times_floor() > EXPLAINED,
+            code => moved(now, code, before, &t.fitted).is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD),
         }),
     }
+}
+
+/// How far the frame that a hypothesis estimates moves from one fit to the other [m], [rad]; the furthest over the
+/// recordings. None where it is not about a frame.
+fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
+    let by = |from: Pose, to: Pose| {
+        let by = from.inverse() * to;
+        (by.translation.vector.norm(), by.rotation.angle())
+    };
+    let (a, b) = (&from.model, &to.model);
+    let (p, q) = (from.calibration.fit.values(), to.calibration.fit.values());
+    match code {
+        "base-frame" => Some(by(a.base_in_world(&p), b.base_in_world(&q))),
+        "tool-frame" => Some(by(a.tip_in_last_link(&p), b.tip_in_last_link(&q))),
+        "board-pose" => {
+            let of = |r: usize| Some(by(a.board_in_world(&p, r)?, b.board_in_world(&q, r)?));
+            (0..now.seen.len()).filter_map(of).reduce(|x, y| (x.0.max(y.0), x.1.max(y.1)))
+        }
+        _ => None,
+    }
+}
+
+/// The same in words.
+fn moved_frame(now: &Inputs, h: &Hypothesis, from: &Fitted, to: &Fitted) -> Option<String> {
+    let (m, rad) = moved(now, h.code, from, to)?;
+    Some(format!(
+        " ({} moved by {} mm and turned by {:.2} deg from where it was taken to be)",
+        h.subject,
+        millimetres(m * 1e3),
+        rad.to_degrees()
+    ))
 }
 
 /// Whether one effect that begins with the recording explains how it differs: a tool or frame that was shifted, a zero that
@@ -234,6 +341,7 @@ fn finding(
     h: &Hypothesis,
     together: &str,
     alternatives: &[String],
+    moved: Option<String>,
     (before, begun): (Option<&Calibration>, Misfit),
     (after, ended): (Option<&Calibration>, Misfit),
 ) -> SetupFinding {
@@ -273,15 +381,35 @@ fn finding(
     };
     let with =
         if together == h.change { format!("with {}{or}", h.change) } else { format!("with {together}{or}") };
+    let ends = moved.unwrap_or_else(|| after.map_or(String::new(), |c| estimated(h, c)));
     SetupFinding {
         code: h.code,
         subject: h.subject.clone(),
-        message: format!("{with} {falls}; {}", h.remedy),
+        message: format!("{with} {falls}{ends}; {}", h.remedy),
         certainty: Certainty::Mistake,
         before_mm,
         after_mm: Some(after_mm),
         alternatives: alternatives.to_vec(),
     }
+}
+
+/// Parameters of a change that are told, at most.
+const TOLD: usize = 3;
+
+/// Where the parameters of a change come out, the furthest first.
+fn estimated(h: &Hypothesis, c: &Calibration) -> String {
+    let of = |own: &Estimated| {
+        let e = c.fit.estimates.iter().find(|e| e.parameter.name == own.parameter)?;
+        let (unit, off) = (e.parameter.unit, e.value - own.nominal);
+        let symbol = unit.display_symbol();
+        let gap = if symbol.is_empty() { "" } else { " " };
+        let words = format!("{} is off by {:+.3}{gap}{symbol}", own.parameter, unit.to_display(off));
+        (off.abs() > own.far).then_some((off.abs() / own.far, words))
+    };
+    let mut words: Vec<(f64, String)> = h.estimated.iter().filter_map(of).collect();
+    words.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let words: Vec<String> = words.into_iter().take(TOLD).map(|w| w.1).collect();
+    if words.is_empty() { String::new() } else { format!(" ({})", words.join(", ")) }
 }
 
 /// Three digits that count.

@@ -43,17 +43,24 @@ pub struct Change {
     pub plus: f64,
     /// Factor on the width of the bounds and of the prior.
     pub widened: f64,
+    /// Whether it is freed where it was fixed, to at least this far either side [m], [rad].
+    pub freed: Option<f64>,
 }
 
 impl Change {
     /// Another nominal value.
     pub fn nominal(name: &str, times: f64, plus: f64) -> Change {
-        Change { name: name.to_owned(), times, plus, widened: 1.0 }
+        Change { name: name.to_owned(), times, plus, widened: 1.0, freed: None }
+    }
+
+    /// Free, whatever the model file says.
+    pub fn freed(name: &str, bound: f64) -> Change {
+        Change { name: name.to_owned(), times: 1.0, plus: 0.0, widened: 1.0, freed: Some(bound) }
     }
 
     /// Wider bounds.
     pub fn widened(name: &str, widened: f64) -> Change {
-        Change { name: name.to_owned(), times: 1.0, plus: 0.0, widened }
+        Change { name: name.to_owned(), times: 1.0, plus: 0.0, widened, freed: None }
     }
 }
 

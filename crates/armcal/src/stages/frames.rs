@@ -92,6 +92,10 @@ pub fn change_nominals(model: &mut Model, changes: &[Change]) -> Result<(), Erro
             (p.lower, p.upper) = (nominal + widths[0], nominal + widths[1]);
             p.nominal = nominal;
             p.prior_sigma = p.prior_sigma.map(|sigma| sigma * change.widened);
+            if let Some(bound) = change.freed.filter(|_| !p.free) {
+                (p.lower, p.upper) = (p.lower.min(nominal - bound), p.upper.max(nominal + bound));
+                (p.free, p.prior_sigma) = (true, Some(bound));
+            }
         })?;
     }
     Ok(())

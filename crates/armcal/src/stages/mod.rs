@@ -4,3 +4,4 @@ pub mod frames;
 pub mod observe;
 pub mod past;
 pub mod perceive;
+pub mod readings;

@@ -4,8 +4,9 @@ use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::setup;
+use crate::stages::readings::{self, Readings};
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, JointSamples, Parameter, Rejection, Samples, Warning};
+use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Frames, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
@@ -39,6 +40,8 @@ pub struct Seen {
     pub warnings: Vec<Warning>,
     /// What tells whether another recording holds the same readings.
     pub fingerprint: Arc<Fingerprint>,
+    /// What the joints' readings look like by themselves.
+    pub readings: Readings,
 }
 
 /// Two recordings that hold the same readings over some time.
@@ -193,6 +196,15 @@ fn dwells_of_one(
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
     let (samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
+    let expected = speed_model.chain().joint_names().len();
+    if samples.joints.joint_rad.len() != expected {
+        return Err(Error::JointCount {
+            recording: name.to_owned(),
+            read: samples.joints.joint_rad.len(),
+            expected,
+        });
+    }
+    warnings.extend(readings::leaps(&samples.joints, name));
     let clock = match &samples.tip {
         Some(tip) if !tip.is_empty() => {
             let doubts = Doubts::of(pipeline, speed_model);
@@ -200,10 +212,13 @@ fn dwells_of_one(
             let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
             let aligned = align_clocks(&samples.joints, tip, arm, &pipeline.clock);
             let (clock, said) = aligned.map_err(|source| {
-                let with = |joints: &JointSamples| {
-                    align_clocks(joints, tip, arm, &pipeline.clock).ok().map(|(clock, _)| clock.correlation)
+                let with = |reading: &setup::Reading| {
+                    let tip_of = |q: &[f64], off: &[f64]| reading.lengths * doubts.tip_m(speed_model, q, off);
+                    let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
+                    let aligned = align_clocks(&reading.joints, &reading.tip, arm, &pipeline.clock);
+                    aligned.ok().map(|(clock, _)| clock.correlation)
                 };
-                misread(in_dwell(source), name, &samples.joints, &with)
+                misread(in_dwell(source), name, &samples, &with)
             })?;
             warnings.extend(said);
             Some(clock)
@@ -224,18 +239,31 @@ fn dwells_of_one(
     report.streams = streams;
     let fingerprint = Arc::new(Fingerprint::of(&samples));
     let name = name.to_owned();
-    let seen = Seen { name, load_kg, report, clock, dwells, base, table, travels_m, warnings, fingerprint };
+    let readings = Readings::of(&samples.joints, &dwells);
+    let seen = Seen {
+        name,
+        load_kg,
+        report,
+        clock,
+        dwells,
+        base,
+        table,
+        travels_m,
+        warnings,
+        fingerprint,
+        readings,
+    };
     Ok((samples, seen))
 }
 
-/// The error of clocks that cannot be aligned, with the reading of the joints that would align them.
+/// The error of clocks that cannot be aligned, with the reading that would align them.
 fn misread(
     source: Error,
     name: &str,
-    joints: &JointSamples,
-    correlation: &dyn Fn(&JointSamples) -> Option<f64>,
+    samples: &Samples,
+    correlation: &(dyn Fn(&setup::Reading) -> Option<f64> + Sync),
 ) -> Error {
-    match setup::joints_that_align(joints, correlation) {
+    match setup::what_would_align(samples, correlation) {
         Some(mistakes) => {
             Error::Setup { source: Box::new(source), mistakes: format!("recording `{name}`: {mistakes}") }
         }

@@ -3,8 +3,9 @@
 use super::Hypothesis;
 use crate::pipeline::{BoardPose, MarkersOn};
 use crate::setup::trial::Inputs;
-use armcal_table::Tilt;
+use armcal_table::{Board, Tilt};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
 
 const FILE: &str = "mend the board file or take the right one";
 const TILT: &str = "mend `tilt` of the recordings";
@@ -16,6 +17,10 @@ const SCALES: [f64; 13] = [0.7, 0.8, 0.87, 0.92, 0.96, 1.0, 1.04, 1.08, 1.13, 1.
 const FAR_SCALE: f64 = 0.03;
 /// Slips of units.
 const UNITS: [f64; 4] = [0.1, 10.0, 25.4, 1.0 / 25.4];
+/// Cavities that share a name but for its number are drawn together: of more groups than this, none is tried alone.
+const MOST_GROUPS: usize = 4;
+const GROUP_HEIGHTS_MM: [f64; 9] = [-20.0, -10.0, -5.0, -2.5, 0.0, 2.5, 5.0, 10.0, 20.0];
+const FAR_GROUP_MM: f64 = 1.0;
 /// Heights of a seated tip's centre above the drawn one [mm]; beyond 2 mm it is no seat.
 const HEIGHTS_MM: [f64; 13] = [-80.0, -40.0, -20.0, -10.0, -5.0, -2.5, 0.0, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0];
 const FAR_HEIGHT_MM: f64 = 2.0;
@@ -30,6 +35,10 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     all.extend(UNITS.map(scaled));
     all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled));
     all.extend(Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, raised));
+    for group in groups(&inputs.board) {
+        let at = move |height_mm| raised_alone(&group, height_mm);
+        all.extend(Hypothesis::of_each(&GROUP_HEIGHTS_MM, 0.0, FAR_GROUP_MM, at));
+    }
     if table.pose == BoardPose::Measured {
         let (other, words) = match table.markers_on {
             MarkersOn::Board => (MarkersOn::Frame, "the frame below the tilting mechanism"),
@@ -46,6 +55,17 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     all
 }
 
+/// Names of cavities without their numbers, where there is more than one.
+fn groups(board: &Option<Board>) -> Vec<String> {
+    let names = board.iter().flat_map(|b| &b.cavities).map(|c| group_of(&c.name).to_owned());
+    let all: BTreeSet<String> = names.collect();
+    if (2..=MOST_GROUPS).contains(&all.len()) { all.into_iter().collect() } else { Vec::new() }
+}
+
+fn group_of(name: &str) -> &str {
+    name.trim_end_matches(|c: char| c.is_ascii_digit())
+}
+
 fn scaled(scale: f64) -> Hypothesis {
     let change = format!("the board {scale:.4} times as large");
     Hypothesis::new("board-scale", "the board", change, FILE, move |i| map_cavities(i, |p| scale * p))
@@ -56,6 +76,16 @@ fn raised(height_mm: f64) -> Hypothesis {
     let change = format!("seated points {height:.2} mm {side} than drawn");
     Hypothesis::new("seat-height", "the board", change, FILE, move |i| {
         map_cavities(i, |p| p + Vector3::new(0.0, 0.0, height_mm * 1e-3));
+    })
+}
+
+fn raised_alone(group: &str, height_mm: f64) -> Hypothesis {
+    let (height, side) = (height_mm.abs(), if height_mm > 0.0 { "higher" } else { "lower" });
+    let (subject, group) = (format!("cavities `{group}…`"), group.to_owned());
+    let change = format!("the seats of the {subject} {height:.2} mm {side} than drawn");
+    Hypothesis::new("seat-height", subject, change, FILE, move |i| {
+        let own = i.board.iter_mut().flat_map(|b| &mut b.cavities).filter(|c| group_of(&c.name) == group);
+        own.for_each(|c| c.in_board_m.z += height_mm * 1e-3);
     })
 }
 

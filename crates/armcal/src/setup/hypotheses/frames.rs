@@ -6,6 +6,8 @@ use crate::setup::trial::Inputs;
 
 const FRAMES: &str = "mend the pose in [frames], or estimate it (pose = \"estimated\")";
 const TABLE: &str = "mend [table] (`at`, `markers_on`, the streams), or estimate it (pose = \"estimated\")";
+const TARGET: &str = "the tracked point is not the tip that rests in the cavities, or is not tracked as declared: give the offset of \
+                      the target in [frames.tip] (`at`), or mend [streams.tip]";
 const RECORDINGS: &str =
     "it looks like a recording of another arm or tool: give it a pipeline of its own, with that arm and tool";
 
@@ -30,6 +32,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }
         };
         all.push(Hypothesis::new("board-pose", "the board", change, TABLE, free).with(Freedom::Frame));
+    }
+    let tracked = inputs.dwells().filter(|d| d.tip.is_some()).count();
+    if inputs.board.is_some() && tracked > 0 {
+        let change = "the tracked point of the tip not used (seated dwells alone)";
+        let blind = |i: &mut Inputs| i.each_dwell(|d| d.tip = None);
+        all.push(Hypothesis::new("target-offset", "the tip", change, TARGET, blind).with(Freedom::Frame));
     }
     if inputs.seen.len() > 1 {
         for (r, seen) in inputs.seen.iter().enumerate() {

@@ -5,11 +5,11 @@ use crate::setup::trial::Inputs;
 use armcal_core::{Arrival, Dwell, Unit};
 use std::f64::consts::FRAC_PI_2;
 
-const SIGN: &str = "mend the direction of its encoder in [streams.joints], or in the driver that records it";
+pub const SIGN: &str = "mend the direction of its encoder in [streams.joints] or in the driver that records it, or its axis in the model file";
 const ORDER: &str = "mend `names` in [streams.joints], or the driver that records them";
 const UNIT: &str = "mend `unit` in [streams.joints], or the driver that records it";
 const COUNTS: &str = "mend `counts_per_turn` in [streams.joints], or the driver that records it";
-const ZERO: &str = "mend `zero_counts` in [streams.joints], or theta of the model";
+pub const ZERO: &str = "mend `zero_counts` in [streams.joints], or theta of the model";
 
 /// Joints beyond which only neighbours and ends are exchanged, not every two.
 const FEW: usize = 3;
@@ -28,9 +28,9 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }));
     }
     for order in orders(n) {
-        let words: Vec<String> = order.iter().map(|j| (j + 1).to_string()).collect();
+        let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
-        all.push(Hypothesis::new("joint-order", "the joints", change, ORDER, move |i| {
+        all.push(Hypothesis::new("joint-order", "order of the joints", change, ORDER, move |i| {
             i.each_dwell(|d| reorder(d, &order));
         }));
     }
@@ -58,7 +58,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     for &j in &turning {
         for quarters in [1.0, 2.0, 3.0] {
-            let change = format!("{} deg added to the reading of {}", 90.0 * quarters, joint(j));
+            let change = format!("the zero of {} moved by {} deg", joint(j), 90.0 * quarters);
             all.push(Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
                 i.each_dwell(|d| shift(d, j, quarters * FRAC_PI_2));
             }));
@@ -104,7 +104,7 @@ fn orders(n: usize) -> Vec<Vec<usize>> {
     once
 }
 
-fn scale(d: &mut Dwell, j: usize, factor: f64) {
+pub fn scale(d: &mut Dwell, j: usize, factor: f64) {
     d.joint_rad[j] *= factor;
     d.joint_sigma_rad[j] *= factor.abs();
     d.joint_spread_rad[j] *= factor.abs();
@@ -118,7 +118,7 @@ fn scale(d: &mut Dwell, j: usize, factor: f64) {
     }
 }
 
-fn shift(d: &mut Dwell, j: usize, by_rad: f64) {
+pub fn shift(d: &mut Dwell, j: usize, by_rad: f64) {
     d.joint_rad[j] += by_rad;
     d.path_memory_rad[j].iter_mut().for_each(|q| *q += by_rad);
 }

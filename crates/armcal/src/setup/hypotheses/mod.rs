@@ -1,12 +1,14 @@
 //! The mistakes that are tried, each as the one change of the inputs that would undo it.
 
 mod board;
+mod drives;
 mod frames;
 mod joints;
 mod model;
 mod poses;
 
 use super::trial::Inputs;
+use armcal_core::Parameter;
 use std::sync::Arc;
 
 /// A mistake that somebody may have made.
@@ -24,6 +26,8 @@ pub struct Hypothesis {
     pub freedom: Freedom,
     /// The number that the change holds, where it holds one.
     pub number: Option<Number>,
+    /// Parameters that the fit estimates for the change; it is no mistake unless one of them comes out far off.
+    pub estimated: Vec<Estimated>,
     /// The recording that it is about, where it is about one.
     pub recording: Option<usize>,
     /// The change itself.
@@ -42,7 +46,32 @@ pub struct Number {
     /// That distance.
     pub far: f64,
     /// The hypothesis of another value.
-    pub at: fn(f64) -> Hypothesis,
+    pub at: Arc<dyn Fn(f64) -> Hypothesis + Send + Sync>,
+}
+
+/// A parameter that is estimated, and how far from its nominal value it is beyond what any effect does.
+#[derive(Debug, Clone)]
+pub struct Estimated {
+    /// Its name.
+    pub parameter: String,
+    /// What it is taken to be, SI.
+    pub nominal: f64,
+    /// That distance, SI.
+    pub far: f64,
+}
+
+/// A parameter that leaves its bounds is a mistake if it comes out this many times as far.
+const FAR_BOUNDS: f64 = 1.1;
+
+impl Estimated {
+    /// A parameter that the fit left on its bound.
+    fn beyond(p: &Parameter) -> Estimated {
+        Estimated {
+            parameter: p.name.clone(),
+            nominal: p.nominal,
+            far: FAR_BOUNDS * (p.upper - p.nominal).abs(),
+        }
+    }
 }
 
 /// How much freedom a change takes. Of two that fit alike, the one with less is believed.
@@ -72,17 +101,24 @@ impl Hypothesis {
             remedy,
             freedom: Freedom::Discrete,
             number: None,
+            estimated: Vec::new(),
             recording: None,
             apply: Arc::new(apply),
         }
     }
 
     /// The same hypothesis for each value of a number, in rising order; `nothing` is among them and is not tried.
-    fn of_each(values: &[f64], nothing: f64, far: f64, at: fn(f64) -> Hypothesis) -> Vec<Hypothesis> {
+    fn of_each(
+        values: &[f64],
+        nothing: f64,
+        far: f64,
+        at: impl Fn(f64) -> Hypothesis + Send + Sync + 'static,
+    ) -> Vec<Hypothesis> {
+        let at: Arc<dyn Fn(f64) -> Hypothesis + Send + Sync> = Arc::new(at);
         let inner = values.windows(3).filter(|w| w[1] != nothing);
         inner
             .map(|w| {
-                let number = Number { value: w[1], between: [w[0], w[2]], nothing, far, at };
+                let number = Number { value: w[1], between: [w[0], w[2]], nothing, far, at: at.clone() };
                 Hypothesis { number: Some(number), freedom: Freedom::Number, ..at(w[1]) }
             })
             .collect()
@@ -100,12 +136,13 @@ impl Hypothesis {
     }
 }
 
-/// Everything worth trying on these inputs. `at_bound` are parameters that the fit left on their bounds.
-pub fn hypotheses(inputs: &Inputs, at_bound: &[String]) -> Vec<Hypothesis> {
+/// Everything worth trying on these inputs, what is rarer apart: to be tried where nothing of the first explains the errors.
+/// `at_bound` are parameters that the fit left on their bounds.
+pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 2] {
     let mut all = joints::hypotheses(inputs);
     all.extend(poses::hypotheses(inputs));
     all.extend(board::hypotheses(inputs));
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
-    all
+    [all, drives::hypotheses(inputs, at_bound)]
 }

@@ -1,8 +1,9 @@
 //! The nominal arm: rows with another sign, lengths and angles in other units, a parameter far beyond its bounds.
 
-use super::{Freedom, Hypothesis};
+use super::joints::ZERO;
+use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::trial::{Change, Inputs};
-use armcal_core::Unit;
+use armcal_core::{Parameter, Unit};
 
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
 /// A parameter on its bound is let go this many times as far.
@@ -10,7 +11,7 @@ const WIDER: f64 = 30.0;
 /// Parameters smaller than these are zero: their sign says nothing [m], [rad].
 const SMALLEST: f64 = 1e-3;
 
-pub fn hypotheses(inputs: &Inputs, at_bound: &[String]) -> Vec<Hypothesis> {
+pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     let mut all = Vec::new();
     for p in inputs.chain.parameters() {
         let name = p.name.clone();
@@ -28,18 +29,45 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[String]) -> Vec<Hypothesis> {
     let of_unit = |unit: Unit| -> Vec<String> {
         inputs.chain.parameters().iter().filter(|p| p.unit == unit).map(|p| p.name.clone()).collect()
     };
-    for (unit, factors, words) in [
-        (Unit::Metre, [1e-3, 1e3, 0.1, 10.0, 25.4, 1.0 / 25.4].as_slice(), "lengths"),
-        (Unit::Radian, [180.0 / std::f64::consts::PI, std::f64::consts::PI / 180.0].as_slice(), "angles"),
+    let degrees = 180.0 / std::f64::consts::PI;
+    for (unit, factor, words) in [
+        (Unit::Metre, 1e-3, "all lengths of the model a thousandth (micrometres given as millimetres)"),
+        (Unit::Metre, 1e3, "all lengths of the model a thousand times as long (metres given as millimetres)"),
+        (Unit::Metre, 0.1, "all lengths of the model a tenth"),
+        (Unit::Metre, 10.0, "all lengths of the model ten times as long (centimetres given as millimetres)"),
+        (Unit::Metre, 25.4, "all lengths of the model 25.4 times as long (inches given as millimetres)"),
+        (Unit::Metre, 1.0 / 25.4, "all lengths of the model divided by 25.4 (millimetres given as inches)"),
+        (Unit::Radian, degrees, "all angles of the model read as radians, not degrees"),
+        (Unit::Radian, 1.0 / degrees, "all angles of the model read as degrees, not radians"),
     ] {
         let names = of_unit(unit);
-        for &factor in factors.iter().filter(|_| !names.is_empty()) {
-            let names = names.clone();
-            let change = format!("all {words} of the model times {factor:.4}");
+        if !names.is_empty() {
+            let change = words;
             all.push(Hypothesis::new("model-unit", "the model", change, FILE, move |i| {
                 i.changes.extend(names.iter().map(|name| Change::nominal(name, factor, 0.0)));
             }));
         }
+    }
+    let mirrored: Vec<String> = inputs
+        .chain
+        .parameters()
+        .iter()
+        .filter(|p| [".d", ".alpha"].iter().any(|field| p.name.ends_with(field)))
+        .map(|p| p.name.clone())
+        .collect();
+    if !mirrored.is_empty() {
+        let change =
+            "the signs of every d and alpha of the DH table reversed (the arm mirrored: of the other hand)";
+        all.push(Hypothesis::new("model-mirrored", "the model", change, FILE, move |i| {
+            i.changes.extend(mirrored.iter().map(|name| Change::nominal(name, -1.0, 0.0)));
+        }));
+    }
+    let exchanged = columns_exchanged(inputs.chain.parameters());
+    if !exchanged.is_empty() {
+        let change = "the columns a and d of the DH table exchanged";
+        all.push(Hypothesis::new("dh-columns", "the model", change, FILE, move |i| {
+            i.changes.extend(exchanged.clone())
+        }));
     }
     if let Some(chain) = inputs.chain.in_other_convention() {
         let change = "the DH table read by the other convention (standard and modified exchanged)";
@@ -52,23 +80,44 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[String]) -> Vec<Hypothesis> {
         let change = format!("rows {} and {} of the DH table exchanged", row + 1, row + 2);
         all.push(Hypothesis::new("dh-rows", "the model", change, FILE, move |i| i.chain = chain.clone()));
     }
-    for name in at_bound {
-        let own = name.clone();
-        let change = format!("{name} free to leave its bounds");
-        let hypothesis = Hypothesis::new("parameter-bound", name.as_str(), change, FILE, move |i| {
-            i.changes.push(Change::widened(&own, WIDER));
-        });
-        all.push(hypothesis.with(Freedom::Number));
+    for p in at_bound {
+        let own = p.name.clone();
+        let joint = inputs.chain.joint_names().iter().find(|joint| p.name == format!("{joint}.theta"));
+        let (code, subject, remedy) = match joint {
+            Some(joint) => ("joint-zero", format!("the zero of {joint} ({})", p.name), ZERO),
+            None => ("parameter-bound", p.name.clone(), FILE),
+        };
+        let change = format!("{subject} free to leave its bounds");
+        let hypothesis =
+            Hypothesis::new(code, subject, change, remedy, move |i| i.changes.push(widened(&own)));
+        all.push(Hypothesis { estimated: vec![Estimated::beyond(p)], ..hypothesis }.with(Freedom::Number));
     }
     if at_bound.len() > 1 {
-        let own = at_bound.to_vec();
-        let change = format!("{} free to leave their bounds", armcal_core::listed(at_bound));
+        let own: Vec<String> = at_bound.iter().map(|p| p.name.clone()).collect();
+        let change = format!("{} free to leave their bounds", armcal_core::listed(&own));
         let hypothesis = Hypothesis::new("parameter-bound", "the model", change, FILE, move |i| {
-            i.changes.extend(own.iter().map(|name| Change::widened(name, WIDER)));
+            i.changes.extend(own.iter().map(|name| widened(name)));
         });
-        all.push(hypothesis.with(Freedom::Frame));
+        let estimated = at_bound.iter().map(Estimated::beyond).collect();
+        all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Frame));
     }
     all
+}
+
+/// The changes that give every a its row's d, and the reverse.
+fn columns_exchanged(parameters: &[Parameter]) -> Vec<Change> {
+    let other = |p: &Parameter| {
+        let row = p.name.strip_suffix(".a").map(|row| format!("{row}.d"));
+        let name = row.or_else(|| p.name.strip_suffix(".d").map(|row| format!("{row}.a")))?;
+        let other = parameters.iter().find(|q| q.name == name)?;
+        Some(Change::nominal(&p.name, 0.0, other.nominal))
+    };
+    parameters.iter().filter_map(other).collect()
+}
+
+/// A parameter let go far beyond its bounds.
+pub fn widened(name: &str) -> Change {
+    Change::widened(name, WIDER)
 }
 
 fn nominal(code: &'static str, name: &str, change: String, times: f64, plus: f64) -> Hypothesis {

@@ -96,17 +96,17 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }
     }
     if inputs.dwells().any(|d| orientation(d).is_some()) {
-        all.push(Hypothesis::new("pose-inverted", "the tip", "the pose of the tip inverted", STREAMS, |i| {
-            i.each_dwell(|d| {
-                if let Some(t) = d.tip.as_mut()
-                    && let Some(q) = t.orientation
-                {
-                    let inverse = Pose::from_parts(t.position_m.into(), q).inverse();
-                    t.position_m = inverse.translation.vector;
-                    t.orientation = Some(inverse.rotation);
+        let change = "the pose of the tip inverted";
+        all.push(Hypothesis::new("pose-inverted", "the tip", change, STREAMS, invert_tips));
+        if base || table {
+            let change = "the pose of every body inverted";
+            all.push(Hypothesis::new("pose-inverted", "every body", change, STREAMS, |i| {
+                invert_tips(i);
+                for body in [Body::Base, Body::Table] {
+                    map_bodies(i, body, |p| p.pose = p.pose.inverse());
                 }
-            });
-        }));
+            }));
+        }
     }
     if base && table {
         all.push(Hypothesis::new(
@@ -163,6 +163,19 @@ fn map_bodies(inputs: &mut Inputs, body: Body, change: impl Fn(&mut MeanPose)) {
         };
         pose.iter_mut().for_each(&change);
     }
+}
+
+/// The sensor as the tip sees it.
+fn invert_tips(inputs: &mut Inputs) {
+    inputs.each_dwell(|d| {
+        if let Some(t) = d.tip.as_mut()
+            && let Some(q) = t.orientation
+        {
+            let inverse = Pose::from_parts(t.position_m.into(), q).inverse();
+            t.position_m = inverse.translation.vector;
+            t.orientation = Some(inverse.rotation);
+        }
+    });
 }
 
 /// A reflection M maps a rotation R to M R M'.

@@ -1,0 +1,113 @@
+//! What the joints' readings look like by themselves, before any model: leaps, zeros, readings without scatter.
+
+use armcal_core::robust::median;
+use armcal_core::{Dwell, JointSamples, Severity, Stage, Warning};
+
+/// No joint turns by this much from one reading to the next [rad].
+pub const LEAP_RAD: f64 = 0.3;
+/// Readings further apart in time say nothing of leaps [ns].
+const NEXT_NS: i64 = 200_000_000;
+/// Readings a dwell from which on their scatter says something.
+const MANY: usize = 10;
+/// A dwell whose joints read one value in this share of its readings does not scatter.
+const SAME_SHARE: f64 = 0.8;
+/// Speeds of an arm at rest are below this, those of one that moves above that [rad/s].
+const RESTING: f64 = 0.02;
+const MOVING: f64 = 0.1;
+
+/// What a stream of joint readings looks like.
+#[derive(Debug, Clone, Default)]
+pub struct Readings {
+    /// The reading of each joint in the dwells in which it does not scatter at all [rad].
+    pub exact_rad: Vec<Vec<f64>>,
+    /// Whether every joint reads nearly zero most of the time, and not always: speeds do.
+    pub mostly_zero: bool,
+}
+
+impl Readings {
+    /// Looks at a stream and its dwells.
+    pub fn of(joints: &JointSamples, dwells: &[Dwell]) -> Readings {
+        let at_rest = |column: &Vec<f64>| {
+            let sizes: Vec<f64> = column.iter().map(|q| q.abs()).collect();
+            median(&sizes) < RESTING && sizes.iter().copied().fold(0.0, f64::max) > MOVING
+        };
+        Readings {
+            exact_rad: dwells.iter().filter_map(|d| exact(joints, d)).collect(),
+            mostly_zero: !joints.is_empty() && joints.joint_rad.iter().all(at_rest),
+        }
+    }
+}
+
+/// The one value that each joint reads in most of a dwell, to the last bit.
+fn exact(joints: &JointSamples, dwell: &Dwell) -> Option<Vec<f64>> {
+    let from = joints.time_ns.partition_point(|t| *t < dwell.start_ns);
+    let to = joints.time_ns.partition_point(|t| *t <= dwell.end_ns);
+    if to < from + MANY {
+        return None;
+    }
+    let one = |column: &Vec<f64>| {
+        let middle = column[(from + to) / 2];
+        let same = column[from..to].iter().filter(|q| **q == middle).count();
+        (same as f64 >= SAME_SHARE * (to - from) as f64).then_some(middle)
+    };
+    joints.joint_rad.iter().map(one).collect()
+}
+
+/// Joints that leap from one reading to the next.
+pub fn leaps(joints: &JointSamples, recording: &str) -> Vec<Warning> {
+    let near: Vec<bool> = joints.time_ns.windows(2).map(|w| w[1] - w[0] <= NEXT_NS).collect();
+    let leap = |column: &Vec<f64>| -> Vec<f64> {
+        let steps = column.windows(2).map(|w| (w[1] - w[0]).abs()).zip(&near);
+        steps.filter(|(step, near)| **near && *step > LEAP_RAD).map(|(step, _)| step).collect()
+    };
+    let columns = joints.joint_rad.iter().enumerate().map(|(j, column)| (j, leap(column)));
+    columns
+        .filter(|(_, leaps)| !leaps.is_empty())
+        .map(|(j, leaps)| {
+            let name = joints.names.get(j).map_or("", String::as_str);
+            let largest_deg = leaps.iter().copied().fold(0.0, f64::max).to_degrees();
+            let message = format!(
+                "joint {} ({name}) leaps {} times from one reading to the next, by up to {largest_deg:.1} deg: its encoder wraps, was \
+                 reset, or lost readings; mend the driver, or leave out what follows",
+                j + 1,
+                leaps.len()
+            );
+            let subject = format!("recording `{recording}`");
+            Warning::new(Severity::Notice, Stage::Recording, "joint-jump", subject, message)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stream(columns: Vec<Vec<f64>>) -> JointSamples {
+        JointSamples {
+            time_ns: (0..columns[0].len() as i64).map(|i| i * 10_000_000).collect(),
+            names: columns.iter().enumerate().map(|(j, _)| format!("j{j}")).collect(),
+            joint_rad: columns,
+            effort_nm: None,
+        }
+    }
+
+    #[test]
+    fn leaps_are_told_by_joint_and_size() {
+        let smooth: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+        let wraps = smooth.iter().map(|q| q.rem_euclid(0.4)).collect();
+        let found = leaps(&stream(vec![smooth, wraps]), "a");
+        assert_eq!(found.len(), 1);
+        assert!(
+            found[0].message.starts_with("joint 2 (j1) leaps 2 times")
+                && found[0].message.contains("22.3 deg")
+        );
+    }
+
+    #[test]
+    fn speeds_are_mostly_zero_and_angles_are_not() {
+        let of = |column: Vec<f64>| Readings::of(&stream(vec![column]), &[]).mostly_zero;
+        assert!(of((0..100).map(|i| if i % 10 < 3 { 0.5 } else { 0.001 }).collect()));
+        assert!(!of((0..100).map(|i| if i < 30 { 0.5 } else { 0.3 }).collect()));
+        assert!(!of(vec![0.0; 100]), "a joint that never moves is another matter");
+    }
+}

@@ -1,0 +1,158 @@
+//! What may be set aside, against planted accidents and against the covariance written out.
+
+use super::*;
+use crate::tests::arm::{Noise, SIGMA_M, design, problem, rng};
+use nalgebra::{DMatrix, Vector3};
+
+fn config() -> DiagnosisConfig {
+    DiagnosisConfig { resamplings: 99, ..Default::default() }
+}
+
+/// 198 dwells in cavities, noise alone.
+fn sound(seed: u64) -> Problem {
+    let mut r = rng(seed);
+    let poses = design(0, &mut r);
+    problem(&poses, &[], Noise::White, &mut r, false)
+}
+
+/// Moves a dwell's measured point.
+fn push(problem: &mut Problem, dwell: usize, by_m: Vector3<f64>) {
+    let mut rows = problem.residual.rows_mut(3 * dwell, 3);
+    rows += by_m / SIGMA_M;
+}
+
+fn aside(problem: &Problem) -> Vec<usize> {
+    let keep = set_aside(problem, &config()).keep;
+    (0..keep.len()).filter(|i| !keep[*i]).collect()
+}
+
+/// Directions that do not agree with each other.
+fn apart(k: usize) -> Vector3<f64> {
+    let a = 2.4 * k as f64;
+    Vector3::new(a.cos(), a.sin(), (1.7 * k as f64).sin())
+}
+
+#[test]
+fn the_square_is_that_of_the_left_out_error_in_its_own_covariance() {
+    let mut p = sound(1);
+    p.residual[0] += 3.0;
+    let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
+    let left = left_out(&p, None, &alone);
+    let square = studentised(&p, &left, &left_out(&p, None, &[]));
+    let precision = DMatrix::from_diagonal(&p.geometry_precision);
+    for i in [0, 17, 100, 197] {
+        let x = p.geometry.rows(3 * i, 3);
+        let normal = p.geometry.tr_mul(&p.geometry) + &precision - x.tr_mul(&x);
+        let covariance = DMatrix::identity(3, 3) + x * normal.try_inverse().unwrap() * x.transpose();
+        let e = left.rows(3 * i, 3);
+        let expected = e.dot(&(covariance.try_inverse().unwrap() * e));
+        assert!((square[i] - expected).abs() < 1e-6 * expected.max(1.0), "{i}: {} {expected}", square[i]);
+    }
+}
+
+#[test]
+fn accidents_are_set_aside_and_nothing_else() {
+    let mut p = sound(2);
+    let planted = [5, 40, 77, 120, 151, 190];
+    planted.iter().enumerate().for_each(|(k, i)| push(&mut p, *i, 6e-3 * apart(k).normalize()));
+    assert_eq!(aside(&p), planted);
+    assert!(aside(&sound(3)).is_empty());
+}
+
+#[test]
+fn dwells_in_a_row_are_an_event_and_stay() {
+    let mut p = sound(4);
+    (60..64).enumerate().for_each(|(k, i)| push(&mut p, i, 6e-3 * apart(k).normalize()));
+    push(&mut p, 120, Vector3::new(0.0, 6e-3, 0.0));
+    assert_eq!(aside(&p), [120]);
+    // Two neighbours are no run.
+    let mut p = sound(5);
+    [60, 61].iter().enumerate().for_each(|(k, i)| push(&mut p, *i, 6e-3 * apart(k).normalize()));
+    assert_eq!(aside(&p), [60, 61]);
+}
+
+#[test]
+fn a_run_ends_with_its_recording() {
+    let p = sound(5);
+    // Dwells 65 and 66 lie in different recordings of 66 dwells.
+    let ends: BTreeSet<usize> = [64, 65, 66, 67].into();
+    assert!(in_a_row(&p, &ends).is_empty());
+    let run: BTreeSet<usize> = [63, 64, 65, 66, 67, 100].into();
+    assert_eq!(in_a_row(&p, &run), [63, 64, 65].into());
+    // The order is that of time, whatever the order of the rows.
+    let mut turned = p.clone();
+    turned.dwells.reverse();
+    let last = turned.dwells.len() - 1;
+    assert_eq!(
+        in_a_row(&turned, &run.iter().map(|i| last - i).collect()),
+        [last - 63, last - 64, last - 65].into()
+    );
+}
+
+#[test]
+fn the_share_counts_all_rounds() {
+    let p = sound(6);
+    let n = p.dwells.len();
+    let found = |from: usize, count: usize| (0..count).map(|k| from + 2 * k).collect::<Vec<_>>();
+    let none = vec![true; n];
+    assert_eq!(accidents(&p, &none, found(0, 19)).len(), 19);
+    assert!(accidents(&p, &none, found(0, 20)).is_empty(), "20 of 198 are more than a tenth");
+    let mut before = none;
+    found(1, 10).into_iter().for_each(|i| before[i] = false);
+    assert_eq!(accidents(&p, &before, found(100, 9)).len(), 9);
+    assert!(accidents(&p, &before, found(100, 10)).is_empty());
+}
+
+#[test]
+fn what_alone_shows_a_cause_is_kept() {
+    let base = sound(7);
+    let alone = [10, 90, 170];
+    let accident = 40;
+    let suspects: BTreeSet<usize> = alone.into_iter().chain([accident]).collect();
+    let changes: [fn(&mut DwellRow, bool); 4] = [
+        |d, moved| d.joint_rad[1] = if moved { 1.0 } else { 0.0 },
+        |d, moved| d.arrival[0] = if moved { -1.0 } else { 1.0 },
+        |d, moved| d.load_kg = if moved { 2.0 } else { 0.0 },
+        |d, moved| d.temperature_c = Some(if moved { 45.0 } else { 20.0 }),
+    ];
+    for change in changes {
+        let mut p = base.clone();
+        p.dwells.iter_mut().enumerate().for_each(|(i, d)| change(d, alone.contains(&i)));
+        assert_eq!(needed(&p, &suspects), alone.into());
+        let keep = vec![true; p.dwells.len()];
+        assert_eq!(accidents(&p, &keep, suspects.iter().copied().collect()), [accident]);
+    }
+    assert!(needed(&base, &suspects).is_empty(), "the rest shows it too");
+}
+
+#[test]
+fn suspects_that_err_alike_beside_each_other_are_a_cause() {
+    let p = sound(8);
+    let at = |i: usize| 3 * i..3 * i + 3;
+    let mut alike = DVector::zeros(p.rows());
+    let mut apart_rows = DVector::zeros(p.rows());
+    let found = [3, 50, 95, 140];
+    for (k, i) in found.iter().enumerate() {
+        alike.rows_mut(at(*i).start, 3).copy_from(&Vector3::new(0.0, 0.0, 9.0));
+        let sign = if k % 2 == 0 { 9.0 } else { -9.0 };
+        apart_rows.rows_mut(at(*i).start, 3).copy_from(&Vector3::new(0.0, 0.0, sign));
+    }
+    assert!((agreement(&p, &alike, &found) - 1.0).abs() < 1e-12);
+    assert!(agreement(&p, &apart_rows, &found) < MAX_AGREEMENT);
+    assert_eq!(agreement(&p, &alike, &found[..3]), 0.0, "three are too few to agree");
+}
+
+#[test]
+fn a_direction_is_suspect_where_the_other_one_fits_far_better() {
+    let mut p = sound(9);
+    p.dwells[2].arrival = vec![0.0; 3];
+    let n = p.rows();
+    let signature = vec![2.0; n];
+    // Turned over, the square changes by -4 r s of each row: 48 for three rows of -2.
+    let mut residual = vec![2.0; n];
+    for dwell in [1, 2] {
+        residual[3 * dwell..3 * dwell + 3].fill(-2.0);
+    }
+    residual[9..12].fill(-1.0);
+    assert_eq!(flipped(&p, &residual, &signature), [1], "24 is not enough, and dwell 2 has no direction");
+}
