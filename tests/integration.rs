@@ -50,6 +50,9 @@ mod many_rigs;
 /// Does the tool learn from a recording which effect is missing, and does adding it help on unseen points?
 mod missing_effect;
 
+/// Is nobody told that nothing is missing where a number of the pipeline, model or board is wrong?
+mod verdict_law;
+
 /// How often is the diagnosis right on scenarios whose truth it cannot see?
 mod sealed_scenarios;
 

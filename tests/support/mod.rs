@@ -97,7 +97,33 @@ pub fn run_pipeline(pipeline: &Path, out: &Path, codes: &[i32]) -> Value {
         String::from_utf8_lossy(&output.stdout),
         String::from_utf8_lossy(&output.stderr)
     );
-    read_json(&out.join("summary.json"))
+    let summary = read_json(&out.join("summary.json"));
+    believable(&summary, &pipeline.display().to_string());
+    summary
+}
+
+/// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times the
+/// floor, and no result is called adequate above twice the floor.
+pub fn believable(summary: &Value, what: &str) {
+    let floors = |error: &str, floor: &str| {
+        let at = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
+        at(error).zip(at(floor)).map(|(error, floor)| error / floor)
+    };
+    let diagnosed = floors("/diagnosis/holdout_mm/before", "/diagnosis/floor_mm");
+    if let (Some(floors), "nothing_missing") = (diagnosed, text(summary, "/diagnosis/verdict")) {
+        assert!(floors <= 1.5, "{what}: nothing is missing at {floors:.2} floors");
+    }
+    let side =
+        if summary.pointer("/fit/holdout/n").and_then(Value::as_u64) > Some(0) { "holdout" } else { "train" };
+    let judged = floors(&format!("/fit/{side}/fitted_mm/mean"), "/fit/noise_floor_mm");
+    let named = ["identified", "ambiguous", "unknown"].contains(&text(summary, "/diagnosis/verdict"));
+    if let (Some(floors), "ok", false) = (judged, text(summary, "/status"), named) {
+        assert!(floors <= 2.0, "{what}: adequate at {floors:.2} floors");
+    }
+}
+
+fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
+    value.pointer(pointer).and_then(Value::as_str).unwrap_or_default()
 }
 
 /// Reads a JSON file.

@@ -89,17 +89,8 @@ pub struct Settled {
     pub inputs: Inputs,
     /// What contradicts the data about the setup.
     pub setup: SetupReport,
-    /// The arm in its frames, without effects.
-    pub geometry: Model,
-    /// The same with the pipeline's effects: what was calibrated.
-    pub model: Model,
-    /// What the fit saw.
-    pub observations: Vec<Observation>,
-    /// The calibration.
-    pub calibration: Calibration,
-    places: Vec<Option<Association>>,
-    rejections: Vec<Rejection>,
-    rounds: usize,
+    /// The calibration on them.
+    pub fitted: Fitted,
 }
 
 /// Inputs with every dwell in its place, calibrated.
@@ -138,20 +129,7 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     progress.step("checking the setup");
     let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
     let setup = setup::examine(&inputs, &fitted);
-    let Fitted { geometry, model, observations, calibration, places, rejections, rounds } = fitted;
-    Ok(Settled {
-        recordings,
-        model_text,
-        inputs,
-        setup,
-        geometry,
-        model,
-        observations,
-        calibration,
-        places,
-        rejections,
-        rounds,
-    })
+    Ok(Settled { recordings, model_text, inputs, setup, fitted })
 }
 
 /// The error of inputs that cannot be calibrated, with the mistake of the setup that would explain it.
@@ -199,23 +177,25 @@ impl Settled {
         if let Some(mistake) = self.setup.mistakes().next() {
             return Err(Error::SetupFirst { code: mistake.code, message: mistake.message.clone() });
         }
-        diagnosis(pipeline, &self.model, &self.calibration, &self.observations, progress)
+        let Fitted { model, calibration, observations, .. } = &self.fitted;
+        diagnosis(pipeline, model, calibration, observations, progress)
     }
 
     /// Everything for the report.
     pub fn into_run(self, pipeline: &Pipeline, diagnosed: Diagnosed) -> (Run, Vec<Recording>) {
-        let mut warnings = closing_warnings(self.rounds, &self.calibration);
+        let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
+        let mut warnings = closing_warnings(rounds, &calibration);
         warnings.extend(diagnosed.warning);
         let run = Run {
             pipeline_name: pipeline.name.clone(),
             pipeline_text: pipeline.text.clone(),
             model_text: self.model_text,
-            recordings: perceive::recording_runs(pipeline, self.inputs.seen, self.places, &self.rejections),
+            recordings: perceive::recording_runs(pipeline, self.inputs.seen, places, &rejections),
             board: self.inputs.board,
-            model: self.model,
-            session: frames::session(pipeline, &self.observations),
-            observations: self.observations,
-            calibration: self.calibration,
+            model,
+            session: frames::session(pipeline, &observations),
+            observations,
+            calibration,
             setup: self.setup,
             diagnosis: diagnosed.diagnosis,
             undiagnosed: diagnosed.undiagnosed,

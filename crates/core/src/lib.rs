@@ -25,7 +25,7 @@ pub use frames::{Pose, RollPitchYaw};
 pub use observation::{Observation, Reference, Rejection};
 pub use parameter::{Parameter, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
-pub use setup::{Certainty, SetupFinding, SetupReport};
+pub use setup::{Certainty, SetupFinding, SetupReport, Unseen};
 pub use units::Unit;
 pub use visited::Visited;
 pub use warning::{Severity, Stage, Warning, listed};

@@ -43,6 +43,30 @@ impl SetupFinding {
     }
 }
 
+/// A mistake that would leave no trace in these data: nobody can say whether it was made.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unseen {
+    /// The code that the mistake would have.
+    pub code: &'static str,
+    /// What it would be about.
+    pub subject: String,
+    /// What was tried, and how one can tell.
+    pub message: String,
+}
+
+impl Unseen {
+    /// As a notice, so that it reaches every output.
+    pub fn warning(&self) -> Warning {
+        Warning::new(
+            Severity::Notice,
+            Stage::Setup,
+            "setup-not-testable",
+            self.subject.clone(),
+            self.message.clone(),
+        )
+    }
+}
+
 /// What the checks of the setup found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SetupReport {
@@ -50,13 +74,19 @@ pub struct SetupReport {
     pub tried: usize,
     /// What contradicts the data, the surest first.
     pub findings: Vec<SetupFinding>,
-    /// Mistakes of which these data could show nothing, in sentences.
-    pub not_testable: Vec<String>,
+    /// Mistakes that would leave no trace in these data.
+    pub not_testable: Vec<Unseen>,
 }
 
 impl SetupReport {
     /// The findings that forbid physical names.
     pub fn mistakes(&self) -> impl Iterator<Item = &SetupFinding> {
         self.findings.iter().filter(|f| f.certainty == Certainty::Mistake)
+    }
+
+    /// Everything that was found, and what could not be, for every output.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let unseen = self.not_testable.iter().map(Unseen::warning);
+        self.findings.iter().map(SetupFinding::warning).chain(unseen).collect()
     }
 }

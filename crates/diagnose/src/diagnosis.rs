@@ -1,5 +1,6 @@
 //! What a diagnosis returns. Every type serialises as the summary shows it.
 
+use crate::combination::Combination;
 use crate::contrasts::Contrast;
 use crate::crossval::HeldOut;
 use crate::error_places::ErrorPlace;
@@ -198,6 +199,8 @@ pub struct FoundEffect {
     pub margin_nats: f64,
     /// Size.
     pub parameters: Vec<ParameterReport>,
+    /// What the data determine of several amplitudes, where they do not determine each.
+    pub combination: Option<Combination>,
     /// Errors on places the fit did not see, with the other effects in the model.
     pub places: HeldOut,
     /// Errors on recordings it did not see.

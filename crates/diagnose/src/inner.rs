@@ -133,6 +133,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l));
     let meant = (0..weighed.entries.len()).filter(meant);
     let probability = meant.map(|k| weighed.entries[k].probability).sum::<f64>();
+    let (parameters, combination) = parameters(judged, weighed);
     FoundEffect {
         name: name(&judged.entry),
         set,
@@ -141,7 +142,8 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
         log_evidence: weighed.entries[judged.entry].ln_evidence,
         margin_nats: weighed.entries[judged.entry].ln_evidence
             - weighed.best_cell().map_or(0.0, |u| u.ln_evidence),
-        parameters: parameters(judged, weighed),
+        parameters,
+        combination,
         places: judged.places,
         recordings: judged.recordings,
         contrast: judged.contrast.clone(),

@@ -12,7 +12,7 @@
 //!   pairs of visits, `confusion` what is the same to these data;
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
-//! * `inner`, `reports`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
 //! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
 //!   explains;
 //! * `implied`: what each dwell says about each joint, for the eye;
@@ -22,6 +22,7 @@
 
 mod bootstrap;
 mod cells;
+mod combination;
 mod compare;
 mod conclude;
 mod config;
@@ -69,6 +70,7 @@ mod tests;
 extern crate self as armcal_diagnose;
 
 pub use armcal_model::Toggle;
+pub use combination::{Combination, Term};
 pub use compare::compare_heldout;
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;

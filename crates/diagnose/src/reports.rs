@@ -1,6 +1,7 @@
 //! The catalogue as the user reads it: sizes, intervals, what could not have been seen.
 
 use crate::bootstrap::Significance;
+use crate::combination::{Combination, combination};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, likeness, one_step, smallest_seen};
 use crate::crossval::{Group, compare, gain, left_out};
@@ -18,13 +19,15 @@ const SHOWN: usize = 5;
 /// A signature this much absorbed is called absorbed.
 const ABSORBED: f64 = 0.9;
 
-/// Sizes of a judged entry from the metric that explains it under white noise.
-pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> Vec<ParameterReport> {
+/// Sizes of a judged entry from the metric that explains it under white noise, and what is determined of them together.
+pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> (Vec<ParameterReport>, Option<Combination>) {
     let entry = &weighed.entries[judged.entry];
     let projection = &weighed.metrics[0].projection;
     let variance = (projection.rss - judged.own().score).max(0.0) / projection.dof();
     let fitted = one_step(&judged.gram, 1.0);
-    sizes(&entry.candidate.amplitudes, &fitted.estimate, &(fitted.covariance * variance))
+    let (amplitudes, covariance) = (&entry.candidate.amplitudes, fitted.covariance * variance);
+    let sizes = sizes(amplitudes, &fitted.estimate, &covariance);
+    (sizes, combination(amplitudes, &fitted.estimate, &covariance))
 }
 
 fn sizes(

@@ -5,7 +5,9 @@ use crate::run::Run;
 use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{in_display_unit, printable};
 use armcal_core::SetupReport;
-use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, ParameterReport, UnknownReport, Verdict};
+use armcal_diagnose::{
+    CandidateReport, Combination, Diagnosis, FoundEffect, ParameterReport, Term, UnknownReport, Verdict,
+};
 use armcal_model::effects_toml;
 use comfy_table::Cell;
 use serde_json::Value;
@@ -207,8 +209,39 @@ pub fn size(p: &ParameterReport) -> String {
     text.trim_end().to_owned()
 }
 
-pub(crate) fn found(e: &FoundEffect) -> String {
+/// All sizes of a found effect, and what the data determine of those that are not determined by themselves.
+pub(crate) fn sizes_of(e: &FoundEffect) -> String {
     let sizes: Vec<String> = e.parameters.iter().map(size).collect();
+    let together =
+        e.combination.as_ref().map_or(String::new(), |c| format!("; determined is {}", combination(c)));
+    format!("{}{together}", sizes.join(", "))
+}
+
+/// `joint1 + 0.48 joint2 = 0.052 ± 0.004 deg`; where units differ, each amplitude stands over the unit it is counted in.
+fn combination(c: &Combination) -> String {
+    let mixed = c.terms.iter().any(|t| t.unit != c.unit);
+    let term = |(k, t): (usize, &Term)| {
+        let weight = c.unit.to_display(t.weight) / t.unit.to_display(1.0);
+        let sign = match (k, weight < 0.0) {
+            (0, false) => "",
+            (0, true) => "-",
+            (_, false) => " + ",
+            (_, true) => " - ",
+        };
+        let factor =
+            if (weight.abs() - 1.0).abs() < 1e-9 { String::new() } else { format!("{:.3} ", weight.abs()) };
+        let symbol = t.unit.display_symbol();
+        let over = if mixed && !symbol.is_empty() { format!("/({symbol})") } else { String::new() };
+        format!("{sign}{factor}{}{over}", t.name)
+    };
+    let terms: String = c.terms.iter().enumerate().map(term).collect();
+    let half = (c.ci95[1] - c.ci95[0]) / 2.0;
+    let shown = |si| in_display_unit(c.unit, si);
+    let symbol = if mixed { "" } else { c.unit.display_symbol() };
+    format!("{terms} = {} ± {} {symbol}", shown(c.value), shown(half)).trim_end().to_owned()
+}
+
+pub(crate) fn found(e: &FoundEffect) -> String {
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let contrast = match &e.contrast {
         Some(c) if c.agrees => {
@@ -224,7 +257,7 @@ pub(crate) fn found(e: &FoundEffect) -> String {
         "{}{set}: {}; linearised, each place left out in turn: {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 \
          %){rival}{contrast}",
         e.name,
-        sizes.join(", "),
+        sizes_of(e),
         h.before,
         h.after,
         h.change_ci95[0],

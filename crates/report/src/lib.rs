@@ -69,7 +69,7 @@ pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
-pub use text::{conclusion, printable};
+pub use text::{conclusion, millimetres, printable};
 pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
     verification_files, verification_json, verification_paths, verification_text,

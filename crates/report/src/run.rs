@@ -2,9 +2,7 @@
 
 use crate::diagnosis_text::{headline, setup_sentence};
 use armcal_calibrate::Calibration;
-use armcal_core::{
-    Dwell, DwellId, Observation, Rejection, Role, SetupFinding, SetupReport, Severity, Warning,
-};
+use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
@@ -144,7 +142,7 @@ impl Run {
         let of_diagnosis = self.diagnosis.iter().flat_map(|d| &d.warnings);
         let calibration = &self.calibration;
         let all = self.warnings.iter().chain(&calibration.warnings).chain(&calibration.fit.warnings);
-        let of_setup: Vec<Warning> = self.setup.findings.iter().map(SetupFinding::warning).collect();
+        let of_setup: Vec<Warning> = self.setup.warnings();
         let all = of_setup.iter().chain(all).chain(of_diagnosis);
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));

@@ -53,7 +53,7 @@ fn change(side: &SideErrors) -> String {
 }
 
 /// A length in millimetres: two decimals, more where two would hide the digits that matter.
-pub(crate) fn millimetres(metres: f64) -> String {
+pub fn millimetres(metres: f64) -> String {
     let mm = metres * 1e3;
     match mm.abs() {
         a if !a.is_finite() => "-".into(),

@@ -56,7 +56,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
-    let geometry = settled.geometry.clone();
+    let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     effects.extend(new.iter().cloned());
     let (mut run, recordings) = settled.into_run(&pipeline, Diagnosed::NOT_ASKED);
@@ -98,7 +98,7 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
 /// The effects that the diagnosis suggests.
 fn suggested(pipeline: &Pipeline, settled: &Settled, progress: &Progress) -> Result<Vec<EffectSpec>, Error> {
     let diagnosis = settled.diagnose(pipeline, progress)?;
-    let joints = settled.geometry.chain().joint_names();
+    let joints = settled.fitted.geometry.chain().joint_names();
     let suggested = diagnosis.map(|d| d.suggested(joints)).transpose()?.unwrap_or_default();
     if suggested.is_empty() {
         return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });

@@ -57,11 +57,11 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     };
     progress.step("weighing what could be recorded");
     let (model, values) = with_certain(&pipeline, &settled, &open)?;
-    let session = frames::session(&pipeline, &settled.observations);
+    let session = frames::session(&pipeline, &settled.fitted.observations);
     let known = Known {
         model: &model,
         values,
-        observations: &settled.observations,
+        observations: &settled.fitted.observations,
         session: &session,
         fit: &pipeline.fit,
         board: settled.inputs.board.as_ref().filter(|_| pipeline.observations.seated),
@@ -113,11 +113,12 @@ fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
 /// The calibrated model with the effects that are beyond doubt, and its parameters.
 fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Result<(Model, Vec<f64>), Error> {
     if open.certain.is_empty() {
-        return Ok((settled.model.clone(), settled.calibration.fit.values()));
+        return Ok((settled.fitted.model.clone(), settled.fitted.calibration.fit.values()));
     }
-    let session = frames::session(pipeline, &settled.observations);
-    let model = settled.model.with_effects(&open.certain, &session)?;
-    let calibration = calibrate(&model, &settled.observations, &pipeline.fit, &HoldoutConfig::default())?;
+    let session = frames::session(pipeline, &settled.fitted.observations);
+    let model = settled.fitted.model.with_effects(&open.certain, &session)?;
+    let calibration =
+        calibrate(&model, &settled.fitted.observations, &pipeline.fit, &HoldoutConfig::default())?;
     Ok((model, calibration.fit.values()))
 }
 

@@ -87,11 +87,11 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let suggested = diagnosis.suggested(settled.geometry.chain().joint_names())?;
-    let session = frames::session(&pipeline, &settled.observations);
-    let (geometry, observations) = (&settled.geometry, &settled.observations);
+    let suggested = diagnosis.suggested(settled.fitted.geometry.chain().joint_names())?;
+    let session = frames::session(&pipeline, &settled.fitted.observations);
+    let (geometry, observations) = (&settled.fitted.geometry, &settled.fitted.observations);
     let after = with(geometry, &suggested, &session, observations, &pipeline.fit, &pipeline.holdout)?;
-    let answer = answer(&diagnosis, &suggested, &settled.calibration, after.as_ref());
+    let answer = answer(&diagnosis, &suggested, &settled.fitted.calibration, after.as_ref());
     Ok((Answer { seconds, ..answer }, truth(&place.truth)?.hidden))
 }
 

@@ -82,10 +82,17 @@ pub struct Misfit {
     pub homeless: usize,
 }
 
+/// The logarithm of an error over its expectation, flat at both ends.
+fn saturating(ratio: f64) -> f64 {
+    0.5 * (1.0 + ratio.min(CAP).powi(2)).ln()
+}
+
 impl Misfit {
     /// Of inputs that cannot be fitted.
-    pub const NOTHING: Misfit =
-        Misfit { log: 0.0, mean_m: f64::INFINITY, floor_m: 0.0, used: 0, seated: 0, homeless: 0 };
+    pub fn of_nothing() -> Misfit {
+        let log = saturating(CAP);
+        Misfit { log, mean_m: f64::INFINITY, floor_m: 0.0, used: 0, seated: 0, homeless: 0 }
+    }
 
     /// Mean error over the floor.
     pub fn times_floor(&self) -> f64 {
@@ -126,7 +133,6 @@ impl Inputs {
     /// How badly a fit of them fits.
     pub fn misfit(&self, fitted: &Fitted) -> Misfit {
         let used: BTreeSet<_> = fitted.observations.iter().map(|o| o.dwell).collect();
-        let saturating = |ratio: f64| 0.5 * (1.0 + ratio.min(CAP).powi(2)).ln();
         let residuals = &fitted.calibration.residuals;
         let of_used: f64 = residuals.iter().map(|r| saturating(r.fitted_m.norm() / r.expected_norm_m)).sum();
         let total = self.dwells().count();

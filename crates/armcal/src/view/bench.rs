@@ -31,7 +31,7 @@ impl Bench {
     pub fn of(path: &Path, progress: &Progress) -> Result<Bench, Error> {
         let pipeline = Pipeline::load(path)?;
         let settled = story::settle(&pipeline, progress)?;
-        let geometry = settled.geometry.clone();
+        let geometry = settled.fitted.geometry.clone();
         let own = frames::effect_specs(&pipeline, &geometry)?;
         let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
         story::add_refits(&mut run, &pipeline, progress)?;

@@ -1,7 +1,7 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
 use super::{finite, or_zero};
-use crate::diagnosis_text::{headline, size, sizes};
+use crate::diagnosis_text::{headline, sizes, sizes_of};
 use crate::proto;
 use crate::run::Answer;
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect};
@@ -58,11 +58,10 @@ fn candidate(c: &CandidateReport) -> proto::Candidate {
 }
 
 fn found(e: &FoundEffect) -> proto::FoundEffect {
-    let sizes: Vec<String> = e.parameters.iter().map(size).collect();
     proto::FoundEffect {
         effect: e.name.clone(),
         one_of: if e.set.len() > 1 { e.set.join(", ") } else { String::new() },
-        size: sizes.join(", "),
+        size: sizes_of(e),
         probability: or_zero(e.probability),
         p_adjusted: finite(e.p_adjusted),
         before_mm: finite(e.places.before),

@@ -23,7 +23,7 @@ mod signature;
 pub use basis::Basis;
 pub use compared::comparison_html;
 
-use crate::diagnosis_text::{pasted, size, unlisted};
+use crate::diagnosis_text::{pasted, sizes_of, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
 use crate::text::millimetres;
 use crate::{ReportError, conclusion};
@@ -161,7 +161,6 @@ fn verdict(run: &Run) -> Verdict {
 fn found(run: &Run, e: &FoundEffect) -> String {
     let kind = e.name.split([':', '@', ',']).next().and_then(find);
     let summary = kind.map_or(String::new(), |kind| format!(": {}", kind.summary));
-    let sizes: Vec<String> = e.parameters.iter().map(size).collect();
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let step = run.steps.iter().position(|step| step.effects.last() == Some(&e.name));
     let fall = step.map_or(String::new(), |k| {
@@ -178,7 +177,7 @@ fn found(run: &Run, e: &FoundEffect) -> String {
         }
         _ => String::new(),
     };
-    format!("{}{set}{summary}. Its size: {}.{fall}{rival}{pairs}", e.name, sizes.join(", "))
+    format!("{}{set}{summary}. Its size: {}.{fall}{rival}{pairs}", e.name, sizes_of(e))
 }
 
 /// Errors on points that the fit never saw, or on all where nothing was held out.

@@ -172,7 +172,7 @@ fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
 fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
     let is_zero = |p: &Parameter| p.name.ends_with(".theta");
     let zeros: Vec<Parameter> = inputs.chain.parameters().iter().filter(|p| is_zero(p)).cloned().collect();
-    let far = at_bound.iter().filter(|p| is_zero(p)).map(|p| Estimated::beyond(p)).collect::<Vec<_>>();
+    let far = at_bound.iter().filter(|p| is_zero(p)).map(Estimated::beyond).collect::<Vec<_>>();
     (far.len() > 1).then(|| {
         let change = "the zeros of all joints free to leave their bounds";
         let widen =

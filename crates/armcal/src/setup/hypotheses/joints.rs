@@ -20,13 +20,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let turning: Vec<usize> = (0..n).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
     let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
     let mut all = Vec::new();
-    for set in sign_sets(n) {
-        let subject = set.iter().map(|&j| joint(j)).collect::<Vec<_>>().join(", ");
-        let change = format!("the sign of {subject} reversed");
-        all.push(Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
-            i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, -1.0)));
-        }));
-    }
+    all.extend(sign_sets(n).into_iter().map(|set| reversed(names, set)));
     for order in orders(n) {
         let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
@@ -65,6 +59,16 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }
     }
     all
+}
+
+/// The signs of these joints reversed.
+pub fn reversed(names: &[String], set: Vec<usize>) -> Hypothesis {
+    let joint = |j: &usize| format!("joint {} ({})", j + 1, names[*j]);
+    let subject = set.iter().map(joint).collect::<Vec<_>>().join(", ");
+    let change = format!("the sign of {subject} reversed");
+    Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
+        i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, -1.0)));
+    })
 }
 
 /// Each joint, every two of them, all.

@@ -9,6 +9,7 @@ mod poses;
 
 use super::trial::Inputs;
 use armcal_core::Parameter;
+pub use joints::reversed;
 use std::sync::Arc;
 
 /// A mistake that somebody may have made.

@@ -1,0 +1,116 @@
+//! Readings of joints that no encoder gives: stuck, speeds, what was asked for.
+
+use super::{TURNS_RAD, mistake};
+use crate::setup::trial::Inputs;
+use armcal_core::{Certainty, Dwell, SetupFinding};
+
+/// A joint that moved less than this over all dwells did not move [rad].
+const STUCK_RAD: f64 = 2e-4;
+/// Fewest dwells in a row that make a joint stuck.
+const MANY_STILL: usize = 8;
+/// Share of the dwells that is nearly all of them.
+const NEARLY_ALL: f64 = 0.9;
+/// Readings nearer to each other than this are one [rad].
+const EXACT_RAD: f64 = 1e-9;
+/// The steps of an encoder are at most so many times finer than the nearest two readings.
+const FINEST: u32 = 12;
+
+/// Joints that read nearly zero most of the time: speeds do, angles do not.
+pub fn speeds(inputs: &Inputs) -> Option<SetupFinding> {
+    let all = !inputs.seen.is_empty() && inputs.seen.iter().all(|s| s.readings.mostly_zero);
+    all.then(|| {
+        let message = "every joint reads nearly zero most of the time, and not always: these are speeds, or another field than \
+                       the angles; mend [streams.joints]";
+        mistake("wrong-field", "the joints".to_owned(), message.to_owned())
+    })
+}
+
+/// Readings without any scatter in nearly all dwells, not on the steps of an encoder: what was asked for, not what was read.
+pub fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
+    let exact: Vec<&Vec<f64>> = inputs.seen.iter().flat_map(|s| &s.readings.exact_rad).collect();
+    let dwells = inputs.dwells().count();
+    if exact.len() < MANY_STILL || (exact.len() as f64) < NEARLY_ALL * dwells as f64 {
+        return None;
+    }
+    let on_steps = (0..inputs.chain.joint_names().len()).any(|j| {
+        let mut read: Vec<f64> = exact.iter().map(|q| q[j]).collect();
+        read.sort_by(f64::total_cmp);
+        read.dedup_by(|a, b| (*a - *b).abs() < EXACT_RAD);
+        read.len() < 2 || steps_of(&read)
+    });
+    let finding = mistake(
+        "setpoints-recorded",
+        "the joints".to_owned(),
+        format!(
+            "no joint's reading scatters in {} of {dwells} dwells, nor lies on the steps of an encoder, and the errors are above the \
+             floor: these look like set-points, not readings; look at the topic in [streams.joints]",
+            exact.len()
+        ),
+    );
+    (!on_steps).then_some(SetupFinding { certainty: Certainty::Possible, ..finding })
+}
+
+/// Whether sorted readings lie on steps of one size, up to [`FINEST`] times finer than the least distance between two.
+fn steps_of(sorted: &[f64]) -> bool {
+    let gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    (1..=FINEST).map(|n| least / f64::from(n)).any(|step| {
+        gaps.iter().all(|gap| {
+            let steps = gap / step;
+            (steps - steps.round()).abs() < 0.05
+        })
+    })
+}
+
+/// Joints that did not move while others did.
+pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
+    let names = inputs.chain.joint_names();
+    let range = |j: usize| {
+        let all = inputs.dwells().map(|d| d.joint_rad[j]);
+        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
+        high - low
+    };
+    let ranges: Vec<f64> = (0..names.len()).map(range).collect();
+    let others_move = ranges.iter().any(|r| *r > TURNS_RAD);
+    let mut all = Vec::new();
+    for (j, name) in names.iter().enumerate().filter(|_| others_move) {
+        let still = inputs.seen.iter().map(|s| (s, longest_still(&s.dwells, j)));
+        let Some((recording, still)) = still.max_by_key(|(_, n)| *n) else { continue };
+        if still < MANY_STILL.max(recording.dwells.len() / 4) {
+            continue;
+        }
+        all.push(mistake(
+            "joint-stuck",
+            format!("joint {} ({name})", j + 1),
+            format!(
+                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move: its reading is stuck, or read from the wrong field; mend the stream of the \
+                 joints or the driver",
+                j + 1,
+                recording.name,
+                recording.dwells.len()
+            ),
+        ));
+    }
+    all
+}
+
+/// The most dwells in a row in which a joint reads the same while another one turns.
+fn longest_still(dwells: &[Dwell], joint: usize) -> usize {
+    let (mut longest, mut from) = (0, 0);
+    for i in 1..=dwells.len() {
+        let first = &dwells[from];
+        let same = |d: &Dwell| (d.joint_rad[joint] - first.joint_rad[joint]).abs() < STUCK_RAD;
+        if dwells.get(i).is_some_and(same) {
+            continue;
+        }
+        let turned = |d: &Dwell| {
+            let pairs = d.joint_rad.iter().zip(&first.joint_rad);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        if dwells[from..i].iter().map(turned).fold(0.0, f64::max) > TURNS_RAD {
+            longest = longest.max(i - from);
+        }
+        from = i;
+    }
+    longest
+}

@@ -1,0 +1,131 @@
+//! What contradicts itself without any refit: bodies that move or stand still where they should not (`bodies`), a joint that
+//! never moves, set-points read as readings (`joints`), tilts that are not the declared ones, frames far from their
+//! declaration.
+
+mod bodies;
+mod joints;
+
+use super::trial::Inputs;
+use crate::story::Fitted;
+use armcal_core::{Certainty, Pose, Role, SetupFinding};
+use armcal_table::Tilt;
+pub use joints::stuck;
+
+/// A joint that turned by this much did move [rad].
+const TURNS_RAD: f64 = 0.1;
+
+/// Tilts differ from their declaration by less than this, with the mechanism as it is [rad].
+const TILT_RAD: f64 = 0.07;
+/// A frame this many standard errors from where it was measured to be contradicts its declaration, if it is off by as
+/// much as this too [m], [rad].
+const SIGMAS: f64 = 8.0;
+const OFF: f64 = 5e-3;
+/// Errors below this many times the floor say that nothing of importance is wrong.
+const SOUND: f64 = 1.5;
+
+/// Everything that can be looked at directly; tilts and frames only where no other mistake was found.
+pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding> {
+    let mut all = Vec::new();
+    // Poses that are fitted to errors say nothing of tilts and frames.
+    let sound = fitted.calibration.times_floor() <= SOUND;
+    if alone && sound {
+        all.extend(tilts(inputs, fitted));
+        all.extend(declared_frames(fitted));
+    }
+    if !sound {
+        all.extend(stuck(inputs));
+        all.extend(bodies::no_quaternion(inputs));
+        all.extend(joints::set_points(inputs));
+    }
+    all
+}
+
+/// Streams that are not what they are said to be, whatever was fitted to them.
+pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
+    let mut all: Vec<SetupFinding> = bodies::same_body(inputs).into_iter().collect();
+    all.extend(joints::speeds(inputs));
+    all.extend(bodies::moving(inputs));
+    all
+}
+
+/// Declared tilts against the board's poses: between two recordings the board turns as its tilts say.
+fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
+    let Some(board) = &inputs.board else { return Vec::new() };
+    let values = fitted.calibration.fit.values();
+    let pose = |r: usize| -> Option<(Pose, Pose)> {
+        let dwells = fitted.observations.iter().filter(|o| o.dwell.recording == r && o.cavity().is_some());
+        if dwells.count() < 4 {
+            return None;
+        }
+        let tilt: Tilt = inputs.pipeline.recordings[r].tilt;
+        Some((board.tilted(tilt).ok()?, fitted.model.board_in_world(&values, r)?))
+    };
+    let poses: Vec<Option<(Pose, Pose)>> = (0..inputs.seen.len()).map(pose).collect();
+    let mut all = Vec::new();
+    for (r, later) in poses.iter().enumerate().skip(1) {
+        let (Some((declared_a, found_a)), Some((declared_b, found_b))) = (poses[0], *later) else { continue };
+        // The later normal as the earlier board sees it: free of where the board stands, and of turns about its normal.
+        let normal = |a: &Pose, b: &Pose| a.rotation.inverse() * b.rotation * nalgebra::Vector3::z();
+        let (declared, found) = (normal(&declared_a, &declared_b), normal(&found_a, &found_b));
+        let from_upright = |n: &nalgebra::Vector3<f64>| n.angle(&nalgebra::Vector3::z());
+        let (declared_rad, found_rad) = (from_upright(&declared), from_upright(&found));
+        let apart_rad = declared.angle(&found);
+        if apart_rad > TILT_RAD {
+            let (a, b) = (&inputs.seen[0].name, &inputs.seen[r].name);
+            all.push(mistake(
+                "tilt-declared",
+                format!("recording `{b}`"),
+                format!(
+                    "between `{a}` and `{b}` the board's normal turned by {:.1} deg where the declared tilts say {:.1} deg, and \
+                     ended {:.1} deg from where they say; mend `tilt` of these recordings (its angles, signs, or which is \
+                     roll and which is pitch)",
+                    found_rad.to_degrees(),
+                    declared_rad.to_degrees(),
+                    apart_rad.to_degrees()
+                ),
+            ));
+        }
+    }
+    all
+}
+
+/// Measured frames that the fit has moved far from their measurement.
+fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
+    let mut all = Vec::new();
+    for e in &fitted.calibration.fit.estimates {
+        let (Role::KnownFrame, Some(sigma)) = (e.parameter.role, e.parameter.prior_sigma) else { continue };
+        let off = e.value - e.parameter.nominal;
+        if off.abs() > SIGMAS * sigma && off.abs() > OFF && e.parameter.free {
+            let unit = e.parameter.unit;
+            all.push(SetupFinding {
+                certainty: Certainty::Possible,
+                ..mistake(
+                    "frame-declared",
+                    e.parameter.name.clone(),
+                    format!(
+                        "{} ends {:.2} {} from where it was measured, {:.0} times the declared standard error; measure it \
+                         again, declare its true standard error, or look for what moved",
+                        e.parameter.name,
+                        unit.to_display(off),
+                        unit.display_symbol(),
+                        off.abs() / sigma
+                    ),
+                )
+            });
+        }
+    }
+    all
+}
+
+fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding {
+    let certainty = Certainty::Mistake;
+    SetupFinding {
+        code,
+        subject,
+        message,
+        certainty,
+        before_mm: None,
+        after_mm: None,
+        alternatives: Vec::new(),
+    }
+}

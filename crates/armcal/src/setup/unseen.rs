@@ -1,0 +1,29 @@
+//! Mistakes that leave no trace: with them undone the data fit as well as they are.
+
+use super::hypotheses::reversed;
+use super::trial::{Inputs, Misfit};
+use armcal_core::Unseen;
+use armcal_report::millimetres;
+
+/// Errors that differ by less than this factor are the same.
+const SAME_FACTOR: f64 = 1.05;
+
+/// The sign of the last joint, where it only turns the tool about its own axis. Of `inputs`, which fit like `now`.
+pub fn unseen(inputs: &Inputs, now: &Misfit) -> Option<Unseen> {
+    let names = inputs.chain.joint_names();
+    let hypothesis = reversed(names, vec![names.len().checked_sub(1)?]);
+    let changed = hypothesis.undone(inputs);
+    let misfit = changed.misfit(&changed.fit().ok()?);
+    let same = misfit.used == now.used && (misfit.log - now.log).abs() < SAME_FACTOR.ln();
+    same.then(|| Unseen {
+        code: hypothesis.code,
+        message: format!(
+            "with {} the mean error would be {} mm instead of {}: these data cannot show whether its sign is right, nor calibrate \
+             what it turns; turn it by hand and compare",
+            hypothesis.change,
+            millimetres(misfit.mean_m),
+            millimetres(now.mean_m)
+        ),
+        subject: hypothesis.subject,
+    })
+}
