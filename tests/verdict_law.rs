@@ -1,6 +1,6 @@
 use crate::support::{armcal, believable, read_json, root};
-use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 /// Pipelines of which one number is wrong.
@@ -19,7 +19,7 @@ fn fuzzed(seed: u64, folder: &Path) -> String {
     }
     let chosen = rng.random_range(0..files.len());
     let factor = [-1.0, 0.5, 0.9, 0.98, 1.02, 1.1, 2.0, 57.3][rng.random_range(0..8)];
-    let (name, text) = &mut files[chosen];
+    let (name, text): &mut (String, String) = &mut files[chosen];
     let numbers: Vec<(usize, usize)> = numbers(text);
     let (from, to) = numbers[rng.random_range(0..numbers.len())];
     let value: f64 = text[from..to].parse().expect("a number");
