@@ -43,9 +43,10 @@ fn the_square_is_that_of_the_left_out_error_in_its_own_covariance() {
     for i in [0, 17, 100, 197] {
         let x = p.geometry.rows(3 * i, 3);
         let normal = p.geometry.tr_mul(&p.geometry) + &precision - x.tr_mul(&x);
-        let covariance = DMatrix::identity(3, 3) + x * normal.try_inverse().unwrap() * x.transpose();
+        let covariance =
+            DMatrix::identity(3, 3) + x * normal.try_inverse().expect("it is regular") * x.transpose();
         let e = left.rows(3 * i, 3);
-        let expected = e.dot(&(covariance.try_inverse().unwrap() * e));
+        let expected = e.dot(&(covariance.try_inverse().expect("it is regular") * e));
         assert!((square[i] - expected).abs() < 1e-6 * expected.max(1.0), "{i}: {} {expected}", square[i]);
     }
 }
