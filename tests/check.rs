@@ -210,7 +210,7 @@ fn a_slip_beyond_the_bounds_of_the_fit_is_named_by_its_bound() {
     let why = said.why("max_over_floor");
     assert!(why.contains("`joint2.theta` is on its bound") && why.contains("the zero of joint2"), "{why}");
     assert!(
-        said.last_line().ends_with("setup: parameter-bound; 2 warnings make it doubtful"),
+        said.last_line().ends_with("setup: joint-zero; 2 warnings make it doubtful"),
         "{}",
         said.last_line()
     );

@@ -58,12 +58,11 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
             t.hypothesis.freedom == tried[best].hypothesis.freedom
                 && (t.misfit.log - tried[best].misfit.log).abs() < ALIKE_FACTOR.ln()
         };
-        let alternatives: Vec<String> = tried
-            .iter()
-            .enumerate()
-            .filter(|(k, t)| *k != best && alike(t))
-            .map(|(_, t)| t.hypothesis.change.clone())
-            .collect();
+        let own = &tried[best].hypothesis.change;
+        let others = tried.iter().filter(|t| alike(t) && t.hypothesis.change != *own);
+        let mut alternatives: Vec<String> = others.map(|t| t.hypothesis.change.clone()).collect();
+        // A search from several starts comes to one end.
+        alternatives.dedup();
         let Tried { hypothesis, inputs, fitted, misfit } = tried.swap_remove(best);
         found.push((hypothesis, alternatives));
         (now, first, before) = (inputs, Some(fitted), misfit);

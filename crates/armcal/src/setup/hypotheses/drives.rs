@@ -24,12 +24,12 @@ const RATIO_OFF: f64 = 0.03;
 /// How far a ratio and a zero may come out.
 const RATIO_BOUND: f64 = 0.5;
 const ZERO_BOUND_DEG: f64 = 60.0;
-/// A zero that moved by less is a slip, which the diagnosis names [rad].
-const SLIPPED_RAD: f64 = 0.02;
 /// Where the search for such a zero starts.
 const SLIPS_DEG: [f64; 6] = [-30.0, -12.0, -4.0, 4.0, 12.0, 30.0];
-/// Where the search for the zero of the whole session starts, and how far off no assembly puts it.
+/// Where the search for the zero of the whole session starts.
 const ZEROS_DEG: [f64; 8] = [-36.0, -26.0, -17.0, -8.0, 8.0, 17.0, 26.0, 36.0];
+/// No assembly puts a zero this far off; and what moved between recordings by less is a slip of a tooth or two, which the
+/// diagnosis names [rad].
 const FAR_ZERO_RAD: f64 = 0.1;
 /// Fixed parameters are let go this far, and are wrong if they come out this far off [m], [rad].
 const FREED: f64 = 0.05;
@@ -100,7 +100,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             let estimated = Estimated {
                 parameter: format!("zero_slip:{}@{r}.offset", j + 1),
                 nominal: 0.0,
-                far: SLIPPED_RAD,
+                far: FAR_ZERO_RAD,
             };
             all.push(effect("joint-zero", joint(j), change, HOMED, spec, estimated));
         }
