@@ -124,7 +124,14 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
     let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
     perceive::refuse_repeated(&fingerprints)?;
-    let inputs = Inputs { pipeline: pipeline.clone(), chain, board, seen, changes: Vec::new() };
+    let inputs = Inputs {
+        pipeline: pipeline.clone(),
+        chain,
+        board,
+        seen,
+        changes: Vec::new(),
+        most_rounds: MAX_ROUNDS,
+    };
     let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
     progress.step("checking the setup");
     let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
@@ -144,7 +151,7 @@ fn without_setup(source: Error, inputs: &Inputs) -> Error {
 
 /// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
 pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
-    let Inputs { pipeline, chain, board, seen, changes } = inputs;
+    let Inputs { pipeline, chain, board, seen, changes, .. } = inputs;
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
@@ -159,12 +166,18 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
         let (observations, rejections) = (observed.observations, observed.rejections);
         let model = with_effects(pipeline, &geometry, &effects, &observations)?;
         let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
-        let values = calibration.fit.values();
-        let again = observe::associate_all(pipeline, board, &model, &values, true, seen)?;
-        if observe::same_places(&again, &places) || rounds == MAX_ROUNDS {
-            return Ok(Fitted { geometry, model, observations, calibration, places, rejections, rounds });
+        let mut next = None;
+        if rounds < inputs.most_rounds {
+            let values = calibration.fit.values();
+            let again = observe::associate_all(pipeline, board, &model, &values, true, seen)?;
+            next = (!observe::same_places(&again, &places)).then_some(again);
         }
-        places = again;
+        match next {
+            Some(again) => places = again,
+            None => {
+                return Ok(Fitted { geometry, model, observations, calibration, places, rejections, rounds });
+            }
+        }
     }
 }
 

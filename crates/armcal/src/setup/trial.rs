@@ -14,6 +14,8 @@ use std::collections::BTreeSet;
 const CAP: f64 = 300.0;
 /// What is wrong need not converge.
 const MOST_ITERATIONS: usize = 25;
+/// Dwells that still change their places after so many rounds have none.
+const MOST_ROUNDS: usize = 3;
 /// Dwells that take part in trials; of more, as many are drawn evenly over time.
 const MOST_DWELLS: usize = 150;
 
@@ -30,6 +32,8 @@ pub struct Inputs {
     pub seen: Vec<Seen>,
     /// Changes to the nominal values of parameters, in order.
     pub changes: Vec<Change>,
+    /// Rounds of association and fit at most.
+    pub most_rounds: usize,
 }
 
 /// A change to the nominal values of the parameters that match a pattern.
@@ -109,6 +113,7 @@ impl Inputs {
             inputs.pipeline.fit.objective = Objective::Robust;
         }
         inputs.pipeline.fit.max_iterations = inputs.pipeline.fit.max_iterations.min(MOST_ITERATIONS);
+        inputs.most_rounds = inputs.most_rounds.min(MOST_ROUNDS);
         let total: usize = inputs.seen.iter().map(|s| s.dwells.len()).sum();
         let share = MOST_DWELLS as f64 / total.max(1) as f64;
         if share < 1.0 {

@@ -3,6 +3,7 @@
 
 use crate::Board;
 use nalgebra::Vector3;
+use std::cell::OnceCell;
 
 /// Raster cell [m].
 const CELL_M: f64 = 0.002;
@@ -27,11 +28,11 @@ pub(super) struct Layout {
     neighbours: Vec<Vec<bool>>,
     neighbour_count: Vec<usize>,
     low_m: [f64; 2],
-    high_m: [f64; 2],
     cell_m: f64,
     columns: usize,
     rows: usize,
-    cells: Vec<[u32; NEAREST]>,
+    /// Filled where it is asked for: few of its cells ever are.
+    cells: Vec<OnceCell<[u32; NEAREST]>>,
     nearest: usize,
 }
 
@@ -61,7 +62,9 @@ impl Layout {
         let low_m = [0, 1].map(|axis| bound(axis, f64::min, f64::INFINITY) - MARGIN_M);
         let high_m = [0, 1].map(|axis| bound(axis, f64::max, f64::NEG_INFINITY) + MARGIN_M);
         let (width_m, depth_m) = (high_m[0] - low_m[0], high_m[1] - low_m[1]);
-        let mut layout = Layout {
+        let cell_m = CELL_M.max((width_m * depth_m / MOST_CELLS).sqrt());
+        let (columns, rows) = ((width_m / cell_m).ceil() as usize, (depth_m / cell_m).ceil() as usize);
+        Layout {
             names: cavities.iter().map(|c| c.name.clone()).collect(),
             spacing_m: if smallest_m.is_finite() { smallest_m } else { LONE_SPACING_M },
             volume_m3: (width_m + 0.1) * (depth_m + 0.1) * 0.3,
@@ -69,15 +72,12 @@ impl Layout {
             neighbours,
             neighbour_count,
             low_m,
-            high_m,
-            cell_m: CELL_M.max((width_m * depth_m / MOST_CELLS).sqrt()),
-            columns: 0,
-            rows: 0,
-            cells: Vec::new(),
+            cell_m,
+            columns,
+            rows,
+            cells: vec![OnceCell::new(); columns * rows],
             nearest: NEAREST.min(n),
-        };
-        layout.fill();
-        layout
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -91,7 +91,8 @@ impl Layout {
         if !(column >= 0.0 && row >= 0.0) || column >= self.columns as f64 || row >= self.rows as f64 {
             return &[];
         }
-        &self.cells[row as usize * self.columns + column as usize][..self.nearest]
+        let cell = row as usize * self.columns + column as usize;
+        &self.cells[cell].get_or_init(|| self.nearest_to(cell))[..self.nearest]
     }
 
     /// The nearest cavity in space, wherever the point is.
@@ -121,23 +122,19 @@ impl Layout {
         steps
     }
 
-    fn fill(&mut self) {
-        self.columns = ((self.high_m[0] - self.low_m[0]) / self.cell_m).ceil() as usize;
-        self.rows = ((self.high_m[1] - self.low_m[1]) / self.cell_m).ceil() as usize;
-        self.cells = Vec::with_capacity(self.rows * self.columns);
-        for cell in 0..self.rows * self.columns {
-            let x = self.low_m[0] + ((cell % self.columns) as f64 + 0.5) * self.cell_m;
-            let y = self.low_m[1] + ((cell / self.columns) as f64 + 0.5) * self.cell_m;
-            let mut best = [(f64::INFINITY, u32::MAX); NEAREST];
-            for (k, c) in self.points_m.iter().enumerate() {
-                let mut entry = ((c.x - x).powi(2) + (c.y - y).powi(2), k as u32);
-                for slot in &mut best {
-                    if entry.0 < slot.0 {
-                        std::mem::swap(slot, &mut entry);
-                    }
+    /// The cavities nearest to the middle of a cell.
+    fn nearest_to(&self, cell: usize) -> [u32; NEAREST] {
+        let x = self.low_m[0] + ((cell % self.columns) as f64 + 0.5) * self.cell_m;
+        let y = self.low_m[1] + ((cell / self.columns) as f64 + 0.5) * self.cell_m;
+        let mut best = [(f64::INFINITY, u32::MAX); NEAREST];
+        for (k, c) in self.points_m.iter().enumerate() {
+            let mut entry = ((c.x - x).powi(2) + (c.y - y).powi(2), k as u32);
+            for slot in &mut best {
+                if entry.0 < slot.0 {
+                    std::mem::swap(slot, &mut entry);
                 }
             }
-            self.cells.push(best.map(|b| b.1));
         }
+        best.map(|b| b.1)
     }
 }
