@@ -128,7 +128,12 @@ impl Layout {
         let y = self.low_m[1] + ((cell / self.columns) as f64 + 0.5) * self.cell_m;
         let mut best = [(f64::INFINITY, u32::MAX); NEAREST];
         for (k, c) in self.points_m.iter().enumerate() {
-            let mut entry = ((c.x - x).powi(2) + (c.y - y).powi(2), k as u32);
+            let square = (c.x - x).powi(2) + (c.y - y).powi(2);
+            // The most are further than the last that is kept.
+            if square >= best[NEAREST - 1].0 {
+                continue;
+            }
+            let mut entry = (square, k as u32);
             for slot in &mut best {
                 if entry.0 < slot.0 {
                     std::mem::swap(slot, &mut entry);

@@ -39,15 +39,27 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
     let sites: Vec<(Vector3<f64>, f64)> =
         problem.sites.iter().map(|s| (supposed.supposed_m(&s.at_m) - middle_m, s.weight)).collect();
     let shifts = steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
-    let mut scored = Vec::new();
+    let all: f64 = sites.iter().map(|s| s.1).sum();
+    let (mut scored, mut highest) = (Vec::new(), f64::NEG_INFINITY);
     for turn_rad in steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD) {
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad);
         let turned: Vec<_> = sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect();
         for (x, y) in shifts.iter().flat_map(|&x| shifts.iter().map(move |&y| (x, y))) {
             let shift = Vector3::new(x, y, 0.0);
-            let support: f64 = turned.iter().map(|(p, w)| w * support(problem, &(p + shift), false).1).sum();
-            let far = (x * x + y * y) / problem.prior.offset_m.powi(2);
-            scored.push((support - 0.1 * far, (turn_rad, shift)));
+            let far = 0.1 * (x * x + y * y) / problem.prior.offset_m.powi(2);
+            // Given up where even full support of what is left would not make it worth keeping.
+            let (mut score, mut left) = (-far, all);
+            for (p, w) in &turned {
+                score += w * support(problem, &(p + shift), false).1;
+                left -= w;
+                if score + left < WORTH * highest {
+                    break;
+                }
+            }
+            if score >= WORTH * highest {
+                highest = highest.max(score);
+                scored.push((score, (turn_rad, shift)));
+            }
         }
     }
     let field = |&(turn_rad, shift): &(f64, Vector3<f64>)| {
