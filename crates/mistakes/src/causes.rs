@@ -247,7 +247,7 @@ pub const CAUSES: &[Cause] = &[
     row(
         "board-turned",
         &["board-turned", "board-mirrored", "frame-declared"],
-        &["board is turned", "turned about", "board turned", "turned by"],
+        &["board is turned", "turned about", "board turned", "turned by", "upside down"],
         &[],
     ),
     row(

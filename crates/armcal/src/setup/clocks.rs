@@ -8,7 +8,10 @@ const AGREES: f64 = 0.97;
 /// Ratios of gears and units that are mistaken for none.
 const RATIOS: [f64; 5] = [2.0, 3.0, 5.0, 57.2958, 100.0];
 /// Below this many readings a second, movements are lost between them.
-const FEW_PER_S: f64 = 2.0;
+const FEW_PER_S: f64 = 4.0;
+/// A body whose path is shorter than this stands still [m], where a joint turns by as much as this [rad].
+const STANDS_M: f64 = 5e-3;
+const TURNS_RAD: f64 = 0.1;
 
 /// What the clocks are aligned with.
 #[derive(Clone)]
@@ -28,6 +31,10 @@ pub fn what_would_align(
     samples: &Samples,
     correlation: &(dyn Fn(&Reading) -> Option<f64> + Sync),
 ) -> Option<String> {
+    // What is lost between the readings, no change brings back: whatever fits then fits by chance.
+    if let Some(few) = few(samples) {
+        return Some(few);
+    }
     let tip = samples.tip.clone()?;
     let now = Reading { joints: samples.joints.clone(), tip, lengths: 1.0 };
     let mut tried: Vec<(f64, String)> = Vec::new();
@@ -37,7 +44,9 @@ pub fn what_would_align(
     // Of those that do as well, the first: it is the simplest.
     let best = tried.iter().map(|t| t.0).fold(0.0, f64::max);
     let first = tried.into_iter().find(|t| t.0 >= best - 0.5 * (1.0 - AGREES));
-    first.map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})")).or_else(|| few(samples))
+    first
+        .map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})"))
+        .or_else(|| still(samples))
 }
 
 fn changes(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
@@ -132,6 +141,27 @@ fn summed(joints: &mut JointSamples) {
         }
         column.iter_mut().take(1).for_each(|q| *q = 0.0);
     }
+}
+
+/// A body that stands still while the arm moves.
+fn still(samples: &Samples) -> Option<String> {
+    let tip = samples.tip.as_ref()?;
+    let first = tip.position_m.first()?;
+    let tip_m = tip.position_m.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
+    let range = |column: &Vec<f64>| {
+        let (low, high) =
+            column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
+        high - low
+    };
+    let turned_rad = samples.joints.joint_rad.iter().map(range).fold(0.0, f64::max);
+    (tip_m < STANDS_M && turned_rad > TURNS_RAD).then(|| {
+        format!(
+            "[streams-swapped] the body read as the tip stands still (within {:.2} mm) while the joints turn by {:.0} deg: it is \
+             another body, mend [streams.tip]",
+            tip_m * 1e3,
+            turned_rad.to_degrees()
+        )
+    })
 }
 
 /// A stream that is too thin to show movements.

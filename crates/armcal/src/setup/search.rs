@@ -5,14 +5,17 @@ use super::beyond::beyond_physics;
 use super::hypotheses::{Freedom, Hypothesis, Number, hypotheses};
 use super::trial::{Inputs, Misfit};
 use super::unseen::unseen;
-use super::weigh::{ALIKE_FACTOR, best, explains, far_enough, in_doubt};
+use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone};
 use super::words::{finding, moved_frame};
 use crate::story::Fitted;
-use armcal_core::{Parameter, Role, SetupReport};
+use armcal_calibrate::Calibration;
+use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 use rayon::prelude::*;
 
 /// Mistakes one upon the other.
 const MOST_MISTAKES: usize = 3;
+/// Codes of changes that let the model's own parameters go.
+const OF_THE_MODEL: [&str; 3] = ["parameter-bound", "parameter-fixed", "joint-zero"];
 /// Steps of a search between two neighbours.
 const REFINEMENTS: usize = 10;
 
@@ -41,19 +44,22 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
         report.not_testable.extend(unseen(&now, &begun));
         return;
     }
+    let mut possible = Vec::new();
     while found.len() < MOST_MISTAKES && in_doubt(&before) {
         let at_bound = first.as_ref().map(at_bound).unwrap_or_default();
-        let mut tried = Vec::new();
+        let (mut tried, mut within) = (Vec::new(), Vec::new());
         for some in hypotheses(&now, &at_bound) {
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
                 report.tried += some.len();
-                tried.extend(explaining(&now, first.as_ref(), &before, some));
+                let all = attempted(&now, &before, some);
+                let (far, near) = explaining(&now, first.as_ref(), &before, all, &mut possible);
+                tried.extend(far);
+                within.extend(near);
             }
         }
-        let weights: Vec<(Freedom, f64)> =
-            tried.iter().map(|t| (t.hypothesis.freedom, t.misfit.log)).collect();
-        let Some(best) = best(&weights) else { break };
+        let weights: Vec<(Freedom, f64)> = tried.iter().map(weight).collect();
+        let Some(best) = best(&weights).filter(|k| !outdone(weights[*k], &within)) else { break };
         let alike = |t: &&Tried| {
             t.hypothesis.freedom == tried[best].hypothesis.freedom
                 && (t.misfit.log - tried[best].misfit.log).abs() < ALIKE_FACTOR.ln()
@@ -67,13 +73,14 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
         found.push((hypothesis, alternatives));
         (now, first, before) = (inputs, Some(fitted), misfit);
     }
+    let alone = || fitted.and_then(|fitted| each_alone(inputs, fitted, &begun));
     if found.is_empty() {
-        report.findings.extend(fitted.and_then(|fitted| each_alone(inputs, fitted, &begun)));
+        report.findings.extend(alone().or_else(|| perhaps(inputs, judged, &begun, &possible)));
         return;
     }
     if let [(only, _)] = &found[..]
         && only.recording.is_some()
-        && let Some(finding) = fitted.and_then(|fitted| each_alone(inputs, fitted, &begun))
+        && let Some(finding) = alone()
     {
         report.findings.push(finding);
         return;
@@ -94,16 +101,56 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
     }
 }
 
-/// Those of the hypotheses that explain the errors, fitted.
-fn explaining(now: &Inputs, first: Option<&Fitted>, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
+/// The change of the model's own parameters that would explain as much as a physical effect: told beside its name.
+fn perhaps(
+    inputs: &Inputs,
+    judged: Option<&Calibration>,
+    begun: &Misfit,
+    possible: &[Tried],
+) -> Option<SetupFinding> {
+    let weights: Vec<(Freedom, f64)> = possible.iter().map(weight).collect();
+    let Tried { hypothesis, misfit, .. } = &possible[best(&weights)?];
+    let after = hypothesis.undone(inputs).fit().ok()?.calibration;
+    let (before, after) = ((judged, *begun), (Some(&after), *misfit));
+    let finding = finding(hypothesis, &hypothesis.change, &[], None, before, after);
+    Some(SetupFinding { certainty: Certainty::Possible, ..finding })
+}
+
+fn weight(t: &Tried) -> (Freedom, f64) {
+    (t.hypothesis.freedom, t.misfit.log)
+}
+
+/// Hypotheses, fitted.
+fn attempted(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
     let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, h)).collect();
     refine_numbers(now, before, &mut tried);
-    tried.retain(|t| {
-        explains(before, &t.misfit)
-            && beyond_physics(now, first, t)
-            && far_enough(before, t.hypothesis.freedom, &t.misfit)
-    });
     tried
+}
+
+/// Those that explain the errors; of what explains them with a number that physics reaches, freedom and misfit. Changes of
+/// the model's own parameters that leave nothing above the floor, but too little was above it to be sure, are `possible`.
+fn explaining(
+    now: &Inputs,
+    first: Option<&Fitted>,
+    before: &Misfit,
+    tried: Vec<Tried>,
+    possible: &mut Vec<Tried>,
+) -> (Vec<Tried>, Vec<(Freedom, f64)>) {
+    let (mut far, mut within) = (Vec::new(), Vec::new());
+    for t in tried {
+        let explains = explains(before, &t.misfit) && far_enough(before, t.hypothesis.freedom, &t.misfit);
+        let own = OF_THE_MODEL.contains(&t.hypothesis.code) && !t.hypothesis.estimated.is_empty();
+        if !explains && !(own && at_the_floor(before, &t.misfit)) {
+            continue;
+        }
+        match (beyond_physics(now, first, &t), explains) {
+            (true, true) => far.push(t),
+            (true, false) => possible.push(t),
+            (false, true) if t.hypothesis.number.is_some() => within.push(weight(&t)),
+            (false, _) => {}
+        }
+    }
+    (far, within)
 }
 
 /// Of each number the value that fits best, refined; the other values are dropped.

@@ -2,6 +2,7 @@
 
 use super::hypotheses::Freedom;
 use super::trial::Misfit;
+use std::cmp::Ordering;
 
 /// Errors below this many times the floor give no reason to look.
 pub const WORTH_LOOKING: f64 = 1.5;
@@ -9,6 +10,8 @@ pub const WORTH_LOOKING: f64 = 1.5;
 const LEAST_FACTOR: f64 = 3.0;
 /// Changes that fit within this factor of each other are not told apart.
 pub const ALIKE_FACTOR: f64 = 1.3;
+/// Errors within this many times the floor leave nothing to explain.
+const NOTHING_LEFT: f64 = 1.2;
 /// With this many dwells at the board and in no cavity, and this share of all there, the board is in doubt.
 const HOMELESS: usize = 5;
 const HOMELESS_SHARE: f64 = 0.1;
@@ -49,6 +52,20 @@ pub fn far_enough(before: &Misfit, freedom: Freedom, after: &Misfit) -> bool {
         Freedom::Number | Freedom::Frame => ESTIMATED_EXPLAINED,
     };
     after.times_floor() < near || after.log < before.log - EXPLAINED.ln()
+}
+
+/// Whether a change loses no dwell and leaves nothing to explain.
+pub fn at_the_floor(before: &Misfit, after: &Misfit) -> bool {
+    after.used >= before.used && after.homeless <= before.homeless && after.times_floor() <= NOTHING_LEFT
+}
+
+/// Whether physics, `within` its bounds, explains the errors with less freedom than what is believed, or better.
+pub fn outdone((freedom, log): (Freedom, f64), within: &[(Freedom, f64)]) -> bool {
+    within.iter().any(|(own, own_log)| match own.cmp(&freedom) {
+        Ordering::Less => *own_log <= log + LEAST_FACTOR.ln() / 2.0,
+        Ordering::Equal => *own_log < log - ALIKE_FACTOR.ln(),
+        Ordering::Greater => false,
+    })
 }
 
 /// The least freedom that comes within reach of the best fit; `tried` are freedoms and logarithmic misfits.
@@ -154,6 +171,24 @@ mod tests {
         // Within a factor of 1.3 (0.262) the first in the list.
         assert_eq!(best(&[(Discrete, 0.26), (Discrete, 0.0)]), Some(0));
         assert_eq!(best(&[(Discrete, 0.27), (Discrete, 0.0)]), Some(1));
+    }
+
+    #[test]
+    fn a_change_that_loses_no_dwell_and_leaves_nothing_ends_at_the_floor() {
+        let before = seated(100, 2.5);
+        assert!(at_the_floor(&before, &seated(100, 1.2)));
+        assert!(!at_the_floor(&before, &seated(100, 1.21)));
+        assert!(!at_the_floor(&before, &seated(99, 1.0)));
+        assert!(!at_the_floor(&before, &Misfit { homeless: 1, ..seated(100, 1.0) }));
+    }
+
+    #[test]
+    fn physics_outdoes_with_less_freedom_or_a_better_fit() {
+        use Freedom::{Discrete, Frame, Number};
+        assert!(!outdone((Frame, 0.0), &[]));
+        assert!(outdone((Frame, 0.0), &[(Number, 0.54)]) && !outdone((Frame, 0.0), &[(Number, 0.56)]));
+        assert!(outdone((Number, 0.0), &[(Number, -0.27)]) && !outdone((Number, 0.0), &[(Number, -0.26)]));
+        assert!(!outdone((Discrete, 0.0), &[(Number, -3.0), (Frame, -3.0)]));
     }
 
     proptest! {

@@ -204,7 +204,11 @@ fn dwells_of_one(
             expected,
         });
     }
-    warnings.extend(readings::leaps(&samples.joints, name));
+    // Readings that are held leap too: told once, by their cause.
+    match readings::stale(&samples.joints, name) {
+        Some(stale) => warnings.push(stale),
+        None => warnings.extend(readings::leaps(&samples.joints, name)),
+    }
     let clock = match &samples.tip {
         Some(tip) if !tip.is_empty() => {
             let doubts = Doubts::of(pipeline, speed_model);

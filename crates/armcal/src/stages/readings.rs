@@ -7,6 +7,12 @@ use armcal_core::{Dwell, JointSamples, Severity, Stage, Warning};
 pub const LEAP_RAD: f64 = 0.3;
 /// Readings further apart in time say nothing of leaps [ns].
 const NEXT_NS: i64 = 200_000_000;
+/// Readings that repeat the one before them at least so often and so long [ns], and then step by more than this [rad], are
+/// not read anew; so many times are no accident.
+const HELD: usize = 5;
+const HELD_NS: i64 = 200_000_000;
+const STEP_RAD: f64 = 0.1;
+const TIMES: usize = 5;
 /// Readings a dwell from which on their scatter says something.
 const MANY: usize = 10;
 /// A dwell whose joints read one value in this share of its readings does not scatter.
@@ -78,6 +84,42 @@ pub fn leaps(joints: &JointSamples, recording: &str) -> Vec<Warning> {
         .collect()
 }
 
+/// Readings that are repeated while the arm moves: all joints stand still, and step to where they have come meanwhile.
+pub fn stale(joints: &JointSamples, recording: &str) -> Option<Warning> {
+    let n = joints.time_ns.len();
+    let step = |i: usize| {
+        joints.joint_rad.iter().map(|column| (column[i] - column[i - 1]).abs()).fold(0.0, f64::max)
+    };
+    let (mut times, mut longest_ns, mut largest, mut since) = (0, 0, 0.0, 0);
+    for i in 1..n {
+        let by = step(i);
+        if by == 0.0 {
+            continue;
+        }
+        let held_ns = joints.time_ns[i - 1] - joints.time_ns[since];
+        if i - since > HELD
+            && held_ns >= HELD_NS
+            && by > STEP_RAD
+            && joints.time_ns[i] - joints.time_ns[i - 1] <= NEXT_NS
+        {
+            times += 1;
+            longest_ns = longest_ns.max(held_ns);
+            largest = by.max(largest);
+        }
+        since = i;
+    }
+    (times >= TIMES).then(|| {
+        let message = format!(
+            "{times} times all joints repeat one reading, for up to {:.1} s, and then leap by up to {:.1} deg: the readings are \
+             stale, repeated and not read anew; mend the driver, or record the topic it reads from",
+            longest_ns as f64 * 1e-9,
+            largest.to_degrees()
+        );
+        let subject = format!("recording `{recording}`");
+        Warning::new(Severity::Notice, Stage::Recording, "stale-readings", subject, message)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,6 +143,18 @@ mod tests {
             found[0].message.starts_with("joint 2 (j1) leaps 2 times")
                 && found[0].message.contains("22.3 deg")
         );
+    }
+
+    #[test]
+    fn readings_that_are_held_and_leap_are_stale_and_a_rest_before_a_move_is_not() {
+        let moving: Vec<f64> = (0..3000).map(|i| (0.02 * f64::from(i)).sin()).collect();
+        let held: Vec<f64> = (0..3000).map(|i| moving[i / 100 * 100]).collect();
+        let found = stale(&stream(vec![held]), "a").expect("it is stale");
+        assert_eq!(found.code, "stale-readings");
+        assert!(stale(&stream(vec![moving]), "a").is_none());
+        // Rests of 1 s between moves of 1 s, a step of 0.03 rad from reading to reading.
+        let rests = (0..3000).map(|i: i32| 0.03 * f64::from(i / 200 * 100 + (i % 200).min(100))).collect();
+        assert!(stale(&stream(vec![rests]), "a").is_none());
     }
 
     #[test]

@@ -55,6 +55,27 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     all
 }
 
+/// A board drawn from its other side: the outline mirrored, and the seats measured from another face. Rarer.
+pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
+    if inputs.board.is_none() || inputs.pipeline.table.is_none() {
+        return Vec::new();
+    }
+    let mirrored = symmetries()
+        .into_iter()
+        .filter(|(_, words, _)| ["upside down", "mirrored"].iter().any(|sided| words.starts_with(sided)));
+    let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, &'static str)| {
+        let at = move |height_mm: f64| {
+            let (height, side) = (height_mm.abs(), if height_mm > 0.0 { "higher" } else { "lower" });
+            let change = format!("the board {words} and its seats {height:.2} mm {side}");
+            Hypothesis::new(code, "the board", change, FILE, move |i| {
+                map_cavities(i, |p| matrix * p + Vector3::new(0.0, 0.0, height_mm * 1e-3));
+            })
+        };
+        Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, at)
+    };
+    mirrored.flat_map(of_each).collect()
+}
+
 /// Names of cavities without their numbers, where there is more than one.
 fn groups(board: &Option<Board>) -> Vec<String> {
     let names = board.iter().flat_map(|b| &b.cavities).map(|c| group_of(&c.name).to_owned());

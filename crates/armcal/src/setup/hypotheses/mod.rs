@@ -145,5 +145,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 
     all.extend(board::hypotheses(inputs));
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
-    [all, drives::hypotheses(inputs, at_bound)]
+    let mut rarer = drives::hypotheses(inputs, at_bound);
+    rarer.extend(board::from_the_other_side(inputs));
+    [all, rarer]
 }
