@@ -1,7 +1,7 @@
 //! Whether what a change estimates comes out further off than physics moves it.
 
+use super::attempt::Tried;
 use super::hypotheses::{Freedom, Hypothesis};
-use super::search::Tried;
 use super::trial::Inputs;
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use crate::story::Fitted;

@@ -1,13 +1,14 @@
 //! Mistakes of wiring, files, frames and units, looked for before any physics.
 //!
 //! A mistake of the setup is discrete: a sign, an order, a unit, a frame. Each is a hypothesis: the inputs with that one
-//! thing changed (`hypotheses`), fitted anew (`trial`, `search`), weighed against the inputs as the pipeline has them
+//! thing changed (`hypotheses`), fitted anew (`trial`, `attempt`, `search`), weighed against the inputs as the pipeline has them
 //! (`weigh`, `beyond`, `alone`) and told (`words`). The right one makes the errors fall as nothing else does; it is reported with what it would do. What
 //! needs no refit (a body that never moves, a tilt that contradicts its measurement) is looked at directly (`facts`).
 //!
 //! No physical effect is looked for while a mistake stands: its name would be that of the mistake.
 
 mod alone;
+mod attempt;
 mod beyond;
 mod clocks;
 mod facts;

@@ -2,7 +2,7 @@
 
 use super::{TURNS_RAD, mistake};
 use crate::setup::trial::Inputs;
-use armcal_core::{Certainty, Dwell, SetupFinding};
+use armcal_core::{Certainty, SetupFinding};
 
 /// A joint that moved less than this over all dwells did not move [rad].
 const STUCK_RAD: f64 = 2e-4;
@@ -74,7 +74,10 @@ pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
     let others_move = ranges.iter().any(|r| *r > TURNS_RAD);
     let mut all = Vec::new();
     for (j, name) in names.iter().enumerate().filter(|_| others_move) {
-        let still = inputs.seen.iter().map(|s| (s, longest_still(&s.dwells, j)));
+        let still = inputs.seen.iter().map(|s| {
+            let read_rad: Vec<&[f64]> = s.dwells.iter().map(|d| &d.joint_rad[..]).collect();
+            (s, longest_still(&read_rad, j))
+        });
         let Some((recording, still)) = still.max_by_key(|(_, n)| *n) else { continue };
         if still < MANY_STILL.max(recording.dwells.len() / 4) {
             continue;
@@ -94,23 +97,42 @@ pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
     all
 }
 
-/// The most dwells in a row in which a joint reads the same while another one turns.
-fn longest_still(dwells: &[Dwell], joint: usize) -> usize {
+/// The most dwells in a row in which a joint reads the same while another one turns; of each dwell its joints [rad].
+fn longest_still(read_rad: &[&[f64]], joint: usize) -> usize {
     let (mut longest, mut from) = (0, 0);
-    for i in 1..=dwells.len() {
-        let first = &dwells[from];
-        let same = |d: &Dwell| (d.joint_rad[joint] - first.joint_rad[joint]).abs() < STUCK_RAD;
-        if dwells.get(i).is_some_and(same) {
+    for i in 1..=read_rad.len() {
+        let first = read_rad[from];
+        if read_rad.get(i).is_some_and(|q| (q[joint] - first[joint]).abs() < STUCK_RAD) {
             continue;
         }
-        let turned = |d: &Dwell| {
-            let pairs = d.joint_rad.iter().zip(&first.joint_rad);
-            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-        };
-        if dwells[from..i].iter().map(turned).fold(0.0, f64::max) > TURNS_RAD {
+        let turned = |q: &&[f64]| q.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        if read_rad[from..i].iter().map(turned).fold(0.0, f64::max) > TURNS_RAD {
             longest = longest.max(i - from);
         }
         from = i;
     }
     longest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_is_still_only_while_another_one_turns() {
+        let turns: Vec<[f64; 2]> =
+            (0..20).map(|i| [0.1 * f64::from(i), if i < 12 { 0.5 } else { 0.7 }]).collect();
+        let read: Vec<&[f64]> = turns.iter().map(|q| &q[..]).collect();
+        assert_eq!(longest_still(&read, 0), 0, "it turns all the time");
+        assert_eq!(longest_still(&read, 1), 12);
+        assert_eq!(longest_still(&[&[0.3, 0.5][..]; 9], 1), 0, "nothing moved");
+    }
+
+    #[test]
+    fn readings_on_the_steps_of_an_encoder_are_told_from_set_points() {
+        let step = 2.0 * std::f64::consts::PI / 8192.0;
+        let encoder: Vec<f64> = [3, 17, 20, 220, 911].iter().map(|k| f64::from(*k) * step).collect();
+        assert!(steps_of(&encoder));
+        assert!(!steps_of(&[0.1, 0.3721, 0.94112, 1.5, 2.718_28, 3.3]));
+    }
 }
