@@ -1,4 +1,4 @@
-use crate::support::root;
+use crate::support::{paper_pipeline, root, run_pipeline};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -66,6 +66,22 @@ fn the_limits_shown_in_the_guide_to_checks_are_understood() {
     let unset: Vec<&String> =
         all.as_object().expect("a table").iter().filter(|(_, v)| v.is_null()).map(|(k, _)| k).collect();
     assert!(unset.is_empty(), "docs/check.md does not show {unset:?}");
+}
+
+/// The mistake that the guide begins with, made in the shipped pipeline.
+#[test]
+fn the_mistake_shown_in_the_guide_to_the_setup_is_told_so() {
+    let guide = std::fs::read_to_string(root().join("docs/setup.md")).expect("guide");
+    let quoted: Vec<&str> = guide.lines().filter_map(|line| line.strip_prefix("> ")).collect();
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (right, wrong) = ("names = [\"joint1\", \"joint2\",", "names = [\"joint2\", \"joint1\",");
+    let pipeline = paper_pipeline(&root().join("fixtures/paper")).replace(right, wrong);
+    assert!(pipeline.contains(wrong), "the shipped pipeline names its joints otherwise");
+    let path = folder.path().join("p.toml");
+    std::fs::write(&path, pipeline).expect("written");
+    let summary = run_pipeline(&path, &folder.path().join("out"), &[3]);
+    let message = summary["setup"]["findings"][0]["message"].as_str().expect("a finding");
+    assert_eq!(quoted.join(" "), format!("Setup first: {message}."));
 }
 
 /// Stands before a block that quotes what a command prints.
