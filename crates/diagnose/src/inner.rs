@@ -232,8 +232,8 @@ fn warnings(
     for a in &search.accepted {
         if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
             let message = format!(
-                "{}: something changed between dwells; a load that is put on and not declared changes them too: check `load_kg` of \
-                 the recordings",
+                "{}: something changed between dwells; a load that is not declared, another tool or another arm in a recording \
+                 changes them too: check `load_kg`, and that all recordings are of this arm with this tool",
                 a.candidate.spec
             );
             add(Severity::Notice, "event-or-load", a.candidate.spec.clone(), message);

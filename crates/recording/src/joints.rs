@@ -181,7 +181,8 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
         }
         JointUnit::Rad => {
             format!(
-                "joint {name} reaches {reach_rad:.1} rad, which looks like degrees: set unit = \"deg\", {otherwise}"
+                "joint {name} reaches {reach_rad:.1} rad, which looks like degrees, or like a motor before its gear: set unit = \
+                 \"deg\", divide by the gear ratio, {otherwise}"
             )
         }
         JointUnit::Deg => {

@@ -5,8 +5,12 @@ use armcal_core::{JointSamples, PoseSamples, Samples};
 
 /// With the right reading, the speeds agree like this.
 const AGREES: f64 = 0.97;
+/// Correlations this close to each other are the same.
+const SAME: f64 = 1e-3;
 /// Ratios of gears and units that are mistaken for none.
 const RATIOS: [f64; 5] = [2.0, 3.0, 5.0, 57.2958, 100.0];
+/// Degrees in a radian.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 /// Below this many readings a second, movements are lost between them.
 const FEW_PER_S: f64 = 4.0;
 /// A body whose path is shorter than this stands still [m], where a joint turns by as much as this [rad].
@@ -43,7 +47,8 @@ pub fn what_would_align(
     }
     // Of those that do as well, the first: it is the simplest.
     let best = tried.iter().map(|t| t.0).fold(0.0, f64::max);
-    let first = tried.into_iter().find(|t| t.0 >= best - 0.5 * (1.0 - AGREES));
+    let like = |t: &(f64, String)| t.0 >= best - SAME.max(0.25 * (1.0 - best));
+    let first = tried.into_iter().find(like);
     first
         .map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})"))
         .or_else(|| still(samples))
@@ -86,6 +91,13 @@ fn changes(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
             (0..n).filter_map(|j| joints.names.get((j + by) % n).map(String::as_str)).collect();
         let words = format!("[joint-order] with the joints read in the order {}", order.join(", "));
         with_joints(&|s| s.joint_rad.rotate_left(by), words);
+    }
+    for (factor, words) in [
+        (DEGREES, "radians where degrees are declared"),
+        (1.0 / DEGREES, "degrees where radians are declared"),
+    ] {
+        let words = format!("[joint-unit] with the joints' readings taken for {words}");
+        with_joints(&|s| s.joint_rad.iter_mut().flatten().for_each(|q| *q *= factor), words);
     }
     let words = "[wrong-field] with the joints' readings taken for speeds and summed over time";
     with_joints(&summed, words.to_owned());

@@ -43,7 +43,7 @@ pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
 pub fn examine_failed(inputs: &Inputs) -> SetupReport {
     let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
     if report.findings.is_empty() {
-        report.findings.extend(facts::stuck(inputs));
+        report.findings.extend(facts::readings(inputs));
     }
     if report.findings.is_empty() {
         search::search(inputs, None, &mut report);

@@ -18,6 +18,8 @@ const HOMELESS_SHARE: f64 = 0.1;
 /// A change of the board that seats this many times as many dwells, the errors no larger than at the floor, undoes a
 /// mistake.
 const SEATED_FACTOR: f64 = 1.4;
+/// Where nothing could be fitted, fewer dwells than this that a change finds a place for say nothing: their places are free.
+const LEAST_USED: usize = 10;
 /// With a change that explains the errors they come within this many times the floor.
 pub const EXPLAINED: f64 = 10.0;
 /// The same of a change that estimates something.
@@ -36,7 +38,8 @@ pub fn explains(before: &Misfit, after: &Misfit) -> bool {
     // rest: then no dwell may be lost for it.
     let keeps = after.used >= before.used && after.homeless <= before.homeless && after.log < before.log;
     let all = before.log - after.log >= LEAST_FACTOR.ln();
-    let falls = after.mean_m <= before.mean_m / LEAST_FACTOR && (all || keeps);
+    let enough = before.used > 0 || after.used >= LEAST_USED;
+    let falls = enough && after.mean_m <= before.mean_m / LEAST_FACTOR && (all || keeps);
     let seats = after.seated as f64 >= SEATED_FACTOR * before.seated as f64
         && before.seated > 0
         && after.homeless < before.homeless
@@ -114,6 +117,13 @@ mod tests {
         let before = seated(100, 30.0);
         assert!(explains(&before, &seated(100, 9.99)));
         assert!(!explains(&before, &seated(100, 10.01)));
+    }
+
+    #[test]
+    fn where_nothing_was_fitted_a_handful_of_dwells_explains_nothing() {
+        assert!(!explains(&Misfit::of_nothing(), &seated(9, 1.0)));
+        assert!(explains(&Misfit::of_nothing(), &seated(10, 1.0)));
+        assert!(explains(&seated(5, 30.0), &seated(5, 1.0)));
     }
 
     #[test]

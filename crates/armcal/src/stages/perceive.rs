@@ -239,11 +239,12 @@ fn dwells_of_one(
         .filter_map(|(role, _, stream)| Some((role, travel_m(&stream.as_ref()?.position_m))))
         .collect();
 
+    let repeated = streams.iter().filter(|s| s.role == "joints").map(|s| s.duplicate_stamps).sum();
     let mut report = recording.report().clone();
     report.streams = streams;
     let fingerprint = Arc::new(Fingerprint::of(&samples));
     let name = name.to_owned();
-    let readings = Readings::of(&samples.joints, &dwells);
+    let readings = Readings::of(&samples.joints, repeated, &dwells);
     let seen = Seen {
         name,
         load_kg,

@@ -13,6 +13,8 @@ const HELD: usize = 5;
 const HELD_NS: i64 = 200_000_000;
 const STEP_RAD: f64 = 0.1;
 const TIMES: usize = 5;
+/// Stamps of which most follow each other so many times as close as even ones would come in bursts.
+const BURST: f64 = 20.0;
 /// Readings a dwell from which on their scatter says something.
 const MANY: usize = 10;
 /// A dwell whose joints read one value in this share of its readings does not scatter.
@@ -28,11 +30,13 @@ pub struct Readings {
     pub exact_rad: Vec<Vec<f64>>,
     /// Whether every joint reads nearly zero most of the time, and not always: speeds do.
     pub mostly_zero: bool,
+    /// What is wrong with the stamps, in a sentence without its full stop, where something is.
+    pub stamps: Option<String>,
 }
 
 impl Readings {
-    /// Looks at a stream and its dwells.
-    pub fn of(joints: &JointSamples, dwells: &[Dwell]) -> Readings {
+    /// Looks at a stream and its dwells; of its rows, `repeated` were dropped because they had the stamp of the one before.
+    pub fn of(joints: &JointSamples, repeated: u64, dwells: &[Dwell]) -> Readings {
         let at_rest = |column: &Vec<f64>| {
             let sizes: Vec<f64> = column.iter().map(|q| q.abs()).collect();
             median(&sizes) < RESTING && sizes.iter().copied().fold(0.0, f64::max) > MOVING
@@ -40,8 +44,30 @@ impl Readings {
         Readings {
             exact_rad: dwells.iter().filter_map(|d| exact(joints, d)).collect(),
             mostly_zero: !joints.is_empty() && joints.joint_rad.iter().all(at_rest),
+            stamps: stamps(&joints.time_ns, repeated),
         }
     }
+}
+
+/// Stamps that repeat, or come in bursts: rounded, or of another unit than nanoseconds.
+fn stamps(time_ns: &[i64], repeated: u64) -> Option<String> {
+    let rows = time_ns.len();
+    if repeated > rows as u64 {
+        return Some(format!(
+            "{repeated} of {} joint messages repeat the stamp of the one before and were dropped: the stamps are rounded",
+            rows as u64 + repeated
+        ));
+    }
+    let between_ns: Vec<f64> = time_ns.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
+    let (middle, mean) = (median(&between_ns), between_ns.iter().sum::<f64>() / between_ns.len() as f64);
+    (rows > MANY && middle < mean / BURST).then(|| {
+        format!(
+            "the stamps of the joints come in bursts, {:.3} ms apart where {:.0} ms would be even: they are of another time unit \
+             or rounded",
+            middle * 1e-6,
+            mean * 1e-6
+        )
+    })
 }
 
 /// The one value that each joint reads in most of a dwell, to the last bit.
@@ -158,8 +184,19 @@ mod tests {
     }
 
     #[test]
+    fn stamps_that_repeat_or_come_in_bursts_are_told() {
+        let even: Vec<i64> = (0..1000).map(|i| i * 10_000_000).collect();
+        assert_eq!(stamps(&even, 1000), None);
+        assert!(stamps(&even, 1001).is_some_and(|why| why.contains("1001 of 2001 joint messages repeat")));
+        // Microseconds where nanoseconds belong: a hundred messages in a thousandth of a second, every second.
+        let microseconds: Vec<i64> =
+            even.iter().map(|t| t / 1_000_000_000 * 1_000_000_000 + t % 1_000_000_000 / 1000).collect();
+        assert!(stamps(&microseconds, 0).is_some_and(|why| why.contains("0.010 ms apart where 9 ms")));
+    }
+
+    #[test]
     fn speeds_are_mostly_zero_and_angles_are_not() {
-        let of = |column: Vec<f64>| Readings::of(&stream(vec![column]), &[]).mostly_zero;
+        let of = |column: Vec<f64>| Readings::of(&stream(vec![column]), 0, &[]).mostly_zero;
         assert!(of((0..100).map(|i| if i % 10 < 3 { 0.5 } else { 0.001 }).collect()));
         assert!(!of((0..100).map(|i| if i < 30 { 0.5 } else { 0.3 }).collect()));
         assert!(!of(vec![0.0; 100]), "a joint that never moves is another matter");

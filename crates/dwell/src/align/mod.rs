@@ -398,7 +398,8 @@ impl<'a> Streams<'a> {
         let widest = self.joints.joint_rad.iter().map(span).fold(0.0, f64::max);
         let hint = if widest > 4.0 * std::f64::consts::PI {
             format!(
-                "a joint spans {widest:.0} rad, which looks like degrees: set unit = \"deg\" for the joint stream"
+                "a joint spans {widest:.0} rad, which looks like degrees, or like a motor before its gear: set unit = \"deg\" for the \
+                 joint stream, or divide by the gear ratio"
             )
         } else {
             "check that both streams are of the same session, the order, unit and direction of the joints, that the \

@@ -2,12 +2,15 @@
 
 use super::{TURNS_RAD, mistake};
 use crate::setup::trial::Inputs;
+use crate::stages::perceive::Seen;
 use armcal_core::{Certainty, SetupFinding};
 
 /// A joint that moved less than this over all dwells did not move [rad].
 const STUCK_RAD: f64 = 2e-4;
 /// Fewest dwells in a row that make a joint stuck.
 const MANY_STILL: usize = 8;
+/// A value that so many times as many dwells share as any other is one at which a reading ends.
+const CROWD: usize = 4;
 /// Share of the dwells that is nearly all of them.
 const NEARLY_ALL: f64 = 0.9;
 /// Readings nearer to each other than this are one [rad].
@@ -60,6 +63,56 @@ fn steps_of(sorted: &[f64]) -> bool {
             (steps - steps.round()).abs() < 0.05
         })
     })
+}
+
+/// Stamps of the joints that no clock gives.
+pub fn stamps(inputs: &Inputs) -> Vec<SetupFinding> {
+    let of = |s: &Seen| {
+        let why = s.readings.stamps.as_ref()?;
+        let message = format!("{why}; mend what stamps them, or set `clock = \"log\"` in [streams.joints]");
+        Some(mistake("stamps-wrong", format!("recording `{}`", s.name), message))
+    };
+    inputs.seen.iter().filter_map(of).collect()
+}
+
+/// Joints whose readings end at one value, again and again, while others turn.
+pub fn saturated(inputs: &Inputs) -> Vec<SetupFinding> {
+    let read_rad: Vec<&[f64]> = inputs.dwells().map(|d| &d.joint_rad[..]).collect();
+    let mut all = Vec::new();
+    for (j, name) in inputs.chain.joint_names().iter().enumerate() {
+        for (end, sign) in [("lowest", -1.0), ("highest", 1.0)] {
+            let Some((n, value_rad)) = at_one_end(&read_rad, j, sign) else { continue };
+            let finding = mistake(
+                "joint-saturated",
+                format!("joint {} ({name})", j + 1),
+                format!(
+                    "joint {} ({name}) reads its {end} value, {:.3} deg, in {n} of {} dwells, while others turn, and no other \
+                     value nearly as often: its reading may be saturated, clipped at this value; look at its driver and the \
+                     range of its encoder",
+                    j + 1,
+                    value_rad.to_degrees(),
+                    read_rad.len()
+                ),
+            );
+            all.push(SetupFinding { certainty: Certainty::Possible, ..finding });
+        }
+    }
+    all
+}
+
+/// How many dwells share the value at one end of a joint's range, and that value [rad], where they are many, not one pose,
+/// and many times as many as share any other value: poses on a grid share all of them.
+fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f64)> {
+    let mut sorted: Vec<f64> = read_rad.iter().map(|q| sign * q[joint]).collect();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let end = *sorted.first()?;
+    let like = |value: f64| sorted.iter().filter(|q| (*q - value).abs() < STUCK_RAD).count();
+    let there: Vec<&&[f64]> = read_rad.iter().filter(|q| end - sign * q[joint] < STUCK_RAD).collect();
+    let elsewhere = sorted[there.len()..].iter().map(|q| like(*q)).max()?;
+    let first = there.first()?;
+    let turned = |q: &&&[f64]| q.iter().zip(first.iter()).any(|(a, b)| (a - b).abs() > TURNS_RAD);
+    let many = there.len() >= MANY_STILL.max(read_rad.len() / 5) && there.len() >= CROWD * elsewhere;
+    (many && there.iter().any(turned)).then_some((there.len(), sign * end))
 }
 
 /// Joints that did not move while others did.
@@ -126,6 +179,22 @@ mod tests {
         assert_eq!(longest_still(&read, 0), 0, "it turns all the time");
         assert_eq!(longest_still(&read, 1), 12);
         assert_eq!(longest_still(&[&[0.3, 0.5][..]; 9], 1), 0, "nothing moved");
+    }
+
+    #[test]
+    fn a_joint_that_ends_at_one_value_while_others_turn_is_saturated() {
+        let clipped: Vec<[f64; 2]> =
+            (0..40).map(|i: i32| [0.05 * f64::from(i), (0.7 * f64::from(i)).sin().min(0.4)]).collect();
+        let read: Vec<&[f64]> = clipped.iter().map(|q| &q[..]).collect();
+        let (n, value) = at_one_end(&read, 1, 1.0).expect("it is clipped");
+        assert!(n >= 8 && (value - 0.4).abs() < 1e-12, "{n} {value}");
+        assert_eq!(at_one_end(&read, 1, -1.0), None);
+        assert_eq!(at_one_end(&read, 0, 1.0), None);
+        assert_eq!(at_one_end(&[&[0.3, 0.5][..]; 9], 1, 1.0), None, "nothing moved");
+        let grid: Vec<[f64; 2]> =
+            (0..60).map(|i: i32| [0.2 * f64::from(i / 3), 0.5 * f64::from(i % 3)]).collect();
+        let grid: Vec<&[f64]> = grid.iter().map(|q| &q[..]).collect();
+        assert_eq!(at_one_end(&grid, 1, 1.0), None, "poses on a grid share every value");
     }
 
     #[test]

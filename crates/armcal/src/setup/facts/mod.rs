@@ -9,7 +9,6 @@ use super::trial::Inputs;
 use crate::story::Fitted;
 use armcal_core::{Certainty, Pose, Role, SetupFinding};
 use armcal_table::Tilt;
-pub use joints::stuck;
 
 /// A joint that turned by this much did move [rad].
 const TURNS_RAD: f64 = 0.1;
@@ -33,10 +32,20 @@ pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding>
         all.extend(declared_frames(fitted));
     }
     if !sound {
-        all.extend(stuck(inputs));
+        all.extend(readings(inputs));
         all.extend(bodies::no_quaternion(inputs));
         all.extend(joints::set_points(inputs));
     }
+    all
+}
+
+/// Readings of joints that no encoder gives: stuck, saturated, with stamps of no clock.
+pub fn readings(inputs: &Inputs) -> Vec<SetupFinding> {
+    let mut all = joints::stuck(inputs);
+    if all.is_empty() {
+        all.extend(joints::saturated(inputs));
+    }
+    all.extend(joints::stamps(inputs));
     all
 }
 

@@ -144,7 +144,7 @@ fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
     if inputs.pipeline.parameters.iter().any(|p| p.free == Some(false)) {
         let own = |p: &Parameter| Estimated { parameter: p.name.clone(), nominal: p.nominal, far: FAR_FREED };
         let estimated = parameters.iter().map(own).collect();
-        let change = "what the pipeline's [[parameters]] hold fixed estimated";
+        let change = "all that is held fixed by the pipeline's [[parameters]] estimated";
         let hypothesis = Hypothesis::new("parameter-fixed", "the model", change, FREE, |i| {
             i.pipeline.parameters.retain(|p| p.free != Some(false));
         });

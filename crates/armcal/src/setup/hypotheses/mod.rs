@@ -146,6 +146,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
     let mut rarer = drives::hypotheses(inputs, at_bound);
+    rarer.extend(model::of_another_size(inputs));
     rarer.extend(board::from_the_other_side(inputs));
     [all, rarer]
 }

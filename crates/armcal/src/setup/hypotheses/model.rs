@@ -8,6 +8,14 @@ use armcal_core::{Parameter, Unit};
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
 /// A parameter on its bound is let go this many times as far.
 const WIDER: f64 = 30.0;
+/// Sizes of the model that are tried, the first and the last only as neighbours, and what no tolerance reaches.
+const SIZES: [f64; 11] = [0.4, 0.55, 0.65, 0.75, 0.87, 1.0, 1.15, 1.3, 1.45, 1.6, 2.0];
+const FAR_SIZE: f64 = 0.05;
+/// The same of what is added to the last length.
+const LONGER_MM: [f64; 15] = [
+    -400.0, -300.0, -240.0, -180.0, -120.0, -70.0, -30.0, 0.0, 30.0, 70.0, 120.0, 180.0, 240.0, 300.0, 400.0,
+];
+const FAR_LONGER_MM: f64 = 15.0;
 /// Parameters smaller than these are zero: their sign says nothing [m], [rad].
 const SMALLEST: f64 = 1e-3;
 
@@ -100,6 +108,33 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         });
         let estimated = at_bound.iter().map(Estimated::beyond).collect();
         all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Frame));
+    }
+    all
+}
+
+/// A model of another size, or of an arm with another tool. Rarer.
+pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
+    let parameters = inputs.chain.parameters();
+    let lengths: Vec<String> =
+        parameters.iter().filter(|p| p.unit == Unit::Metre).map(|p| p.name.clone()).collect();
+    if lengths.is_empty() {
+        return Vec::new();
+    }
+    let mut all = Hypothesis::of_each(&SIZES, 1.0, FAR_SIZE, move |times| {
+        let lengths = lengths.clone();
+        let change =
+            format!("all lengths of the model {times:.3} times as long (the model file of another arm)");
+        Hypothesis::new("link-length", "the model", change, FILE, move |i| {
+            i.changes.extend(lengths.iter().map(|name| Change::nominal(name, times, 0.0)));
+        })
+    });
+    for column in [".a", ".d"] {
+        let Some(last) = parameters.iter().rev().find(|p| p.name.ends_with(column)) else { continue };
+        let name = last.name.clone();
+        all.extend(Hypothesis::of_each(&LONGER_MM, 0.0, FAR_LONGER_MM, move |mm| {
+            let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
+            nominal("tool-length", &name, change, 1.0, mm * 1e-3)
+        }));
     }
     all
 }
