@@ -9,6 +9,9 @@ use armcal_model::Model;
 use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
 use nalgebra::{Matrix3, Vector3};
 
+/// Fewer dwells than parameters of a three-axis arm calibrate nothing.
+const FEW: usize = 12;
+
 /// The observations of all recordings, and the dwells that did not become one.
 pub struct Observed {
     /// What the fit sees.
@@ -85,7 +88,13 @@ pub fn observations(
             "no dwell was found: lower [dwell] thresholds or check the joints stream".to_owned(),
             |r| format!("the first was rejected because {}", r.why),
         );
-        return Err(Error::NoObservations { dwells: observed.rejections.len(), hint });
+        let dwells = observed.rejections.len();
+        let few = if (1..FEW).contains(&dwells) {
+            "; so few dwells are too few for a calibration: were the recordings cut short?"
+        } else {
+            ""
+        };
+        return Err(Error::NoObservations { dwells, hint: hint + few });
     }
     Ok(observed)
 }

@@ -170,7 +170,7 @@ impl Scale {
             if shortest_s < 2.0 * self.h_s {
                 return Err(DwellError::NoMotion {
                     seen: format!(
-                        "there are {groups} separate movements, errors cannot be told from fewer than \
+                        "there are {groups} separate movements, too few: errors cannot be told from fewer than \
                          {MIN_MOVEMENTS}"
                     ),
                     advice: "record more moves between poses",
