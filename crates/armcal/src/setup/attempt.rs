@@ -38,8 +38,10 @@ fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
         let values = tried.iter().filter(|t| own(t));
         let Some(best) = values.min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log)) else { continue };
         let refined = (best.misfit.log < before.log).then(|| refined(now, best)).flatten();
+        // In the place of its values: of what cannot be told apart the first in the list is believed.
+        let place = tried.iter().take_while(|t| !own(t)).count();
         tried.retain(|t| !own(t));
-        tried.extend(refined);
+        tried.splice(place..place, refined);
     }
 }
 
