@@ -17,6 +17,9 @@ const NAMED: &[(&str, Rig)] = &[
     ("half-turn-off", Rig::Table),
     ("tip-axis-mirrored", Rig::Table),
     ("joint-frozen-from-the-middle", Rig::Sockets),
+    ("joint-stamps-in-microseconds", Rig::Sockets),
+    ("tip-is-a-still-body", Rig::Poses),
+    ("encoder-stale", Rig::Sockets),
 ];
 
 fn answer(name: &str, rig: Rig) -> Case {
