@@ -6,7 +6,7 @@ use super::beyond::beyond_physics;
 use super::hypotheses::{Freedom, Hypothesis, hypotheses};
 use super::trial::{Inputs, Misfit};
 use super::unseen::unseen;
-use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone};
+use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone, sure};
 use super::words::{finding, moved_frame};
 use crate::story::Fitted;
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
@@ -121,8 +121,8 @@ fn weight(t: &Tried) -> (Freedom, f64) {
     (t.hypothesis.freedom, t.misfit.log)
 }
 
-/// Those that explain the errors; of what explains them with a number that physics reaches, freedom and misfit. Changes of
-/// the model's own parameters that leave nothing above the floor, but too little was above it to be sure, are `possible`.
+/// Those that explain the errors; of what explains them with a number that physics reaches, freedom and misfit. Where too
+/// little was above the floor to be sure, frames and changes of the model's own parameters are `possible`.
 fn explaining(
     now: &Inputs,
     first: Option<&Fitted>,
@@ -137,7 +137,8 @@ fn explaining(
         if !explains && !(own && at_the_floor(before, &t.misfit)) {
             continue;
         }
-        match (beyond_physics(now, first, &t), explains) {
+        let certain = explains && (t.hypothesis.recording.is_some() || sure(before, t.hypothesis.freedom));
+        match (beyond_physics(now, first, &t), certain) {
             (true, true) => far.push(t),
             (true, false) => possible.push(t),
             (false, true) if t.hypothesis.number.is_some() => within.push(weight(&t)),

@@ -10,6 +10,8 @@ pub const WORTH_LOOKING: f64 = 1.5;
 const LEAST_FACTOR: f64 = 3.0;
 /// Changes that fit within this factor of each other are not told apart.
 pub const ALIKE_FACTOR: f64 = 1.3;
+/// Below this many times the floor, frames that are let go are possible, not sure.
+const FRAMES_FROM: f64 = 5.0;
 /// Errors within this many times the floor leave nothing to explain.
 const NOTHING_LEFT: f64 = 1.2;
 /// With this many dwells at the board and in no cavity, and this share of all there, the board is in doubt.
@@ -55,6 +57,12 @@ pub fn far_enough(before: &Misfit, freedom: Freedom, after: &Misfit) -> bool {
         Freedom::Number | Freedom::Frame => ESTIMATED_EXPLAINED,
     };
     after.times_floor() < near || after.log < before.log - EXPLAINED.ln()
+}
+
+/// Whether errors are so large that what explains them with this freedom is a mistake and no share that it takes of
+/// something physical.
+pub fn sure(before: &Misfit, freedom: Freedom) -> bool {
+    freedom != Freedom::Frame || before.times_floor() >= FRAMES_FROM
 }
 
 /// Whether a change loses no dwell and leaves nothing to explain.
@@ -190,6 +198,13 @@ mod tests {
         assert!(!at_the_floor(&before, &seated(100, 1.21)));
         assert!(!at_the_floor(&before, &seated(99, 1.0)));
         assert!(!at_the_floor(&before, &Misfit { homeless: 1, ..seated(100, 1.0) }));
+    }
+
+    #[test]
+    fn frames_are_sure_of_large_errors_only() {
+        assert!(sure(&seated(100, 1.5), Freedom::Discrete) && sure(&seated(100, 1.5), Freedom::Number));
+        assert!(!sure(&seated(100, 4.99), Freedom::Frame) && sure(&seated(100, 5.0), Freedom::Frame));
+        assert!(sure(&Misfit::of_nothing(), Freedom::Frame));
     }
 
     #[test]
