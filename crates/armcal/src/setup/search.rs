@@ -134,7 +134,8 @@ fn explaining(
     for t in tried {
         let explains = explains(before, &t.misfit) && far_enough(before, t.hypothesis.freedom, &t.misfit);
         let own = OF_THE_MODEL.contains(&t.hypothesis.code) && !t.hypothesis.estimated.is_empty();
-        if !explains && !(own && at_the_floor(before, &t.misfit)) {
+        let perhaps = own && at_the_floor(before, &t.misfit);
+        if !(explains || perhaps) {
             continue;
         }
         let certain = explains && (t.hypothesis.recording.is_some() || sure(before, t.hypothesis.freedom));

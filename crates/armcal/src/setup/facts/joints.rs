@@ -202,6 +202,6 @@ mod tests {
         let step = 2.0 * std::f64::consts::PI / 8192.0;
         let encoder: Vec<f64> = [3, 17, 20, 220, 911].iter().map(|k| f64::from(*k) * step).collect();
         assert!(steps_of(&encoder));
-        assert!(!steps_of(&[0.1, 0.3721, 0.94112, 1.5, 2.718_28, 3.3]));
+        assert!(!steps_of(&[0.1, 0.3721, 0.94112, 1.5, 2.7281, 3.3]));
     }
 }
