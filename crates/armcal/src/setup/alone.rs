@@ -1,6 +1,6 @@
 //! Recordings of which each fits by itself and all together do not: what moved between them?
 
-use super::beyond::{FAR_M, FAR_RAD};
+use super::beyond::{FAR_M, FAR_RAD, apart};
 use super::trial::{Inputs, Misfit};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use crate::pipeline::FramePose;
@@ -26,13 +26,9 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
     };
     let alone: Vec<(Misfit, Pose)> =
         (0..inputs.seen.len()).into_par_iter().map(alone).collect::<Option<_>>()?;
-    let by = |a: &Pose, b: &Pose| {
-        let by = a.inverse() * b;
-        (by.translation.vector.norm(), by.rotation.angle())
-    };
-    let apart: Vec<(f64, f64)> = alone.windows(2).map(|w| by(&w[0].1, &w[1].1)).collect();
-    let k = (0..apart.len()).max_by(|a, b| apart[*a].0.total_cmp(&apart[*b].0))?;
-    let (m, rad) = apart[k];
+    let moves: Vec<(f64, f64)> = alone.windows(2).map(|w| apart(&w[0].1, &w[1].1)).collect();
+    let k = (0..moves.len()).max_by(|a, b| moves[*a].0.total_cmp(&moves[*b].0))?;
+    let (m, rad) = moves[k];
     if m < FAR_M && rad < FAR_RAD {
         return None;
     }

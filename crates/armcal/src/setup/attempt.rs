@@ -35,44 +35,52 @@ fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
     numbers.dedup();
     for number in numbers {
         let own = |t: &Tried| of_number(t) && name(t) == number;
-        let values = tried.iter().filter(|t| own(t));
-        let Some(best) = values.min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log)) else { continue };
-        let refined = (best.misfit.log < before.log).then(|| refined(now, best)).flatten();
         // In the place of its values: of what cannot be told apart the first in the list is believed.
         let place = tried.iter().take_while(|t| !own(t)).count();
-        tried.retain(|t| !own(t));
-        tried.splice(place..place, refined);
+        let (values, others): (Vec<Tried>, Vec<Tried>) = std::mem::take(tried).into_iter().partition(own);
+        *tried = others;
+        let best = values.into_iter().min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log));
+        let worth = best.filter(|best| best.misfit.log < before.log);
+        tried.splice(place..place, worth.map(|best| refined(now, best)));
     }
 }
 
 /// The best value of a number between the neighbours of the one that was tried, by golden section.
-fn refined(now: &Inputs, tried: &Tried) -> Option<Tried> {
-    let number = tried.hypothesis.number.as_ref()?;
+fn refined(now: &Inputs, tried: Tried) -> Tried {
+    let Some(number) = tried.hypothesis.number.clone() else { return tried };
     let ratio = (5f64.sqrt() - 1.0) / 2.0;
     let at = |value: f64| {
+        let of_value = (number.at)(value);
         let number = Some(Number { value, ..number.clone() });
-        attempt(
-            now,
-            Hypothesis { number, freedom: Freedom::Number, ..(tried.hypothesis.number.as_ref()?.at)(value) },
-        )
+        attempt(now, Hypothesis { number, freedom: Freedom::Number, ..of_value })
     };
+    let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.mean_m);
     let [mut low, mut high] = number.between;
-    let mut best = at(number.value);
-    for _ in 0..REFINEMENTS {
-        let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
-        let (at_a, at_b) = (at(a), at(b));
-        let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.mean_m);
-        let left = mean(&at_a) < mean(&at_b);
-        let better = if left { at_a } else { at_b };
-        if mean(&better) < mean(&best) {
-            best = better;
+    let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));
+    let (mut at_a, mut at_b) = (at(a), at(b));
+    // Each step keeps the better of the two inner values, and tries one more.
+    for _ in 1..REFINEMENTS {
+        if mean(&at_a) < mean(&at_b) {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - ratio * (high - low);
+            at_a = at(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + ratio * (high - low);
+            at_b = at(b);
         }
-        (low, high) = if left { (low, b) } else { (a, high) };
+    }
+    let mut best = tried;
+    for other in [at_a, at_b].into_iter().flatten() {
+        if other.misfit.mean_m < best.misfit.mean_m {
+            best = other;
+        }
     }
     best
 }
 
-fn attempt(now: &Inputs, hypothesis: Hypothesis) -> Option<Tried> {
+/// A hypothesis, fitted.
+pub fn attempt(now: &Inputs, hypothesis: Hypothesis) -> Option<Tried> {
     let inputs = hypothesis.undone(now);
     let fitted = inputs.fit().ok()?;
     let misfit = inputs.misfit(&fitted);

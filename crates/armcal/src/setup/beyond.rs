@@ -36,20 +36,22 @@ pub fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool 
     }
 }
 
+/// How far one pose lies from another [m], [rad].
+pub fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    let by = a.inverse() * b;
+    (by.translation.vector.norm(), by.rotation.angle())
+}
+
 /// How far the frame that a hypothesis estimates moves from one fit to the other [m], [rad]; the furthest over the
 /// recordings. None where it is not about a frame.
 pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
-    let by = |from: Pose, to: Pose| {
-        let by = from.inverse() * to;
-        (by.translation.vector.norm(), by.rotation.angle())
-    };
     let (a, b) = (&from.model, &to.model);
     let (p, q) = (from.calibration.fit.values(), to.calibration.fit.values());
     match code {
-        "base-frame" => Some(by(a.base_in_world(&p), b.base_in_world(&q))),
-        "tool-frame" => Some(by(a.tip_in_last_link(&p), b.tip_in_last_link(&q))),
+        "base-frame" => Some(apart(&a.base_in_world(&p), &b.base_in_world(&q))),
+        "tool-frame" => Some(apart(&a.tip_in_last_link(&p), &b.tip_in_last_link(&q))),
         "board-pose" => {
-            let of = |r: usize| Some(by(a.board_in_world(&p, r)?, b.board_in_world(&q, r)?));
+            let of = |r: usize| Some(apart(&a.board_in_world(&p, r)?, &b.board_in_world(&q, r)?));
             (0..now.seen.len()).filter_map(of).reduce(|x, y| (x.0.max(y.0), x.1.max(y.1)))
         }
         _ => None,

@@ -1,5 +1,7 @@
 //! Clocks that cannot be aligned because something is read wrongly: the tip's speed is then another one than the arm's.
 
+use super::DEGREES;
+use super::facts::{spread, still_tip};
 use crate::stages::readings::LEAP_RAD;
 use armcal_core::{JointSamples, PoseSamples, Samples};
 
@@ -9,13 +11,8 @@ const AGREES: f64 = 0.97;
 const SAME: f64 = 1e-3;
 /// Ratios of gears and units that are mistaken for none.
 const RATIOS: [f64; 5] = [2.0, 3.0, 5.0, 57.2958, 100.0];
-/// Degrees in a radian.
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 /// Below this many readings a second, movements are lost between them.
 const FEW_PER_S: f64 = 4.0;
-/// A body whose path is shorter than this stands still [m], where a joint turns by as much as this [rad].
-const STANDS_M: f64 = 5e-3;
-const TURNS_RAD: f64 = 0.1;
 
 /// What the clocks are aligned with.
 #[derive(Clone)]
@@ -160,20 +157,9 @@ fn still(samples: &Samples) -> Option<String> {
     let tip = samples.tip.as_ref()?;
     let first = tip.position_m.first()?;
     let tip_m = tip.position_m.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
-    let range = |column: &Vec<f64>| {
-        let (low, high) =
-            column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(*q), h.max(*q)));
-        high - low
-    };
-    let turned_rad = samples.joints.joint_rad.iter().map(range).fold(0.0, f64::max);
-    (tip_m < STANDS_M && turned_rad > TURNS_RAD).then(|| {
-        format!(
-            "[streams-swapped] the body read as the tip stands still (within {:.2} mm) while the joints turn by {:.0} deg: it is \
-             another body, mend [streams.tip]",
-            tip_m * 1e3,
-            turned_rad.to_degrees()
-        )
-    })
+    let columns = samples.joints.joint_rad.iter();
+    let turned_rad = columns.map(|column| spread(column.iter().copied())).fold(0.0, f64::max);
+    still_tip(tip_m, turned_rad).map(|message| format!("[streams-swapped] {message}"))
 }
 
 /// A stream that is too thin to show movements.

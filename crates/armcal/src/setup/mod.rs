@@ -25,6 +25,9 @@ pub use trial::{Change, Inputs};
 use crate::story::Fitted;
 use armcal_core::SetupReport;
 
+/// Degrees in a radian.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
 /// Looks for mistakes in the inputs of a calibration.
 pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
     let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };

@@ -31,18 +31,15 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
     }
     let mut possible = Vec::new();
     let (found, ended) = one_upon_the_other(now, first, begun, report, &mut possible);
-    let alone = || fitted.and_then(|fitted| each_alone(inputs, fitted, &begun));
-    match &found[..] {
-        [] => {
-            let perhaps = || perhaps(inputs, fitted?, &begun, &possible);
-            report.findings.extend(alone().or_else(perhaps));
+    let one_recording = matches!(&found[..], [(only, _)] if only.recording.is_some());
+    let alone = fitted.filter(|_| found.is_empty() || one_recording);
+    report.findings.extend(match alone.and_then(|fitted| each_alone(inputs, fitted, &begun)) {
+        Some(finding) => vec![finding],
+        None if found.is_empty() => {
+            fitted.and_then(|f| perhaps(inputs, f, &begun, &possible)).into_iter().collect()
         }
-        [(only, _)] if only.recording.is_some() => match alone() {
-            Some(finding) => report.findings.push(finding),
-            None => report.findings.extend(told(inputs, fitted, &found, (begun, ended))),
-        },
-        _ => report.findings.extend(told(inputs, fitted, &found, (begun, ended))),
-    }
+        None => told(inputs, fitted, &found, (begun, ended)),
+    });
 }
 
 /// The mistakes that explain the errors, and the misfit without them; `first` is the fit as it is, `before` its misfit.

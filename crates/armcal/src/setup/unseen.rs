@@ -1,5 +1,6 @@
 //! Mistakes that leave no trace: with them undone the data fit as well as they are.
 
+use super::attempt::{Tried, attempt};
 use super::hypotheses::reversed;
 use super::trial::{Inputs, Misfit};
 use armcal_core::Unseen;
@@ -12,8 +13,7 @@ const SAME_FACTOR: f64 = 1.05;
 pub fn unseen(inputs: &Inputs, now: &Misfit) -> Option<Unseen> {
     let names = inputs.chain.joint_names();
     let hypothesis = reversed(names, vec![names.len().checked_sub(1)?]);
-    let changed = hypothesis.undone(inputs);
-    let misfit = changed.misfit(&changed.fit().ok()?);
+    let Tried { hypothesis, misfit, .. } = attempt(inputs, hypothesis)?;
     let same = misfit.used == now.used && (misfit.log - now.log).abs() < SAME_FACTOR.ln();
     same.then(|| Unseen {
         code: hypothesis.code,

@@ -49,13 +49,11 @@ pub fn finding(
         true => String::new(),
         false => format!(" (these data cannot tell it from: {})", armcal_core::listed(alternatives)),
     };
-    let with =
-        if together == h.change { format!("with {}{or}", h.change) } else { format!("with {together}{or}") };
     let ends = moved.unwrap_or_else(|| after.map_or(String::new(), |c| estimated(h, c)));
     SetupFinding {
         code: h.code,
         subject: h.subject.clone(),
-        message: format!("{with} {falls}{ends}; {}", h.remedy),
+        message: format!("with {together}{or} {falls}{ends}; {}", h.remedy),
         certainty: Certainty::Mistake,
         before_mm: before_m.map(|m| m * 1e3),
         after_mm: Some(after_m * 1e3),

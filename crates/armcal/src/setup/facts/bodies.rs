@@ -1,6 +1,7 @@
 //! Base, table and tip: do they move and turn as what they are said to be?
 
 use super::{TURNS_RAD, mistake};
+use crate::setup::beyond::apart;
 use crate::setup::trial::Inputs;
 use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, SetupFinding};
@@ -52,17 +53,8 @@ pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
             joints.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
         let turned_rad = seen.dwells.iter().map(moved).fold(0.0, f64::max);
-        if tips.len() > 2 && tip_m < STANDS_M && turned_rad > TURNS_RAD {
-            all.push(mistake(
-                "streams-swapped",
-                format!("recording `{}`", seen.name),
-                format!(
-                    "the body read as the tip stood still (within {:.2} mm) while the joints turned by {:.0} deg: it is \
-                     another body; mend [streams.tip]",
-                    tip_m * 1e3,
-                    turned_rad.to_degrees()
-                ),
-            ));
+        if let Some(message) = still_tip(tip_m, turned_rad).filter(|_| tips.len() > 2) {
+            all.push(mistake("streams-swapped", format!("recording `{}`", seen.name), message));
         }
         for (role, travel_m) in &seen.travels_m {
             if *travel_m > MOVES_M {
@@ -81,13 +73,22 @@ pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
     all
 }
 
+/// A tip that moved by `tip_m` at most while a joint turned by `turned_rad`, in a sentence where it should have moved more.
+pub fn still_tip(tip_m: f64, turned_rad: f64) -> Option<String> {
+    (tip_m < STANDS_M && turned_rad > TURNS_RAD).then(|| {
+        format!(
+            "the body read as the tip stood still (within {:.2} mm) while the joints turned by {:.0} deg: it is another body; \
+             mend [streams.tip]",
+            tip_m * 1e3,
+            turned_rad.to_degrees()
+        )
+    })
+}
+
 /// Base and table that are one body in every recording.
 pub fn same_body(inputs: &Inputs) -> Option<SetupFinding> {
-    let apart = |s: &Seen| {
-        let by = s.base.as_ref()?.pose.inverse() * s.table.as_ref()?.pose;
-        Some((by.translation.vector.norm(), by.rotation.angle()))
-    };
-    let all: Option<Vec<(f64, f64)>> = inputs.seen.iter().map(apart).collect();
+    let of = |s: &Seen| Some(apart(&s.base.as_ref()?.pose, &s.table.as_ref()?.pose));
+    let all: Option<Vec<(f64, f64)>> = inputs.seen.iter().map(of).collect();
     let all =
         all.filter(|all| !all.is_empty() && all.iter().all(|(m, rad)| *m < SAME_M && *rad < SAME_RAD))?;
     let apart_mm = all.iter().map(|(m, _)| m * 1e3).fold(0.0, f64::max);

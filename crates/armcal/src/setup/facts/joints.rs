@@ -1,9 +1,9 @@
 //! Readings of joints that no encoder gives: stuck, speeds, what was asked for.
 
-use super::{TURNS_RAD, mistake};
+use super::{TURNS_RAD, mistake, possible, spread};
 use crate::setup::trial::Inputs;
 use crate::stages::perceive::Seen;
-use armcal_core::{Certainty, SetupFinding};
+use armcal_core::SetupFinding;
 
 /// A joint that moved less than this over all dwells did not move [rad].
 const STUCK_RAD: f64 = 2e-4;
@@ -41,7 +41,7 @@ pub fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
         read.dedup_by(|a, b| (*a - *b).abs() < EXACT_RAD);
         read.len() < 2 || steps_of(&read)
     });
-    let finding = mistake(
+    let finding = possible(
         "setpoints-recorded",
         "the joints".to_owned(),
         format!(
@@ -50,7 +50,7 @@ pub fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
             exact.len()
         ),
     );
-    (!on_steps).then_some(SetupFinding { certainty: Certainty::Possible, ..finding })
+    (!on_steps).then_some(finding)
 }
 
 /// Whether sorted readings lie on steps of one size, up to [`FINEST`] times finer than the least distance between two.
@@ -82,7 +82,7 @@ pub fn saturated(inputs: &Inputs) -> Vec<SetupFinding> {
     for (j, name) in inputs.chain.joint_names().iter().enumerate() {
         for (end, sign) in [("lowest", -1.0), ("highest", 1.0)] {
             let Some((n, value_rad)) = at_one_end(&read_rad, j, sign) else { continue };
-            let finding = mistake(
+            all.push(possible(
                 "joint-saturated",
                 format!("joint {} ({name})", j + 1),
                 format!(
@@ -93,8 +93,7 @@ pub fn saturated(inputs: &Inputs) -> Vec<SetupFinding> {
                     value_rad.to_degrees(),
                     read_rad.len()
                 ),
-            );
-            all.push(SetupFinding { certainty: Certainty::Possible, ..finding });
+            ));
         }
     }
     all
@@ -118,19 +117,12 @@ fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f6
 /// Joints that did not move while others did.
 pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
     let names = inputs.chain.joint_names();
-    let range = |j: usize| {
-        let all = inputs.dwells().map(|d| d.joint_rad[j]);
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
-        high - low
-    };
-    let ranges: Vec<f64> = (0..names.len()).map(range).collect();
-    let others_move = ranges.iter().any(|r| *r > TURNS_RAD);
+    let others_move = (0..names.len()).any(|j| spread(inputs.dwells().map(|d| d.joint_rad[j])) > TURNS_RAD);
+    let read_rad: Vec<Vec<&[f64]>> =
+        inputs.seen.iter().map(|s| s.dwells.iter().map(|d| &d.joint_rad[..]).collect()).collect();
     let mut all = Vec::new();
     for (j, name) in names.iter().enumerate().filter(|_| others_move) {
-        let still = inputs.seen.iter().map(|s| {
-            let read_rad: Vec<&[f64]> = s.dwells.iter().map(|d| &d.joint_rad[..]).collect();
-            (s, longest_still(&read_rad, j))
-        });
+        let still = inputs.seen.iter().zip(&read_rad).map(|(s, read)| (s, longest_still(read, j)));
         let Some((recording, still)) = still.max_by_key(|(_, n)| *n) else { continue };
         if still < MANY_STILL.max(recording.dwells.len() / 4) {
             continue;
@@ -139,8 +131,8 @@ pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
             "joint-stuck",
             format!("joint {} ({name})", j + 1),
             format!(
-                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move: its reading is stuck, or read from the wrong field; mend the stream of the \
-                 joints or the driver",
+                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move: its reading \
+                 is stuck, or read from the wrong field; mend the stream of the joints or the driver",
                 j + 1,
                 recording.name,
                 recording.dwells.len()

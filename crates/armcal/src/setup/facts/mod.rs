@@ -5,6 +5,8 @@
 mod bodies;
 mod joints;
 
+pub use bodies::still_tip;
+
 use super::trial::Inputs;
 use crate::story::Fitted;
 use armcal_core::{Certainty, Pose, Role, SetupFinding};
@@ -106,24 +108,32 @@ fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
         let off = e.value - e.parameter.nominal;
         if off.abs() > SIGMAS * sigma && off.abs() > OFF && e.parameter.free {
             let unit = e.parameter.unit;
-            all.push(SetupFinding {
-                certainty: Certainty::Possible,
-                ..mistake(
-                    "frame-declared",
-                    e.parameter.name.clone(),
-                    format!(
-                        "{} ends {:.2} {} from where it was measured, {:.0} times the declared standard error; measure it \
-                         again, declare its true standard error, or look for what moved",
-                        e.parameter.name,
-                        unit.to_display(off),
-                        unit.display_symbol(),
-                        off.abs() / sigma
-                    ),
-                )
-            });
+            all.push(possible(
+                "frame-declared",
+                e.parameter.name.clone(),
+                format!(
+                    "{} ends {:.2} {} from where it was measured, {:.0} times the declared standard error; measure it again, \
+                     declare its true standard error, or look for what moved",
+                    e.parameter.name,
+                    unit.to_display(off),
+                    unit.display_symbol(),
+                    off.abs() / sigma
+                ),
+            ));
         }
     }
     all
+}
+
+/// Between the lowest and the highest of some values.
+pub fn spread(values: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    high - low
+}
+
+/// What is worth a look; the result may stand.
+fn possible(code: &'static str, subject: String, message: String) -> SetupFinding {
+    SetupFinding { certainty: Certainty::Possible, ..mistake(code, subject, message) }
 }
 
 fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding {

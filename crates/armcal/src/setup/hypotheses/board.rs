@@ -60,15 +60,13 @@ pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
     if inputs.board.is_none() || inputs.pipeline.table.is_none() {
         return Vec::new();
     }
-    let mirrored = symmetries()
-        .into_iter()
-        .filter(|(_, words, _)| ["upside down", "mirrored"].iter().any(|sided| words.starts_with(sided)));
+    // One axis of the outline reversed, whatever becomes of the heights.
+    let mirrored = symmetries().into_iter().filter(|(matrix, ..)| matrix.m11 * matrix.m22 < 0.0);
     let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, &'static str)| {
         let at = move |height_mm: f64| {
-            let (height, side) = (height_mm.abs(), if height_mm > 0.0 { "higher" } else { "lower" });
-            let change = format!("the board {words} and its seats {height:.2} mm {side}");
+            let change = format!("the board {words} and its seats {}", higher(height_mm));
             Hypothesis::new(code, "the board", change, FILE, move |i| {
-                map_cavities(i, |p| matrix * p + Vector3::new(0.0, 0.0, height_mm * 1e-3));
+                map_cavities(i, |p| matrix * p + up(height_mm));
             })
         };
         Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, at)
@@ -93,21 +91,29 @@ fn scaled(scale: f64) -> Hypothesis {
 }
 
 fn raised(height_mm: f64) -> Hypothesis {
-    let (height, side) = (height_mm.abs(), if height_mm > 0.0 { "higher" } else { "lower" });
-    let change = format!("seated points {height:.2} mm {side} than drawn");
+    let change = format!("seated points {} than drawn", higher(height_mm));
     Hypothesis::new("seat-height", "the board", change, FILE, move |i| {
-        map_cavities(i, |p| p + Vector3::new(0.0, 0.0, height_mm * 1e-3));
+        map_cavities(i, |p| p + up(height_mm));
     })
 }
 
 fn raised_alone(group: &str, height_mm: f64) -> Hypothesis {
-    let (height, side) = (height_mm.abs(), if height_mm > 0.0 { "higher" } else { "lower" });
     let (subject, group) = (format!("cavities `{group}…`"), group.to_owned());
-    let change = format!("the seats of the {subject} {height:.2} mm {side} than drawn");
+    let change = format!("the seats of the {subject} {} than drawn", higher(height_mm));
     Hypothesis::new("seat-height", subject, change, FILE, move |i| {
         let own = i.board.iter_mut().flat_map(|b| &mut b.cavities).filter(|c| group_of(&c.name) == group);
-        own.for_each(|c| c.in_board_m.z += height_mm * 1e-3);
+        own.for_each(|c| c.in_board_m += up(height_mm));
     })
+}
+
+fn up(height_mm: f64) -> Vector3<f64> {
+    Vector3::new(0.0, 0.0, height_mm * 1e-3)
+}
+
+/// `2.50 mm higher`.
+fn higher(height_mm: f64) -> String {
+    let side = if height_mm > 0.0 { "higher" } else { "lower" };
+    format!("{:.2} mm {side}", height_mm.abs())
 }
 
 /// Boards that look alike to whoever draws them.

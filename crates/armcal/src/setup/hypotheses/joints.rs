@@ -1,6 +1,7 @@
 //! Joint readings: sign, order, unit, counts a turn, zero.
 
 use super::Hypothesis;
+use crate::setup::DEGREES;
 use crate::setup::trial::Inputs;
 use armcal_core::{Arrival, Dwell, Unit};
 use std::f64::consts::FRAC_PI_2;
@@ -28,10 +29,9 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             i.each_dwell(|d| reorder(d, &order));
         }));
     }
-    let degrees = 180.0 / std::f64::consts::PI;
     for (factor, words) in [
-        (1.0 / degrees, "read as degrees instead of radians"),
-        (degrees, "read as radians instead of degrees"),
+        (1.0 / DEGREES, "read as degrees instead of radians"),
+        (DEGREES, "read as radians instead of degrees"),
     ] {
         let each = turning.iter().map(|&j| (vec![j], joint(j)));
         for (set, subject) in each.chain([(turning.clone(), "all joints".to_owned())]) {

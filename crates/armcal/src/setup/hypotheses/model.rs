@@ -2,6 +2,7 @@
 
 use super::joints::ZERO;
 use super::{Estimated, Freedom, Hypothesis};
+use crate::setup::DEGREES;
 use crate::setup::trial::{Change, Inputs};
 use armcal_core::{Parameter, Unit};
 
@@ -37,7 +38,6 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     let of_unit = |unit: Unit| -> Vec<String> {
         inputs.chain.parameters().iter().filter(|p| p.unit == unit).map(|p| p.name.clone()).collect()
     };
-    let degrees = 180.0 / std::f64::consts::PI;
     for (unit, factor, words) in [
         (Unit::Metre, 1e-3, "all lengths of the model a thousandth (micrometres given as millimetres)"),
         (Unit::Metre, 1e3, "all lengths of the model a thousand times as long (metres given as millimetres)"),
@@ -45,8 +45,8 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         (Unit::Metre, 10.0, "all lengths of the model ten times as long (centimetres given as millimetres)"),
         (Unit::Metre, 25.4, "all lengths of the model 25.4 times as long (inches given as millimetres)"),
         (Unit::Metre, 1.0 / 25.4, "all lengths of the model divided by 25.4 (millimetres given as inches)"),
-        (Unit::Radian, degrees, "all angles of the model read as radians, not degrees"),
-        (Unit::Radian, 1.0 / degrees, "all angles of the model read as degrees, not radians"),
+        (Unit::Radian, DEGREES, "all angles of the model read as radians, not degrees"),
+        (Unit::Radian, 1.0 / DEGREES, "all angles of the model read as degrees, not radians"),
     ] {
         let names = of_unit(unit);
         if !names.is_empty() {
