@@ -306,3 +306,7 @@ fn listed<'p>(problem: &'p Problem, candidate: &Candidate) -> Option<&'p Candida
     let all = problem.candidates.iter().chain(problem.scans.iter().flat_map(|s| &s.points));
     all.into_iter().find(|c| c.spec == candidate.spec)
 }
+
+#[cfg(test)]
+#[path = "tests/forward.rs"]
+mod tests;

@@ -275,3 +275,7 @@ fn direction_suspects(a: &Accepted) -> Vec<armcal_core::DwellId> {
         .map(|i| problem.dwells[i].id)
         .collect()
 }
+
+#[cfg(test)]
+#[path = "tests/inner.rs"]
+mod tests;

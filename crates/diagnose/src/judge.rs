@@ -264,3 +264,7 @@ pub(crate) fn base_fit(problem: &Problem) -> DVector<f64> {
     let half = factor.tr_solve_upper_triangular(&right).unwrap_or_else(|| right.clone());
     factor.solve_upper_triangular(&half).unwrap_or(half)
 }
+
+#[cfg(test)]
+#[path = "tests/judge.rs"]
+mod tests;

@@ -5,8 +5,10 @@ pub(crate) mod arm;
 
 use crate::noise::{Noise, Whitener};
 use crate::projection::Projection;
-use crate::{DiagnosisConfig, Problem};
-use arm::{design, problem, rng};
+use crate::rooms::{Room, Rooms};
+use crate::weigh::weigh;
+use crate::{DiagnosisConfig, LinearRefit, Problem};
+use arm::{catalogue, design, problem, rng};
 use nalgebra::{DMatrix, DVector};
 
 fn small(seed: u64) -> Problem {
@@ -14,6 +16,41 @@ fn small(seed: u64) -> Problem {
     let poses: Vec<_> =
         design(0, &mut r).into_iter().filter(|p| p.dwell % 6 == 0 || p.dwell % 6 == 5).collect();
     problem(&poses, &[], arm::Noise::White, &mut r, false)
+}
+
+/// Few resamplings: what the tests ask is far from chance.
+pub(crate) fn quick() -> DiagnosisConfig {
+    DiagnosisConfig { resamplings: 199, ..Default::default() }
+}
+
+/// Catalogue entries planted at `size` times their typical size, and white noise.
+pub(crate) fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem {
+    let mut r = rng(seed);
+    let poses = design(free, &mut r);
+    let list = catalogue(&poses);
+    let of = |(name, size): &(&str, f64)| {
+        let own = list.iter().find(|l| l.spec == *name).unwrap();
+        (own.effect.clone(), own.typical.iter().map(|t| size * t).collect())
+    };
+    let hidden: Vec<_> = names.iter().map(of).collect();
+    problem(&poses, &hidden, arm::Noise::White, &mut r, false)
+}
+
+/// Calls `ask` with the rooms of a problem.
+pub(crate) fn in_rooms<T>(p: &Problem, config: &DiagnosisConfig, ask: impl FnOnce(&mut Rooms<'_>) -> T) -> T {
+    let mut refit = LinearRefit::new(p.clone());
+    let first = (p.clone(), weigh(p, config));
+    ask(&mut Rooms::new(&mut refit, vec![true; p.dwells.len()], first, config))
+}
+
+/// The first of them.
+pub(crate) fn room(p: &Problem, config: &DiagnosisConfig) -> std::rc::Rc<Room> {
+    in_rooms(p, config, |rooms| rooms.with(&[]).unwrap())
+}
+
+/// A candidate of a problem.
+pub(crate) fn own(p: &Problem, spec: &str) -> crate::Candidate {
+    p.candidates.iter().find(|c| c.spec == spec).unwrap().clone()
 }
 
 /// The covariance behind a whitener, written out.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::atomic::{self, AtomicFile};
 use crate::output::McapOutput;
-use crate::{input, may_put, may_write};
+use crate::{input, may_put, may_write, may_write_all};
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
@@ -152,4 +152,42 @@ fn what_somebody_puts_there_meanwhile_stays() {
     atomic::write(&target, b"plain").expect("over an empty file");
     atomic::write(&target, b"plain").expect("the same again");
     assert!(atomic::write(&target, b"other").is_err());
+}
+
+#[test]
+fn of_several_outputs_all_are_asked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [free, ours, mine] = ["free.toml", "ours.toml", "mine.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&ours, "# armcal.test/1\n").expect("written");
+    std::fs::write(&mine, "mine").expect("written");
+    may_write_all([&free, &ours]).expect("nothing is lost");
+    assert!(
+        matches!(may_write_all([&free, &ours, &mine]), Err(RecordingError::NotOurs { path, .. }) if path == mine)
+    );
+}
+
+#[test]
+fn another_kind_of_result_and_a_link_with_the_same_content_stay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (ours, link) = (folder.path().join("a.toml"), folder.path().join("link"));
+    std::fs::write(&ours, "# armcal.test/1\n").expect("written");
+    may_put(&ours, b"# armcal.test/1\nnew = 1\n").expect("of the same kind");
+    let other = may_put(&ours, b"# armcal.other/1\n");
+    assert!(
+        matches!(other, Err(RecordingError::NotOurs { ref what, .. }) if what.contains("test")),
+        "{other:?}"
+    );
+    // A link is as long as the name that it leads to.
+    std::fs::write(&ours, "6bytes").expect("written");
+    std::os::unix::fs::symlink("a.toml", &link).expect("linked");
+    may_put(&ours, b"6bytes").expect("it is there already");
+    assert!(matches!(may_put(&link, b"6bytes"), Err(RecordingError::NotOurs { .. })));
+}
+
+#[test]
+fn a_place_that_cannot_be_looked_at_is_no_free_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "mine").expect("written");
+    assert!(matches!(may_write(&file.join("out.toml")), Err(RecordingError::Write { .. })));
 }

@@ -1,0 +1,353 @@
+//! Steps forward and back, against planted effects and against the rules written out.
+
+use super::*;
+use crate::Scan;
+use crate::cells::Unlisted;
+use crate::problem::Columns;
+use crate::refit::LinearRefit;
+use crate::tests::{arm, in_rooms, own, planted, quick, room};
+use crate::weigh::{Outside, weigh};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+fn step(candidate: Candidate, ln: [f64; 3], named_at_once: bool) -> Step {
+    let [ln_evidence, ln_cell, ln_prior] = ln;
+    Step { candidate, ln_evidence, named_at_once, ln_cell, ln_prior, fall: 12.0 }
+}
+
+fn names(steps: &[Step]) -> Vec<&str> {
+    steps.iter().map(|s| s.candidate.spec.as_str()).collect()
+}
+
+fn strong(p: &Problem, specs: &[&str]) -> Vec<Step> {
+    specs.iter().map(|s| Step::known(own(p, s), 1.0)).collect()
+}
+
+#[test]
+fn steps_together_must_say_more_than_a_cell_and_their_priors() {
+    let c = own(&planted(&[], 0, 1), "backlash:1");
+    let config = quick();
+    let step = |ln, named| step(c.clone(), ln, named);
+    let known = step([50.0, 90.0, -90.0], true);
+    assert!(beats_a_cell(&[known], &config), "what had a name at once needs no comparison");
+    // 10 + 8 - 2 - 13 is the margin of 3; the prior of the first one does not count, nor does a gain.
+    let two = |cell, prior| {
+        beats_a_cell(
+            &[
+                step([50.0, 90.0, 0.0], true),
+                step([10.0, cell, -9.0], false),
+                step([8.0, 99.0, prior], false),
+            ],
+            &config,
+        )
+    };
+    assert!(two(13.0, -2.0));
+    assert!(!two(13.1, -2.0));
+    assert!(!two(13.0, -2.1));
+    assert!(!two(15.1, 5.0) && two(14.9, 5.0));
+}
+
+#[test]
+fn what_switches_leaves_only_what_switches_alike() {
+    let p = planted(&[], 0, 1);
+    let alike = |a: &str, b: &str| switches_alike(&own(&p, a), &own(&p, b));
+    assert!(alike("scale:1", "backlash:1") && alike("scale:1", "scale:2"));
+    assert!(alike("backlash:1", "friction_windup:2") && alike("zero_drift:1", "thermal"));
+    assert!(!alike("backlash:1", "scale:1") && !alike("backlash:1", "zero_drift:1"));
+    assert!(alike("zero_slip:1@1", "tool_shift@2") && !alike("zero_slip:1@1", "thermal"));
+}
+
+#[test]
+fn a_group_enters_as_its_members() {
+    let p = planted(&[], 0, 1);
+    let alone = one_by_one(step(own(&p, "backlash:1"), [8.0, 1.0, -3.0], true), &p);
+    assert_eq!((names(&alone), alone[0].ln_prior), (vec!["backlash:1"], -3.0));
+    let group = Candidate { spec: "backlash:1+backlash:3".into(), ..own(&p, "backlash:1") };
+    let members = one_by_one(step(group, [8.0, 1.0, -3.0], true), &p);
+    assert_eq!(names(&members), ["backlash:1", "backlash:3"]);
+    for m in &members {
+        assert_eq!((m.ln_evidence, m.ln_cell, m.ln_prior, m.fall), (4.0, 1.0, 0.0, 6.0));
+        assert!(m.named_at_once);
+    }
+}
+
+#[test]
+fn a_candidate_is_found_by_name_and_else_by_family_and_target() {
+    let p = planted(&[], 0, 1);
+    let weighed = weigh(&p, &quick());
+    let at = |spec: &str| weighed.entries.iter().position(|e| e.candidate.spec == spec);
+    assert_eq!(entry_of(&weighed, &own(&p, "scale:2")), at("scale:2"));
+    let other = Candidate { spec: "scale:2,shape=3".into(), ..own(&p, "scale:2") };
+    assert_eq!(entry_of(&weighed, &other), at("scale:2"));
+    assert_eq!(entry_of(&weighed, &Candidate { target: "joint7".into(), ..other.clone() }), None);
+    assert_eq!(entry_of(&weighed, &Candidate { family: "else".into(), ..other }), None);
+}
+
+/// A room in which only what is given was weighed; `predicts` are the columns of the planted effect.
+fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let mut r = Rc::try_unwrap(room(&p, &config)).expect("the room is ours");
+    r.weighed.p_nothing = 0.01;
+    r.weighed.entries.retain(|e| e.candidate.spec == entry.0);
+    r.weighed.entries[0].ln_evidence = entry.1;
+    let outside = |(spec, cell, ln_evidence): &(&str, bool, f64)| Outside {
+        what: Unlisted {
+            channel: cell.then_some(0),
+            driver: cell.then_some(0),
+            name: spec.to_string(),
+            driver_name: String::new(),
+            columns: own(&p, spec).columns,
+            unit_si: 1.0,
+        },
+        ln_evidence: *ln_evidence,
+        probability: 0.1,
+    };
+    r.weighed.unlisted = unlisted.iter().map(outside).collect();
+    r
+}
+
+#[test]
+fn something_is_missing_where_an_explanation_predicts() {
+    let config = quick();
+    let mut r = told(("backlash:1", 50.0), &[]);
+    assert!(something(&r, &config));
+    r.weighed.p_nothing = config.max_probability_nothing;
+    assert!(!something(&r, &config), "nothing may be missing");
+    // Another joint's play predicts nothing; the right one may be the best cell, or the best listed one.
+    assert!(!something(&told(("backlash:2", 50.0), &[]), &config));
+    for (ln, found) in [(2.9, false), (3.0, true), (3.1, true)] {
+        let cell = [("backlash:2", false, 60.0), ("backlash:1", true, ln)];
+        assert_eq!(something(&told(("backlash:2", 1.0), &cell), &config), found, "cell at {ln}");
+        let listed = [("backlash:2", true, 60.0)];
+        assert_eq!(something(&told(("backlash:1", ln), &listed), &config), found, "listed at {ln}");
+    }
+}
+
+#[test]
+fn an_earlier_step_that_later_ones_made_superfluous_leaves() {
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
+    let config = quick();
+    let left = |specs: &[&str]| {
+        let mut steps = strong(&p, specs);
+        in_rooms(&p, &config, |rooms| drop_superseded(&mut steps, rooms, &config)).unwrap();
+        steps.into_iter().map(|s| s.candidate.spec).collect::<Vec<_>>()
+    };
+    assert_eq!(left(&["scale:2", "backlash:1", "zero_drift:2"]), ["backlash:1", "zero_drift:2"]);
+    assert_eq!(left(&["scale:2", "scale:1", "backlash:1", "zero_drift:2"]), ["backlash:1", "zero_drift:2"]);
+    assert_eq!(left(&["backlash:1", "scale:2", "zero_drift:2"]), ["backlash:1", "zero_drift:2"]);
+    assert_eq!(left(&["backlash:1", "zero_drift:2"]), ["backlash:1", "zero_drift:2"]);
+    assert_eq!(left(&["backlash:1", "scale:2"]), ["backlash:1", "scale:2"], "the last one has no later one");
+    assert_eq!(left(&["scale:2"]), ["scale:2"]);
+}
+
+#[test]
+fn steps_are_confirmed_among_each_other() {
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
+    let config = quick();
+    let confirmed = |p: &Problem, steps: Vec<Step>, cells: &[Candidate]| {
+        let found = in_rooms(p, &config, |rooms| confirm(rooms, steps, cells, &config)).unwrap();
+        found.into_iter().map(|a| (a.candidate.spec, a.grade)).collect::<Vec<_>>()
+    };
+    let both = ["backlash:1", "zero_drift:2"].map(|s| (s.to_string(), Grade::Named));
+    assert_eq!(confirmed(&p, strong(&p, &["backlash:1", "zero_drift:2"]), &[]), both);
+    assert_eq!(confirmed(&p, strong(&p, &["backlash:1", "scale:2", "zero_drift:2", "scale:1"]), &[]), both);
+    assert!(confirmed(&p, strong(&p, &["scale:2"]), &[]).is_empty());
+    // What explains it already stands in the base.
+    assert!(confirmed(&p, strong(&p, &["backlash:1"]), &[own(&p, "backlash:1")]).is_empty());
+    // One that is not listed here leaves, the others stay.
+    let mut steps = strong(&p, &["backlash:1", "zero_drift:2"]);
+    let unknown = Candidate { spec: "else".into(), family: "else".into(), ..own(&p, "scale:1") };
+    steps.insert(0, Step::known(unknown, 1.0));
+    assert_eq!(confirmed(&p, steps, &[]), both);
+    // Without a name at once, and not more than a cell: not even tried.
+    let doubtful =
+        |ln| vec![Step::known(own(&p, "backlash:1"), 1.0), step(own(&p, "zero_drift:2"), ln, false)];
+    assert_eq!(confirmed(&p, doubtful([90.0, 95.0, 0.0]), &[]), both[..1]);
+    assert_eq!(confirmed(&p, doubtful([90.0, 1.0, 0.0]), &[]), both);
+}
+
+#[test]
+fn of_two_that_hide_each_other_the_weaker_leaves() {
+    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    // Play with a tenth of another's: alone each says nearly all, beside the other nothing.
+    let (a, b) = (own(&p, "backlash:1"), own(&p, "scale:1"));
+    let mixed = a.columns.dense(&p.dwells, 1.0) + 0.02 * b.columns.dense(&p.dwells, 1.0);
+    let twin = Candidate {
+        spec: "twin".into(),
+        family: "twin".into(),
+        columns: Columns::Dense(Arc::new(mixed)),
+        ..a
+    };
+    p.candidates.push(twin);
+    let left = |specs: &[&str]| {
+        let found = in_rooms(&p, &config, |rooms| confirm(rooms, strong(&p, specs), &[], &config)).unwrap();
+        found.into_iter().map(|a| a.candidate.spec).collect::<Vec<_>>()
+    };
+    let one = left(&["backlash:1", "twin"]);
+    assert_eq!(one.len(), 1);
+    assert_eq!(left(&["twin", "backlash:1"]), one, "whatever the order");
+    let alone = |spec: &str| {
+        let other = own(&p, if spec == "twin" { "backlash:1" } else { "twin" });
+        let room = in_rooms(&p, &config, |rooms| rooms.with(&[other]).unwrap());
+        let entry = entry_of(&room.weighed, &own(&p, spec)).unwrap();
+        room.weighed.entries[entry].ln_evidence
+    };
+    let stronger = if alone("twin") > alone("backlash:1") { "twin" } else { "backlash:1" };
+    assert_eq!(one, [stronger]);
+}
+
+fn stepped(p: &Problem, known: Vec<Step>, config: &DiagnosisConfig) -> (Vec<Step>, bool) {
+    in_rooms(p, config, |rooms| forward(rooms, known, &[], config)).unwrap()
+}
+
+#[test]
+fn forward_steps_end_when_nothing_is_left_or_enough_were_found() {
+    let config = quick();
+    assert!(stepped(&planted(&[], 0, 5), Vec::new(), &config).0.is_empty());
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
+    let (steps, may_be_shape) = stepped(&p, Vec::new(), &config);
+    assert_eq!((names(&steps), may_be_shape), (vec!["backlash:1", "zero_drift:2"], false));
+    let one = DiagnosisConfig { max_effects: 1, ..quick() };
+    assert_eq!(names(&stepped(&p, Vec::new(), &one).0), ["backlash:1"]);
+    assert_eq!(stepped(&p, Vec::new(), &DiagnosisConfig { max_effects: 0, ..quick() }).0.len(), 0);
+    // What stands in the base already is not found again.
+    let shapes = [own(&p, "backlash:1")];
+    let (steps, _) = in_rooms(&p, &config, |rooms| forward(rooms, Vec::new(), &shapes, &config)).unwrap();
+    assert_eq!(names(&steps), ["zero_drift:2"]);
+}
+
+#[test]
+fn a_step_carries_what_it_said() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let (steps, _) = stepped(&p, Vec::new(), &config);
+    let r = room(&p, &config);
+    let weighed = &r.weighed;
+    let entry = entry_of(weighed, &own(&p, "backlash:1")).unwrap();
+    let s = &steps[0];
+    assert!(s.named_at_once && steps.len() == 1);
+    assert_eq!(s.ln_evidence, weighed.entries[entry].ln_evidence);
+    assert_eq!(s.ln_cell, weighed.best_cell().unwrap().ln_evidence);
+    let cells = weighed.unlisted.iter().filter(|u| u.what.channel.is_some()).count() as f64;
+    assert!(cells > 1.0 && cells < weighed.unlisted.len() as f64);
+    // 0.4 shared by the entries against 0.05 shared by the cells.
+    let ln_prior = (0.4 / weighed.entries.len() as f64).ln() - (0.05 / cells).ln();
+    assert!((s.ln_prior - ln_prior).abs() < 1e-12, "{} {ln_prior}", s.ln_prior);
+    let score = r.judge(entry, &config).own().score;
+    assert!((s.fall - score * weighed.scale * weighed.scale).abs() < 1e-9 * score);
+}
+
+#[test]
+fn the_fall_is_in_units_of_the_declared_noise() {
+    // Declared ten times too small: everything is weighed again, and the fall is a hundred times as large.
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let fall = stepped(&p, Vec::new(), &config).0[0].fall;
+    let large = stepped(&arm::overconfident(p, 10.0), Vec::new(), &config).0[0].fall;
+    assert!((large / fall - 100.0).abs() < 5.0, "{large} {fall}");
+}
+
+#[test]
+fn a_small_rest_that_switches_alike_may_be_the_first_effects_shape() {
+    let p = planted(&[("backlash:1", 2.0), ("backlash:3", 0.6)], 60, 3);
+    let (steps, may_be_shape) = stepped(&p, Vec::new(), &quick());
+    assert_eq!((names(&steps), may_be_shape), (vec!["backlash:1", "backlash:3"], false));
+    let share = steps[1].fall / steps[0].fall;
+    assert!(share > 0.01 && share < 0.9);
+    let at = |leftover_share| stepped(&p, Vec::new(), &DiagnosisConfig { leftover_share, ..quick() });
+    let (steps, may_be_shape) = at(1.1 * share);
+    assert_eq!((names(&steps), may_be_shape), (vec!["backlash:1"], true));
+    let (steps, may_be_shape) = at(0.9 * share);
+    assert_eq!((steps.len(), may_be_shape), (2, false));
+    // A drift is no shape of a play, however small.
+    let p = planted(&[("backlash:1", 2.0), ("zero_drift:3", 1.0)], 0, 3);
+    let config = DiagnosisConfig { leftover_share: 0.9, ..quick() };
+    let (steps, may_be_shape) = stepped(&p, Vec::new(), &config);
+    assert_eq!((steps.len(), may_be_shape), (2, false));
+}
+
+/// Says once that a candidate acts otherwise at its own size.
+struct Refined {
+    linear: LinearRefit,
+    asked: Vec<String>,
+}
+
+impl crate::Refit for Refined {
+    fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        self.linear.problem(accepted)
+    }
+
+    fn refine(&mut self, _: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
+        self.asked.push(candidate.spec.clone());
+        Ok(self.asked.len() == 1)
+    }
+}
+
+#[test]
+fn only_what_has_no_name_at_once_is_tried_at_its_own_size() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let asked = |config: &DiagnosisConfig| {
+        let mut refit = Refined { linear: LinearRefit::new(p.clone()), asked: Vec::new() };
+        let first = (p.clone(), weigh(&p, config));
+        let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, config);
+        let (steps, _) = forward(&mut rooms, Vec::new(), &[], config).unwrap();
+        (refit.asked, steps.len())
+    };
+    assert_eq!(asked(&quick()), (vec![], 1));
+    // No p-value of 199 resamplings is so small: nothing has a name at once.
+    let strict = DiagnosisConfig { max_p_adjusted: 1e-6, ..quick() };
+    let (asked, _) = asked(&strict);
+    assert_eq!(asked[..2], ["backlash:1", "backlash:1"]);
+}
+
+#[test]
+fn a_search_tells_names_curves_and_what_is_left() {
+    let config = quick();
+    let searched = |p: &Problem| in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap();
+    let specs = |of: &[Accepted]| of.iter().map(|a| a.candidate.spec.clone()).collect::<Vec<_>>();
+    let s = searched(&planted(&[], 0, 5));
+    assert!(s.accepted.is_empty() && s.curves.is_empty() && !s.left_over && !s.may_be_shape);
+    let s = searched(&planted(&[("backlash:1", 1.0)], 0, 3));
+    assert_eq!(specs(&s.accepted), ["backlash:1"]);
+    assert!(s.curves.is_empty() && s.tentative.is_empty() && !s.left_over && !s.may_be_shape);
+    // A play, and an error curve of another joint that no name explains.
+    let mut r = arm::rng(8);
+    let poses = arm::design(60, &mut r);
+    let list = arm::catalogue(&poses);
+    let play = list.iter().find(|l| l.spec == "backlash:1").unwrap();
+    let curve = arm::on_joint(2, |p, _, _| 5e-3 * (25.0 * p.q[2]).sin().powi(3));
+    let hidden = [(play.effect.clone(), play.typical.clone()), (curve, vec![])];
+    let s = searched(&arm::problem(&poses, &hidden, arm::Noise::White, &mut r, false));
+    assert_eq!(specs(&s.accepted), ["backlash:1"]);
+    let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
+    assert_eq!(curves, ["joint3 <- q3"]);
+    assert!(s.left_over && !s.may_be_shape);
+    let mean = |r: &Room| r.weighed.metrics[0].projection.rss;
+    assert!(mean(&s.with_curves) < 0.7 * mean(&s.rest), "the curve is in the model");
+}
+
+#[test]
+fn a_name_that_a_curve_explains_as_well_was_never_that_effect() {
+    // A narrow bump over joint 1's own angle: eccentricity and the like have a part of it.
+    let config = quick();
+    let mut r = arm::rng(44);
+    let poses = arm::design(0, &mut r);
+    let bump = arm::on_joint(0, |p, _, _| 9e-3 * (-((p.q[0] - 0.05) / 0.05).powi(2)).exp());
+    let p = arm::problem(&poses, &[(bump, vec![])], arm::Noise::White, &mut r, false);
+    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
+    assert!(s.accepted.is_empty(), "{:?}", s.accepted.iter().map(|a| &a.candidate.spec).collect::<Vec<_>>());
+    assert_eq!(s.curves[0].candidate.spec, "joint1 <- q1");
+}
+
+#[test]
+fn a_point_of_a_scan_is_listed_too() {
+    let mut p = planted(&[], 0, 1);
+    let point = Candidate { spec: "scale:2,shape=3".into(), ..own(&p, "scale:2") };
+    assert!(listed(&p, &point).is_none());
+    p.scans.push(Scan { name: "scale:2".into(), points: vec![point.clone()] });
+    assert_eq!(listed(&p, &point).unwrap().spec, point.spec);
+    let zeros = DMatrix::<f64>::zeros(1, 1);
+    assert_eq!(listed(&p, &own(&p, "scale:3")).unwrap().columns.len(), zeros.ncols());
+}

@@ -1,0 +1,260 @@
+//! What the verdict says, against counts and sums written out.
+
+use super::*;
+use crate::problem::{Candidate, Columns};
+use crate::tests::arm::SIGMA_M;
+use crate::tests::{arm, in_rooms, own, planted, quick, room};
+use armcal_core::DwellId;
+use std::rc::Rc;
+use std::sync::Arc;
+
+fn entry(weighed: &Weighed, spec: &str) -> usize {
+    weighed.entries.iter().position(|e| e.candidate.spec == spec).unwrap()
+}
+
+/// The entry of a problem's first room as it would be accepted.
+fn accepted(p: &Problem, spec: &str) -> Accepted {
+    let config = quick();
+    let room = room(p, &config);
+    let judged = room.judge(entry(&room.weighed, spec), &config);
+    Accepted { candidate: own(p, spec), grade: judged.grade(&room.weighed, &config), judged, room }
+}
+
+fn searched(p: &Problem) -> Search {
+    let config = quick();
+    in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap()
+}
+
+fn codes(all: &[Warning]) -> Vec<&str> {
+    all.iter().map(|w| w.code).collect()
+}
+
+fn assembled(p: &Problem, search: &Search) -> Diagnosis {
+    let config = quick();
+    let first = room(p, &config);
+    let top = first.judge(first.weighed.ranking()[0], &config);
+    let keep = vec![true; p.dwells.len()];
+    assemble(p, &keep, &first, Some(&top), search, &config)
+}
+
+#[test]
+fn nothing_found_is_told_with_the_probability_of_nothing() {
+    let p = planted(&[], 0, 6);
+    let mut s = searched(&p);
+    let d = assembled(&p, &s);
+    assert_eq!((d.verdict, d.probability, d.names.len()), (Verdict::NothingMissing, Some(d.p_nothing), 0));
+    assert!(d.p_nothing > 0.5 && d.unknown.is_none() && d.unlisted.is_empty());
+    let config = quick();
+    let first = room(&p, &config);
+    let top = first.judge(first.weighed.ranking()[0], &config);
+    assert_eq!(d.p_adjusted, top.own().p_adjusted, "that of what stands out most");
+    assert!(d.p_adjusted > 0.05, "{}", d.p_adjusted);
+    s.left_over = true;
+    let d = assembled(&p, &s);
+    assert_eq!((d.verdict, d.probability), (Verdict::Unknown, Some(1.0 - d.p_nothing)));
+}
+
+#[test]
+fn what_was_found_is_told_with_its_numbers() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let s = searched(&p);
+    let d = assembled(&p, &s);
+    assert_eq!((d.verdict, &d.names[..]), (Verdict::Identified, &["backlash:1".to_string()][..]));
+    assert_eq!((d.probability, d.p_adjusted), (Some(d.effects[0].probability), d.effects[0].p_adjusted));
+    assert!(d.unknown.is_none() && d.unlisted.is_empty() && d.set_aside.is_empty());
+    // The mean over dwells of the left-out errors, before and with the effect in the model.
+    let mean = |p: &Problem| {
+        let e = left_out(p, None, &by_place(p));
+        let norm = |i: usize| e.rows(3 * i, 3).norm() * SIGMA_M;
+        (0..p.dwells.len()).map(norm).sum::<f64>() / p.dwells.len() as f64 * 1e3
+    };
+    assert!((d.holdout_mm.before - mean(&p)).abs() < 1e-9);
+    assert!((d.holdout_mm.after - mean(&s.with_curves.problem)).abs() < 1e-9);
+    assert!(d.holdout_mm.after < 0.6 && d.holdout_mm.before > 1.0);
+    // 2 sqrt(2 / pi) sigma for three coordinates.
+    let floor_mm = 1e3 * SIGMA_M * 2.0 * (2.0 / std::f64::consts::PI).sqrt();
+    assert!((d.floor_mm - floor_mm).abs() < 1e-3 * floor_mm, "{} {floor_mm}", d.floor_mm);
+}
+
+#[test]
+fn two_names_or_a_doubt_are_ambiguous() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let mut s = searched(&p);
+    s.accepted[0].grade = Grade::OrUnlisted;
+    let d = assembled(&p, &s);
+    assert_eq!(d.verdict, Verdict::Ambiguous);
+    assert_eq!(d.names, ["backlash:1", NOT_LISTED]);
+    let mut s = searched(&p);
+    let other = entry(&s.accepted[0].room.weighed, "scale:2");
+    s.accepted[0].judged.set.push(other);
+    let d = assembled(&p, &s);
+    assert_eq!(
+        (d.verdict, &d.names[..]),
+        (Verdict::Ambiguous, &["backlash:1".to_string(), "scale:2".into()][..])
+    );
+}
+
+#[test]
+fn several_effects_are_as_sure_as_the_least_sure() {
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
+    let mut s = searched(&p);
+    assert_eq!(s.accepted.len(), 2);
+    let (first, second) = (s.accepted[0].judged.entry, s.accepted[1].judged.entry);
+    s.accepted[0].judged.significance[first].p_adjusted = 0.004;
+    s.accepted[1].judged.significance[second].p_adjusted = 0.007;
+    let d = assembled(&p, &s);
+    assert_eq!(d.p_adjusted, 0.007);
+    let least = d.effects.iter().map(|e| e.probability).fold(1.0, f64::min);
+    assert_eq!(d.probability, Some(least));
+}
+
+#[test]
+fn an_effects_probability_is_that_of_all_that_its_set_means() {
+    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let own_point = Candidate { spec: "backlash:1,shape=2".into(), ..own(&p, "backlash:1") };
+    p.scans.push(crate::Scan { name: "backlash:1".into(), points: vec![own_point] });
+    let config = quick();
+    let mut a = accepted(&p, "backlash:1");
+    let (k, l) = (a.judged.entry, entry(&a.room.weighed, "backlash:1,shape=2"));
+    let mut r = Rc::try_unwrap(a.room).expect("nobody else has the room");
+    r.weighed.entries.iter_mut().for_each(|e| e.probability = 1e-3);
+    (r.weighed.entries[k].probability, r.weighed.entries[l].probability) = (0.5, 0.3);
+    a.room = Rc::new(r);
+    a.judged.set = vec![k];
+    let found = found_effect(&a, &config);
+    assert!((found.probability - 0.8).abs() < 1e-12, "{}", found.probability);
+    let w = &a.room.weighed;
+    assert_eq!(found.log_evidence, w.entries[k].ln_evidence);
+    assert_eq!(found.margin_nats, w.entries[k].ln_evidence - w.best_cell().unwrap().ln_evidence);
+    a.grade = Grade::OrUnlisted;
+    assert_eq!(found_effect(&a, &config).set, ["backlash:1", NOT_LISTED]);
+    a.grade = Grade::Named;
+    assert_eq!(found_effect(&a, &config).set, ["backlash:1"]);
+}
+
+#[test]
+fn alike_signatures_are_listed_as_pairs() {
+    let config = quick();
+    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let all = |p: &Problem| {
+        let r = room(p, &config);
+        confused(&r.problem, &r.weighed, &config)
+    };
+    assert!(!all(&p).iter().any(|pair| pair.contains(&"backlash:1".to_string())));
+    let a = own(&p, "backlash:1");
+    let half = |c: &Columns| Columns::Dense(Arc::new(0.5 * c.dense(&p.dwells, 1.0)));
+    let twin = Candidate { spec: "twin".into(), columns: half(&a.columns), ..a.clone() };
+    // Its columns are so small that these data do not show it: no pair.
+    let tiny = Columns::Dense(Arc::new(1e-3 * a.columns.dense(&p.dwells, 1.0)));
+    let unseen = Candidate { spec: "unseen".into(), columns: tiny, ..a.clone() };
+    let group = Candidate { spec: "backlash:1+else".into(), ..a };
+    p.candidates.splice(0..0, [group, unseen, twin]);
+    let pairs = all(&p);
+    let has = |a: &str, b: &str| pairs.iter().any(|pair| pair[0] == a && pair[1] == b);
+    assert!(has("twin", "backlash:1"), "{pairs:?}");
+    assert!(
+        !pairs.iter().any(|p| p[0] == p[1] || p[0] == "unseen" || p[0] == "backlash:1+else"),
+        "{pairs:?}"
+    );
+}
+
+#[test]
+fn noise_is_reported_in_declared_units_the_likeliest_kind_first() {
+    let p = planted(&[], 0, 5);
+    let mut r = Rc::try_unwrap(room(&p, &quick())).expect("nobody else has the room");
+    r.weighed.p_noise = vec![(crate::noise::Noise::White, 0.2), (crate::noise::Noise::Place, 0.8)];
+    r.weighed.scale = 3.0;
+    let n = noise(&r.weighed);
+    let white = &r.weighed.metrics[0].projection;
+    assert!((n.sigma_ratio - 3.0 * (white.rss / white.dof()).sqrt()).abs() < 1e-12);
+    assert_eq!(n.kinds[0], (crate::noise::Noise::Place.word().to_string(), 0.8));
+}
+
+#[test]
+fn noise_that_is_declared_wrongly_is_a_notice() {
+    let s = searched(&planted(&[], 0, 5));
+    let of = |sigma_ratio: f64, kinds: Vec<(String, f64)>| {
+        let noise = NoiseReport { sigma_ratio, kinds };
+        let all = warnings(&noise, &[], 198, &s, &quick());
+        codes(&all).iter().map(|c| c.to_string()).collect::<Vec<_>>()
+    };
+    assert!(of(1.0, vec![]).is_empty() && of(1.4, vec![]).is_empty() && of(0.5, vec![]).is_empty());
+    assert_eq!(of(1.41, vec![]), ["scatter-larger"]);
+    assert_eq!(of(0.49, vec![]), ["noise-overdeclared"]);
+    assert_eq!(of(1.0, vec![("repeated".into(), 0.999)]), ["scatter-correlated"]);
+    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    let id = DwellId { recording: 1, dwell: 5 };
+    let all = warnings(&noise, &[id], 198, &s, &quick());
+    assert_eq!(codes(&all), ["suspect-dwell"]);
+    assert!(all[0].message.starts_with("1 of 198 dwells"), "{}", all[0].message);
+}
+
+#[test]
+fn a_change_between_recordings_may_be_a_load_that_is_not_declared() {
+    let mut p = planted(&[("tool_shift@1", 1.0)], 0, 3);
+    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    let of = |p: &Problem, spec: &str| {
+        let mut s = searched(&planted(&[], 0, 5));
+        s.accepted = vec![accepted(p, spec)];
+        codes(&warnings(&noise, &[], 198, &s, &quick())).iter().map(|c| c.to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&p, "tool_shift@1"), ["event-or-load"]);
+    assert!(of(&p, "scale:1").is_empty());
+    p.dwells.iter_mut().for_each(|d| d.load_kg = if d.id.recording == 1 { 2.0 } else { 0.0 });
+    assert!(of(&p, "tool_shift@1").is_empty(), "the load is declared");
+}
+
+#[test]
+fn directions_that_a_play_contradicts_are_named() {
+    let mut p = planted(&[("backlash:1", 2.0)], 0, 3);
+    let turned = [30, 90, 150];
+    for i in turned {
+        p.dwells[i].arrival[0] *= -1.0;
+        for c in p.candidates.iter_mut().filter(|c| c.spec == "backlash:1") {
+            let mut dense = c.columns.dense(&p.dwells, 1.0);
+            dense.rows_mut(3 * i, 3).neg_mut();
+            c.columns = Columns::Dense(Arc::new(dense));
+        }
+    }
+    let a = accepted(&p, "backlash:1");
+    let wrong = direction_suspects(&a);
+    assert_eq!(wrong, turned.map(|i| p.dwells[i].id));
+    let mut s = searched(&planted(&[], 0, 5));
+    s.accepted = vec![a];
+    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    let all = warnings(&noise, &[], 198, &s, &quick());
+    assert_eq!(codes(&all), ["suspect-direction"]);
+    assert!(all[0].message.starts_with("3 dwells fit backlash:1"), "{}", all[0].message);
+    // Those that are right are not.
+    let right = accepted(&planted(&[("backlash:1", 2.0)], 0, 3), "backlash:1");
+    assert!(direction_suspects(&right).is_empty());
+}
+
+#[test]
+fn what_was_set_aside_is_reported() {
+    let mut r = arm::rng(101);
+    let poses = arm::design(0, &mut r);
+    let p = arm::problem(&poses, &[], arm::Noise::Swaps, &mut r, false);
+    let d = diagnose_problem(&mut crate::LinearRefit::new(p.clone()), &quick()).unwrap();
+    assert_eq!(d.verdict, Verdict::NothingMissing);
+    assert!(!d.set_aside.is_empty() && codes(&d.warnings).contains(&"suspect-dwell"));
+    let bad = DiagnosisConfig { resamplings: 3, ..quick() };
+    assert!(
+        diagnose_problem(&mut crate::LinearRefit::new(p), &bad).is_err(),
+        "a bad configuration is refused"
+    );
+}
+
+#[test]
+fn curves_come_first_and_else_the_best_unlisted() {
+    let mut r = arm::rng(40);
+    let poses = arm::design(0, &mut r);
+    let (_, channel, driver, effect) = arm::outside(1.0).remove(0);
+    let p = arm::problem(&poses, &[(effect, vec![])], arm::Noise::White, &mut r, false);
+    let s = searched(&p);
+    let d = assembled(&p, &s);
+    assert_eq!((d.verdict, d.unlisted.len()), (Verdict::Unknown, 1));
+    let u = d.unknown.as_ref().unwrap();
+    assert_eq!((u.channel.as_str(), u.driver.as_str()), (channel, driver));
+    assert_eq!(d.probability, Some(1.0 - d.p_nothing));
+}
