@@ -61,22 +61,19 @@ fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
     let left = left_out(problem, effect.as_ref(), &alone);
     let fitted = left_out(problem, effect.as_ref(), &[]);
     let square = studentised(problem, &left, &fitted);
-    // Wilson-Hilferty: the median of chi-square with k degrees of freedom is about k (1 - 2/(9k))^3.
-    let reduced: Vec<f64> = problem
-        .dwells
-        .iter()
-        .zip(&square)
-        .map(|(d, square)| {
-            let k = d.rows as f64;
-            square / (k * (1.0 - 2.0 / (9.0 * k)).powi(3))
-        })
-        .collect();
+    let reduced: Vec<f64> =
+        problem.dwells.iter().zip(&square).map(|(d, square)| square / median_square(d.rows as f64)).collect();
     let variance = median(&reduced).max(1e-300);
     let rare = chi2_tail(config.outlier_sigma.powi(2), 1.0);
     let found: Vec<usize> = (0..square.len())
         .filter(|i| chi2_tail(square[*i] / variance, problem.dwells[*i].rows as f64) < rare)
         .collect();
     if agreement(problem, &left, &found) < MAX_AGREEMENT { found } else { Vec::new() }
+}
+
+/// Median of chi-square with so many degrees of freedom, within one in a hundred (Wilson, Hilferty, PNAS 1931).
+fn median_square(rows: f64) -> f64 {
+    rows * (1.0 - 2.0 / (9.0 * rows)).powi(3)
 }
 
 /// `r' (I - H)^-1 r` of each dwell: the square of its left-out residual in units of what that scatters. A dwell that

@@ -1,7 +1,7 @@
 //! What may be set aside, against planted accidents and against the covariance written out.
 
 use super::*;
-use crate::tests::arm::{Noise, SIGMA_M, design, problem, rng};
+use crate::tests::arm::{Noise, SIGMA_M, design, overconfident, problem, rng};
 use nalgebra::{DMatrix, Vector3};
 
 fn config() -> DiagnosisConfig {
@@ -49,6 +49,49 @@ fn the_square_is_that_of_the_left_out_error_in_its_own_covariance() {
         let expected = e.dot(&(covariance.try_inverse().expect("it is regular") * e));
         assert!((square[i] - expected).abs() < 1e-6 * expected.max(1.0), "{i}: {} {expected}", square[i]);
     }
+}
+
+#[test]
+fn the_median_of_chi_square_is_that_of_scipy() {
+    // scipy.stats.chi2.median
+    for (rows, median) in [(3.0, 2.36597), (6.0, 5.34812)] {
+        assert!((median_square(rows) / median - 1.0).abs() < 0.01, "{rows}");
+    }
+}
+
+#[test]
+fn an_error_is_suspect_from_the_declared_rarity_on_whatever_the_noise() {
+    // scipy: chi2.isf(chi2.sf(25, 1), 3), the square of three coordinates as rare as five sigma of one.
+    const RARE: f64 = 31.8;
+    for (declared, at) in [(1.0, 20), (2.0, 101)] {
+        let (mut below, mut above) = (0, 0);
+        for tenths in (40..80).step_by(4) {
+            let mut p = sound(3);
+            push(&mut p, at, Vector3::new(0.0, 0.0, 0.1 * f64::from(tenths) * SIGMA_M));
+            let p = overconfident(p, declared);
+            let weighed = weigh(&p, &config());
+            let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| weighed.tamed(b.0, &p, &config()));
+            let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
+            let left = left_out(&p, best.as_ref(), &alone);
+            let square = studentised(&p, &left, &left_out(&p, best.as_ref(), &[]));
+            let ratio = square[at] * 2.38 / median(&square);
+            if (ratio / RARE - 1.0).abs() < 0.03 {
+                continue;
+            }
+            let found = suspects(&p, &weighed, &config()).contains(&at);
+            assert_eq!(found, ratio > RARE, "{ratio}");
+            if found { above += 1 } else { below += 1 }
+        }
+        assert!(below > 1 && above > 1, "{below} {above}");
+    }
+}
+
+#[test]
+fn accidents_are_seen_beside_a_large_effect() {
+    let mut p = crate::tests::planted(&[("backlash:1", 6.0)], 0, 3);
+    let planted = [5, 77, 151];
+    planted.iter().enumerate().for_each(|(k, i)| push(&mut p, *i, 3.5e-3 * apart(k).normalize()));
+    assert_eq!(aside(&p), planted);
 }
 
 #[test]
