@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
-"""Prints what `cargo mutants` found as the table of docs/mutation-testing.md: .ci/mutants_table.py [OUTCOMES.JSON]"""
+"""Prints what `cargo mutants` found as the table of docs/mutation-testing.md: .ci/mutants_table.py [OUTCOMES.JSON ...]
+
+Of a mutant that was tried more than once the latest result counts."""
 
 import json
 import sys
 from collections import defaultdict
 from pathlib import Path
 
-path = Path(sys.argv[1] if len(sys.argv) > 1 else "target/mutants.out/outcomes.json")
+results = {}
+for path in sys.argv[1:] or ["target/mutants.out/outcomes.json"]:
+    for outcome in json.loads(Path(path).read_text())["outcomes"]:
+        if outcome["scenario"] != "Baseline":
+            mutant = outcome["scenario"]["Mutant"]
+            results[mutant["name"]] = (mutant["file"], outcome["summary"])
 files, survivors = defaultdict(lambda: defaultdict(int)), []
-for outcome in json.loads(path.read_text())["outcomes"]:
-    scenario = outcome["scenario"]
-    if scenario == "Baseline":
-        continue
-    mutant = scenario["Mutant"]
-    files[mutant["file"]][outcome["summary"]] += 1
-    if outcome["summary"] == "MissedMutant":
-        survivors.append(mutant["name"])
+for name, (file, summary) in results.items():
+    files[file][summary] += 1
+    if summary == "MissedMutant":
+        survivors.append(name)
 
 print("| file | mutants | killed | survive | do not compile |")
 print("|---|---|---|---|---|")

@@ -7,7 +7,7 @@ use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
-use armcal_diagnose::{Calibrated, Diagnosis, diagnose};
+use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, diagnose};
 use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
 use armcal_report::{Refit, Run, Undiagnosed};
@@ -119,6 +119,8 @@ impl Fitted {
 /// in the setup.
 pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
     let (model_text, chain) = frames::nominal_chain(pipeline)?;
+    // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
+    Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;
     let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;

@@ -3,9 +3,10 @@
 //!
 //! * *nothing missing* is said only of errors at the floor, of noise about as declared, and of a model that is not
 //!   improbable;
-//! * a name stays only where the refitted model errs less;
+//! * a name stays only where the refitted model errs less, by an amount worth a name and clear of chance;
 //! * what is neither explained nor at the floor is `unexplained`, and says how much, where, and what was tried.
 
+use crate::compare::compare_heldout;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
 use crate::error_places::{DwellError, error_places};
@@ -13,8 +14,10 @@ use crate::explain::explanations;
 use armcal_calibrate::Calibration;
 use armcal_core::{Observation, Severity, Stage, Warning};
 
-/// A refit that leaves more than this share of the error, on either side of the hold-out, has not confirmed anything.
+/// A refit that leaves more than this share of the error that was fitted shows nothing by that.
 const CONFIRMED_SHARE: f64 = 0.95;
+/// Mean errors that fall by less than this share of the floor are not worth a name.
+const WORTH_NAMING: f64 = 0.02;
 
 /// Where more than this many times the floor remains, a name stays only if it explains at least this share of what lay above
 /// the floor: what leaves the most unexplained has only leaned on another cause.
@@ -47,7 +50,7 @@ impl Diagnosis {
         let left = left_over(after.unwrap_or(before));
         let withheld = match after {
             Some(after) => {
-                !confirms(before, after)
+                !confirms(before, after, observations, config)
                     || left > config.unexplained_factor
                     || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
             }
@@ -124,11 +127,22 @@ fn agrees(calibration: &Calibration, p_nothing: f64, config: &DiagnosisConfig) -
         && p_nothing >= config.max_probability_nothing
 }
 
-/// Whether a model with more effects errs less: on held-out points; or, where these cannot show what an effect does (it
-/// acts only in what was held out), clearly less on those that were fitted.
-fn confirms(before: &Calibration, after: &Calibration) -> bool {
-    let mean = |c: &Calibration| c.judged().fitted.mean_m;
-    mean(after) < mean(before) || after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m
+/// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
+/// or, where these cannot show what an effect does (it acts only in what was held out) and are not worse for it, clearly
+/// less on those that were fitted.
+fn confirms(
+    before: &Calibration,
+    after: &Calibration,
+    observations: &[Observation],
+    config: &DiagnosisConfig,
+) -> bool {
+    let gain_m = before.judged().fitted.mean_m - after.judged().fitted.mean_m;
+    let worth = gain_m > WORTH_NAMING * before.noise_floor_m;
+    let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
+    match compare_heldout(before, after, observations, config) {
+        Some(held) => (worth && held.change_ci95[1] < 0.0) || (fitted && gain_m >= 0.0),
+        None => worth,
+    }
 }
 
 /// Share of the squared error above the floor that a refit with more effects explains, on the side of the hold-out that shows

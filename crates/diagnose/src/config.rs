@@ -2,6 +2,7 @@
 
 use crate::DiagnoseError;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// How the diagnosis weighs and decides. Defaults: `notes/diagnosis.md` section 9.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,6 +61,12 @@ pub struct DiagnosisConfig {
     pub max_weighed: usize,
     /// Joint difference below which two dwells are visits to the same pose [deg]; default 0.6.
     pub same_pose_deg: f64,
+    /// Effects that this arm cannot have, each with the reason: they are not tried. `backlash` is that of every joint.
+    pub exclude: BTreeMap<String, String>,
+    /// Where there are any, the only effects that are tried, each with the reason.
+    pub only: BTreeMap<String, String>,
+    /// Effects that are known to act, each with the reason: of names that the data cannot tell apart they are the answer.
+    pub known: BTreeMap<String, String>,
 }
 
 impl Default for DiagnosisConfig {
@@ -90,6 +97,9 @@ impl Default for DiagnosisConfig {
             unexplained_factor: 10.0,
             max_weighed: 400,
             same_pose_deg: 0.6,
+            exclude: BTreeMap::new(),
+            only: BTreeMap::new(),
+            known: BTreeMap::new(),
         }
     }
 }

@@ -42,6 +42,16 @@ pub enum DiagnoseError {
         /// What is allowed.
         why: &'static str,
     },
+    /// A name that the catalogue or the arm does not have.
+    #[error("diagnosis.{key}, {effect}: {source}")]
+    BadEffect {
+        /// The key.
+        key: &'static str,
+        /// What stands there.
+        effect: String,
+        /// What is wrong with it.
+        source: armcal_model::ModelError,
+    },
     /// An effect cannot be put into the model.
     #[error("diagnosis: {0}")]
     Model(#[from] armcal_model::ModelError),

@@ -25,6 +25,8 @@ pub(crate) struct Accepted {
     pub room: Rc<Room>,
     /// How far its name can be trusted.
     pub grade: Grade,
+    /// Names that the data do not tell from it, and that the user's knowledge of the arm does.
+    pub instead_of: Vec<String>,
 }
 
 /// Where the search ended.
@@ -140,20 +142,34 @@ fn confirm(
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
-            let verdict = room.judge(entry, config);
+            let (verdict, instead_of) = as_known(&room, room.judge(entry, config), config);
+            let entry = verdict.entry;
             let grade = verdict.grade(weighed, config);
             let ln = weighed.entries[entry].ln_evidence;
             if grade == Grade::Refused && weakest.is_none_or(|w| ln < w.0) {
                 weakest = Some((ln, k));
             }
             let candidate = weighed.entries[entry].candidate.clone();
-            judged.push(Accepted { candidate, judged: verdict, room: room.clone(), grade });
+            judged.push(Accepted { candidate, judged: verdict, room: room.clone(), grade, instead_of });
         }
         match weakest {
             Some((_, k)) => drop(steps.remove(k)),
             None => return Ok(judged),
         }
     }
+}
+
+/// Of names that these data cannot tell apart, those that the user knows to act are the answer; with the others.
+fn as_known(room: &Room, judged: Judged, config: &DiagnosisConfig) -> (Judged, Vec<String>) {
+    let of = |k: &usize| &room.weighed.entries[*k].candidate;
+    let Some(known) = judged.set.iter().copied().find(|k| of(k).known.is_some()) else {
+        return (judged, Vec::new());
+    };
+    let mut judged = room.judge(known, config);
+    let others: Vec<String> =
+        judged.set.iter().map(of).filter(|c| c.known.is_none()).map(|c| c.spec.clone()).collect();
+    judged.set.retain(|k| of(k).known.is_some());
+    (judged, others)
 }
 
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of

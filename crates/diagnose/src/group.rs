@@ -27,6 +27,7 @@ pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
         let group = Candidate {
             spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
             target: "all joints".to_owned(),
+            known: None,
             amplitudes: members.iter().flat_map(|c| named(c)).collect(),
             columns: Columns::Dense(Arc::new(DMatrix::from_columns(&columns))),
             ..members[0].clone()

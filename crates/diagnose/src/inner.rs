@@ -17,7 +17,7 @@ use crate::rooms::{Room, Rooms};
 use crate::structure::structure;
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
-use crate::{DiagnoseError, next};
+use crate::{DiagnoseError, next, rivals};
 use armcal_core::{Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DMatrix;
@@ -36,7 +36,8 @@ pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Resu
     let mut rooms = Rooms::new(refit, keep.clone(), (problem, weighed), config);
     let first = rooms.with(&[])?;
     let top = first.weighed.ranking().first().map(|top| first.judge(*top, config));
-    let search = search(&mut rooms, config)?;
+    let mut search = search(&mut rooms, config)?;
+    rivals::settle(&mut search, &mut rooms, config)?;
     Ok(assemble(&whole, &keep, &first, top.as_ref(), &search, config))
 }
 
@@ -130,7 +131,12 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     if a.grade == Grade::OrUnlisted {
         set.push(NOT_LISTED.to_string());
     }
-    let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l));
+    // What a group of which it is a member says is said of the member too.
+    let holds = |l: usize, k: usize| {
+        let group = &weighed.entries[l].candidate;
+        group.is_group() && group.members().any(|m| m == weighed.entries[k].candidate.spec)
+    };
+    let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l) || holds(*l, *k));
     let meant = (0..weighed.entries.len()).filter(meant);
     let probability = meant.map(|k| weighed.entries[k].probability).sum::<f64>();
     let (parameters, combination) = parameters(judged, weighed);
@@ -230,6 +236,14 @@ fn warnings(
         add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
     }
     for a in &search.accepted {
+        if let Some(reason) = a.candidate.known.as_ref().filter(|_| !a.instead_of.is_empty()) {
+            let message = format!(
+                "{} and not {}: these data do not tell them apart, the pipeline does (\"{reason}\")",
+                a.candidate.spec,
+                listed(&a.instead_of)
+            );
+            add(Severity::Notice, "named-as-known", a.candidate.spec.clone(), message);
+        }
         if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
             let message = format!(
                 "{}: something changed between dwells; a load that is not declared, another tool or another arm in a recording \

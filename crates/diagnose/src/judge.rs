@@ -192,10 +192,11 @@ fn answer(
     }
     for k in (0..weighed.entries.len()).filter(|k| *k != entry) {
         let like = likeness(projection, &own, &fitted.estimate, &white(k), variance);
+        // Alike to the eye is one answer only while the evidence is: where the noise is small, the data tell apart what
+        // differs by little.
         let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
-        let same =
-            like.cosine > config.merge_cosine || (like.delta < config.min_delta && gap < config.margin_nats);
-        if same && !set.contains(&k) {
+        let alike = like.cosine > config.merge_cosine || like.delta < config.min_delta;
+        if alike && gap < config.margin_nats && !set.contains(&k) {
             set.push(k);
         }
     }

@@ -2,11 +2,15 @@
 
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;
+use crate::knowledge::Knowledge;
 use crate::places::thinned;
 use crate::problem::{Candidate, Problem};
+use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
-use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem};
+use armcal_calibrate::{
+    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem, inner, linearise,
+};
 use armcal_core::Observation;
 use armcal_model::{Model, Session};
 use std::collections::BTreeMap;
@@ -31,6 +35,7 @@ pub struct Calibrated<'a> {
 /// Diagnoses a calibrated model: which effect do its observations ask for?
 pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
     let Calibrated { model, calibration, observations, session, fit, .. } = *calibrated;
+    let joint_names = model.chain().joint_names();
     let values = calibration.fit.values();
     let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
     let mut refit = ModelRefit {
@@ -43,9 +48,10 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         fits: BTreeMap::new(),
         known: BTreeMap::new(),
         sizes: BTreeMap::new(),
+        knowledge: Knowledge::of(config, joint_names)?,
     };
     let mut diagnosis = diagnose_problem(&mut refit, config)?;
-    let joint_names = model.chain().joint_names();
+    diagnosis.warnings.extend(refit.knowledge.warning());
     let refitted = refitted(calibrated, &diagnosis);
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
@@ -79,6 +85,7 @@ struct ModelRefit<'a> {
     known: BTreeMap<Vec<String>, Problem>,
     /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
     sizes: BTreeMap<String, Option<f64>>,
+    knowledge: Knowledge,
 }
 
 impl ModelRefit<'_> {
@@ -107,6 +114,7 @@ impl ModelRefit<'_> {
             session: self.session,
             fit: self.fit,
             sizes: &self.sizes,
+            knowledge: &self.knowledge,
         }
     }
 }
@@ -121,6 +129,25 @@ impl Refit for ModelRefit<'_> {
         let problem = self.view(&model, &values).problem()?;
         self.known.insert(names, problem.clone());
         Ok(problem)
+    }
+
+    fn refitted(
+        &mut self,
+        accepted: &[Candidate],
+        keep: &[bool],
+    ) -> Result<Option<AfterRefit>, DiagnoseError> {
+        let (model, values) = self.fitted(&names(accepted))?;
+        let linear = linearise(&model, self.weighed, &values, self.fit)?;
+        let rows = linear.rows.iter().zip(keep).filter(|(_, keep)| **keep);
+        let rows: Vec<usize> = rows.flat_map(|(rows, _)| rows.clone()).collect();
+        let residual = linear.residual.select_rows(&rows);
+        let mut jacobian = linear.jacobian.select_rows(&rows);
+        let mut square = residual.norm_squared();
+        for (mut column, axis) in jacobian.column_iter_mut().zip(&linear.axes) {
+            column /= axis.precision.sqrt();
+            square += axis.precision * axis.offset.powi(2);
+        }
+        Ok(Some(AfterRefit { square, rows: rows.len(), normal: inner(&jacobian, &jacobian) }))
     }
 
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {

@@ -98,6 +98,8 @@ pub struct Candidate {
     pub target: String,
     /// Other mechanisms that are the same to the data.
     pub aliases: Vec<String>,
+    /// Why the user knows that it acts, where he does.
+    pub known: Option<String>,
     /// Amplitudes, one for each column.
     pub amplitudes: Vec<Amplitude>,
     /// What drives it.

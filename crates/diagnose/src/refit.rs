@@ -2,6 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::problem::{Candidate, Problem};
+use crate::rivals::AfterRefit;
 
 /// Gives the problem with some effects in its base model.
 pub trait Refit {
@@ -14,6 +15,17 @@ pub trait Refit {
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
         let _ = (accepted, candidate);
         Ok(false)
+    }
+
+    /// What a fit with these effects leaves of the kept dwells; none where problems are one linearisation, in which a refit
+    /// says what the weighing says.
+    fn refitted(
+        &mut self,
+        accepted: &[Candidate],
+        keep: &[bool],
+    ) -> Result<Option<AfterRefit>, DiagnoseError> {
+        let _ = (accepted, keep);
+        Ok(None)
     }
 }
 

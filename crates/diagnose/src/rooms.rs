@@ -7,6 +7,7 @@ use crate::crossval::gain;
 use crate::judge::{Judged, independent_groups, judge};
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
+use crate::rivals::AfterRefit;
 use crate::weigh::{Weighed, weigh};
 use armcal_model::Toggle;
 use std::collections::BTreeMap;
@@ -17,7 +18,7 @@ use std::sync::Arc;
 const UNLISTED: &str = "unlisted";
 
 /// A problem with some effects in its base, weighed; judgements are kept by entry.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Room {
     accepted: Vec<String>,
     /// The problem.
@@ -91,6 +92,11 @@ impl<'a> Rooms<'a> {
         Ok(changed)
     }
 
+    /// What a refit with these effects leaves of the dwells that count.
+    pub fn refitted(&mut self, accepted: &[Candidate]) -> Result<Option<AfterRefit>, DiagnoseError> {
+        self.refit.refitted(accepted, &self.keep)
+    }
+
     /// The problem alone.
     pub fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
@@ -117,6 +123,7 @@ pub(crate) fn as_candidate(cell: &Unlisted, room: &Room, config: &DiagnosisConfi
         family: UNLISTED.to_string(),
         target: String::new(),
         aliases: Vec::new(),
+        known: None,
         amplitudes: Vec::new(),
         toggle: Toggle::None,
         columns: Columns::Dense(Arc::new(tamed)),

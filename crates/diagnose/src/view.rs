@@ -6,6 +6,7 @@
 
 use crate::DiagnoseError;
 use crate::group::with_groups;
+use crate::knowledge::Knowledge;
 use crate::places::places;
 use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
 use armcal_calibrate::{FitConfig, Linearisation, linearise};
@@ -28,12 +29,13 @@ pub(crate) struct View<'a> {
     pub session: &'a Session,
     pub fit: &'a FitConfig,
     pub sizes: &'a BTreeMap<String, Option<f64>>,
+    pub knowledge: &'a Knowledge,
 }
 
 impl View<'_> {
     pub fn problem(&self) -> Result<Problem, DiagnoseError> {
         let mut specs = self.model.candidates(self.session);
-        specs.retain(|spec| !self.taken(spec));
+        specs.retain(|spec| self.tried(spec));
         let base = self.linearised(&[])?.1;
         let channels = self.channels(&base);
         Ok(Problem {
@@ -48,10 +50,12 @@ impl View<'_> {
         })
     }
 
-    /// Whether the model has an effect already, whatever a pipeline says of its parameters.
-    fn taken(&self, spec: &EffectSpec) -> bool {
+    /// Whether an effect may explain something: the model has it not yet, whatever a pipeline says of its parameters, and
+    /// the user does not rule it out.
+    fn tried(&self, spec: &EffectSpec) -> bool {
         let name = spec.to_string();
-        self.model.effects().iter().any(|e| e.spec.to_string() == name)
+        let taken = self.model.effects().iter().any(|e| e.spec.to_string() == name);
+        !taken && self.knowledge.tries(spec)
     }
 
     /// The model with more effects at zero, linearised at the fit.
@@ -119,6 +123,7 @@ impl View<'_> {
             family: effect.spec.kind.clone(),
             target: self.target(&effect.spec),
             aliases: effect.kind.aliases.iter().map(|alias| (*alias).to_owned()).collect(),
+            known: self.knowledge.acts(&effect.spec).map(str::to_owned),
             amplitudes: own.iter().map(amplitude).collect(),
             toggle: toggle(effect),
             columns: Columns::Dense(Arc::new(-linear.jacobian.select_columns(&own))),
@@ -141,7 +146,10 @@ impl View<'_> {
         let Some(first) = dwells.iter().min().copied() else { return Ok(Vec::new()) };
         let mut scans = Vec::new();
         for (family, mut members) in self.model.scans(self.session, self.observations) {
-            members.retain(|spec| !self.taken(spec));
+            members.retain(|spec| self.tried(spec));
+            if members.is_empty() {
+                continue;
+            }
             let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
             let joint = family.target.map(|j| format!("joint{}", j + 1));
             let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
@@ -174,6 +182,7 @@ impl View<'_> {
             let basis = DMatrix::from_iterator(dwells.len(), 1, dwells.iter().map(on));
             Candidate {
                 spec: member.to_string(),
+                known: self.knowledge.acts(member).map(str::to_owned),
                 target: self.target(member),
                 columns: Columns::Product { base: base.clone(), basis: Arc::new(basis) },
                 ..whole[0].clone()
@@ -196,6 +205,7 @@ impl View<'_> {
             });
             Candidate {
                 spec: member.to_string(),
+                known: self.knowledge.acts(member).map(str::to_owned),
                 columns: Columns::Product { base: channel.columns.clone(), basis: Arc::new(basis) },
                 ..like.clone()
             }

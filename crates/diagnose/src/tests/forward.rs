@@ -358,3 +358,31 @@ fn a_point_of_a_scan_is_listed_too() {
     let zeros = DMatrix::<f64>::zeros(1, 1);
     assert_eq!(listed(&p, &own(&p, "scale:3")).unwrap().columns.len(), zeros.ncols());
 }
+
+#[test]
+fn of_names_that_the_data_leave_the_known_one_is_told() {
+    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let a = own(&p, "backlash:1");
+    let mixed = a.columns.dense(&p.dwells, 1.0) + 1e-3 * own(&p, "scale:1").columns.dense(&p.dwells, 1.0);
+    let columns = Columns::Dense(Arc::new(mixed));
+    let twin = Candidate { spec: "twin".into(), family: "twin".into(), columns, ..a };
+    p.candidates.push(twin);
+    let told = |p: &Problem| {
+        let s = in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap();
+        let [one] = &s.accepted[..] else { panic!("one effect was planted") };
+        let name = |k: &usize| one.room.weighed.entries[*k].candidate.spec.clone();
+        let set: Vec<String> = one.judged.set.iter().map(name).collect();
+        (one.candidate.spec.clone(), set, one.instead_of.clone())
+    };
+    let (_, both, others) = told(&p);
+    assert_eq!((both.len(), others.len()), (2, 0), "{both:?}");
+    for (known, other) in [("twin", "backlash:1"), ("backlash:1", "twin")] {
+        let mut p = p.clone();
+        p.candidates.iter_mut().filter(|c| c.spec == known).for_each(|c| c.known = Some("seen".into()));
+        assert_eq!(told(&p), (known.to_string(), vec![known.to_string()], vec![other.to_string()]));
+    }
+    // What is known and does not show is not told for it.
+    p.candidates.iter_mut().filter(|c| c.spec == "scale:2").for_each(|c| c.known = Some("seen".into()));
+    assert_eq!(told(&p).1, both);
+}

@@ -17,7 +17,8 @@ fn accepted(p: &Problem, spec: &str) -> Accepted {
     let config = quick();
     let room = room(p, &config);
     let judged = room.judge(entry(&room.weighed, spec), &config);
-    Accepted { candidate: own(p, spec), grade: judged.grade(&room.weighed, &config), judged, room }
+    let grade = judged.grade(&room.weighed, &config);
+    Accepted { candidate: own(p, spec), grade, judged, room, instead_of: Vec::new() }
 }
 
 fn searched(p: &Problem) -> Search {
@@ -113,16 +114,19 @@ fn an_effects_probability_is_that_of_all_that_its_set_means() {
     let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
     let own_point = Candidate { spec: "backlash:1,shape=2".into(), ..own(&p, "backlash:1") };
     p.scans.push(crate::Scan { name: "backlash:1".into(), points: vec![own_point] });
+    p.candidates.push(Candidate { spec: "backlash:1+backlash:2".into(), ..own(&p, "backlash:1") });
     let config = quick();
     let mut a = accepted(&p, "backlash:1");
     let (k, l) = (a.judged.entry, entry(&a.room.weighed, "backlash:1,shape=2"));
     let mut r = Rc::try_unwrap(a.room).expect("nobody else has the room");
     r.weighed.entries.iter_mut().for_each(|e| e.probability = 1e-3);
+    let group = r.weighed.entries.iter().position(|e| e.candidate.is_group()).unwrap();
+    r.weighed.entries[group].probability = 0.1;
     (r.weighed.entries[k].probability, r.weighed.entries[l].probability) = (0.5, 0.3);
     a.room = Rc::new(r);
     a.judged.set = vec![k];
     let found = found_effect(&a, &config);
-    assert!((found.probability - 0.8).abs() < 1e-12, "{}", found.probability);
+    assert!((found.probability - 0.9).abs() < 1e-12, "{}", found.probability);
     let w = &a.room.weighed;
     assert_eq!(found.log_evidence, w.entries[k].ln_evidence);
     assert_eq!(found.margin_nats, w.entries[k].ln_evidence - w.best_cell().unwrap().ln_evidence);

@@ -151,13 +151,15 @@ fn what_looks_the_same_is_in_the_answer_once() {
         j.set.iter().map(|k| weighed.entries[*k].candidate.spec.clone()).collect::<Vec<_>>()
     };
     assert_eq!(set_of(&with_twin(0.02), &|_| ()), ["backlash:1", "twin"]);
-    // Whatever its evidence: the signature is the same.
-    let behind = |w: &mut Weighed| {
-        let (own, k) = (entry(w, "backlash:1"), entry(w, "twin"));
-        w.entries[own].probability += w.entries[k].probability;
-        (w.entries[k].ln_evidence, w.entries[k].probability) = (1.0, 0.0);
-    };
-    assert_eq!(set_of(&with_twin(0.02), &behind), ["backlash:1", "twin"]);
+    // While the evidence is: 3 nats behind it is another answer, however alike its signature.
+    for (nats, set) in [(2.9, &["backlash:1", "twin"][..]), (3.1, &["backlash:1"][..])] {
+        let behind = |w: &mut Weighed| {
+            let (own, k) = (entry(w, "backlash:1"), entry(w, "twin"));
+            w.entries[own].probability += w.entries[k].probability;
+            (w.entries[k].ln_evidence, w.entries[k].probability) = (w.entries[own].ln_evidence - nats, 0.0);
+        };
+        assert_eq!(set_of(&with_twin(0.02), &behind), set);
+    }
     assert_eq!(set_of(&with_twin(1.5), &|_| ()), ["backlash:1"]);
     // The set holds 95 % of what is not nothing: another entry with a large part of it belongs to it.
     let probable = |w: &mut Weighed| {
@@ -215,7 +217,7 @@ fn the_answer_is_ordered_by_evidence_after_its_own_name() {
     let twin = own(&p, "twin");
     p.candidates.push(Candidate { spec: "third".into(), family: "third".into(), ..twin });
     let mut weighed = weigh(&p, &config);
-    for (spec, ln) in [("backlash:1", 1.0), ("twin", 20.0), ("third", 30.0)] {
+    for (spec, ln) in [("backlash:1", 30.0), ("twin", 31.0), ("third", 32.0)] {
         let k = entry(&weighed, spec);
         weighed.entries[k].ln_evidence = ln;
     }

@@ -184,6 +184,13 @@ fn suspects_that_err_alike_beside_each_other_are_a_cause() {
     assert!((agreement(&p, &alike, &found) - 1.0).abs() < 1e-12);
     assert!(agreement(&p, &apart_rows, &found) < MAX_AGREEMENT);
     assert_eq!(agreement(&p, &alike, &found[..3]), 0.0, "three are too few to agree");
+    // Two poses, each visited twice, err in opposite ways: next to each other they agree.
+    let visits = [3, 62, 20, 45];
+    let mut by_pose = DVector::zeros(p.rows());
+    for (i, z) in visits.into_iter().zip([9.0, 9.0, -9.0, -9.0]) {
+        by_pose.rows_mut(at(i).start, 3).copy_from(&Vector3::new(0.0, 0.0, z));
+    }
+    assert!((agreement(&p, &by_pose, &visits) - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -194,9 +201,12 @@ fn a_direction_is_suspect_where_the_other_one_fits_far_better() {
     let signature = vec![2.0; n];
     // Turned over, the square changes by -4 r s of each row: 48 for three rows of -2.
     let mut residual = vec![2.0; n];
-    for dwell in [1, 2] {
+    let mut signature = signature;
+    for dwell in [2, 4] {
         residual[3 * dwell..3 * dwell + 3].fill(-2.0);
     }
     residual[9..12].fill(-1.0);
-    assert_eq!(flipped(&p, &residual, &signature), [1], "24 is not enough, and dwell 2 has no direction");
+    residual[15..18].fill(-2.0);
+    signature[15..18].fill(0.5);
+    assert_eq!(flipped(&p, &residual, &signature), [4], "24 and 12 are not enough, and dwell 2 has no direction");
 }

@@ -231,6 +231,7 @@ pub fn problem(
             family: l.family.to_string(),
             target: l.spec.split_once(':').map_or(String::new(), |t| format!("joint{}", &t.1[..1])),
             aliases: Vec::new(),
+            known: Option::None,
             amplitudes: amplitude(l),
             toggle: l.toggle,
             columns: Columns::Dense(Arc::new(effect_columns(&l.effect, &l.typical))),
@@ -284,6 +285,7 @@ fn periodic_scan(poses: &[Pose], j: usize, joint: &Arc<DMatrix<f64>>) -> Scan {
             family: "periodic".into(),
             target: format!("joint{}", j + 1),
             aliases: Vec::new(),
+            known: Option::None,
             amplitudes: (0..2)
                 .map(|k| Amplitude { name: format!("a{k}"), unit: Unit::Radian, typical: size })
                 .collect(),

@@ -119,6 +119,13 @@ impl EffectSpec {
         Ok(spec)
     }
 
+    /// Whether what is said of this one holds for another: where it names no joint or no time, for every one.
+    pub fn covers(&self, other: &EffectSpec) -> bool {
+        self.kind == other.kind
+            && (self.target.is_none() || self.target == other.target)
+            && (self.since.is_none() || self.since == other.since)
+    }
+
     /// The entry of the catalogue; errors name the nearest one.
     pub fn kind(&self) -> Result<&'static EffectKind, ModelError> {
         known_kind(&self.kind)

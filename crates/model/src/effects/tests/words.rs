@@ -192,3 +192,19 @@ fn a_formula_is_the_entry_of_the_catalogue_it_spells_out() {
         }
     }
 }
+
+#[test]
+fn a_spec_covers_what_it_does_not_say() {
+    let joints = ["a".to_owned(), "b".to_owned()];
+    let spec = |text: &str| EffectSpec::parse(text, &joints).expect("a spec");
+    for (wide, own, covered) in [
+        ("backlash", "backlash:2", true),
+        ("backlash:b", "backlash:2", true),
+        ("backlash:1", "backlash:2", false),
+        ("zero_slip:2", "zero_slip:2@1.17", true),
+        ("zero_slip:2@1", "zero_slip:2@1.17", false),
+        ("frame_shift", "zero_slip:2@1", false),
+    ] {
+        assert_eq!(spec(wide).covers(&spec(own)), covered, "{wide} and {own}");
+    }
+}

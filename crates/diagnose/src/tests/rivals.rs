@@ -1,0 +1,105 @@
+//! What refits decide, against closed forms and refits made up.
+
+use super::*;
+use crate::refit::LinearRefit;
+use crate::tests::{in_rooms, planted, quick};
+use crate::weigh::weigh;
+use crate::{Problem, Refit};
+use std::collections::BTreeMap;
+
+#[test]
+fn the_evidence_of_a_refit_is_that_of_a_gaussian() {
+    // One observation y = a x + e, x ~ N(0, 1), e ~ N(0, s^2): y ~ N(0, a^2 + s^2).
+    let (a, y, variance) = (3.0f64, 5.0f64, 2.0f64);
+    let x = a * y / (a * a + variance);
+    let square = (y - a * x).powi(2) + variance * x * x;
+    let refit = AfterRefit { square, rows: 1, normal: DMatrix::from_element(1, 1, a * a) };
+    let marginal = -0.5 * y * y / (a * a + variance) - 0.5 * (a * a / variance + 1.0).ln();
+    assert!((refit.ln_evidence(variance).unwrap() - marginal).abs() < 1e-12);
+    let rows = AfterRefit { square: 30.0, rows: 12, normal: DMatrix::zeros(2, 2) };
+    assert_eq!(rows.variance(), 3.0);
+}
+
+/// Refits as they are told: the square that remains with these effects.
+struct Told {
+    linear: LinearRefit,
+    square: BTreeMap<&'static str, f64>,
+    asked: usize,
+}
+
+impl Refit for Told {
+    fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        self.linear.problem(accepted)
+    }
+
+    fn refitted(
+        &mut self,
+        accepted: &[Candidate],
+        keep: &[bool],
+    ) -> Result<Option<AfterRefit>, DiagnoseError> {
+        self.asked += 1;
+        let last = accepted.last().map_or("", |c| c.spec.as_str());
+        let rows = 3 * keep.iter().filter(|k| **k).count();
+        let after = |square: &f64| AfterRefit { square: *square, rows, normal: DMatrix::zeros(0, 0) };
+        Ok(self.square.get(last).map(after))
+    }
+}
+
+/// The answer to a planted play once each refit leaves so much (declared noise = 1, 594 rows).
+fn answer(square: &[(&'static str, f64)]) -> (Vec<String>, Grade) {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut refit =
+        Told { linear: LinearRefit::new(p.clone()), square: square.iter().copied().collect(), asked: 0 };
+    let first = (p.clone(), weigh(&p, &config));
+    let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
+    // All entries are within reach of the name.
+    let own = search.accepted[0].judged.entry;
+    let room = std::rc::Rc::make_mut(&mut search.accepted[0].room);
+    for (spec, _) in square {
+        let at = room.weighed.entries.iter().position(|e| e.candidate.spec == *spec).unwrap();
+        room.weighed.entries[at].ln_evidence = room.weighed.entries[own].ln_evidence - 1.0;
+    }
+    settle(&mut search, &mut rooms, &config).unwrap();
+    let a = &search.accepted[0];
+    let names = a.judged.set.iter().map(|k| a.room.weighed.entries[*k].candidate.spec.clone());
+    assert_eq!(a.candidate.spec, a.room.weighed.entries[a.judged.entry].candidate.spec);
+    (names.collect(), a.grade)
+}
+
+#[test]
+fn a_rival_counts_as_its_refit_does() {
+    let name = |s: &str| vec![s.to_string()];
+    // Nothing refits: nothing changes. Far behind: the name stays alone.
+    assert_eq!(answer(&[]).0, name("backlash:1"));
+    assert_eq!(answer(&[("backlash:1", 500.0), ("zero_drift:1", 600.0)]), (name("backlash:1"), Grade::Named));
+    // Half a square is a nat: within three they stand beside each other.
+    let both = vec!["backlash:1".to_string(), "zero_drift:1".to_string()];
+    assert_eq!(answer(&[("backlash:1", 500.0), ("zero_drift:1", 505.9)]).0, both);
+    assert_eq!(answer(&[("backlash:1", 500.0), ("zero_drift:1", 506.1)]).0, name("backlash:1"));
+    assert_eq!(answer(&[("backlash:1", 505.9), ("zero_drift:1", 500.0)]).0, both);
+    // Clearly better after the refit: it has the name, or nothing has it alone.
+    let (set, grade) = answer(&[("backlash:1", 560.0), ("zero_drift:1", 500.0)]);
+    assert!(set == name("zero_drift:1") || (set == both && grade == Grade::OrUnlisted), "{set:?} {grade:?}");
+    // What a rival without a fit would leave is not known.
+    assert_eq!(answer(&[("zero_drift:1", 100.0)]).0, name("backlash:1"));
+}
+
+#[test]
+fn what_is_known_or_repeats_is_not_asked() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let asked = |change: &dyn Fn(&mut Accepted)| {
+        let mut refit = Told { linear: LinearRefit::new(p.clone()), square: BTreeMap::new(), asked: 0 };
+        let first = (p.clone(), weigh(&p, &config));
+        let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+        change(&mut search.accepted[0]);
+        let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
+        settle(&mut search, &mut rooms, &config).unwrap();
+        refit.asked
+    };
+    assert!(asked(&|_| ()) >= 1);
+    assert_eq!(asked(&|a| a.candidate.known = Some("seen".into())), 0);
+    assert_eq!(asked(&|a| std::rc::Rc::make_mut(&mut a.room).weighed.p_noise = vec![(Noise::Place, 0.9)]), 0);
+}
