@@ -77,7 +77,7 @@ mod tests {
     use nalgebra::{dmatrix, dvector};
 
     fn amplitude(name: &str, unit: Unit, typical: f64) -> Amplitude {
-        Amplitude { name: name.to_owned(), unit, typical }
+        Amplitude { name: name.to_owned(), unit, typical, never_negative: false }
     }
 
     #[test]

@@ -244,6 +244,14 @@ fn warnings(
             );
             add(Severity::Notice, "named-as-known", a.candidate.spec.clone(), message);
         }
+        if !a.judged.impossible.is_empty() {
+            let message = format!(
+                "{}: {} came out negative, which no such mechanism is; something else acts that looks like it",
+                a.candidate.spec,
+                listed(&a.judged.impossible)
+            );
+            add(Severity::Notice, "negative-size", a.candidate.spec.clone(), message);
+        }
         if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
             let message = format!(
                 "{}: something changed between dwells; a load that is not declared, another tool or another arm in a recording \

@@ -2,13 +2,13 @@
 
 use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
-use crate::confusion::{likeness, one_step};
+use crate::confusion::{OneStep, half_width, likeness, one_step};
 use crate::contrasts::{Contrast, contrast};
 use crate::crossval::{Group, HeldOut, by_place, by_recording, by_stretch, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
 use crate::noise::Noise;
 use crate::places::units;
-use crate::problem::{Problem, Scan};
+use crate::problem::{Amplitude, Problem, Scan};
 use crate::projection::Gram;
 use crate::weigh::Weighed;
 use nalgebra::DVector;
@@ -42,6 +42,8 @@ pub(crate) struct Judged {
     pub p_other: f64,
     /// Paired contrast, where the design has one.
     pub contrast: Option<Contrast>,
+    /// Amplitudes that are negative and cannot be.
+    pub impossible: Vec<String>,
     /// Products of its columns under white noise.
     pub gram: Gram,
 }
@@ -74,7 +76,7 @@ impl Judged {
         }
         let beats = self.margin >= 0.0 && self.p_other <= (1.0 - config.credible_mass) * something;
         let disagrees = self.contrast.as_ref().is_some_and(|c| !c.agrees);
-        if beats && !disagrees { Grade::Named } else { Grade::OrUnlisted }
+        if beats && !disagrees && self.impossible.is_empty() { Grade::Named } else { Grade::OrUnlisted }
     }
 }
 
@@ -83,7 +85,8 @@ impl Judged {
 pub(crate) enum Grade {
     /// Not real, or something unlisted is more probable.
     Refused,
-    /// Real and listed, but something unlisted cannot be excluded or pairs of visits disagree.
+    /// Real and listed, but something unlisted cannot be excluded, pairs of visits disagree, or it is negative where it cannot
+    /// be.
     OrUnlisted,
     /// The set holds the name.
     Named,
@@ -103,7 +106,7 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let own = dense(entry);
     let gram = projection.gram(&own);
     let fitted = one_step(&gram, 1.0);
-    let residual_variance = (projection.rss - significance[entry].score).max(0.0) / projection.dof();
+    let residual_variance = projection.variance_without(significance[entry].score);
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
     let set = answer(problem, weighed, metric, entry, config);
 
@@ -115,13 +118,29 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, None, config));
 
     let theta = &fitted.estimate;
-    let theta_sigma = (residual_variance * (theta.transpose() * &fitted.covariance * theta)[(0, 0)]).sqrt()
-        / theta.norm_squared().max(1e-300);
+    let theta_sigma = relative_sigma(&fitted, residual_variance);
+    let impossible = impossible(&weighed.entries[entry].candidate.amplitudes, &fitted, residual_variance);
     let base = &problem.residual - &problem.geometry * base_fit(problem);
     let contrast =
         contrast(problem, &base, &weighed.entries[entry].candidate, &effect, theta, theta_sigma, config);
     let (margin, p_other) = against_unlisted(problem, weighed, metric, entry, config);
-    Judged { entry, gram, significance, places, recordings, set, margin, p_other, contrast }
+    Judged { entry, gram, significance, places, recordings, set, margin, p_other, contrast, impossible }
+}
+
+/// Standard deviation of an estimate along itself, in units of its size.
+fn relative_sigma(fitted: &OneStep, variance: f64) -> f64 {
+    let theta = &fitted.estimate;
+    (variance * (theta.transpose() * &fitted.covariance * theta)[(0, 0)]).sqrt()
+        / theta.norm_squared().max(1e-300)
+}
+
+/// Amplitudes of which the whole 95 % interval is negative though physics does not let them be.
+fn impossible(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<String> {
+    let below = |k: usize| {
+        let high = fitted.estimate[k] + half_width((variance * fitted.covariance[(k, k)]).max(0.0).sqrt());
+        amplitudes[k].never_negative && high < 0.0
+    };
+    (0..amplitudes.len()).filter(|k| below(*k)).map(|k| amplitudes[k].name.clone()).collect()
 }
 
 /// Projected directions of all entries, then of every other point of the scans: the maximum runs over all of them.
@@ -175,7 +194,7 @@ fn answer(
     let own = white(entry);
     let fitted = one_step(&projection.gram(&own), 1.0);
     let score = fitted.estimate.dot(&projection.gram(&own).g);
-    let variance = ((projection.rss - score) / projection.dof()).max(1e-12);
+    let variance = projection.variance_without(score).max(1e-12);
 
     let total = 1.0 - weighed.p_nothing;
     let mut order: Vec<(f64, Option<usize>)> =

@@ -85,6 +85,8 @@ pub struct Amplitude {
     pub unit: Unit,
     /// Typical size, SI: one unit of the column.
     pub typical: f64,
+    /// Whether physics does not let it be negative.
+    pub never_negative: bool,
 }
 
 /// One effect on one target.

@@ -71,6 +71,11 @@ impl Projection {
         Projection { q: data, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
     }
 
+    /// Variance of the residual (declared noise = 1) once something took so much of its square.
+    pub fn variance_without(&self, square: f64) -> f64 {
+        (self.rss - square).max(0.0) / self.dof()
+    }
+
     /// Degrees of freedom left.
     pub fn dof(&self) -> f64 {
         (self.residual.len() as f64 - self.effective_parameters).max(1.0)

@@ -23,7 +23,7 @@ const ABSORBED: f64 = 0.9;
 pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> (Vec<ParameterReport>, Option<Combination>) {
     let entry = &weighed.entries[judged.entry];
     let projection = &weighed.metrics[0].projection;
-    let variance = (projection.rss - judged.own().score).max(0.0) / projection.dof();
+    let variance = projection.variance_without(judged.own().score);
     let fitted = one_step(&judged.gram, 1.0);
     let (amplitudes, covariance) = (&entry.candidate.amplitudes, fitted.covariance * variance);
     let sizes = sizes(amplitudes, &fitted.estimate, &covariance);
@@ -77,7 +77,7 @@ pub(crate) fn candidate_reports(
         let gram = projection.gram(&columns);
         let fitted = one_step(&gram, 1.0);
         let significance = top.map_or(none, |t| t.significance[k]);
-        let own_variance = (projection.rss - significance.score).max(0.0) / projection.dof();
+        let own_variance = projection.variance_without(significance.score);
         let held = (rank < SHOWN).then(|| {
             let after = left_out(problem, Some(&c.columns.dense(&problem.dwells, 1.0)), groups);
             compare(problem, &before, &after, groups, config)
@@ -142,7 +142,7 @@ pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTesta
         let gram = weighed.white_gram(&weighed.entries[*k].candidate.columns, problem);
         one_step(&gram, 1.0).estimate.dot(&gram.g).max(0.0)
     });
-    let variance = (projection.rss - best).max(0.0) / projection.dof();
+    let variance = projection.variance_without(best);
     let mut all = Vec::new();
     for entry in weighed.entries.iter().filter(|e| !e.candidate.is_group()) {
         let c = &entry.candidate;

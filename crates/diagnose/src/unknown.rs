@@ -39,7 +39,7 @@ pub(crate) fn described(
     let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
     let (theta, covariance) = coefficients(&gram, a);
     let drop = theta.dot(&gram.g);
-    let variance = ((metric.projection.rss - drop) / metric.projection.dof()).max(0.0);
+    let variance = metric.projection.variance_without(drop);
     let effect = weighed.tamed(&best.columns, problem, config);
     let groups = independent_groups(problem, weighed);
     let memory = weighed.memory_of(&best.columns, problem, config);

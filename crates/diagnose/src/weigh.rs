@@ -239,7 +239,7 @@ impl Weighed {
             }
             _ => 0.0,
         };
-        (white.projection.rss - drop).max(0.0) / white.projection.dof() * self.scale.powi(2)
+        white.projection.variance_without(drop) * self.scale.powi(2)
     }
 
     /// Columns in the units of the weighing.

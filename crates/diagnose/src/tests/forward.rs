@@ -1,5 +1,7 @@
 //! Steps forward and back, against planted effects and against the rules written out.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use super::*;
 use crate::Scan;
 use crate::cells::Unlisted;

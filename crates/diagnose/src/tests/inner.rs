@@ -1,5 +1,7 @@
 //! What the verdict says, against counts and sums written out.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use super::*;
 use crate::problem::{Candidate, Columns};
 use crate::tests::arm::SIGMA_M;

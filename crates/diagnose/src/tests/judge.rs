@@ -1,5 +1,7 @@
 //! When a name may be told, against the rules written out and planted effects.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use super::*;
 use crate::cells::Unlisted;
 use crate::problem::{Candidate, Columns};
@@ -85,6 +87,7 @@ fn a_name_needs_what_is_real_and_listed_and_beats_the_rest() {
     assert_eq!(with(&|j| j.set = vec![0; 9]), Grade::Refused);
     assert_eq!(with(&|j| j.places.p = 0.5), Grade::Refused);
     assert_eq!(with(&|j| j.contrast = None), Grade::Named);
+    assert_eq!(with(&|j| j.impossible = vec!["compliance".into()]), Grade::OrUnlisted);
     assert_eq!(with(&|j| j.contrast.as_mut().unwrap().agrees = false), Grade::OrUnlisted);
 }
 
@@ -344,4 +347,38 @@ fn a_room_judges_an_entry_once() {
     // Another seed would draw other signs: what is known is told again.
     let again = r.judge(0, &DiagnosisConfig { seed: 7, ..quick() });
     assert_eq!(first.significance, again.significance);
+}
+
+#[test]
+fn an_estimate_is_as_uncertain_as_its_covariance_along_itself() {
+    // 4 with variance 4 x 0.25: a quarter of itself.
+    let of = |estimate: &[f64], covariance: &[f64]| OneStep {
+        estimate: DVector::from_column_slice(estimate),
+        covariance: DMatrix::from_diagonal(&DVector::from_column_slice(covariance)),
+        absorbed: 0.0,
+    };
+    assert!((relative_sigma(&of(&[4.0], &[0.25]), 4.0) - 0.25).abs() < 1e-12);
+    // Along (3, 4) the variance is (9 x 0.5 + 16 x 2) / 25 = 1.46, times 9; the size is 5.
+    let sigma = relative_sigma(&of(&[3.0, 4.0], &[0.5, 2.0]), 9.0);
+    assert!((sigma - (9.0f64 * 1.46).sqrt() / 5.0).abs() < 1e-12, "{sigma}");
+    // Below zero by more than 1.96 standard deviations of 0.5 x 2.
+    let amplitude = |name: &str, never_negative| Amplitude {
+        name: name.into(),
+        unit: armcal_core::Unit::Radian,
+        typical: 1.0,
+        never_negative,
+    };
+    let all = [amplitude("spring", true), amplitude("phase", false)];
+    let names = |a: f64, b: f64| impossible(&all, &of(&[a, b], &[0.25, 0.25]), 4.0);
+    assert!(names(-1.9, -9.0).is_empty() && names(3.0, -9.0).is_empty());
+    assert_eq!(names(-2.0, 0.0), ["spring"]);
+}
+
+#[test]
+fn what_is_left_is_the_residual_without_its_part() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let weighed = weigh(&p, &quick());
+    let white = &weighed.metrics[0].projection;
+    assert!((white.variance_without(0.4 * white.rss) - 0.6 * white.rss / white.dof()).abs() < 1e-12);
+    assert_eq!(white.variance_without(2.0 * white.rss), 0.0);
 }

@@ -208,5 +208,9 @@ fn a_direction_is_suspect_where_the_other_one_fits_far_better() {
     residual[9..12].fill(-1.0);
     residual[15..18].fill(-2.0);
     signature[15..18].fill(0.5);
-    assert_eq!(flipped(&p, &residual, &signature), [4], "24 and 12 are not enough, and dwell 2 has no direction");
+    assert_eq!(
+        flipped(&p, &residual, &signature),
+        [4],
+        "24 and 12 are not enough, and dwell 2 has no direction"
+    );
 }

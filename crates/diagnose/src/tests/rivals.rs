@@ -1,5 +1,7 @@
 //! What refits decide, against closed forms and refits made up.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use super::*;
 use crate::refit::LinearRefit;
 use crate::tests::{in_rooms, planted, quick};

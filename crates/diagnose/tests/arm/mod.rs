@@ -212,7 +212,12 @@ pub fn problem(
         l.typical
             .iter()
             .enumerate()
-            .map(|(k, t)| Amplitude { name: format!("a{k}"), unit: l.unit, typical: *t })
+            .map(|(k, t)| Amplitude {
+                name: format!("a{k}"),
+                unit: l.unit,
+                typical: *t,
+                never_negative: false,
+            })
             .collect()
     };
     let effect_columns = |effect: &Effect, typical: &[f64]| {
@@ -287,7 +292,12 @@ fn periodic_scan(poses: &[Pose], j: usize, joint: &Arc<DMatrix<f64>>) -> Scan {
             aliases: Vec::new(),
             known: Option::None,
             amplitudes: (0..2)
-                .map(|k| Amplitude { name: format!("a{k}"), unit: Unit::Radian, typical: size })
+                .map(|k| Amplitude {
+                    name: format!("a{k}"),
+                    unit: Unit::Radian,
+                    typical: size,
+                    never_negative: false,
+                })
                 .collect(),
             toggle: Toggle::None,
             columns: Columns::Product { base: joint.clone(), basis: Arc::new(basis) },

@@ -39,6 +39,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &["compliance"],
     confused_with: &[
         "compliance",
         "belt_compliance",

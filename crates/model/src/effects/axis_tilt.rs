@@ -37,6 +37,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["eccentricity", "second_harmonic", "gear_ratio", "belt_coupling"],
     source: include_str!("axis_tilt.rs"),
     place,

@@ -42,6 +42,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
     source: include_str!("backlash.rs"),
     place,

@@ -49,6 +49,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(heights),
     }],
+    never_negative: &[],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
     source: include_str!("base_compliance.rs"),
     place,

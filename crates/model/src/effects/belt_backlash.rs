@@ -39,6 +39,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
     source: include_str!("belt_backlash.rs"),
     place,

@@ -37,6 +37,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
     source: include_str!("belt_compliance.rs"),
     place,

@@ -36,6 +36,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["gear_ratio", "compliance", "eccentricity", "second_harmonic"],
     source: include_str!("belt_coupling.rs"),
     place,

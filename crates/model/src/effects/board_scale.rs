@@ -34,6 +34,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["sensor_scale"],
     source: include_str!("board_scale.rs"),
     place,

@@ -34,6 +34,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &[],
     source: include_str!("clock_offset.rs"),
     place,

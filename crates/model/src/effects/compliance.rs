@@ -40,6 +40,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &["compliance", "compliance_load"],
     confused_with: &[
         "belt_compliance",
         "hardening_compliance",

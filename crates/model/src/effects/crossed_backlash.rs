@@ -48,6 +48,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: false,
         values: Some(others),
     }],
+    never_negative: &[],
     confused_with: &["backlash", "belt_backlash"],
     source: include_str!("crossed_backlash.rs"),
     place,

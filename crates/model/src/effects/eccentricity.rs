@@ -35,6 +35,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
     source: include_str!("eccentricity.rs"),
     place,

@@ -35,6 +35,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["compliance", "hardening_compliance"],
     source: include_str!("effort_compliance.rs"),
     place,

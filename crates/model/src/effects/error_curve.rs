@@ -49,6 +49,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: false,
         values: None,
     }],
+    never_negative: &[],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
     source: include_str!("error_curve.rs"),
     place,

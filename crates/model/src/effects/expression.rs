@@ -52,6 +52,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Never,
     shapes: &[],
+    never_negative: &[],
     confused_with: &[],
     source: include_str!("expression.rs"),
     place,

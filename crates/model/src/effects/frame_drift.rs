@@ -34,6 +34,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["zero_drift", "thermal_growth", "warm_up", "frame_shift"],
     source: include_str!("frame_drift.rs"),
     place,

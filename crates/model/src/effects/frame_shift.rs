@@ -37,6 +37,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["zero_slip", "tool_shift", "frame_drift"],
     source: include_str!("frame_shift.rs"),
     place,

@@ -41,6 +41,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["backlash"],
     source: include_str!("friction_windup.rs"),
     place,

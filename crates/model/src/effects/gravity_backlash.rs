@@ -70,6 +70,7 @@ pub(super) static KIND: EffectKind = EffectKind {
             values: Some(weights),
         },
     ],
+    never_negative: &[],
     confused_with: &["backlash", "compliance", "arm_compliance"],
     source: include_str!("gravity_backlash.rs"),
     place,

@@ -38,6 +38,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["compliance", "gravity_backlash"],
     source: include_str!("hardening_compliance.rs"),
     place,

@@ -24,6 +24,8 @@ pub struct EffectKind {
     pub offered: Offered,
     /// Numbers that are not amplitudes.
     pub shapes: &'static [Shape],
+    /// Amplitudes that physics does not let be negative, without the number of a joint: a spring yields with its load.
+    pub never_negative: &'static [&'static str],
     /// Other entries that look alike in common data, though not in all.
     pub confused_with: &'static [&'static str],
     /// Its source file, whose header is its documentation.

@@ -41,6 +41,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
     source: include_str!("link_bending.rs"),
     place,

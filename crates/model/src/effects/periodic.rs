@@ -45,6 +45,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(frequencies),
     }],
+    never_negative: &[],
     confused_with: &[],
     source: include_str!("periodic.rs"),
     place,

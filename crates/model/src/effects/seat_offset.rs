@@ -36,6 +36,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Never,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["board_scale"],
     source: include_str!("seat_offset.rs"),
     place,

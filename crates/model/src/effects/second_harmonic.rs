@@ -33,6 +33,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
     source: include_str!("second_harmonic.rs"),
     place,

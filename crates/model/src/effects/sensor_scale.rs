@@ -38,6 +38,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["volume_distortion"],
     source: include_str!("sensor_scale.rs"),
     place,

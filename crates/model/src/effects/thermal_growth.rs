@@ -35,6 +35,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["zero_drift", "frame_drift", "warm_up"],
     source: include_str!("thermal_growth.rs"),
     place,

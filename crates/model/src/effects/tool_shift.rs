@@ -35,6 +35,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["zero_slip", "frame_shift"],
     source: include_str!("tool_shift.rs"),
     place,

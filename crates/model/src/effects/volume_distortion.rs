@@ -38,6 +38,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["sensor_scale"],
     source: include_str!("volume_distortion.rs"),
     place,

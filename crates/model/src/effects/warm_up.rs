@@ -44,6 +44,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(time_constants),
     }],
+    never_negative: &[],
     confused_with: &["thermal_growth", "zero_drift", "frame_drift"],
     source: include_str!("warm_up.rs"),
     place,

@@ -33,6 +33,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
     source: include_str!("zero_drift.rs"),
     place,

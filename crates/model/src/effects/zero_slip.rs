@@ -36,6 +36,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Events,
     shapes: &[],
+    never_negative: &[],
     confused_with: &["frame_shift", "tool_shift", "zero_drift"],
     source: include_str!("zero_slip.rs"),
     place,
