@@ -87,12 +87,12 @@ mod tests {
             exclude: map(&[("belt_backlash", "no belts"), ("zero_slip:elbow", "an absolute encoder")]),
             ..Default::default()
         };
-        let k = Knowledge::of(&config, &joints()).unwrap();
-        let tried = |text: &str| k.tries(&EffectSpec::parse(text, &joints()).unwrap());
+        let k = Knowledge::of(&config, &joints()).expect("understood");
+        let tried = |text: &str| k.tries(&EffectSpec::parse(text, &joints()).expect("a spec"));
         assert!(!tried("belt_backlash:1") && !tried("belt_backlash:2"));
         assert!(!tried("zero_slip:2@1") && !tried("zero_slip:2@0.4") && tried("zero_slip:1@1"));
         assert!(tried("backlash:1"));
-        let said = k.warning().unwrap().message;
+        let said = k.warning().expect("said").message;
         assert_eq!(
             said,
             "as the pipeline says: belt_backlash (\"no belts\"), zero_slip:2 (\"an absolute encoder\") not tried"
@@ -107,8 +107,8 @@ mod tests {
             exclude: map(&[("backlash:1", "a direct drive")]),
             ..Default::default()
         };
-        let k = Knowledge::of(&config, &joints()).unwrap();
-        let of = |text: &str| EffectSpec::parse(text, &joints()).unwrap();
+        let k = Knowledge::of(&config, &joints()).expect("understood");
+        let of = |text: &str| EffectSpec::parse(text, &joints()).expect("a spec");
         assert!(k.tries(&of("backlash:2")) && !k.tries(&of("backlash:1")) && !k.tries(&of("compliance:1")));
         assert!(k.tries(&of("compliance:2")));
         assert_eq!(
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_misspelt_effect_is_named() {
         let config = DiagnosisConfig { exclude: map(&[("backlsh:1", "")]), ..Default::default() };
-        let error = Knowledge::of(&config, &joints()).unwrap_err().to_string();
+        let error = Knowledge::of(&config, &joints()).expect_err("misspelt").to_string();
         assert!(error.contains("diagnosis.exclude") && error.contains("\"backlash\""), "{error}");
     }
 }
