@@ -190,21 +190,19 @@ fn ranked(share: f64) -> i64 {
 /// Rotates the columns of an orthonormal basis so that the variance of their squared entries is largest: Jacobi-like
 /// sweeps over pairs of columns with Kaiser's closed-form angle.
 fn varimax(mut basis: DMatrix<f64>) -> DMatrix<f64> {
-    let rows = basis.nrows() as f64;
     for _sweep in 0..100 {
         let mut largest: f64 = 0.0;
         for i in 0..basis.ncols() {
             for j in i + 1..basis.ncols() {
-                let (mut a, mut b, mut c, mut d) = (0.0, 0.0, 0.0, 0.0);
+                // The sums of u and v, which Kaiser takes off, are zero of orthonormal columns.
+                let (mut c, mut d) = (0.0, 0.0);
                 for r in 0..basis.nrows() {
                     let (x, y) = (basis[(r, i)], basis[(r, j)]);
                     let (u, v) = (x * x - y * y, 2.0 * x * y);
-                    a += u;
-                    b += v;
                     c += u * u - v * v;
                     d += 2.0 * u * v;
                 }
-                let angle = 0.25 * (d - 2.0 * a * b / rows).atan2(c - (a * a - b * b) / rows);
+                let angle = 0.25 * d.atan2(c);
                 let (sin, cos) = angle.sin_cos();
                 for r in 0..basis.nrows() {
                     let (x, y) = (basis[(r, i)], basis[(r, j)]);
