@@ -313,10 +313,15 @@ pub enum Error {
         message: String,
     },
     /// `armcal add suggested` where nothing is.
-    #[error("the diagnosis of `{pipeline}` suggests no effect; name one (see `armcal effects`)")]
+    #[error(
+        "the diagnosis of `{pipeline}` suggests no effect{}; name one (see `armcal effects`)",
+        if left_out.is_empty() { String::new() } else { format!(" that another session has ({} is a formula of time)", left_out.join(", ")) }
+    )]
     NothingSuggested {
         /// Name of the pipeline.
         pipeline: String,
+        /// What it suggests for this session alone.
+        left_out: Vec<String>,
     },
     /// A folder of results does not say which pipeline made it.
     #[error(

@@ -5,6 +5,8 @@ use armcal_model::{EffectSpec, Expression, ModelError, Override};
 
 /// A formula must remove this share of what the free shape removes; otherwise a whole curve is offered.
 const FORMULA_SHARE: f64 = 0.9;
+/// The driver of what depends on the time since the start of the session.
+const TIME: &str = "t";
 /// Harmonics of an error curve that stands for an unlisted shape over a joint's own angle.
 const HARMONICS: f64 = 30.0;
 
@@ -20,6 +22,22 @@ impl Diagnosis {
             effects.extend(self.unlisted.iter().filter_map(UnknownReport::effect));
         }
         Ok(effects)
+    }
+
+    /// Of the suggested effects those to keep, and those that are no part of an arm: a formula of absolute time that was
+    /// fitted over several recordings says nothing of the next one.
+    ///
+    /// # Errors
+    /// As [`Diagnosis::suggested`].
+    pub fn lasting(
+        &self,
+        joint_names: &[String],
+        recordings: usize,
+    ) -> Result<(Vec<EffectSpec>, Vec<EffectSpec>), ModelError> {
+        let of_time: Vec<EffectSpec> =
+            self.unlisted.iter().filter(|u| u.driver == TIME).filter_map(UnknownReport::effect).collect();
+        let all = self.suggested(joint_names)?;
+        Ok(all.into_iter().partition(|e| recordings < 2 || !of_time.contains(e)))
     }
 }
 

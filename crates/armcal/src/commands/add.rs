@@ -37,6 +37,8 @@ pub struct Request<'a> {
 #[derive(Debug, Serialize)]
 struct Added<'a> {
     added: Vec<String>,
+    /// What the diagnosis suggests and no other session has.
+    left_out: Vec<String>,
     pipeline: &'a Path,
     comparison: &'a Comparison,
     remaining: &'a Option<Diagnosis>,
@@ -52,7 +54,10 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
-    let new = named.map_or_else(|| suggested(&pipeline, &settled, &progress), Ok)?;
+    let (new, left_out) = match named {
+        Some(new) => (new, Vec::new()),
+        None => suggested(&pipeline, &settled, &progress)?,
+    };
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
@@ -70,13 +75,17 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     view::remember(request.out, &extended.path)?;
     progress.finish();
 
-    let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
+    let texts = |specs: &[EffectSpec]| specs.iter().map(EffectSpec::to_string).collect::<Vec<_>>();
+    let (added, left_out) = (texts(&new), texts(&left_out));
     if request.json {
         let remaining = &run.diagnosis;
-        let value = Added { added, pipeline: &extended.path, comparison: &comparison, remaining };
+        let value = Added { added, left_out, pipeline: &extended.path, comparison: &comparison, remaining };
         print(&super::json_text(&value)?)?;
     } else {
         print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()))?;
+        if !left_out.is_empty() {
+            print(&format!("Left out: {}, a formula of this session's time\n\n", left_out.join(", ")))?;
+        }
         print(&comparison.terminal(style()))?;
         print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());
@@ -95,15 +104,21 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
     parsed.collect::<Result<_, _>>().map(Some).map_err(Error::of_usage)
 }
 
-/// The effects that the diagnosis suggests.
-fn suggested(pipeline: &Pipeline, settled: &Settled, progress: &Progress) -> Result<Vec<EffectSpec>, Error> {
+/// The effects that the diagnosis suggests, and those of them that no other session has.
+fn suggested(
+    pipeline: &Pipeline,
+    settled: &Settled,
+    progress: &Progress,
+) -> Result<(Vec<EffectSpec>, Vec<EffectSpec>), Error> {
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = settled.fitted.geometry.chain().joint_names();
-    let suggested = diagnosis.map(|d| d.suggested(joints)).transpose()?.unwrap_or_default();
-    if suggested.is_empty() {
-        return Err(Error::NothingSuggested { pipeline: pipeline.name.clone() });
+    let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
+    let (lasting, left_out) = lasting.unwrap_or_default();
+    if lasting.is_empty() {
+        let names = left_out.iter().map(EffectSpec::to_string).collect();
+        return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: names });
     }
-    Ok(suggested)
+    Ok((lasting, left_out))
 }
 
 /// A pipeline with more effects, and where it is written.
