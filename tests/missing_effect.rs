@@ -112,3 +112,32 @@ fn the_catalogue_explains_every_entry() {
         }
     }
 }
+
+/// What the user knows of the arm is not tried, and that is said with its reason.
+#[test]
+fn an_excluded_effect_is_not_tried_and_the_reason_is_told() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let pipeline = recorded("pipelines/lab/paper-backlash.toml", folder.path());
+    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
+    let knowing = |line: &str| {
+        std::fs::write(&pipeline, format!("{text}\n[diagnosis.exclude]\n{line}\n")).expect("pipeline");
+    };
+    knowing("backlash = 'direct drives have none'");
+    let summary = run_pipeline(&pipeline, &folder.path().join("out"), &[0, 3]);
+    let of_play =
+        |name: &Value| name.as_str().is_some_and(|n| n.split('+').any(|n| n.starts_with("backlash:")));
+    let diagnosis = &summary["diagnosis"];
+    let tried = diagnosis["candidates"].as_array().expect("candidates");
+    assert!(tried.len() > 20 && !tried.iter().any(|c| of_play(&c["spec"])), "{diagnosis:#}");
+    assert!(!diagnosis["names"].as_array().expect("names").iter().any(of_play), "{diagnosis:#}");
+    let warnings = summary["warnings"].as_array().expect("warnings");
+    let said = warnings.iter().find(|w| w["code"] == "not-tried").expect("it is said");
+    let message = said["message"].as_str().expect("text");
+    assert!(message.contains("backlash (\"direct drives have none\") not tried"), "{message}");
+
+    knowing("backlsh = 'misspelt'");
+    let output = armcal([Path::new("diagnose"), &pipeline]);
+    assert_eq!(output.status.code(), Some(1));
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(words.contains("diagnosis.exclude") && words.contains("\"backlash\""), "{words}");
+}

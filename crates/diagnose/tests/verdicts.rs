@@ -147,3 +147,21 @@ fn the_error_curves_of_two_joints_are_both_listed() {
     assert_eq!(d.unknown.unwrap().channel, d.unlisted[0].channel, "the strongest comes first");
     assert!(d.holdout_mm.after < 0.7 * d.holdout_mm.before, "{:?}", d.holdout_mm);
 }
+
+#[test]
+fn a_formula_of_time_is_kept_for_its_own_session_only() {
+    let joints = ["joint1", "joint2", "joint3"].map(str::to_owned);
+    for (k, (name, _, driver, effect)) in outside(1.0).into_iter().enumerate() {
+        if !["cycling", "crossed"].contains(&name) {
+            continue;
+        }
+        let mut r = rng(40 + k as u64);
+        let poses = design(0, &mut r);
+        let d = run(problem(&poses, &[(effect, vec![])], Noise::White, &mut r, false));
+        let suggested = d.suggested(&joints).unwrap();
+        assert_eq!(suggested.len(), 1, "{name}");
+        let (kept, left_out) = d.lasting(&joints, 3).unwrap();
+        assert_eq!((kept.len(), left_out.len()), if driver == "t" { (0, 1) } else { (1, 0) }, "{name}");
+        assert_eq!(d.lasting(&joints, 1).unwrap(), (suggested, vec![]), "{name}");
+    }
+}

@@ -388,3 +388,33 @@ fn of_names_that_the_data_leave_the_known_one_is_told() {
     p.candidates.iter_mut().filter(|c| c.spec == "scale:2").for_each(|c| c.known = Some("seen".into()));
     assert_eq!(told(&p).1, both);
 }
+
+/// A listed effect beside twice the size of one that is not.
+fn beside(outside: &str, spec: &str, size: f64) -> Problem {
+    let mut r = arm::rng(3);
+    let poses = arm::design(30, &mut r);
+    let list = arm::catalogue(&poses);
+    let own = list.iter().find(|l| l.spec == spec).unwrap();
+    let (_, _, _, effect) = arm::outside(2.0).into_iter().find(|o| o.0 == outside).unwrap();
+    let hidden = [(own.effect.clone(), own.typical.iter().map(|t| size * t).collect()), (effect, vec![])];
+    arm::problem(&poses, &hidden, arm::Noise::White, &mut r, false)
+}
+
+#[test]
+fn what_shows_only_beside_an_unlisted_shape_is_tentative() {
+    let config = quick();
+    let p = beside("bump", "backlash:3", 0.4);
+    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
+    let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
+    let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
+    assert_eq!((curves, tentative), (vec!["joint1 <- q1"], vec!["backlash:3"]));
+    assert!(s.accepted.is_empty() && s.left_over);
+}
+
+#[test]
+fn doubtful_steps_are_given_a_few_more() {
+    // Play that grows with the angle: plain play is a part of it, without a name; the play of another joint comes after it.
+    let (steps, _) = stepped(&beside("worn", "backlash:3", 0.4), Vec::new(), &quick());
+    assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
+    assert_eq!(names(&steps).last(), Some(&"backlash:3"));
+}

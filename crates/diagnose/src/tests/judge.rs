@@ -163,6 +163,14 @@ fn what_looks_the_same_is_in_the_answer_once() {
         };
         assert_eq!(set_of(&with_twin(0.02), &behind), set);
     }
+    // Signatures that are parallel enough, though these data tell their difference.
+    let near = |w: &mut Weighed| {
+        let (own, k) = (entry(w, "backlash:1"), entry(w, "twin"));
+        w.entries[own].probability = 1.0;
+        (w.entries[k].ln_evidence, w.entries[k].probability) = (w.entries[own].ln_evidence - 1.0, 0.0);
+    };
+    assert_eq!(set_of(&with_twin(0.1), &near), ["backlash:1", "twin"]);
+    assert_eq!(set_of(&with_twin(1.5), &near), ["backlash:1"]);
     assert_eq!(set_of(&with_twin(1.5), &|_| ()), ["backlash:1"]);
     // The set holds 95 % of what is not nothing: another entry with a large part of it belongs to it.
     let probable = |w: &mut Weighed| {
