@@ -79,18 +79,9 @@ pub(crate) fn search(rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Result<
     if left_over && !may_be_shape {
         curves = error_curves(rooms, &names, config)?;
         let mut shapes: Vec<Candidate> = curves.iter().map(|c| c.candidate.clone()).collect();
-        if !shapes.is_empty() && !names.is_empty() {
-            // What a curve of the joint's own angle explains as well was never that effect.
-            let kept = confirm(rooms, known(&names, &rest), &shapes, config)?;
-            if kept.len() < accepted.len() {
-                let keep = named(&kept);
-                let steps = accepted.iter().map(|a| a.candidate.clone());
-                let steps: Vec<Candidate> = steps.filter(|c| keep.iter().any(|k| k.spec == c.spec)).collect();
-                accepted = confirm(rooms, known(&steps, &rest), &[], config)?;
-                names = named(&accepted);
-                rest = rooms.with(&names)?;
-            }
-        }
+        accepted = beside_curves(rooms, accepted, &shapes, &rest, config)?;
+        names = named(&accepted);
+        rest = rooms.with(&names)?;
         if shapes.is_empty() {
             let best = rest.weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats);
             shapes.extend(best.map(|cell| as_candidate(&cell.what, &rest, config)));
@@ -108,6 +99,23 @@ pub(crate) fn search(rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Result<
     let with_curves = rooms.with(&all)?;
     let may_be_shape = left_over && may_be_shape;
     Ok(Search { accepted, tentative, curves, rest, with_curves, left_over, may_be_shape })
+}
+
+/// The names that stand beside error curves too: what a curve of a joint's own angle explains as well was never that effect.
+fn beside_curves(
+    rooms: &mut Rooms<'_>,
+    accepted: Vec<Accepted>,
+    curves: &[Candidate],
+    rest: &Room,
+    config: &DiagnosisConfig,
+) -> Result<Vec<Accepted>, DiagnoseError> {
+    let kept = confirm(rooms, known(&named(&accepted), rest), curves, config)?;
+    if kept.len() == accepted.len() {
+        return Ok(accepted);
+    }
+    let mut steps = named(&accepted);
+    steps.retain(|c| kept.iter().any(|k| k.candidate.spec == c.spec));
+    confirm(rooms, known(&steps, rest), &[], config)
 }
 
 fn named(accepted: &[Accepted]) -> Vec<Candidate> {
@@ -143,6 +151,7 @@ fn confirm(
                 break;
             };
             let (verdict, instead_of) = as_known(&room, room.judge(entry, config), config);
+            let verdict = as_possible(&room, verdict, config);
             let entry = verdict.entry;
             let grade = verdict.grade(weighed, config);
             let ln = weighed.entries[entry].ln_evidence;
@@ -170,6 +179,24 @@ fn as_known(room: &Room, judged: Judged, config: &DiagnosisConfig) -> (Judged, V
         judged.set.iter().map(of).filter(|c| c.known.is_none()).map(|c| c.spec.clone()).collect();
     judged.set.retain(|k| of(k).known.is_some());
     (judged, others)
+}
+
+/// Of names that look the same, one that came out as no such mechanism can is told after one that could be.
+fn as_possible(room: &Room, judged: Judged, config: &DiagnosisConfig) -> Judged {
+    if judged.impossible.is_empty() {
+        return judged;
+    }
+    let others = judged.set[1..].iter().map(|k| room.judge(*k, config));
+    let possible = |j: &Judged| j.impossible.is_empty() && j.grade(&room.weighed, config) != Grade::Refused;
+    match { others }.find(possible) {
+        Some(mut other) => {
+            let entry = other.entry;
+            other.set = vec![entry];
+            other.set.extend(judged.set.iter().copied().filter(|k| *k != entry));
+            other
+        }
+        None => judged,
+    }
 }
 
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of

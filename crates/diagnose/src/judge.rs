@@ -108,7 +108,10 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
-    let set = answer(problem, weighed, metric, entry, config);
+    let impossible = impossible(&weighed.entries[entry].candidate.amplitudes, &fitted, residual_variance);
+    // What came out as no such mechanism can is no better answer than what looks the same.
+    let within_nats = if impossible.is_empty() { config.margin_nats } else { f64::INFINITY };
+    let set = answer(problem, weighed, metric, (entry, within_nats), config);
 
     let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
     let groups = independent_groups(problem, weighed);
@@ -119,7 +122,6 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
 
     let theta = &fitted.estimate;
     let theta_sigma = relative_sigma(&fitted, residual_variance);
-    let impossible = impossible(&weighed.entries[entry].candidate.amplitudes, &fitted, residual_variance);
     let base = &problem.residual - &problem.geometry * base_fit(problem);
     let contrast =
         contrast(problem, &base, &weighed.entries[entry].candidate, &effect, theta, theta_sigma, config);
@@ -186,7 +188,7 @@ fn answer(
     problem: &Problem,
     weighed: &Weighed,
     metric: &Metric,
-    entry: usize,
+    (entry, within_nats): (usize, f64),
     config: &DiagnosisConfig,
 ) -> Vec<usize> {
     let projection = &metric.projection;
@@ -215,7 +217,7 @@ fn answer(
         // differs by little.
         let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
         let alike = like.cosine > config.merge_cosine || like.delta < config.min_delta;
-        if alike && gap < config.margin_nats && !set.contains(&k) {
+        if alike && gap < within_nats && !set.contains(&k) {
             set.push(k);
         }
     }

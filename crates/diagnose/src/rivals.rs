@@ -80,7 +80,10 @@ fn settled(
 ) -> Result<Option<Accepted>, DiagnoseError> {
     let room = found.room.clone();
     // Noise that repeats counts the same error more than once; the weighing knows, this does not.
-    if found.candidate.known.is_some() || !room.weighed.probable(Noise::White) {
+    if found.candidate.known.is_some()
+        || !found.judged.impossible.is_empty()
+        || !room.weighed.probable(Noise::White)
+    {
         return Ok(None);
     }
     let mut refits = Vec::new();
@@ -119,7 +122,10 @@ fn decided(found: &Accepted, evidence: &[(usize, f64)], config: &DiagnosisConfig
     if best_ln > own + config.margin_nats {
         judged = found.room.judge(best, config);
         grade = judged.grade(&found.room.weighed, config);
-        if grade == Grade::Refused {
+        if !judged.impossible.is_empty() {
+            // What came out as no such mechanism can does not take a name.
+            (judged, grade) = (found.judged.clone(), found.grade);
+        } else if grade == Grade::Refused {
             // What explains more after the refit cannot be named, so neither can the other alone.
             (judged, grade) = (found.judged.clone(), Grade::OrUnlisted);
         }

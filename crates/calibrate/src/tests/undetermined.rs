@@ -74,6 +74,11 @@ fn varimax_is_the_maximum_of_kaisers_criterion() {
         assert!((found.transpose() * &found - DMatrix::identity(columns, columns)).amax() < 1e-9);
         assert!((&found * found.transpose() - &basis * basis.transpose()).amax() < 1e-9);
         let best = criterion(&found);
+        // From half way to the next maximum, where the criterion is smallest, too.
+        if columns == 2 {
+            let again = varimax(turned(&found, 0, 1, std::f64::consts::FRAC_PI_4));
+            assert!((criterion(&again) - best).abs() < 1e-9, "{seed}");
+        }
         for (i, j) in (0..columns).flat_map(|i| (i + 1..columns).map(move |j| (i, j))) {
             for step in 0..200 {
                 let angle = std::f64::consts::PI * f64::from(step) / 200.0;

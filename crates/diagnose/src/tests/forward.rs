@@ -418,3 +418,23 @@ fn doubtful_steps_are_given_a_few_more() {
     assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
     assert_eq!(names(&steps).last(), Some(&"backlash:3"));
 }
+
+#[test]
+fn a_name_falls_to_a_curve_that_says_the_same_and_to_no_other() {
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
+    let config = quick();
+    let beside = |spec: &str| {
+        let curve = Candidate { spec: "curve".into(), family: "unlisted".into(), ..own(&p, spec) };
+        in_rooms(&p, &config, |rooms| {
+            let steps = strong(&p, &["backlash:1", "zero_drift:2"]);
+            let accepted = confirm(rooms, steps, &[], &config).unwrap();
+            let rest = rooms.with(&named(&accepted)).unwrap();
+            let kept = beside_curves(rooms, accepted, &[curve], &rest, &config).unwrap();
+            kept.into_iter().map(|a| (a.candidate.spec, a.room.problem.geometry.ncols())).collect::<Vec<_>>()
+        })
+    };
+    // What stays is judged without the curve again: 21 columns of geometry, and the other effect where there is one.
+    let both = [("backlash:1".to_string(), 22), ("zero_drift:2".to_string(), 22)];
+    assert_eq!(beside("scale:3"), both);
+    assert_eq!(beside("zero_drift:2"), [("backlash:1".to_string(), 21)]);
+}
