@@ -188,3 +188,24 @@ fn what_the_documents_quote_is_what_the_commands_print() {
     }
     assert!(quotes >= 2, "only {quotes} quotes were found");
 }
+
+/// `cargo run -- run ...` needs one program to run.
+#[test]
+fn the_first_command_of_the_readme_has_one_program() {
+    let output = std::process::Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    let workspace: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let default = workspace["workspace_default_members"].as_array().expect("members");
+    let packages = workspace["packages"].as_array().expect("packages");
+    let programs: Vec<&str> = packages
+        .iter()
+        .filter(|p| default.contains(&p["id"]))
+        .flat_map(|p| p["targets"].as_array().expect("targets"))
+        .filter(|t| t["kind"].as_array().is_some_and(|k| k.iter().any(|k| k == "bin")))
+        .filter_map(|t| t["name"].as_str())
+        .collect();
+    assert_eq!(programs, ["armcal"]);
+}
