@@ -409,6 +409,11 @@ fn what_shows_only_beside_an_unlisted_shape_is_tentative() {
     let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
     assert_eq!((curves, tentative), (vec!["joint1 <- q1"], vec!["backlash:3"]));
     assert!(s.accepted.is_empty() && s.left_over);
+    // Where no joint errs over its own angle the best cell stands for what is not listed.
+    let p = beside("crossed", "zero_drift:1", 0.4);
+    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
+    let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
+    assert_eq!((s.curves.len(), tentative), (0, vec!["zero_drift:1"]));
 }
 
 #[test]
