@@ -315,7 +315,7 @@ pub enum Error {
     /// `armcal add suggested` where nothing is.
     #[error(
         "the diagnosis of `{pipeline}` suggests no effect{}; name one (see `armcal effects`)",
-        if left_out.is_empty() { String::new() } else { format!(" that another session has ({} is a formula of time)", left_out.join(", ")) }
+        of_this_session(left_out)
     )]
     NothingSuggested {
         /// Name of the pipeline.
@@ -410,6 +410,14 @@ pub enum Error {
     /// Printing a result.
     #[error("printing to stdout: {0}")]
     Stdout(std::io::Error),
+}
+
+/// What is suggested for one session and not for the next one, inside a sentence.
+fn of_this_session(left_out: &[String]) -> String {
+    if left_out.is_empty() {
+        return String::new();
+    }
+    format!(" that another session has ({} is a formula of time)", left_out.join(", "))
 }
 
 impl Error {

@@ -109,6 +109,9 @@ fn beside_curves(
     rest: &Room,
     config: &DiagnosisConfig,
 ) -> Result<Vec<Accepted>, DiagnoseError> {
+    if curves.is_empty() {
+        return Ok(accepted);
+    }
     let kept = confirm(rooms, known(&named(&accepted), rest), curves, config)?;
     if kept.len() == accepted.len() {
         return Ok(accepted);
@@ -186,17 +189,12 @@ fn as_possible(room: &Room, judged: Judged, config: &DiagnosisConfig) -> Judged 
     if judged.impossible.is_empty() {
         return judged;
     }
-    let others = judged.set[1..].iter().map(|k| room.judge(*k, config));
     let possible = |j: &Judged| j.impossible.is_empty() && j.grade(&room.weighed, config) != Grade::Refused;
-    match { others }.find(possible) {
-        Some(mut other) => {
-            let entry = other.entry;
-            other.set = vec![entry];
-            other.set.extend(judged.set.iter().copied().filter(|k| *k != entry));
-            other
-        }
-        None => judged,
-    }
+    let mut others = judged.set[1..].iter().map(|k| room.judge(*k, config));
+    let Some(mut other) = others.find(possible) else { return judged };
+    other.set = vec![other.entry];
+    other.set.extend(judged.set.iter().filter(|k| **k != other.entry));
+    other
 }
 
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of

@@ -3,12 +3,13 @@
 #[path = "../tests/arm/mod.rs"]
 pub(crate) mod arm;
 
+use crate::cells::Unlisted;
 use crate::noise::{Noise, Whitener};
 use crate::projection::Projection;
 use crate::rooms::{Room, Rooms};
-use crate::weigh::weigh;
+use crate::weigh::{Outside, Weighed, weigh};
 use crate::{DiagnosisConfig, LinearRefit, Problem};
-use arm::{catalogue, design, problem, rng};
+use arm::{design, problem, rng};
 use nalgebra::{DMatrix, DVector};
 
 fn small(seed: u64) -> Problem {
@@ -23,18 +24,7 @@ pub(crate) fn quick() -> DiagnosisConfig {
     DiagnosisConfig { resamplings: 199, ..Default::default() }
 }
 
-/// Catalogue entries planted at `size` times their typical size, and white noise.
-pub(crate) fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem {
-    let mut r = rng(seed);
-    let poses = design(free, &mut r);
-    let list = catalogue(&poses);
-    let of = |(name, size): &(&str, f64)| {
-        let own = list.iter().find(|l| l.spec == *name).unwrap();
-        (own.effect.clone(), own.typical.iter().map(|t| size * t).collect())
-    };
-    let hidden: Vec<_> = names.iter().map(of).collect();
-    problem(&poses, &hidden, arm::Noise::White, &mut r, false)
-}
+pub(crate) use arm::planted;
 
 /// Calls `ask` with the rooms of a problem.
 pub(crate) fn in_rooms<T>(p: &Problem, config: &DiagnosisConfig, ask: impl FnOnce(&mut Rooms<'_>) -> T) -> T {
@@ -46,6 +36,24 @@ pub(crate) fn in_rooms<T>(p: &Problem, config: &DiagnosisConfig, ask: impl FnOnc
 /// The first of them.
 pub(crate) fn room(p: &Problem, config: &DiagnosisConfig) -> std::rc::Rc<Room> {
     in_rooms(p, config, |rooms| rooms.with(&[]).unwrap())
+}
+
+/// Where a candidate was weighed.
+pub(crate) fn entry(weighed: &Weighed, spec: &str) -> usize {
+    weighed.entries.iter().position(|e| e.candidate.spec == spec).unwrap()
+}
+
+/// A candidate weighed as if it were not listed: as a cell, or as a shape without a place and a driver.
+pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64, probability: f64) -> Outside {
+    let what = Unlisted {
+        channel: cell.then_some(0),
+        driver: cell.then_some(0),
+        name: spec.to_string(),
+        driver_name: String::new(),
+        columns: own(p, spec).columns,
+        unit_si: 1.0,
+    };
+    Outside { what, ln_evidence, probability }
 }
 
 /// A candidate of a problem.

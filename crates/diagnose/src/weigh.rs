@@ -230,11 +230,7 @@ impl Weighed {
         let drop = match self.best() {
             Some((columns, ln)) if ln > 0.0 => {
                 let gram = white.gram(&self.dense(columns, problem));
-                let (p, a) = (
-                    &white.projection,
-                    best_amplitude(&gram, white.projection.rss, white.projection.dof(), config),
-                );
-                let _ = p;
+                let a = best_amplitude(&gram, white.projection.rss, white.projection.dof(), config);
                 coefficients(&gram, a).0.dot(&gram.g)
             }
             _ => 0.0,

@@ -13,16 +13,8 @@ fn run(p: Problem) -> Diagnosis {
 }
 
 /// Plants catalogue entries at typical size.
-fn planted(names: &[&str], free: usize, seed: u64) -> Diagnosis {
-    let mut r = rng(seed);
-    let poses = design(free, &mut r);
-    let list = catalogue(&poses);
-    let hidden: Vec<_> = list
-        .iter()
-        .filter(|l| names.contains(&l.spec.as_str()))
-        .map(|l| (l.effect.clone(), l.typical.clone()))
-        .collect();
-    run(problem(&poses, &hidden, Noise::White, &mut r, false))
+fn planted(name: &str, free: usize, seed: u64) -> Diagnosis {
+    run(arm::planted(&[(name, 1.0)], free, seed))
 }
 
 #[test]
@@ -44,7 +36,7 @@ fn noise_of_any_kind_is_not_an_effect() {
 #[test]
 fn one_cause_is_named_and_the_error_falls_to_the_noise() {
     for (name, free) in [("backlash:1", 0), ("zero_drift:1", 0), ("compliance:3", 60), ("coupling:3", 60)] {
-        let d = planted(&[name], free, 7);
+        let d = planted(name, free, 7);
         assert!(d.effects.iter().any(|e| e.set.iter().any(|n| n == name)), "{name}: {:?}", d.names);
         assert_eq!(d.effects.len(), 1, "{name}: {:?}", d.names);
         assert!(d.holdout_mm.after < 0.5 && d.holdout_mm.after < d.holdout_mm.before, "{:?}", d.holdout_mm);
@@ -54,7 +46,7 @@ fn one_cause_is_named_and_the_error_falls_to_the_noise() {
 
 #[test]
 fn the_size_of_a_backlash_lies_in_its_interval() {
-    let d = planted(&["backlash:1"], 0, 11);
+    let d = planted("backlash:1", 0, 11);
     let size = &d.effects[0].parameters[0];
     let truth = 0.5f64.to_radians();
     assert!(size.ci95[0] < truth && truth < size.ci95[1], "{size:?}");
@@ -65,7 +57,7 @@ fn the_size_of_a_backlash_lies_in_its_interval() {
 
 #[test]
 fn two_causes_are_both_found() {
-    let d = planted(&["backlash:3", "coupling:3"], 60, 3);
+    let d = run(arm::planted(&[("backlash:3", 1.0), ("coupling:3", 1.0)], 60, 3));
     for name in ["backlash:3", "coupling:3"] {
         assert!(d.effects.iter().any(|e| e.set.iter().any(|n| n == name)), "{:?}", d.names);
     }
@@ -105,7 +97,7 @@ fn a_wrong_noise_declaration_hides_nothing() {
 
 #[test]
 fn the_same_input_gives_the_same_bytes() {
-    let text = || serde_json::to_string(&planted(&["backlash:2"], 0, 9)).unwrap();
+    let text = || serde_json::to_string(&planted("backlash:2", 0, 9)).unwrap();
     assert_eq!(text(), text());
 }
 

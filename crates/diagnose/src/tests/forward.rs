@@ -4,11 +4,10 @@
 
 use super::*;
 use crate::Scan;
-use crate::cells::Unlisted;
 use crate::problem::Columns;
 use crate::refit::LinearRefit;
-use crate::tests::{arm, in_rooms, own, quick, room};
-use crate::weigh::{Outside, weigh};
+use crate::tests::{arm, in_rooms, outside, own, quick, room};
+use crate::weigh::weigh;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -100,19 +99,7 @@ fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
     r.weighed.p_nothing = 0.01;
     r.weighed.entries.retain(|e| e.candidate.spec == entry.0);
     r.weighed.entries[0].ln_evidence = entry.1;
-    let outside = |(spec, cell, ln_evidence): &(&str, bool, f64)| Outside {
-        what: Unlisted {
-            channel: cell.then_some(0),
-            driver: cell.then_some(0),
-            name: spec.to_string(),
-            driver_name: String::new(),
-            columns: own(&p, spec).columns,
-            unit_si: 1.0,
-        },
-        ln_evidence: *ln_evidence,
-        probability: 0.1,
-    };
-    r.weighed.unlisted = unlisted.iter().map(outside).collect();
+    r.weighed.unlisted = unlisted.iter().map(|(s, cell, ln)| outside(&p, s, *cell, *ln, 0.1)).collect();
     r
 }
 

@@ -5,14 +5,10 @@
 use super::*;
 use crate::problem::{Candidate, Columns};
 use crate::tests::arm::SIGMA_M;
-use crate::tests::{arm, in_rooms, own, planted, quick, room};
+use crate::tests::{arm, entry, in_rooms, own, planted, quick, room};
 use armcal_core::DwellId;
 use std::rc::Rc;
 use std::sync::Arc;
-
-fn entry(weighed: &Weighed, spec: &str) -> usize {
-    weighed.entries.iter().position(|e| e.candidate.spec == spec).unwrap()
-}
 
 /// The entry of a problem's first room as it would be accepted.
 fn accepted(p: &Problem, spec: &str) -> Accepted {

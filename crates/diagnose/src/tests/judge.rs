@@ -3,17 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::cells::Unlisted;
 use crate::problem::{Candidate, Columns};
-use crate::tests::{own, planted, quick, room};
-use crate::weigh::{Outside, weigh};
+use crate::tests::{entry, outside, own, planted, quick, room};
+use crate::weigh::weigh;
 use armcal_core::DwellId;
 use nalgebra::DMatrix;
 use std::sync::Arc;
-
-fn entry(weighed: &Weighed, spec: &str) -> usize {
-    weighed.entries.iter().position(|e| e.candidate.spec == spec).unwrap()
-}
 
 /// A planted play, weighed and judged.
 fn judged() -> (Problem, Weighed, Judged) {
@@ -261,19 +256,8 @@ fn against(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> (f6
     let mut weighed = weigh(&p, config);
     let own_entry = entry(&weighed, "backlash:1");
     weighed.entries[own_entry].ln_evidence = 40.0;
-    let outside = |(spec, cell, ln_evidence, probability): &(&str, bool, f64, f64)| Outside {
-        what: Unlisted {
-            channel: cell.then_some(0),
-            driver: cell.then_some(0),
-            name: spec.to_string(),
-            driver_name: String::new(),
-            columns: own(&p, spec).columns,
-            unit_si: 1.0,
-        },
-        ln_evidence: *ln_evidence,
-        probability: *probability,
-    };
-    weighed.unlisted = unlisted.iter().map(outside).collect();
+    weighed.unlisted =
+        unlisted.iter().map(|(s, cell, ln, share)| outside(&p, s, *cell, *ln, *share)).collect();
     against_unlisted(&p, &weighed, &weighed.metrics[0], own_entry, config)
 }
 

@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::refit::LinearRefit;
-use crate::tests::{in_rooms, planted, quick};
+use crate::tests::{entry, in_rooms, planted, quick};
 use crate::weigh::weigh;
 use crate::{Problem, Refit};
 use std::collections::BTreeMap;
@@ -60,7 +60,7 @@ fn answer(square: &[(&'static str, f64)]) -> (Vec<String>, Grade) {
     let own = search.accepted[0].judged.entry;
     let room = std::rc::Rc::make_mut(&mut search.accepted[0].room);
     for (spec, _) in square {
-        let at = room.weighed.entries.iter().position(|e| e.candidate.spec == *spec).unwrap();
+        let at = entry(&room.weighed, spec);
         room.weighed.entries[at].ln_evidence = room.weighed.entries[own].ln_evidence - 1.0;
     }
     settle(&mut search, &mut rooms, &config).unwrap();

@@ -164,6 +164,19 @@ pub enum Noise {
     Swaps,
 }
 
+/// Catalogue entries planted at `size` times their typical size, and white noise.
+pub fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem {
+    let mut r = rng(seed);
+    let poses = design(free, &mut r);
+    let list = catalogue(&poses);
+    let of = |(name, size): &(&str, f64)| {
+        let own = list.iter().find(|l| l.spec == *name).expect("a name of the catalogue");
+        (own.effect.clone(), own.typical.iter().map(|t| size * t).collect())
+    };
+    let hidden: Vec<_> = names.iter().map(of).collect();
+    problem(&poses, &hidden, Noise::White, &mut r, false)
+}
+
 /// A problem with planted displacements [m] (already at size), noise and geometry errors.
 pub fn problem(
     poses: &[Pose],
