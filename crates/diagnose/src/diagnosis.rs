@@ -363,7 +363,7 @@ impl NoiseReport {
     /// The kind of correlation that is beyond doubt, with its probability; none of plain noise.
     pub(crate) fn correlated(&self) -> Option<(&str, f64)> {
         let (kind, p) = self.kinds.first()?;
-        (*p > CERTAIN && *kind != Noise::White.word()).then_some((kind.as_str(), *p))
+        (*p > CERTAIN && *kind != *Noise::White.word()).then_some((kind.as_str(), *p))
     }
 }
 

@@ -60,7 +60,14 @@ pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -
         };
         for b in amplitudes {
             let metric = Metric::new(*noise, *b, problem, scale);
-            metrics.push(metric.weighed(prior / amplitudes.len() as f64, metrics.first(), config));
+            let metric = metric.weighed(prior / amplitudes.len() as f64, metrics.first(), config);
+            // Slack scatters along what it would hide: where it says less than plain noise even of an unexplained
+            // residual, it says nothing.
+            if !matches!(noise, Noise::Slack(_))
+                || metrics.first().is_none_or(|w| metric.ln_weight > w.ln_weight)
+            {
+                metrics.push(metric);
+            }
         }
     }
     let lead = metrics.iter().max_by(|a, b| a.ln_weight.total_cmp(&b.ln_weight));

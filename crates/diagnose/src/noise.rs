@@ -4,13 +4,16 @@
 //! costs no more than walking the rows: groups that share one displacement (rank 3 a group), or a first-order
 //! autoregression, whitened by its Kalman filter. Rows it touches are rescaled by `1 + b^2`: the correlated part is a
 //! share of the declared noise, not an addition to it, so that pure correlated noise does not contradict the declared
-//! size. Everything else is then done in the whitened rows, so that a
-//! noise-like term and a physical one compete on equal ground (formula 9, evaluated exactly for all terms).
+//! size; a wandering sensor and a joint with slack scatter on top of what is declared. Everything else is then done in
+//! the whitened rows, so that a noise-like term and a physical one compete on equal ground (formula 9, evaluated
+//! exactly for all terms).
 
 use crate::problem::{DwellRow, Problem};
 use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Correlation length of the short memory [dwells].
 const MEMORY_DWELLS: f64 = 3.0;
@@ -31,12 +34,17 @@ pub(crate) enum Noise {
     Sensor,
     /// The sensor wanders, and cavities are off their place.
     SensorAndPlace,
+    /// A joint (from 0) rests anywhere within its play: an angle of its own in every dwell, on top of what is declared.
+    Slack(usize),
 }
 
 impl Noise {
     /// In words.
-    pub fn word(self) -> &'static str {
-        match self {
+    pub fn word(self) -> Cow<'static, str> {
+        let plain = match self {
+            Noise::Slack(joint) => {
+                return format!("another angle of joint {} in every dwell, as within play", joint + 1).into();
+            }
             Noise::White => "independent from dwell to dwell",
             Noise::Place => "repeated at every visit to a place (seat or cavity errors)",
             Noise::Visit => "repeated at visits to a place within a recording",
@@ -45,7 +53,8 @@ impl Noise {
             Noise::SensorAndPlace => {
                 "a wandering position sensor, larger than declared, and cavities off their place"
             }
-        }
+        };
+        plain.into()
     }
 
     /// Those the data can tell from white noise: groups need repeats. Not the one of two kinds, see [`Noise::and_place`].
@@ -75,6 +84,7 @@ impl Noise {
         if tracked >= 20 && tracked < problem.dwells.len() {
             found.push(Noise::Sensor);
         }
+        found.extend((0..problem.joints()).map(Noise::Slack).filter(|n| n.direction(problem).is_some()));
         found
     }
 }
@@ -83,6 +93,16 @@ impl Noise {
     /// The kind that has the errors of places besides, where one is known: worth its price only where this one leads.
     pub fn and_place(self, available: &[Noise]) -> Option<Noise> {
         (self == Noise::Sensor && available.contains(&Noise::Place)).then_some(Noise::SensorAndPlace)
+    }
+
+    /// Whitened rows of what a joint's slack turns, one declared standard deviation a dwell in the mean of squares.
+    fn direction(self, problem: &Problem) -> Option<DVector<f64>> {
+        let Noise::Slack(joint) = self else { return None };
+        let name = format!("joint{}", joint + 1);
+        let channel = problem.channels.iter().find(|c| c.name == name)?;
+        let column = channel.columns.column(0);
+        let size = (column.norm_squared() / problem.dwells.len() as f64).sqrt();
+        (size > 0.0).then(|| column / size)
     }
 }
 
@@ -99,6 +119,8 @@ enum Kind {
     White,
     /// `sqrt(1 + b^2)`, and for each group its rows and P with `x - P P'x` whitened.
     Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
+    /// The rows of each dwell, and p with `x - p p'x` whitened.
+    Dwells(Vec<Range<usize>>, DVector<f64>),
     /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
     Memory(Vec<Filter>),
     /// First the memory, of rows scaled, then `x - P P'x` with what places share as the memory shows it.
@@ -133,6 +155,7 @@ impl Whitener {
             Noise::Memory => memory(problem, |_| Share::of_declared(b)),
             Noise::Sensor => memory(problem, sensor(b)),
             Noise::SensorAndPlace => sensor_and_place(problem, b),
+            Noise::Slack(_) => slack(noise, problem, b),
         }
     }
 
@@ -148,6 +171,16 @@ impl Whitener {
                         rows.iter()
                             .zip(change.iter())
                             .for_each(|(r, c)| column[*r] = unit * (column[*r] - c));
+                    }
+                }
+            }
+            Kind::Dwells(dwells, p) => {
+                for mut column in columns.column_iter_mut() {
+                    for rows in dwells {
+                        let own = p.rows(rows.start, rows.len());
+                        let mut x = column.rows_mut(rows.start, rows.len());
+                        let shared = own.dot(&x);
+                        x.axpy(-shared, &own, 1.0);
                     }
                 }
             }
@@ -212,6 +245,20 @@ fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
         p.column_mut(k).scale_mut(share);
     }
     (p, ln_det)
+}
+
+/// `I + b^2 v v'` in every dwell.
+fn slack(noise: Noise, problem: &Problem, b: f64) -> Whitener {
+    let Some(mut p) = noise.direction(problem) else { return Whitener { kind: Kind::White, ln_det: 0.0 } };
+    let dwells: Vec<Range<usize>> = problem.dwells.iter().map(DwellRow::range).collect();
+    let mut ln_det = 0.0;
+    for rows in &dwells {
+        let own = DMatrix::from_column_slice(rows.len(), 1, p.rows(rows.start, rows.len()).as_slice());
+        let (share, grown) = shares(&own, b);
+        p.rows_mut(rows.start, rows.len()).copy_from(&share);
+        ln_det += grown;
+    }
+    Whitener { kind: Kind::Dwells(dwells, p), ln_det }
 }
 
 fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {

@@ -99,6 +99,30 @@ fn whiteners_are_inverse_roots_of_their_covariance() {
     }
 }
 
+#[test]
+fn a_slack_joint_is_whitened_as_one_more_angle_in_every_dwell() {
+    let p = small(3);
+    for joint in 0..p.joints() {
+        let v =
+            p.channels.iter().find(|c| c.name == format!("joint{}", joint + 1)).unwrap().columns.column(0);
+        let unit = p.dwells.len() as f64 / v.norm_squared();
+        for b in [0.3, 3.0] {
+            let dwell = |row: usize| p.dwells.iter().position(|d| d.range().contains(&row));
+            let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| {
+                let shared = if dwell(i) == dwell(k) { b * b * unit * v[i] * v[k] } else { 0.0 };
+                f64::from(i == k) + shared
+            });
+            let whitener = Whitener::new(Noise::Slack(joint), b, &p);
+            let mut w = DMatrix::identity(p.rows(), p.rows());
+            whitener.apply(&mut w);
+            let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
+            assert!(error < 1e-9, "joint {joint}: {error}");
+            let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+            assert!((whitener.ln_det - ln_det).abs() < 1e-8, "joint {joint}: {} {ln_det}", whitener.ln_det);
+        }
+    }
+}
+
 /// The covariance of a wandering sensor, with what places share or without, written out.
 fn dense_sensor(b: f64, places: bool, p: &Problem) -> DMatrix<f64> {
     // Standard deviation of the part that remembers, and the factor back to the declared noise.

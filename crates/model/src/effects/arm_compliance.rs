@@ -11,6 +11,8 @@
 //! `compliance<j>` c_j [rad/(N m)], one a turning joint, of the links with their default masses (2.5 kg a metre; each
 //! absorbs the true scale at its joint). Prior: 0.1 deg with the nominal arm stretched out, the size of an industrial
 //! gear.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! The tip sags with the lever of gravity by a little of every joint. One joint's share alone may be too small to be
@@ -26,6 +28,7 @@ use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use crate::segment::Motion;
 use armcal_core::Unit;
@@ -38,7 +41,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Whole,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[SEATED],
     never_negative: &["compliance"],
     confused_with: &[
         "compliance",

@@ -13,6 +13,8 @@
 //!
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
+//! The gap while a cavity holds the tip has a size of its own, `width_seated`, where a session has both kinds of dwell:
+//! whoever led the tip there, servo or hand, decided the flank.
 //!
 //! # Signature in the data
 //! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
@@ -31,6 +33,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
+use super::state::apart;
 use crate::rigid::Scalar;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -59,7 +62,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
     let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
     let resolved = placing.joint_size(joint, RESOLVED_DEG);
-    Ok(Placement::new(vec![width], Backlash { joint, resolved }))
+    Ok(apart(placing, Placement::new(vec![width], Backlash { joint, resolved })))
 }
 
 impl Physics for Backlash {

@@ -11,6 +11,8 @@
 //! `compliance` c [rad/(N m)] of the links with their default masses, `compliance_outer` the correction for the share
 //! of the outer links, `compliance_load` under the load; shape `height` h [m], 0 unless said. Prior: 0.3 deg with the
 //! nominal arm stretched out.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! The tip sinks towards where the arm reaches out, as with a compliant shoulder whose pivot lies lower.
@@ -27,6 +29,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle}
 use super::physics::{Deformation, Physics};
 use super::placing::Placing;
 use super::shares::Shares;
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::{Observation, Unit};
 use nalgebra::Vector3;
@@ -39,16 +42,19 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Whole,
     offered: Offered::Once,
-    shapes: &[Shape {
-        name: "height",
-        unit: Unit::Metre,
-        default: Some(0.0),
-        lower: -2.0,
-        upper: 5.0,
-        meaning: "height of the pivot above the origin of the base",
-        parameter: true,
-        values: Some(heights),
-    }],
+    shapes: &[
+        Shape {
+            name: "height",
+            unit: Unit::Metre,
+            default: Some(0.0),
+            lower: -2.0,
+            upper: 5.0,
+            meaning: "height of the pivot above the origin of the base",
+            parameter: true,
+            values: Some(heights),
+        },
+        SEATED,
+    ],
     never_negative: &[],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
     source: include_str!("base_compliance.rs"),

@@ -11,6 +11,8 @@
 //! # Parameters and units
 //! `compliance` c [rad/(N m)] of the links with their default masses, `compliance_load` under the load. The spec
 //! names j. Prior: 0.4 deg with the nominal arm stretched out.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! The tip sags with the lever of the inner link alone, and the outer link does not tilt.
@@ -25,6 +27,7 @@ use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -36,7 +39,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[SEATED],
     never_negative: &[],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
     source: include_str!("belt_compliance.rs"),

@@ -10,6 +10,8 @@
 //! `compliance` c [rad/(N m)] of the links with their default masses (2.5 kg a metre; it absorbs the true scale),
 //! `compliance_outer` the correction for the share of the outer links, `compliance_load` the true c, seen under a
 //! known load, where the session has one. Prior: 0.4 deg with the nominal arm stretched out.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! The tip sags with the lever of gravity; a load at the tip adds to it. In a narrow range of poses nearly all of
@@ -28,6 +30,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::Placing;
 use super::shares::Shares;
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -39,7 +42,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[SEATED],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &[
         "belt_compliance",

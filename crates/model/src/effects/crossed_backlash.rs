@@ -12,6 +12,8 @@
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]), negative where j is dragged along with i; `from` i names the joint whose
 //! direction counts. The spec names j.
+//! The gap while a cavity holds the tip has a size of its own, `width_seated`, where a session has both kinds of dwell:
+//! whoever led the tip there, servo or hand, decided the flank.
 //!
 //! # Signature in the data
 //! The residual enters like a rotation of one joint and flips with the direction of arrival of another.
@@ -27,6 +29,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle}
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, following};
+use super::state::apart;
 use crate::rigid::Scalar;
 use armcal_core::{Observation, Unit};
 
@@ -82,7 +85,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     );
     let resolved = placing.joint_size(from, RESOLVED_DEG);
     let per_unit = placing.joint_size(joint, 1.0) / placing.joint_size(from, 1.0);
-    Ok(Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit }))
+    Ok(apart(placing, Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit })))
 }
 
 fn others(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {

@@ -12,6 +12,8 @@
 //! # Parameters and units
 //! `windup` c [rad/(N m)] of the links with their default masses; `windup_outer` the correction for the share of
 //! the outer links; `windup_load` under the load. Prior: 0.4 deg with the nominal arm stretched out.
+//! Wind-up while a cavity holds the tip has a size of its own, `windup_seated`, where a session has both kinds of dwell:
+//! whoever led the tip there, servo or hand, decided the flank.
 //!
 //! # Signature in the data
 //! The residual flips with the direction of arrival, most where the arm is stretched out or loaded.
@@ -29,6 +31,7 @@ use super::physics::{Deformation, Physics};
 use super::placing::Placing;
 use super::play::{RESOLVED_DEG, lagging};
 use super::shares::Shares;
+use super::state::apart;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -61,7 +64,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let unit = Unit::RadianPerNewtonMetre;
     let meaning = "wind-up per gravity torque against the direction of arrival";
     let amplitudes = shares.amplitudes("windup", unit, 0.4 * per_deg, 8.0 * per_deg, meaning);
-    Ok(Placement::new(amplitudes, FrictionWindup { joint, shares }))
+    Ok(apart(placing, Placement::new(amplitudes, FrictionWindup { joint, shares })))
 }
 
 impl Physics for FrictionWindup {

@@ -12,6 +12,8 @@
 //! # Parameters and units
 //! `width` b [rad]; shapes `friction` F [1], `smoothing` e [1], `outer` r [1]: nobody knows the masses, and where the
 //! torque changes sign depends on their ratio.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! A jump where the gravity torque of the joint changes sign, a constant elsewhere: with one sign of torque it is
@@ -27,6 +29,7 @@ use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::{Observation, Unit};
 
@@ -69,6 +72,7 @@ pub(super) static KIND: EffectKind = EffectKind {
             parameter: true,
             values: Some(weights),
         },
+        SEATED,
     ],
     never_negative: &[],
     confused_with: &["backlash", "compliance", "arm_compliance"],

@@ -11,6 +11,8 @@
 //! # Parameters and units
 //! `compliance`, `compliance_outer`, `compliance_load` [rad/(N m)] as in `compliance`; `cubic` a [rad], negative
 //! where the joint hardens; `quintic` b [rad], which then turns back.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! A sag whose growth with the lever of gravity bends over.
@@ -26,6 +28,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::shares::Shares;
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -37,7 +40,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[SEATED],
     never_negative: &[],
     confused_with: &["compliance", "gravity_backlash"],
     source: include_str!("hardening_compliance.rs"),

@@ -11,6 +11,8 @@
 //! # Parameters and units
 //! `sag` w [m] of the link held out level with the nominal masses beyond it; `sag_outer` the correction for the
 //! moment of the outer links; `sag_load` under a load of 1 kg.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
+//! arm there.
 //!
 //! # Signature in the data
 //! The tip sinks with the lever of gravity, and the links beyond it tilt.
@@ -28,6 +30,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::Placing;
 use super::shares::Shares;
+use super::state::SEATED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 use nalgebra::Vector3;
@@ -40,7 +43,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[SEATED],
     never_negative: &[],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
     source: include_str!("link_bending.rs"),

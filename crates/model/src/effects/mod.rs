@@ -52,6 +52,7 @@ mod sensor_scale;
 mod session;
 mod shares;
 mod spec;
+mod state;
 mod table;
 mod thermal_growth;
 mod tool_shift;

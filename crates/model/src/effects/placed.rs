@@ -6,6 +6,7 @@ use super::physics::{AnyPhysics, Deformation, Slot};
 use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
+use super::state;
 use crate::error::nearest;
 use crate::path::{PathAt, joint_twists};
 use crate::rigid::Rigid;
@@ -101,6 +102,8 @@ pub(crate) fn place(
         role: Role::Effect,
         meaning: shape.meaning.to_owned(),
     }));
+    let share = parameters.iter().position(|p| p.name == state::SEATED.name);
+    let physics = share.map_or_else(|| physics.clone(), |share| state::shared(physics.clone(), count, share));
     for (quantity, change) in &spec.overrides {
         let known = || parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
         let message = || {

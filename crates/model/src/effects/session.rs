@@ -42,6 +42,11 @@ pub struct Session {
 }
 
 impl Session {
+    /// Whether the tip was held by a cavity in some dwells and by the arm alone in others.
+    pub(crate) fn seated_and_tracked(&self) -> bool {
+        !self.cavities.is_empty() && self.volume_centre_m.is_some()
+    }
+
     /// Summarises observations; the order does not matter.
     pub fn of(observations: &[Observation]) -> Session {
         let times = || observations.iter().map(|o| o.time_ns);

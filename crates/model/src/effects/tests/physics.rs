@@ -184,3 +184,56 @@ fn gravity_in_the_base_goes_before_gravity_in_the_world() {
         assert!((a.total_nm() - b.total_nm()).abs() < 1e-12);
     }
 }
+
+/// Motion of the tip of the paper's arm by one amplitude in each of its observations, tracked and seated in turn.
+fn motions_m(text: &str, quantity: &str, observations: &[Observation]) -> Vec<f64> {
+    let model = paper();
+    let session = Session::of(observations);
+    let spec: EffectSpec = model.effect(text).expect("a spec");
+    let extended = model.with_effects(&[spec], &session).expect("a model");
+    let mut p = extended.nominal();
+    let rigid = p.clone();
+    p[extended.index(&format!("{text}.{quantity}")).expect("a parameter")] = 1e-3;
+    let tip_m = |p: &[f64], o: &Observation| extended.predicted_tip_in_world(p, o);
+    observations.iter().map(|o| (tip_m(&p, o) - tip_m(&rigid, o)).norm()).collect()
+}
+
+#[test]
+fn lost_motion_has_a_size_of_its_own_where_a_cavity_holds_the_tip() {
+    let both = observations(&paper(), 20, false);
+    for text in ["backlash:2", "friction_windup:2", "belt_backlash:3", "crossed_backlash:2,from=1"] {
+        let quantity = if text.starts_with("friction") { "windup" } else { "width" };
+        let own = motions_m(text, quantity, &both);
+        let seated = motions_m(text, &format!("{quantity}_seated"), &both);
+        for ((o, own), seated) in both.iter().zip(&own).zip(&seated) {
+            assert!(if o.cavity().is_some() { *own == 0.0 } else { *seated == 0.0 }, "{text}");
+        }
+        assert!(own.iter().any(|m| *m > 1e-5) && seated.iter().any(|m| *m > 1e-5), "{text}");
+    }
+    // With one kind of dwell alone there is one size.
+    let tracked = observations(&paper(), 20, true);
+    assert!(motions_m("backlash:2", "width", &tracked).iter().all(|m| *m > 1e-5));
+    let model = paper();
+    let alone = model.with_effects(&[model.effect("backlash:2").expect("a spec")], &Session::of(&tracked));
+    assert_eq!(alone.expect("a model").effects()[0].amplitudes, 1);
+}
+
+#[test]
+fn what_gravity_bends_may_rest_while_a_cavity_holds_the_tip() {
+    let both = observations(&paper(), 20, false);
+    for text in ["compliance:2", "link_bending:1", "base_compliance", "gravity_backlash:2"] {
+        let quantity = match text {
+            "link_bending:1" => "sag",
+            "gravity_backlash:2" => "width",
+            _ => "compliance",
+        };
+        let always = motions_m(text, quantity, &both);
+        for share in [0.0, 0.5] {
+            let own = motions_m(&format!("{text},seated={share}"), quantity, &both);
+            for ((o, own), always) in both.iter().zip(&own).zip(&always) {
+                let expected = if o.cavity().is_some() { share * always } else { *always };
+                assert!((own - expected).abs() < 1e-3 * always, "{text} {share}: {own} {expected}");
+            }
+        }
+    }
+}

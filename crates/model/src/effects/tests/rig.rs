@@ -123,7 +123,8 @@ pub fn specs(model: &Model, observations: &[Observation]) -> Vec<EffectSpec> {
     let session = Session::of(observations);
     let mut specs = model.candidates(&session);
     for (_, members) in model.scans(&session, observations) {
-        specs.extend([members[0].clone(), members[members.len() / 2].clone()]);
+        specs.push(members[0].clone());
+        specs.extend((members.len() > 1).then(|| members[members.len() / 2].clone()));
     }
     let placed = |spec: &EffectSpec| model.with_effects(std::slice::from_ref(spec), &session).is_ok();
     let unoffered = catalogue().iter().filter(|kind| kind.offered == Offered::Never);

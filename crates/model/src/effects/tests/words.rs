@@ -163,8 +163,8 @@ fn what_is_wrong_with_a_formula_is_named() {
 #[test]
 fn a_formula_is_the_entry_of_the_catalogue_it_spells_out() {
     let model = paper();
-    let mut observations = observations(&model, 24, false);
-    // A formula knows the direction of arrival, not the path.
+    // A formula knows neither who holds the tip nor the path, only the direction of arrival.
+    let mut observations = observations(&model, 24, true);
     observations.iter_mut().for_each(|o| o.path_memory_rad = None);
     let session = Session::of(&observations);
     for (kind, formula, acts_on, unit) in [
