@@ -53,6 +53,9 @@ mod missing_effect;
 /// Is nobody told that nothing is missing where a number of the pipeline, model or board is wrong?
 mod verdict_law;
 
+/// Do names hold on the rig as another physics engine moves it?
+mod another_engine;
+
 /// How often is the diagnosis right on scenarios whose truth it cannot see?
 mod sealed_scenarios;
 

@@ -1,6 +1,7 @@
-"""usage: python -m mujoco_rig.judge ARMCAL FOLDER [--seeds N] [--from K] [--nothing N] [--only A,B] [--out TABLE.md]
+"""usage: python -m mujoco_rig.judge ARMCAL FOLDER [--seeds N] [--from K] [--nothing N] [--only A,B] [--page PAGE.md]
 
-Makes sessions in FOLDER, asks armcal what is missing, adds what it suggests, opens the truth afterwards and counts.
+Makes sessions in FOLDER, asks armcal what is missing, adds what it suggests, opens the truth afterwards and counts. What
+was said of a session stays in FOLDER, so that a judgement that was broken off goes on. The last line is JSON.
 """
 import argparse
 import json
@@ -13,10 +14,10 @@ from collections import Counter, defaultdict
 from concurrent.futures import ThreadPoolExecutor
 
 from .hidden import MECHANISMS
+from .page import write
 
 ABOVE_FLOOR = 1.5  # an error larger than so many floors may not go without a word
 AT_FLOOR = 1.1
-WORDS = ["first", "first, and more", "in the answer", "unknown", "unexplained", "not shown", "silent", "wrong set", "wrong name", "setup"]
 
 
 def _armcal(program, *words):
@@ -35,7 +36,8 @@ def session(program, folder, mechanism, seed):
         subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
         said = {"diagnosis": _armcal(program, "diagnose", f"{path}/pipeline.toml")}
         if any(e["set"] for e in said["diagnosis"]["effects"]):
-            said["added"] = _armcal(program, "add", "suggested", f"{path}/pipeline.toml", "--out", f"{path}/out")
+            added = _armcal(program, "add", "suggested", f"{path}/pipeline.toml", "--out", f"{path}/out")
+            said["after_mm"] = added.get("comparison", {}).get("held_out", {}).get("after_mm")
         with open(f"{path}-said.json", "w") as out:
             json.dump(said, out)
         shutil.rmtree(path)
@@ -49,7 +51,7 @@ def is_true(name, accept):
 
 
 def judged(truth, found):
-    """One of WORDS for what armcal said of a session."""
+    """One of the columns of the table for what armcal said of a session."""
     if found["verdict"] == "setup":
         return "setup"
     floors = found["holdout_mm"]["before"] / found["floor_mm"]
@@ -57,6 +59,8 @@ def judged(truth, found):
     true = [any(is_true(name, truth["accept"]) for name in names) for names in sets]
     if found["verdict"] == "nothing_missing":
         return "silent" if floors > ABOVE_FLOOR else "not shown"
+    if found["verdict"] == "unexplained" and floors <= AT_FLOOR:
+        return "not shown"
     if any(len(names) == 1 and not right for names, right in zip(sets, true)):
         return "first, and more" if true[0] and is_true(sets[0][0], truth["accept"]) else "wrong name"
     if sets and is_true(sets[0][0], truth["accept"]):
@@ -74,32 +78,31 @@ def main():
     ask.add_argument("--from", type=int, default=1, dest="first")
     ask.add_argument("--nothing", type=int, default=0)
     ask.add_argument("--only", default="")
-    ask.add_argument("--out")
+    ask.add_argument("--jobs", type=int, default=os.cpu_count())
+    ask.add_argument("--page")
     ask = ask.parse_args()
     os.makedirs(ask.folder, exist_ok=True)
     only = [m for m in ask.only.split(",") if m] or [m for m in MECHANISMS if m != "nothing"]
     wanted = [(m, ask.first + k) for m in only for k in range(ask.seeds)]
     wanted += [("nothing", ask.first + k) for k in range(ask.nothing)]
-    with ThreadPoolExecutor(int(os.environ.get("JOBS", os.cpu_count()))) as pool:
+    with ThreadPoolExecutor(ask.jobs) as pool:
         done = list(pool.map(lambda w: session(ask.armcal, ask.folder, *w), wanted))
     counts, floors = defaultdict(Counter), defaultdict(list)
     for truth, said in done:
         found = said["diagnosis"]
         word = judged(truth, found)
         counts[truth["mechanism"]][word] += 1
-        before = found.get("holdout_mm", {}).get("before", float("nan")) / (found.get("floor_mm") or 1)
-        after = said.get("added", {}).get("over_floor", before)
-        floors[truth["mechanism"]].append((before, after))
+        floor = found.get("floor_mm") or float("nan")
+        before = found.get("holdout_mm", {}).get("before", float("nan"))
+        floors[truth["mechanism"]].append((before / floor, (said.get("after_mm") or before) / floor))
         names = "; ".join(" or ".join(e["set"][:4]) for e in found["effects"])
-        print(f"{truth['mechanism']:12} {truth['seed']:5} {truth['size']:8.3f} {truth['unit']:5} {word:16} {before:6.2f} floors  {names}")
-    table = ["| hidden | n | " + " | ".join(WORDS) + " | before/floor |", "|---|--:|" + "--:|" * (len(WORDS) + 1)]
-    for mechanism, words in counts.items():
-        row = [mechanism, str(sum(words.values()))] + [str(words[w] or "") for w in WORDS]
-        table.append("| " + " | ".join(row) + f" | {statistics.median(b for b, _ in floors[mechanism]):.2f} |")
-    print("\n".join(table))
-    if ask.out:
-        with open(ask.out, "w") as out:
-            out.write("\n".join(table) + "\n")
+        hidden = f"{truth['mechanism']:12} {truth['seed']:5} {truth['size']:8.3f} {truth['unit']:6}"
+        after = "{:6.2f} -> {:5.2f} floors".format(*floors[truth["mechanism"]][-1])
+        print(f"{hidden} {word:16} {after}  {names or found['verdict']}")
+    if ask.page:
+        write(ask.page, counts, floors, ask, AT_FLOOR)
+    median = {m: statistics.median(after for _, after in all) for m, all in floors.items()}
+    print(json.dumps({"counts": counts, "after_floors": median}))
 
 
 if __name__ == "__main__":

@@ -55,7 +55,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         },
         SEATED,
     ],
-    never_negative: &[],
+    never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
     source: include_str!("base_compliance.rs"),
     place,

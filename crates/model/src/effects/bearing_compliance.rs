@@ -42,7 +42,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[],
-    never_negative: &[],
+    never_negative: &["tilt", "tilt_load"],
     confused_with: &["compliance", "base_compliance", "arm_compliance", "link_bending"],
     source: include_str!("bearing_compliance.rs"),
     place,

@@ -40,7 +40,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[SEATED],
-    never_negative: &[],
+    never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
     source: include_str!("belt_compliance.rs"),
     place,

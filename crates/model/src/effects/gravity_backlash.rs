@@ -74,7 +74,7 @@ pub(super) static KIND: EffectKind = EffectKind {
         },
         SEATED,
     ],
-    never_negative: &[],
+    never_negative: &["width"],
     confused_with: &["backlash", "compliance", "arm_compliance"],
     source: include_str!("gravity_backlash.rs"),
     place,

@@ -44,7 +44,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Joint,
     offered: Offered::Once,
     shapes: &[SEATED],
-    never_negative: &[],
+    never_negative: &["sag", "sag_load"],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
     source: include_str!("link_bending.rs"),
     place,
