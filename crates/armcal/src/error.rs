@@ -312,7 +312,7 @@ pub enum Error {
         /// What would undo it.
         message: String,
     },
-    /// `armcal add suggested` where nothing is.
+    /// `armcal add suggested` where nothing is, or nothing that holds elsewhere.
     #[error(
         "the diagnosis of `{pipeline}` suggests no effect{}; name one (see `armcal effects`)",
         of_this_session(left_out)
@@ -412,12 +412,12 @@ pub enum Error {
     Stdout(std::io::Error),
 }
 
-/// What is suggested for one session and not for the next one, inside a sentence.
+/// What is suggested and not added, inside a sentence.
 fn of_this_session(left_out: &[String]) -> String {
     if left_out.is_empty() {
         return String::new();
     }
-    format!(" that another session has ({} is a formula of time)", left_out.join(", "))
+    format!(" that another session or recording does not contradict ({})", left_out.join("; "))
 }
 
 impl Error {

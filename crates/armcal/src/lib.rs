@@ -21,6 +21,7 @@ pub mod setup;
 pub mod stages;
 pub mod stdout;
 pub mod story;
+pub mod transfer;
 pub mod verify;
 pub mod view;
 

@@ -337,7 +337,8 @@ fn diagnosis(
     Ok(Some(diagnose(&calibrated, &pipeline.diagnosis)?))
 }
 
-fn with_effects(
+/// The geometry with effects, or as it is without any.
+pub(crate) fn with_effects(
     pipeline: &Pipeline,
     geometry: &Model,
     effects: &[EffectSpec],

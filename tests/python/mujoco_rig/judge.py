@@ -22,10 +22,11 @@ AT_FLOOR = 1.1
 
 def _armcal(program, *words):
     ran = subprocess.run([program, *words, "--json"], capture_output=True, text=True)
+    stopped = {"verdict": "setup", "effects": [], "error": (ran.stdout + ran.stderr).strip()}
     try:
-        return json.loads(ran.stdout)
+        return json.loads(ran.stdout) or stopped
     except json.JSONDecodeError:
-        return {"verdict": "setup", "effects": [], "error": (ran.stdout + ran.stderr).strip()}
+        return stopped
 
 
 def session(program, folder, mechanism, seed):

@@ -6,7 +6,8 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::frames;
-use crate::story::{self, Diagnosed, Settled};
+use crate::story::{self, Diagnosed, Fitted, Settled};
+use crate::transfer::{Transfer, transfers};
 use crate::view;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, effects_toml};
@@ -37,11 +38,27 @@ pub struct Request<'a> {
 #[derive(Debug, Serialize)]
 struct Added<'a> {
     added: Vec<String>,
-    /// What the diagnosis suggests and no other session has.
-    left_out: Vec<String>,
+    /// What the diagnosis suggests and another session or recording contradicts.
+    left_out: &'a [LeftOut],
+    /// Each effect fitted on all recordings but one and judged on that one.
+    transfer: &'a [Transfer],
     pipeline: &'a Path,
     comparison: &'a Comparison,
     remaining: &'a Option<Diagnosis>,
+}
+
+/// A suggestion that is not added.
+#[derive(Debug, Serialize)]
+struct LeftOut {
+    effect: String,
+    reason: String,
+}
+
+/// What is added, what it does to recordings that did not teach it, and what is left out for that.
+struct Chosen {
+    new: Vec<EffectSpec>,
+    transfer: Vec<Transfer>,
+    left_out: Vec<LeftOut>,
 }
 
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
@@ -54,10 +71,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
-    let (new, left_out) = match named {
-        Some(new) => (new, Vec::new()),
-        None => suggested(&pipeline, &settled, &progress)?,
-    };
+    let Chosen { new, transfer, left_out } = chosen(named, &pipeline, &settled, &progress)?;
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
@@ -75,18 +89,26 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     view::remember(request.out, &extended.path)?;
     progress.finish();
 
-    let texts = |specs: &[EffectSpec]| specs.iter().map(EffectSpec::to_string).collect::<Vec<_>>();
-    let (added, left_out) = (texts(&new), texts(&left_out));
+    let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
     if request.json {
-        let remaining = &run.diagnosis;
-        let value = Added { added, left_out, pipeline: &extended.path, comparison: &comparison, remaining };
+        let value = Added {
+            added,
+            left_out: &left_out,
+            transfer: &transfer,
+            pipeline: &extended.path,
+            comparison: &comparison,
+            remaining: &run.diagnosis,
+        };
         print(&super::json_text(&value)?)?;
     } else {
         print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()))?;
-        if !left_out.is_empty() {
-            print(&format!("Left out: {}, a formula of this session's time\n\n", left_out.join(", ")))?;
+        for LeftOut { effect, reason } in &left_out {
+            print(&format!("Left out: {effect}: {reason}\n\n"))?;
         }
         print(&comparison.terminal(style()))?;
+        for transfer in &transfer {
+            print(&format!("\nTransfer: {}.\n", transfer.sentence()))?;
+        }
         print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());
         print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"))?;
@@ -104,21 +126,46 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
     parsed.collect::<Result<_, _>>().map(Some).map_err(Error::of_usage)
 }
 
-/// The effects that the diagnosis suggests, and those of them that no other session has.
-fn suggested(
+/// What is added: what the user names, or of what the diagnosis suggests that which another session and the other
+/// recordings do not contradict.
+fn chosen(
+    named: Option<Vec<EffectSpec>>,
     pipeline: &Pipeline,
     settled: &Settled,
     progress: &Progress,
-) -> Result<(Vec<EffectSpec>, Vec<EffectSpec>), Error> {
-    let diagnosis = settled.diagnose(pipeline, progress)?;
-    let joints = settled.fitted.geometry.chain().joint_names();
-    let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
-    let (lasting, left_out) = lasting.unwrap_or_default();
-    if lasting.is_empty() {
-        let names = left_out.iter().map(EffectSpec::to_string).collect();
-        return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: names });
+) -> Result<Chosen, Error> {
+    let Fitted { geometry, observations, .. } = &settled.fitted;
+    let base = frames::effect_specs(pipeline, geometry)?;
+    let checked = |new: &[EffectSpec]| {
+        progress.step("fitting without each recording in turn");
+        transfers(pipeline, geometry, &base, new, observations)
+    };
+    if let Some(new) = named {
+        let transfer = checked(&new)?;
+        return Ok(Chosen { new, transfer, left_out: Vec::new() });
     }
-    Ok((lasting, left_out))
+    let diagnosis = settled.diagnose(pipeline, progress)?;
+    let joints = geometry.chain().joint_names();
+    let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
+    let (mut new, of_time) = lasting.unwrap_or_default();
+    let of_time = of_time.iter().map(|e| LeftOut {
+        effect: e.to_string(),
+        reason: "a formula of this session's time, which no other session has".to_owned(),
+    });
+    let mut left_out: Vec<LeftOut> = of_time.collect();
+    let mut transfer = checked(&new)?;
+    if transfer.iter().any(Transfer::harms) {
+        let harmful = |effect: &str| transfer.iter().find(|t| t.effect == effect && t.harms());
+        let reasons = new.iter().filter_map(|e| harmful(&e.to_string()));
+        left_out.extend(reasons.map(|t| LeftOut { effect: t.effect.clone(), reason: t.sentence() }));
+        new.retain(|e| left_out.iter().all(|l| l.effect != e.to_string()));
+        transfer = checked(&new)?;
+    }
+    if new.is_empty() {
+        let reasons = left_out.iter().map(|l| format!("{}: {}", l.effect, l.reason)).collect();
+        return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: reasons });
+    }
+    Ok(Chosen { new, transfer, left_out })
 }
 
 /// A pipeline with more effects, and where it is written.

@@ -2,16 +2,19 @@
 
 use super::attempt::Tried;
 use super::hypotheses::{Freedom, Hypothesis};
-use super::trial::Inputs;
+use super::trial::{Inputs, Misfit};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use crate::story::Fitted;
 use armcal_core::Pose;
 use armcal_model::{EffectSpec, EffectTable};
+use rayon::prelude::*;
 
 /// A frame that is estimated is a mistake of the setup only if it lies this far from where it was taken to be, beyond
 /// what any effect of the catalogue moves it [m], [rad].
 pub const FAR_M: f64 = 0.01;
 pub const FAR_RAD: f64 = 0.05;
+/// Dwells of a recording at which an event is tried first.
+const COARSE_STEPS: usize = 8;
 
 /// Whether what was estimated lies further off than any effect of the catalogue could move it; a sign or an order always
 /// does.
@@ -58,17 +61,67 @@ pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f6
     }
 }
 
-/// Whether one effect that begins with the recording explains how it differs: a tool or frame that was shifted, a zero that
-/// slipped. Then it is physics, and the diagnosis will name it.
+/// Whether one effect that begins with the recording, or at a dwell of it, explains how it differs: a tool or frame that
+/// was shifted, a zero that slipped. Then it is physics, and the diagnosis will name it.
 fn one_effect_explains(now: &Inputs, h: &Hypothesis) -> bool {
     let Some(recording) = h.recording else { return false };
-    let joints = now.chain.joint_names();
-    let zeros = (1..=joints.len()).map(|j| format!("zero_slip:{j}@{recording}"));
-    let shifts = ["tool_shift", "frame_shift"].map(|kind| format!("{kind}@{recording}"));
-    shifts.into_iter().chain(zeros).any(|name| {
-        let mut inputs = now.clone();
-        let Ok(spec) = EffectSpec::parse(&name, joints) else { return false };
-        inputs.pipeline.effects.push(EffectTable::from(&spec));
-        inputs.fit().is_ok_and(|fitted| inputs.misfit(&fitted).times_floor() < WORTH_LOOKING)
-    })
+    let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
+    let events: Vec<String> =
+        ["tool_shift", "frame_shift"].map(str::to_owned).into_iter().chain(zeros).collect();
+    let times_floor = |since: String| Some(with_effect(now, &since)?.times_floor());
+    let explained = |floors: Option<f64>| floors.is_some_and(|floors| floors < WORTH_LOOKING);
+    if events.iter().any(|event| explained(times_floor(format!("{event}@{recording}")))) {
+        return true;
+    }
+    let dwells = now.seen[recording].dwells.len();
+    let at = |event: &String, dwell: usize| times_floor(format!("{event}@{recording}.{dwell}"));
+    events.iter().any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
+}
+
+/// The misfit with one more effect.
+fn with_effect(now: &Inputs, name: &str) -> Option<Misfit> {
+    let spec = EffectSpec::parse(name, now.chain.joint_names()).ok()?;
+    let mut inputs = now.clone();
+    inputs.pipeline.effects.push(EffectTable::from(&spec));
+    let fitted = inputs.fit().ok()?;
+    Some(inputs.misfit(&fitted))
+}
+
+/// The least of what an event at one of the dwells leaves, by halving the stride around the best of a coarse grid: what an
+/// event at the wrong dwell leaves grows with the distance from the right one.
+fn least_at_a_dwell(dwells: usize, leaves: impl Fn(usize) -> Option<f64> + Sync) -> Option<f64> {
+    let mut stride = (dwells / COARSE_STEPS).max(1);
+    let least = |of: Vec<usize>| {
+        let all = of.into_par_iter().filter_map(|dwell| Some((leaves(dwell)?, dwell)));
+        all.collect::<Vec<_>>().into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let mut best = least((1..dwells).step_by(stride).collect())?;
+    while stride > 1 {
+        stride = stride.div_ceil(2);
+        let (low, high) = (best.1.saturating_sub(stride).max(1), best.1 + stride);
+        let near = [low, high].into_iter().filter(|dwell| *dwell < dwells && *dwell != best.1).collect();
+        best = least(near).filter(|other| other.0 < best.0).unwrap_or(best);
+    }
+    Some(best.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_dwell_of_an_event_is_found(dwells in 2usize..300, share in 0.0..1.0f64) {
+            let event = 1 + (share * (dwells - 1) as f64) as usize;
+            let leaves = |dwell: usize| Some(1.0 + dwell.abs_diff(event) as f64);
+            prop_assert_eq!(least_at_a_dwell(dwells, leaves), Some(1.0));
+        }
+    }
+
+    #[test]
+    fn a_recording_without_a_second_dwell_has_no_event() {
+        assert_eq!(least_at_a_dwell(1, |_| Some(0.0)), None);
+        assert_eq!(least_at_a_dwell(20, |_| None), None);
+    }
 }

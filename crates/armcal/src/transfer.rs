@@ -1,0 +1,80 @@
+//! Does what was learnt in all recordings but one help in that one? Effect by effect.
+
+use crate::error::Error;
+use crate::pipeline::Pipeline;
+use crate::story::with_effects;
+use armcal_calibrate::{Calibration, HoldoutConfig, calibrate};
+use armcal_core::Observation;
+use armcal_diagnose::{HeldOut, compare_heldout};
+use armcal_model::{EffectSpec, Model};
+use serde::Serialize;
+
+/// What an effect does to the errors of recordings that its fit did not see.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Transfer {
+    /// The effect.
+    pub effect: String,
+    /// Mean errors without and with it [mm], all other effects in both; null of an event, which no other recording has.
+    pub held_out: Option<HeldOut>,
+}
+
+impl Transfer {
+    /// Whether it raises the error of recordings that it was not fitted to, by more than chance.
+    pub fn harms(&self) -> bool {
+        self.held_out.as_ref().is_some_and(|h| h.change_ci95[0] > 0.0)
+    }
+
+    /// In one sentence.
+    pub fn sentence(&self) -> String {
+        let Some(h) = &self.held_out else {
+            return format!("{} is an event: no other recording can tell whether it happened", self.effect);
+        };
+        let [low, high] = h.change_ci95;
+        let verdict = match (high < 0.0, low > 0.0) {
+            (true, _) => "it helps there",
+            (_, true) => "it does harm there",
+            _ => "no more than chance",
+        };
+        format!(
+            "{} fitted without each recording in turn changes the mean error there from {:.3} to {:.3} mm \
+             (95 % {low:+.3} to {high:+.3}): {verdict}",
+            self.effect, h.before, h.after
+        )
+    }
+}
+
+/// Each of the effects, fitted on all recordings but one and judged on that one, in turn; none of a single recording.
+///
+/// `base` are the effects that stay in the model whatever comes of the others.
+///
+/// # Errors
+/// A fit without one of the recordings that cannot be made.
+pub fn transfers(
+    pipeline: &Pipeline,
+    geometry: &Model,
+    base: &[EffectSpec],
+    new: &[EffectSpec],
+    observations: &[Observation],
+) -> Result<Vec<Transfer>, Error> {
+    if pipeline.recordings.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let calibrated = |without: Option<&EffectSpec>| -> Result<Calibration, Error> {
+        let effects: Vec<EffectSpec> =
+            base.iter().chain(new.iter().filter(|e| Some(*e) != without)).cloned().collect();
+        let model = with_effects(pipeline, geometry, &effects, observations)?;
+        Ok(calibrate(&model, observations, &pipeline.fit, &HoldoutConfig::EachRecording)?)
+    };
+    let lasting = new.iter().any(|e| e.since.is_none());
+    let all = lasting.then(|| calibrated(None)).transpose()?;
+    let transfer = |effect: &EffectSpec| {
+        let held_out = match &all {
+            Some(all) if effect.since.is_none() => {
+                compare_heldout(&calibrated(Some(effect))?, all, observations, &pipeline.diagnosis)
+            }
+            _ => None,
+        };
+        Ok(Transfer { effect: effect.to_string(), held_out })
+    };
+    new.iter().map(transfer).collect()
+}
