@@ -134,7 +134,7 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
         &format!("{}.log_evidence", e.name),
         format!(
             "the data are e^{:.1} times as probable with {} as without, and e^{:.1} times as probable as with the best \
-             unlisted explanation (a name needs e^{})",
+             unlisted explanation of another shape (a name needs e^{})",
             e.log_evidence, e.name, e.margin_nats, config.margin_nats
         ),
     );
