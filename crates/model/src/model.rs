@@ -185,6 +185,12 @@ impl Model {
         Pose::from(&self.tip_segment().transform(p, &[]))
     }
 
+    /// Whether the pose of a recording's board is found by the fit, with nothing else known of it.
+    pub(crate) fn board_is_estimated(&self, recording: usize) -> bool {
+        let own = &self.parameters[self.board_parameters(recording)];
+        own.iter().any(|p| p.free && p.prior_sigma.is_none())
+    }
+
     /// world_from_board of a recording, if it has a board.
     pub fn board_in_world(&self, p: &[f64], recording: usize) -> Option<Pose> {
         self.boards.get(&recording).map(|board| Pose::from(&board.transform(p, &[])))

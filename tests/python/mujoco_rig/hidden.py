@@ -129,7 +129,7 @@ def _tool(draw):
 def _board(draw):
     mm = _log(draw, 0.5, 3.0)
     shift = {int(draw.integers(0, 3)): mm * 1e-3 * _direction(draw)}
-    return Hidden("board", ["frame_shift", "zero_slip:1"], mm, "mm", board_m=shift)
+    return Hidden("board", ["board_shift"], mm, "mm", board_m=shift)
 
 
 def _growth(draw):

@@ -91,7 +91,7 @@ class Session:
         for joint, recording, at, size in self.hidden.slips:
             if (self.index, share) >= (recording, at):
                 teeth[joint] += size
-        day = (self.index + share) / len(TILTS_DEG)
+        day = hours / (1200.0 * len(TILTS_DEG) / 3600)
         self.machine.drift(self.warmer_k, day, teeth, self.hidden.tool_m.get(self.index, np.zeros(3)))
 
     def _keep(self):

@@ -102,6 +102,9 @@ fn advice(kind: &EffectKind) -> &'static str {
         ("frame_shift", _) => {
             "The robot's foot, the table or the cameras moved, or a tilt is not what was declared: look at their clamps and marker plates."
         }
+        ("board_shift", _) => {
+            "The board slipped on its stand or under its markers: look at its clamps, and measure it again before and after."
+        }
         ("tool_shift", _) => {
             "The tool or its markers were remounted, bent or knocked: look at the last link."
         }

@@ -67,7 +67,7 @@ fn one_effect_explains(now: &Inputs, h: &Hypothesis) -> bool {
     let Some(recording) = h.recording else { return false };
     let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
     let events: Vec<String> =
-        ["tool_shift", "frame_shift"].map(str::to_owned).into_iter().chain(zeros).collect();
+        ["tool_shift", "frame_shift", "board_shift"].map(str::to_owned).into_iter().chain(zeros).collect();
     let times_floor = |since: String| Some(with_effect(now, &since)?.times_floor());
     let explained = |floors: Option<f64>| floors.is_some_and(|floors| floors < WORTH_LOOKING);
     if events.iter().any(|event| explained(times_floor(format!("{event}@{recording}")))) {

@@ -15,7 +15,8 @@
 //!
 //! # Not to be confused with
 //! `zero_slip` of a vertical first joint, the same as a turn about it; `tool_shift`. A fixed reference marker on
-//! the base separates them. A board whose tilt is not what was declared is the same to the data.
+//! the base separates them. A board whose tilt is not what was declared is the same to the data. `board_shift`, of which
+//! tracked dwells know nothing.
 //!
 //! # Source
 //! Vicon Tracker help, "Prepare the capture environment" (camera creep); notes of the project.
@@ -38,7 +39,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     shapes: &[],
     never_negative: &[],
-    confused_with: &["zero_slip", "tool_shift", "frame_drift"],
+    confused_with: &["zero_slip", "tool_shift", "board_shift", "frame_drift"],
     source: include_str!("frame_shift.rs"),
     place,
 };

@@ -22,6 +22,7 @@ mod belt_backlash;
 mod belt_compliance;
 mod belt_coupling;
 mod board_scale;
+mod board_shift;
 mod clock_offset;
 mod compliance;
 mod crossed_backlash;
@@ -100,6 +101,7 @@ static CATALOGUE: &[&EffectKind] = &[
     &zero_slip::KIND,
     &tool_shift::KIND,
     &frame_shift::KIND,
+    &board_shift::KIND,
     &zero_drift::KIND,
     &frame_drift::KIND,
     &thermal_growth::KIND,

@@ -237,3 +237,33 @@ fn what_gravity_bends_may_rest_while_a_cavity_holds_the_tip() {
         }
     }
 }
+
+#[test]
+fn a_board_that_slipped_moves_its_cavities_and_no_tracked_tip() {
+    let model = paper();
+    let both = observations(&model, 20, false);
+    let session = Session::of(&both);
+    let spec = model.effect("board_shift@0.3").expect("a spec");
+    let extended = model.with_effects(&[spec], &session).expect("a model");
+    let moved = |quantity: &str, o: &Observation| {
+        let mut p = extended.nominal();
+        p[extended.index(&format!("board_shift@0.3.{quantity}")).expect("a parameter")] = 1e-3;
+        extended.measured_tip_in_world(&p, o) - model.measured_tip_in_world(&model.nominal(), o)
+    };
+    for o in &both {
+        let acts = o.cavity().is_some() && (o.dwell.recording, o.dwell.dwell) >= (0, 3);
+        let along = moved("x", o);
+        let expected = if acts { 1e-3 } else { 0.0 };
+        assert!((along.norm() - expected).abs() < 1e-12, "{}: {along}", o.dwell);
+        // A turn about the middle of the seated points leaves that middle where it is.
+        if acts && let armcal_core::Reference::Seated { in_board_m, .. } = &o.reference {
+            let arm_m = in_board_m - session.board_centres_m[&o.dwell.recording];
+            let turned_m = 1e-3 * arm_m.xy().norm();
+            assert!((moved("rz", o).norm() - turned_m).abs() < 1e-6 * turned_m.max(1e-6), "{}", o.dwell);
+        }
+    }
+    let tracked = observations(&model, 20, true);
+    let spec = model.effect("board_shift@1").expect("a spec");
+    let refused = model.with_effects(&[spec], &Session::of(&tracked)).expect_err("no cavities");
+    assert!(refused.to_string().contains("frame_shift"), "{refused}");
+}

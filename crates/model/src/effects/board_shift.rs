@@ -1,0 +1,84 @@
+//! The board moved against what its pose was measured by.
+//!
+//! # What moves
+//! The cavities alone: the board slipped on its stand after it was measured, or under its markers, or its mechanism gave.
+//! Where the tip was tracked nothing changes.
+//!
+//! # Equation
+//! `c' = Exp(w) (c - m) + m + t`, c the seated point and m the middle of those of the recording, in the frame of the board,
+//! in the recording, or from the dwell on, that the spec names.
+//!
+//! # Parameters and units
+//! `x`, `y`, `z` t [m]; `rx`, `ry`, `rz` w [rad], in the frame of the board.
+//!
+//! # Signature in the data
+//! A step between recordings or at a dwell that is the same for every cavity, or turns all of them together, and that
+//! tracked dwells do not share.
+//!
+//! # Not to be confused with
+//! `frame_shift`, which tracked dwells share: without any of them the two are the same, and `frame_shift` is the name of
+//! both. `board_scale`, which no event begins.
+//!
+//! # Source
+//! Rigid motion (eq. 7-10 of Li et al. 2016, for the board); notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitudes_xyz};
+use super::spec::Since;
+use crate::rigid::{Scalar, rotation_of_vector};
+use armcal_core::{Reference, Unit};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "board_shift",
+    aliases: &["slipped markers of the board"],
+    summary: "the board moved under what measures it, between recordings or at a dwell",
+    family: Family::Event,
+    toggle: Toggle::Recording,
+    target: Target::Whole,
+    offered: Offered::Events,
+    shapes: &[],
+    never_negative: &[],
+    confused_with: &["frame_shift", "tool_shift"],
+    source: include_str!("board_shift.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct BoardShift {
+    middles_m: BTreeMap<usize, Vector3<f64>>,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    placing.event()?;
+    if !placing.session.seated_and_tracked() {
+        return Err(
+            "it needs dwells in cavities and tracked ones; without either, use frame_shift".to_owned()
+        );
+    }
+    if let Some(Since::Recording(recording)) = placing.spec.since
+        && placing.model.board_is_estimated(recording)
+    {
+        return Err(format!("the board's pose in recording {recording} is estimated already"));
+    }
+    let deg = 1f64.to_radians();
+    let mut amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift along the board's");
+    amplitudes.extend(amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, "turn about the board's"));
+    Ok(Placement::new(amplitudes, BoardShift { middles_m: placing.session.board_centres_m.clone() }))
+}
+
+impl Physics for BoardShift {
+    fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
+        let Reference::Seated { in_board_m, .. } = &x.observation.reference else { return };
+        let recording = x.observation.dwell.recording;
+        let middle_m = self.middles_m.get(&recording).copied().unwrap_or_else(Vector3::zeros);
+        let arm_m = (in_board_m - middle_m).map(D::from);
+        let turned_m = rotation_of_vector(&Vector3::new(theta[3], theta[4], theta[5])) * arm_m;
+        for axis in 0..3 {
+            change.seat_m[axis] += theta[axis] + turned_m[axis] - arm_m[axis];
+        }
+    }
+}
