@@ -207,7 +207,7 @@ impl Unexplained {
             .collect();
         let places = match places.is_empty() {
             true => "about alike in all recordings, joint ranges and directions".to_owned(),
-            false => format!("largest in {}", places.join(" and in ")),
+            false => format!("largest against their noise in {}", places.join(" and in ")),
         };
         let refitted: Vec<String> = self
             .tried

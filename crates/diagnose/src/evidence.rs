@@ -61,18 +61,17 @@ pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -
         for b in amplitudes {
             let metric = Metric::new(*noise, *b, problem, scale);
             let metric = metric.weighed(prior / amplitudes.len() as f64, metrics.first(), config);
-            // Slack scatters along what it would hide: where it says less than plain noise even of an unexplained
-            // residual, it says nothing.
-            if !matches!(noise, Noise::Slack(_))
-                || metrics.first().is_none_or(|w| metric.ln_weight > w.ln_weight)
-            {
+            if !noise.widens() || metrics.first().is_none_or(|white| metric.ln_weight > white.ln_weight) {
                 metrics.push(metric);
             }
         }
     }
-    let lead = metrics.iter().max_by(|a, b| a.ln_weight.total_cmp(&b.ln_weight));
-    if let Some((both, b)) = lead.and_then(|m| Some((m.noise.and_place(&kinds)?, m.amplitude))) {
-        let metric = Metric::new(both, b, problem, scale);
+    let by_weight = |a: &&Metric, b: &&Metric| a.ln_weight.total_cmp(&b.ln_weight);
+    let Some(leading) = metrics.iter().max_by(by_weight).map(|m| m.noise) else { return metrics };
+    let both = |m: &Metric| Some((m.noise.and_place(leading, &kinds)?, m.amplitude));
+    let with_places = metrics.iter().filter(|m| both(m).is_some()).max_by(by_weight).and_then(both);
+    if let Some((noise, b)) = with_places {
+        let metric = Metric::new(noise, b, problem, scale);
         metrics.push(metric.weighed(config.prior_correlated_noise / others, metrics.first(), config));
     }
     metrics

@@ -162,9 +162,9 @@ pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> 
     for (i, d) in problem.dwells.iter().enumerate() {
         let key = if weighed.remembers() {
             (d.id.recording, d.id.dwell / BLOCK)
-        } else if weighed.probable(Noise::Place) {
+        } else if weighed.probably(&[Noise::Place, Noise::TrackedAndPlace]) {
             (0, unit[i])
-        } else if weighed.probable(Noise::Visit) {
+        } else if weighed.probably(&[Noise::Visit]) {
             (d.id.recording, unit[i])
         } else {
             (d.id.recording, i)

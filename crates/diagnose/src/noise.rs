@@ -36,6 +36,13 @@ pub(crate) enum Noise {
     SensorAndPlace,
     /// A joint (from 0) rests anywhere within its play: an angle of its own in every dwell, on top of what is declared.
     Slack(usize),
+    /// Tracked dwells scatter more than declared, each by itself: a camera whose readings within a dwell are not
+    /// independent.
+    Tracked,
+    /// They do, and cavities are off their place.
+    TrackedAndPlace,
+    /// Seated ones do: cavities wider than declared.
+    Seated,
 }
 
 impl Noise {
@@ -50,6 +57,11 @@ impl Noise {
             Noise::Visit => "repeated at visits to a place within a recording",
             Noise::Memory => "correlated over a few dwells in a row",
             Noise::Sensor => "a wandering position sensor, larger than declared",
+            Noise::Tracked => "larger than declared where the tip was tracked",
+            Noise::TrackedAndPlace => {
+                "larger than declared where the tip was tracked, and cavities off their place"
+            }
+            Noise::Seated => "larger than declared where the tip was seated",
             Noise::SensorAndPlace => {
                 "a wandering position sensor, larger than declared, and cavities off their place"
             }
@@ -82,7 +94,7 @@ impl Noise {
         }
         let tracked = problem.dwells.iter().filter(|d| d.tracked).count();
         if tracked >= 20 && tracked < problem.dwells.len() {
-            found.push(Noise::Sensor);
+            found.extend([Noise::Sensor, Noise::Tracked, Noise::Seated]);
         }
         found.extend((0..problem.joints()).map(Noise::Slack).filter(|n| n.direction(problem).is_some()));
         found
@@ -90,9 +102,22 @@ impl Noise {
 }
 
 impl Noise {
-    /// The kind that has the errors of places besides, where one is known: worth its price only where this one leads.
-    pub fn and_place(self, available: &[Noise]) -> Option<Noise> {
-        (self == Noise::Sensor && available.contains(&Noise::Place)).then_some(Noise::SensorAndPlace)
+    /// Whether it adds to what is declared in a way that hides what is missing: weighed only where it says more than plain
+    /// noise even of an unexplained residual.
+    pub fn widens(self) -> bool {
+        matches!(self, Noise::Slack(_) | Noise::Tracked | Noise::TrackedAndPlace | Noise::Seated)
+    }
+
+    /// The kind that has the errors of places besides, where places repeat: worth its price only where this one leads, or
+    /// places lead and this one is there too.
+    pub fn and_place(self, leading: Noise, available: &[Noise]) -> Option<Noise> {
+        let both = match self {
+            Noise::Sensor => Noise::SensorAndPlace,
+            Noise::Tracked => Noise::TrackedAndPlace,
+            _ => return None,
+        };
+        let leads = leading == self || (self == Noise::Tracked && leading == Noise::Place);
+        (leads && available.contains(&Noise::Place)).then_some(both)
     }
 
     /// Whitened rows of what a joint's slack turns, one declared standard deviation a dwell in the mean of squares.
@@ -119,6 +144,10 @@ enum Kind {
     White,
     /// `sqrt(1 + b^2)`, and for each group its rows and P with `x - P P'x` whitened.
     Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
+    /// One after the other.
+    Then(Box<[Whitener; 2]>),
+    /// A factor for each row.
+    Rows(DVector<f64>),
     /// The rows of each dwell, and p with `x - p p'x` whitened.
     Dwells(Vec<Range<usize>>, DVector<f64>),
     /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
@@ -156,6 +185,14 @@ impl Whitener {
             Noise::Sensor => memory(problem, sensor(b)),
             Noise::SensorAndPlace => sensor_and_place(problem, b),
             Noise::Slack(_) => slack(noise, problem, b),
+            Noise::Tracked => wider(problem, b, |dwell| dwell.tracked),
+            Noise::TrackedAndPlace => {
+                let [tracked, place] =
+                    [(Noise::Tracked, b), (Noise::Place, 1.0)].map(|(n, b)| Whitener::new(n, b, problem));
+                let ln_det = tracked.ln_det + place.ln_det;
+                Whitener { kind: Kind::Then(Box::new([tracked, place])), ln_det }
+            }
+            Noise::Seated => wider(problem, b, |dwell| !dwell.tracked),
         }
     }
 
@@ -173,6 +210,10 @@ impl Whitener {
                             .for_each(|(r, c)| column[*r] = unit * (column[*r] - c));
                     }
                 }
+            }
+            Kind::Then(both) => both.iter().for_each(|one| one.apply(columns)),
+            Kind::Rows(factors) => {
+                columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
             }
             Kind::Dwells(dwells, p) => {
                 for mut column in columns.column_iter_mut() {
@@ -245,6 +286,18 @@ fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
         p.column_mut(k).scale_mut(share);
     }
     (p, ln_det)
+}
+
+/// `(1 + b^2) I` in the dwells that `scatter`.
+fn wider(problem: &Problem, b: f64, scatter: impl Fn(&DwellRow) -> bool) -> Whitener {
+    let variance = 1.0 + b * b;
+    let mut factors = DVector::from_element(problem.rows(), 1.0);
+    let mut ln_det = 0.0;
+    for dwell in problem.dwells.iter().filter(|d| scatter(d)) {
+        factors.rows_mut(dwell.first_row, dwell.rows).fill(variance.sqrt().recip());
+        ln_det += dwell.rows as f64 * variance.ln();
+    }
+    Whitener { kind: Kind::Rows(factors), ln_det }
 }
 
 /// `I + b^2 v v'` in every dwell.

@@ -82,7 +82,7 @@ fn settled(
     // Noise that repeats counts the same error more than once; the weighing knows, this does not.
     if found.candidate.known.is_some()
         || !found.judged.impossible.is_empty()
-        || !room.weighed.probable(Noise::White)
+        || !room.weighed.probably(&[Noise::White])
     {
         return Ok(None);
     }

@@ -100,6 +100,28 @@ fn whiteners_are_inverse_roots_of_their_covariance() {
 }
 
 #[test]
+fn dwells_that_scatter_more_than_declared_are_whitened_by_a_factor() {
+    let mut p = small(2);
+    p.dwells.iter_mut().step_by(3).for_each(|d| d.tracked = true);
+    let place = dense(Noise::Place, 1.0, &p);
+    for (noise, tracked) in [(Noise::Tracked, true), (Noise::Seated, false), (Noise::TrackedAndPlace, true)] {
+        let whitener = Whitener::new(noise, 3.0, &p);
+        let mut w = DMatrix::identity(p.rows(), p.rows());
+        whitener.apply(&mut w);
+        let wider = |row: usize| p.dwells[row / 3].tracked == tracked;
+        let size = |row: usize| if wider(row) { 10f64.sqrt() } else { 1.0 };
+        let alike = |i: usize, k: usize| {
+            if noise == Noise::TrackedAndPlace { place[(i, k)] } else { f64::from(i == k) }
+        };
+        let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| size(i) * alike(i, k) * size(k));
+        let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
+        assert!(error < 1e-9, "{noise:?} {error}");
+        let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+        assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+    }
+}
+
+#[test]
 fn a_slack_joint_is_whitened_as_one_more_angle_in_every_dwell() {
     let p = small(3);
     for joint in 0..p.joints() {

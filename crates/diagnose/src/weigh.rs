@@ -214,14 +214,13 @@ impl Weighed {
 
     /// Whether the noise probably remembers the dwells before.
     pub fn remembers(&self) -> bool {
-        let remembering = [Noise::Memory, Noise::Sensor, Noise::SensorAndPlace];
-        let p = self.p_noise.iter().filter(|(noise, _)| remembering.contains(noise)).map(|(_, p)| p);
-        p.sum::<f64>() > 0.5
+        self.probably(&[Noise::Memory, Noise::Sensor, Noise::SensorAndPlace])
     }
 
-    /// Whether this is probably the kind of noise.
-    pub fn probable(&self, noise: Noise) -> bool {
-        self.p_noise.iter().any(|(n, p)| *n == noise && *p > 0.5)
+    /// Whether the noise is probably of one of these kinds.
+    pub fn probably(&self, kinds: &[Noise]) -> bool {
+        let p = self.p_noise.iter().filter(|(noise, _)| kinds.contains(noise)).map(|(_, p)| p);
+        p.sum::<f64>() > 0.5
     }
 
     /// Residual variance (declared noise = 1, white) left by the best explanation of all.

@@ -13,8 +13,8 @@
 //!
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
-//! The gap while a cavity holds the tip has a size of its own, `width_seated`, where a session has both kinds of dwell:
-//! whoever led the tip there, servo or hand, decided the flank.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
+//! link there and it lags elsewhere.
 //!
 //! # Signature in the data
 //! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
@@ -33,7 +33,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
-use super::state::apart;
+use super::state::LED;
 use crate::rigid::Scalar;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -44,7 +44,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[LED],
     never_negative: &[],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
     source: include_str!("backlash.rs"),
@@ -62,7 +62,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
     let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
     let resolved = placing.joint_size(joint, RESOLVED_DEG);
-    Ok(apart(placing, Placement::new(vec![width], Backlash { joint, resolved })))
+    Ok(Placement::new(vec![width], Backlash { joint, resolved }))
 }
 
 impl Physics for Backlash {

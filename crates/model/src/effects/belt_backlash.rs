@@ -12,8 +12,8 @@
 //!
 //! # Parameters and units
 //! `width` b [rad]. The spec names the joint j that is driven from the base.
-//! The gap while a cavity holds the tip has a size of its own, `width_seated`, where a session has both kinds of dwell:
-//! whoever led the tip there, servo or hand, decided the flank.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
+//! link there and it lags elsewhere.
 //!
 //! # Signature in the data
 //! The residual flips with the direction in which the link turned in space, whatever its own joint did.
@@ -29,7 +29,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
-use super::state::apart;
+use super::state::LED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -41,7 +41,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[LED],
     never_negative: &[],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
     source: include_str!("belt_backlash.rs"),
@@ -61,7 +61,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
         .ok_or("a belt from the base needs an axis parallel to the one before it")?;
     let deg = 1f64.to_radians();
     let width = amplitude("width", Unit::Radian, 0.5 * deg, 8.0 * deg, "width of the gap");
-    Ok(apart(placing, Placement::new(vec![width], BeltBacklash { joint, sense })))
+    Ok(Placement::new(vec![width], BeltBacklash { joint, sense }))
 }
 
 impl Physics for BeltBacklash {

@@ -12,8 +12,8 @@
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]), negative where j is dragged along with i; `from` i names the joint whose
 //! direction counts. The spec names j.
-//! The gap while a cavity holds the tip has a size of its own, `width_seated`, where a session has both kinds of dwell:
-//! whoever led the tip there, servo or hand, decided the flank.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
+//! link there and it lags elsewhere.
 //!
 //! # Signature in the data
 //! The residual enters like a rotation of one joint and flips with the direction of arrival of another.
@@ -29,7 +29,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle}
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, following};
-use super::state::apart;
+use super::state::LED;
 use crate::rigid::Scalar;
 use armcal_core::{Observation, Unit};
 
@@ -41,16 +41,19 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[Shape {
-        name: "from",
-        unit: Unit::One,
-        default: None,
-        lower: 1.0,
-        upper: 64.0,
-        meaning: "number of the joint whose direction of arrival counts",
-        parameter: false,
-        values: Some(others),
-    }],
+    shapes: &[
+        Shape {
+            name: "from",
+            unit: Unit::One,
+            default: None,
+            lower: 1.0,
+            upper: 64.0,
+            meaning: "number of the joint whose direction of arrival counts",
+            parameter: false,
+            values: Some(others),
+        },
+        LED,
+    ],
     never_negative: &[],
     confused_with: &["backlash", "belt_backlash"],
     source: include_str!("crossed_backlash.rs"),
@@ -85,7 +88,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     );
     let resolved = placing.joint_size(from, RESOLVED_DEG);
     let per_unit = placing.joint_size(joint, 1.0) / placing.joint_size(from, 1.0);
-    Ok(apart(placing, Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit })))
+    Ok(Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit }))
 }
 
 fn others(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {

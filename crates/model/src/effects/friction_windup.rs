@@ -12,8 +12,8 @@
 //! # Parameters and units
 //! `windup` c [rad/(N m)] of the links with their default masses; `windup_outer` the correction for the share of
 //! the outer links; `windup_load` under the load. Prior: 0.4 deg with the nominal arm stretched out.
-//! Wind-up while a cavity holds the tip has a size of its own, `windup_seated`, where a session has both kinds of dwell:
-//! whoever led the tip there, servo or hand, decided the flank.
+//! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
+//! link there and it lags elsewhere.
 //!
 //! # Signature in the data
 //! The residual flips with the direction of arrival, most where the arm is stretched out or loaded.
@@ -31,7 +31,7 @@ use super::physics::{Deformation, Physics};
 use super::placing::Placing;
 use super::play::{RESOLVED_DEG, lagging};
 use super::shares::Shares;
-use super::state::apart;
+use super::state::LED;
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -43,7 +43,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[],
+    shapes: &[LED],
     never_negative: &[],
     confused_with: &["backlash"],
     source: include_str!("friction_windup.rs"),
@@ -64,7 +64,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let unit = Unit::RadianPerNewtonMetre;
     let meaning = "wind-up per gravity torque against the direction of arrival";
     let amplitudes = shares.amplitudes("windup", unit, 0.4 * per_deg, 8.0 * per_deg, meaning);
-    Ok(apart(placing, Placement::new(amplitudes, FrictionWindup { joint, shares })))
+    Ok(Placement::new(amplitudes, FrictionWindup { joint, shares }))
 }
 
 impl Physics for FrictionWindup {

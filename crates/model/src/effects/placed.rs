@@ -91,7 +91,8 @@ pub(crate) fn place(
     let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&placing).map_err(bad)?;
     let count = amplitudes.len();
     let mut parameters = amplitudes;
-    parameters.extend(kind.shapes.iter().filter(|shape| shape.parameter).map(|shape| Parameter {
+    let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &placing));
+    parameters.extend(shapes.map(|shape| Parameter {
         name: shape.name.to_owned(),
         unit: shape.unit,
         nominal: placing.shape(shape.name).unwrap_or_default(),

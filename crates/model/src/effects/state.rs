@@ -1,12 +1,12 @@
 //! Who holds the arm in a dwell: a servo, or the cavity that the tip is seated in and the hand that led it there.
 //!
 //! A servo carries gravity through its gears and lets the link lag behind; a hand carries the arm itself, and the link
-//! it leads pulls the encoder after it, from the other flank. Which of them acts in the cavities no recording says,
-//! so that the data do: lost motion has a size of its own there ([`apart`]), and what gravity bends is tried with and
-//! without it ([`SEATED`]). Only where a session has dwells of both kinds.
+//! it leads pulls the encoder after it, from the other flank. Which of them acts in the cavities no recording says, so
+//! that the data do: every effect of which that decides is tried with the shares of it that may act there. Only where a
+//! session has dwells of both kinds.
 
 use super::drivers::Drivers;
-use super::kind::{Placement, Shape};
+use super::kind::Shape;
 use super::physics::{AnyPhysics, Deformation};
 use super::placing::Placing;
 use armcal_core::{Observation, Unit};
@@ -15,36 +15,38 @@ use num_dual::Dual64;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// How much of an effect acts while a cavity holds the tip.
+/// How much of what gravity does acts while a cavity holds the tip.
 pub(super) const SEATED: Shape = Shape {
     name: "seated",
     unit: Unit::One,
     default: Some(1.0),
-    lower: -1.0,
-    upper: 1.0,
+    lower: -2.0,
+    upper: 2.0,
     meaning: "share of it that acts while a cavity holds the tip: 0 where the hand carries what a servo carries elsewhere",
     parameter: true,
     values: Some(carried),
 };
 
+/// How much of a lost motion does.
+pub(super) const LED: Shape = Shape {
+    meaning: "share of it that acts while a cavity holds the tip: negative where a hand leads the link, which lags elsewhere",
+    values: Some(led),
+    ..SEATED
+};
+
+/// In a cavity a joint may rest within its play: less than all of it.
+fn led(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    if placing.session.seated_and_tracked() { vec![-1.0, -0.75, -0.5, 0.0, 0.5] } else { Vec::new() }
+}
+
 fn carried(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
     if placing.session.seated_and_tracked() { vec![0.0] } else { Vec::new() }
 }
 
-/// The placement with amplitudes of their own for dwells in which a cavity holds the tip.
-pub(super) fn apart(placing: &Placing<'_>, placement: Placement) -> Placement {
-    if !placing.session.seated_and_tracked() {
-        return placement;
-    }
-    let mut amplitudes = placement.amplitudes;
-    let count = amplitudes.len();
-    for k in 0..count {
-        let mut own = amplitudes[k].clone();
-        own.name = format!("{}_seated", own.name);
-        own.meaning = format!("{} while a cavity holds the tip (negative: a hand led the link)", own.meaning);
-        amplitudes.push(own);
-    }
-    Placement { amplitudes, physics: Arc::new(Apart { physics: placement.physics, count }), ..placement }
+/// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does.
+pub(super) fn matters(shape: &Shape, placing: &Placing<'_>) -> bool {
+    let said = placing.spec.shape.iter().any(|(name, _)| name == shape.name);
+    shape.name != SEATED.name || said || placing.session.seated_and_tracked()
 }
 
 /// The placement with its amplitudes times the shape [`SEATED`], which stands at `share` of its parameters.
@@ -54,43 +56,6 @@ pub(super) fn shared(physics: Arc<dyn AnyPhysics>, amplitudes: usize, share: usi
 
 fn seated(x: &Drivers<'_>) -> bool {
     x.observation.cavity().is_some()
-}
-
-/// `count` amplitudes for a tracked tip, as many for a seated one, then the shapes.
-#[derive(Debug)]
-struct Apart {
-    physics: Arc<dyn AnyPhysics>,
-    count: usize,
-}
-
-impl Apart {
-    fn own<T: Copy>(&self, theta: &[T], x: &Drivers<'_>) -> Vec<T> {
-        let first = if seated(x) { self.count } else { 0 };
-        let (own, shapes) = (&theta[first..first + self.count], &theta[2 * self.count..]);
-        own.iter().chain(shapes).copied().collect()
-    }
-}
-
-impl AnyPhysics for Apart {
-    fn predict(&self, theta: &[f64], x: &Drivers<'_>, change: &mut Deformation<f64>) {
-        self.physics.predict(&self.own(theta, x), x, change);
-    }
-
-    fn differentiate(&self, theta: &[Dual64], x: &Drivers<'_>, change: &mut Deformation<Dual64>) {
-        self.physics.differentiate(&self.own(theta, x), x, change);
-    }
-
-    fn predict_seen(&self, _theta: &[f64], _point_m: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::zeros()
-    }
-
-    fn differentiate_seen(&self, _theta: &[Dual64], _point_m: &Vector3<Dual64>) -> Vector3<Dual64> {
-        Vector3::repeat(Dual64::from(0.0))
-    }
-
-    fn touched_entries(&self, _x: &Drivers<'_>, count: usize) -> Range<usize> {
-        0..count
-    }
 }
 
 /// Amplitudes that count in part while a cavity holds the tip.
