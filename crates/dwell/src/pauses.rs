@@ -349,7 +349,8 @@ fn moved_within(time_ns: &[i64], values: &[f64]) -> Option<(f64, f64)> {
     Some((line.slope * line.span_s, line.span_s / line.square_s2.sqrt()))
 }
 
-/// Cuts `trim_s` off both ends, but not where the stream itself begins or ends, and never more than a half.
+/// Cuts `trim_s` off both ends, but not where the stream itself begins or ends, and never more than a half; nothing of a
+/// pause with so few rows that none would be left.
 fn trim(time_ns: &[i64], run: Range<usize>, stretch: &Range<usize>, trim_s: f64) -> Range<usize> {
     let (first, last) = (time_ns[run.start], time_ns[run.end - 1]);
     let most_s = trim_s.min(0.25 * seconds_between(first, last));
@@ -357,10 +358,13 @@ fn trim(time_ns: &[i64], run: Range<usize>, stretch: &Range<usize>, trim_s: f64)
     while run.start > stretch.start && seconds_between(first, time_ns[kept.start]) < most_s - 1e-9 {
         kept.start += 1;
     }
-    while run.end < stretch.end && seconds_between(time_ns[kept.end - 1], last) < most_s - 1e-9 {
+    while run.end < stretch.end
+        && kept.end > kept.start
+        && seconds_between(time_ns[kept.end - 1], last) < most_s - 1e-9
+    {
         kept.end -= 1;
     }
-    kept
+    if kept.is_empty() { run } else { kept }
 }
 
 /// For each time the nearest of `candidates` (both increasing), where it lies within `reach_s`.
@@ -393,5 +397,12 @@ mod tests {
         let time_ns: Vec<i64> = (0..100).map(|i| i * 10_000_000).collect();
         assert_eq!(trim(&time_ns, 0..50, &(0..100), 0.02), 0..48);
         assert_eq!(trim(&time_ns, 10..100, &(0..100), 0.02), 12..100);
+    }
+
+    #[test]
+    fn trimming_leaves_a_pause_of_two_rows_as_it_is() {
+        let time_ns: Vec<i64> = (0..10).map(|i| i * 500_000_000).collect();
+        assert_eq!(trim(&time_ns, 4..6, &(0..10), 0.1), 4..6);
+        assert_eq!(trim(&time_ns, 4..7, &(0..10), 0.1), 5..6);
     }
 }
