@@ -5,10 +5,10 @@
 //! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
 
 use crate::config::DiagnosisConfig;
-use crate::noise::Whitener;
 use crate::places::units;
 use crate::problem::Problem;
 use crate::projection::cholesky_upper;
+use crate::whitener::Whitener;
 use armcal_calibrate::grouped_ci95;
 use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector, Vector3};

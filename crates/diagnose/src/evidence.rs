@@ -1,10 +1,11 @@
 //! Evidence of a term with a physical amplitude prior, noise variance marginalised (notes 4.6, formula 8).
 
 use crate::config::DiagnosisConfig;
-use crate::noise::{Noise, Whitener};
+use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
+use crate::whitener::Whitener;
 use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
 

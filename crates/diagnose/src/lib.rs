@@ -65,6 +65,7 @@ mod suggestion;
 mod unknown;
 mod view;
 mod weigh;
+mod whitener;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]

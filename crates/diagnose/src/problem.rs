@@ -2,7 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::crossval::EFFECT_PRECISION;
-use crate::noise::Whitener;
+use crate::whitener::Whitener;
 use armcal_core::{DwellId, Unit};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3};

@@ -4,10 +4,11 @@
 pub(crate) mod arm;
 
 use crate::cells::Unlisted;
-use crate::noise::{Noise, Whitener};
+use crate::noise::Noise;
 use crate::projection::Projection;
 use crate::rooms::{Room, Rooms};
 use crate::weigh::{Outside, Weighed, weigh};
+use crate::whitener::Whitener;
 use crate::{DiagnosisConfig, LinearRefit, Problem};
 use arm::{design, problem, rng};
 use nalgebra::{DMatrix, DVector};

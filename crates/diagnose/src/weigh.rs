@@ -5,10 +5,11 @@ use crate::config::DiagnosisConfig;
 use crate::crossval::EFFECT_PRECISION;
 use crate::drivers::{Driver, drivers};
 use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
-use crate::noise::{Noise, Whitener};
+use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem, Scan};
 use crate::projection::Gram;
 use crate::special::ln_sum_exp;
+use crate::whitener::Whitener;
 use nalgebra::DMatrix;
 
 /// Residual variance of the best explanation above which the declared noise is taken to be wrong and everything is

@@ -1,16 +1,16 @@
 """The table of a judgement, as a page of docs/."""
 import statistics
 
-COLUMNS = ["first", "first, and more", "in the answer", "unknown", "unexplained", "not shown", "silent", "wrong set", "wrong name", "setup"]
+COLUMNS = ["first", "first, and more", "in the answer", "unknown", "unexplained", "not shown", "silent"]
+COLUMNS += ["wrong set", "wrong name", "setup"]
 HEAD = """# The rig in another physics engine
 
 Written in one go: `{command}`
 
 Sessions of the paper's rig simulated by MuJoCo (`tests/python/mujoco_rig`, which shares no formula with armcal): links in gravity,
 motors behind gears with gaps and springs, dry friction, a servo with an integral, a hand that leads the tip from cavity to
-cavity and lets go of nothing before the encoders are read. Three tilts of the board, 150 dwells seated by hand, 36 poses that
-the servo holds, geometry errors of up to 3 mm and 1 deg, one mechanism hidden. armcal sees recordings and the nominal arm; the
-truth is opened afterwards.
+cavity while the motors are off. Three tilts of the board, 150 dwells seated by hand, 36 poses that the servo holds, geometry
+errors of up to 3 mm and 1 deg, one mechanism hidden. armcal sees recordings and the nominal arm; the truth is opened afterwards.
 
 *first*: a true name is told first, and nothing untrue; *first, and more*: with another name that is not true; *in the answer*:
 among names that the data do not tell apart; *unknown*: something unlisted is said to be missing; *unexplained*: errors above the

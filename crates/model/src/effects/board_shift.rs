@@ -56,7 +56,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
     if !placing.session.seated_and_tracked() {
         return Err(
-            "it needs dwells in cavities and tracked ones; without either, use frame_shift".to_owned()
+            "it needs dwells in cavities and tracked ones; with one kind alone, use frame_shift".to_owned()
         );
     }
     if let Some(Since::Recording(recording)) = placing.spec.since

@@ -1,0 +1,282 @@
+//! Rows made independent of each other, and of one size: the inverse roots of what the noise may be.
+//!
+//! Each alternative is a covariance `(I + b^2 K) / (1 + b^2)` of the whitened rows. `K` is so structured that its inverse root
+//! costs no more than walking the rows: groups that share one displacement (rank 3 a group), or a first-order
+//! autoregression, whitened by its Kalman filter. Rows it touches are rescaled by `1 + b^2`: the correlated part is a
+//! share of the declared noise, not an addition to it, so that pure correlated noise does not contradict the declared
+//! size; a wandering sensor and a joint with slack scatter on top of what is declared. Everything else is then done in
+//! the whitened rows, so that a noise-like term and a physical one compete on equal ground (formula 9, evaluated
+//! exactly for all terms).
+
+use crate::noise::Noise;
+use crate::problem::{DwellRow, Problem};
+use armcal_calibrate::inner;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Correlation length of the short memory [dwells].
+const MEMORY_DWELLS: f64 = 3.0;
+
+/// `((I + b^2 K) / (1 + b^2))^(-1/2)`, ready to be applied to columns.
+#[derive(Debug, Clone)]
+pub(crate) struct Whitener {
+    kind: Kind,
+    /// ln of the determinant of that covariance.
+    pub ln_det: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    White,
+    /// `sqrt(1 + b^2)`, and for each group its rows and P with `x - P P'x` whitened.
+    Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
+    /// One after the other.
+    Then(Box<[Whitener; 2]>),
+    /// A factor for each row.
+    Rows(DVector<f64>),
+    /// The rows of each dwell, and p with `x - p p'x` whitened.
+    Dwells(Vec<Range<usize>>, DVector<f64>),
+    /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
+    Memory(Vec<Filter>),
+    /// First the memory, of rows scaled, then `x - P P'x` with what places share as the memory shows it.
+    Both {
+        scale: DVector<f64>,
+        filters: Vec<Filter>,
+        p: DMatrix<f64>,
+    },
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Filter {
+    row: usize,
+    /// Axis of the state.
+    axis: usize,
+    /// Back from the declared noise to the row in which the state's share is `load`.
+    scale: f64,
+    decay: f64,
+    /// How much of the state the row shows.
+    load: f64,
+    gain: f64,
+    weight: f64,
+}
+
+impl Whitener {
+    /// For noise of a kind with standard deviation `b` (declared noise = 1).
+    pub fn new(noise: Noise, b: f64, problem: &Problem) -> Whitener {
+        match noise {
+            Noise::White => Whitener { kind: Kind::White, ln_det: 0.0 },
+            Noise::Place => groups(problem, b, false),
+            Noise::Visit => groups(problem, b, true),
+            Noise::Memory => memory(problem, |_| Share::of_declared(b)),
+            Noise::Sensor => memory(problem, sensor(b)),
+            Noise::SensorAndPlace => sensor_and_place(problem, b),
+            Noise::Slack(_) => slack(noise, problem, b),
+            Noise::Tracked => wider(problem, b, |dwell| dwell.tracked),
+            Noise::TrackedAndPlace => {
+                let [tracked, place] =
+                    [(Noise::Tracked, b), (Noise::Place, 1.0)].map(|(n, b)| Whitener::new(n, b, problem));
+                let ln_det = tracked.ln_det + place.ln_det;
+                Whitener { kind: Kind::Then(Box::new([tracked, place])), ln_det }
+            }
+            Noise::Seated => wider(problem, b, |dwell| !dwell.tracked),
+        }
+    }
+
+    /// Whitens columns in place.
+    pub fn apply(&self, columns: &mut DMatrix<f64>) {
+        match &self.kind {
+            Kind::White => {}
+            Kind::Groups(unit, groups) => {
+                for (rows, p) in groups {
+                    let x = columns.select_rows(rows);
+                    let change = p * inner(p, &x);
+                    for (mut column, change) in columns.column_iter_mut().zip(change.column_iter()) {
+                        rows.iter()
+                            .zip(change.iter())
+                            .for_each(|(r, c)| column[*r] = unit * (column[*r] - c));
+                    }
+                }
+            }
+            Kind::Then(both) => both.iter().for_each(|one| one.apply(columns)),
+            Kind::Rows(factors) => {
+                columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
+            }
+            Kind::Dwells(dwells, p) => {
+                for mut column in columns.column_iter_mut() {
+                    for rows in dwells {
+                        let own = p.rows(rows.start, rows.len());
+                        let mut x = column.rows_mut(rows.start, rows.len());
+                        let shared = own.dot(&x);
+                        x.axpy(-shared, &own, 1.0);
+                    }
+                }
+            }
+            Kind::Memory(filters) => innovations(filters, columns),
+            Kind::Both { scale, filters, p } => {
+                columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(scale));
+                innovations(filters, columns);
+                let shared = inner(p, columns);
+                columns.gemm(-1.0, p, &shared, 1.0);
+            }
+        }
+    }
+}
+
+/// Walks the filters over each column: what each row says that the rows before it did not.
+fn innovations(filters: &[Filter], columns: &mut DMatrix<f64>) {
+    let axes = filters.iter().map(|f| f.axis + 1).max().unwrap_or(0);
+    let mut state = vec![0.0; axes];
+    for mut column in columns.column_iter_mut() {
+        state.fill(0.0);
+        for f in filters {
+            let predicted = f.decay * state[f.axis];
+            let innovation = f.scale * column[f.row] - f.load * predicted;
+            state[f.axis] = predicted + f.gain * innovation;
+            column[f.row] = innovation * f.weight;
+        }
+    }
+}
+
+/// `C = D (C_sensor + Z Z') D`: seated rows, half their variance the place's, are scaled back to the declared noise.
+fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
+    let Whitener { kind, mut ln_det } = memory(problem, sensor(b));
+    let Kind::Memory(filters) = kind else { return Whitener { kind, ln_det } };
+    let seated: Vec<&DwellRow> = problem.dwells.iter().filter(|d| !d.tracked && d.place.is_some()).collect();
+    let mut place: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut scale = DVector::from_element(problem.rows(), 1.0);
+    for d in &seated {
+        let next = place.len();
+        place.entry(d.place.as_deref().unwrap_or_default()).or_insert(next);
+        scale.rows_mut(d.first_row, d.rows).fill(2f64.sqrt());
+        ln_det -= d.rows as f64 * 2f64.ln();
+    }
+    let mut shared = DMatrix::zeros(problem.rows(), 3 * place.len());
+    for d in &seated {
+        let k = 3 * place[d.place.as_deref().unwrap_or_default()];
+        shared.view_mut((d.first_row, k), (d.rows, 3)).copy_from(&d.seat);
+    }
+    innovations(&filters, &mut shared);
+    let (p, grown) = shares(&shared, 1.0);
+    Whitener { kind: Kind::Both { scale, filters, p }, ln_det: ln_det + grown }
+}
+
+/// P with `(I - P P')^2 = (I + b^2 Z Z')^-1`, and ln of the determinant of `I + b^2 Z Z'`.
+fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
+    let eigen = inner(z, z).symmetric_eigen();
+    let mut p = z * &eigen.eigenvectors;
+    let mut ln_det = 0.0;
+    for (k, w) in eigen.eigenvalues.iter().enumerate() {
+        let grown = 1.0 + b * b * w.max(0.0);
+        ln_det += grown.ln();
+        let share = if *w > 1e-12 { ((1.0 - 1.0 / grown.sqrt()) / w).sqrt() } else { 0.0 };
+        p.column_mut(k).scale_mut(share);
+    }
+    (p, ln_det)
+}
+
+/// `(1 + b^2) I` in the dwells that `scatter`.
+fn wider(problem: &Problem, b: f64, scatter: impl Fn(&DwellRow) -> bool) -> Whitener {
+    let variance = 1.0 + b * b;
+    let mut factors = DVector::from_element(problem.rows(), 1.0);
+    let mut ln_det = 0.0;
+    for dwell in problem.dwells.iter().filter(|d| scatter(d)) {
+        factors.rows_mut(dwell.first_row, dwell.rows).fill(variance.sqrt().recip());
+        ln_det += dwell.rows as f64 * variance.ln();
+    }
+    Whitener { kind: Kind::Rows(factors), ln_det }
+}
+
+/// `I + b^2 v v'` in every dwell.
+fn slack(noise: Noise, problem: &Problem, b: f64) -> Whitener {
+    let Some(mut p) = noise.direction(problem) else { return Whitener { kind: Kind::White, ln_det: 0.0 } };
+    let dwells: Vec<Range<usize>> = problem.dwells.iter().map(DwellRow::range).collect();
+    let mut ln_det = 0.0;
+    for rows in &dwells {
+        let own = DMatrix::from_column_slice(rows.len(), 1, p.rows(rows.start, rows.len()).as_slice());
+        let (share, grown) = shares(&own, b);
+        p.rows_mut(rows.start, rows.len()).copy_from(&share);
+        ln_det += grown;
+    }
+    Whitener { kind: Kind::Dwells(dwells, p), ln_det }
+}
+
+fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
+    let mut members: BTreeMap<(usize, &str), Vec<&DwellRow>> = BTreeMap::new();
+    for dwell in &problem.dwells {
+        if let Some(place) = &dwell.place {
+            let recording = if by_recording { dwell.id.recording } else { 0 };
+            members.entry((recording, place)).or_default().push(dwell);
+        }
+    }
+    let mut ln_det = 0.0;
+    let mut groups = Vec::new();
+    for dwells in members.values() {
+        let rows: Vec<usize> = dwells.iter().flat_map(|d| d.range()).collect();
+        let mut z = DMatrix::zeros(rows.len(), 3);
+        let mut at = 0;
+        for d in dwells {
+            z.rows_mut(at, d.rows).copy_from(&d.seat);
+            at += d.rows;
+        }
+        let (p, grown) = shares(&z, b);
+        ln_det += grown - rows.len() as f64 * (1.0 + b * b).ln();
+        groups.push((rows, p));
+    }
+    Whitener { kind: Kind::Groups((1.0 + b * b).sqrt(), groups), ln_det }
+}
+
+/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2, seen with unit noise; reset at each recording.
+fn memory(problem: &Problem, shares: impl Fn(&DwellRow) -> Share) -> Whitener {
+    let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
+    order.sort_by_key(|i| problem.dwells[*i].id);
+    let axes = problem.dwells.iter().map(|d| d.rows).max().unwrap_or(0);
+    let mut variance = vec![1.0; axes];
+    let (mut filters, mut ln_det) = (Vec::new(), 0.0);
+    let mut last: Option<&DwellRow> = None;
+    for i in order {
+        let dwell = &problem.dwells[i];
+        let gap = match last {
+            Some(l) if l.id.recording == dwell.id.recording => dwell.id.dwell.abs_diff(l.id.dwell) as f64,
+            _ => f64::INFINITY,
+        };
+        let decay = (-gap / MEMORY_DWELLS).exp();
+        let Share { load, unit } = shares(dwell);
+        for (axis, state) in variance.iter_mut().enumerate() {
+            let predicted = decay * decay * *state + (1.0 - decay * decay);
+            *state = predicted;
+            if axis < dwell.rows {
+                let innovation = load * load * predicted + 1.0;
+                let gain = load * predicted / innovation;
+                *state = predicted * (1.0 - gain * load);
+                ln_det += (innovation / unit).ln();
+                let (scale, weight) = (unit.sqrt(), innovation.sqrt().recip());
+                filters.push(Filter { row: dwell.first_row + axis, axis, scale, decay, load, gain, weight });
+            }
+        }
+        last = Some(dwell);
+    }
+    Whitener { kind: Kind::Memory(filters), ln_det }
+}
+
+/// Tracked dwells wander on top of what is declared for them; half the noise of seated ones remembers.
+fn sensor(b: f64) -> impl Fn(&DwellRow) -> Share {
+    move |dwell| match dwell.tracked {
+        true => Share { load: b, unit: 1.0 },
+        false => Share::of_declared(1.0),
+    }
+}
+
+/// How a dwell shows the state that remembers.
+struct Share {
+    /// Standard deviation of the state in the dwell (declared noise = 1).
+    load: f64,
+    /// Variance that is called one: `1 + load^2` where the state is a share of the declared noise, 1 where it adds to it.
+    unit: f64,
+}
+
+impl Share {
+    fn of_declared(load: f64) -> Share {
+        Share { load, unit: 1.0 + load * load }
+    }
+}
