@@ -5,7 +5,7 @@ COLUMNS = ["first", "first, and more", "in the answer", "unknown", "unexplained"
 COLUMNS += ["wrong set", "wrong name", "setup"]
 HEAD = """# The rig in another physics engine
 
-Written in one go: `{command}`
+Written in one go: `PYTHONPATH=tests/python {command}`
 
 Sessions of the paper's rig simulated by MuJoCo (`tests/python/mujoco_rig`, which shares no formula with armcal): links in gravity,
 motors behind gears with gaps and springs, dry friction, a servo with an integral, a hand that leads the tip from cavity to
