@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::Pipeline;
+use crate::progress::Progress;
 use crate::story::with_effects;
 use armcal_calibrate::{Calibration, HoldoutConfig, calibrate};
 use armcal_core::Observation;
@@ -45,20 +46,21 @@ impl Transfer {
 
 /// Each of the effects, fitted on all recordings but one and judged on that one, in turn; none of a single recording.
 ///
-/// `base` are the effects that stay in the model whatever comes of the others.
+/// The effects of the first list stay in the model whatever comes of the second, which are judged.
 ///
 /// # Errors
 /// A fit without one of the recordings that cannot be made.
 pub fn transfers(
     pipeline: &Pipeline,
     geometry: &Model,
-    base: &[EffectSpec],
-    new: &[EffectSpec],
+    (base, new): (&[EffectSpec], &[EffectSpec]),
     observations: &[Observation],
+    progress: &Progress,
 ) -> Result<Vec<Transfer>, Error> {
     if pipeline.recordings.len() < 2 {
         return Ok(Vec::new());
     }
+    progress.step("fitting without each recording in turn");
     let calibrated = |without: Option<&EffectSpec>| -> Result<Calibration, Error> {
         let effects: Vec<EffectSpec> =
             base.iter().chain(new.iter().filter(|e| Some(*e) != without)).cloned().collect();

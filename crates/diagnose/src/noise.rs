@@ -93,7 +93,7 @@ impl Noise {
     /// Whether it adds to what is declared in a way that hides what is missing: weighed only where it says more than plain
     /// noise even of an unexplained residual.
     pub fn widens(self) -> bool {
-        matches!(self, Noise::Slack(_) | Noise::Tracked | Noise::TrackedAndPlace | Noise::Seated)
+        matches!(self, Noise::Slack(_) | Noise::Tracked | Noise::Seated)
     }
 
     /// The kind that has the errors of places besides, where places repeat: worth its price only where this one leads, or

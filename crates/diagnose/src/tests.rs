@@ -85,18 +85,23 @@ fn dense(noise: Noise, b: f64, p: &Problem) -> DMatrix<f64> {
     k / (1.0 + b * b)
 }
 
+/// That a whitener is an inverse root of this covariance, and knows its determinant.
+fn assert_whitens(noise: Noise, b: f64, p: &Problem, c: DMatrix<f64>) {
+    let whitener = Whitener::new(noise, b, p);
+    let mut w = DMatrix::identity(p.rows(), p.rows());
+    whitener.apply(&mut w);
+    let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
+    assert!(error < 1e-9, "{noise:?} {error}");
+    let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
+    assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+}
+
 #[test]
 fn whiteners_are_inverse_roots_of_their_covariance() {
     let p = small(1);
     for noise in [Noise::Place, Noise::Visit, Noise::Memory] {
-        let whitener = Whitener::new(noise, 1.7, &p);
-        let mut w = DMatrix::identity(p.rows(), p.rows());
-        whitener.apply(&mut w);
         let c = dense(noise, 1.7, &p);
-        let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
-        assert!(error < 1e-9, "{noise:?} {error}");
-        let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-        assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+        assert_whitens(noise, 1.7, &p, c);
     }
 }
 
@@ -106,19 +111,13 @@ fn dwells_that_scatter_more_than_declared_are_whitened_by_a_factor() {
     p.dwells.iter_mut().step_by(3).for_each(|d| d.tracked = true);
     let place = dense(Noise::Place, 1.0, &p);
     for (noise, tracked) in [(Noise::Tracked, true), (Noise::Seated, false), (Noise::TrackedAndPlace, true)] {
-        let whitener = Whitener::new(noise, 3.0, &p);
-        let mut w = DMatrix::identity(p.rows(), p.rows());
-        whitener.apply(&mut w);
         let wider = |row: usize| p.dwells[row / 3].tracked == tracked;
         let size = |row: usize| if wider(row) { 10f64.sqrt() } else { 1.0 };
         let alike = |i: usize, k: usize| {
             if noise == Noise::TrackedAndPlace { place[(i, k)] } else { f64::from(i == k) }
         };
         let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| size(i) * alike(i, k) * size(k));
-        let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
-        assert!(error < 1e-9, "{noise:?} {error}");
-        let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-        assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+        assert_whitens(noise, 3.0, &p, c);
     }
 }
 
@@ -135,13 +134,7 @@ fn a_slack_joint_is_whitened_as_one_more_angle_in_every_dwell() {
                 let shared = if dwell(i) == dwell(k) { b * b * unit * v[i] * v[k] } else { 0.0 };
                 f64::from(i == k) + shared
             });
-            let whitener = Whitener::new(Noise::Slack(joint), b, &p);
-            let mut w = DMatrix::identity(p.rows(), p.rows());
-            whitener.apply(&mut w);
-            let error = (&w * &c * w.transpose() - DMatrix::identity(p.rows(), p.rows())).amax();
-            assert!(error < 1e-9, "joint {joint}: {error}");
-            let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-            assert!((whitener.ln_det - ln_det).abs() < 1e-8, "joint {joint}: {} {ln_det}", whitener.ln_det);
+            assert_whitens(Noise::Slack(joint), b, &p, c);
         }
     }
 }
@@ -173,14 +166,8 @@ fn a_wandering_sensor_is_whitened_with_and_without_errors_of_places() {
     let mut p = small(2);
     p.dwells.iter_mut().skip(1).step_by(3).for_each(|d| d.tracked = true);
     for (noise, places) in [(Noise::Sensor, false), (Noise::SensorAndPlace, true)] {
-        let whitener = Whitener::new(noise, 1.7, &p);
-        let mut w = DMatrix::identity(p.rows(), p.rows());
-        whitener.apply(&mut w);
         let c = dense_sensor(1.7, places, &p);
-        let error = (w.tr_mul(&w) * &c - DMatrix::identity(p.rows(), p.rows())).amax();
-        assert!(error < 1e-9, "{noise:?} {error}");
-        let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-        assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+        assert_whitens(noise, 1.7, &p, c);
     }
 }
 

@@ -4,7 +4,7 @@
 //! costs no more than walking the rows: groups that share one displacement (rank 3 a group), or a first-order
 //! autoregression, whitened by its Kalman filter. Rows it touches are rescaled by `1 + b^2`: the correlated part is a
 //! share of the declared noise, not an addition to it, so that pure correlated noise does not contradict the declared
-//! size; a wandering sensor and a joint with slack scatter on top of what is declared. Everything else is then done in
+//! size; a wandering sensor, a joint with slack and dwells that scatter more do so on top of what is declared. Everything else is then done in
 //! the whitened rows, so that a noise-like term and a physical one compete on equal ground (formula 9, evaluated
 //! exactly for all terms).
 
@@ -13,7 +13,6 @@ use crate::problem::{DwellRow, Problem};
 use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// Correlation length of the short memory [dwells].
 const MEMORY_DWELLS: f64 = 3.0;
@@ -28,23 +27,14 @@ pub(crate) struct Whitener {
 
 #[derive(Debug, Clone)]
 enum Kind {
-    White,
-    /// `sqrt(1 + b^2)`, and for each group its rows and P with `x - P P'x` whitened.
-    Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
-    /// One after the other.
-    Then(Box<[Whitener; 2]>),
     /// A factor for each row.
     Rows(DVector<f64>),
-    /// The rows of each dwell, and p with `x - p p'x` whitened.
-    Dwells(Vec<Range<usize>>, DVector<f64>),
+    /// A factor, and for each group its rows and P: `x - P P'x` times the factor is whitened.
+    Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
     /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
     Memory(Vec<Filter>),
-    /// First the memory, of rows scaled, then `x - P P'x` with what places share as the memory shows it.
-    Both {
-        scale: DVector<f64>,
-        filters: Vec<Filter>,
-        p: DMatrix<f64>,
-    },
+    /// One after the other; of none, nothing.
+    Then(Vec<Kind>),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -65,28 +55,38 @@ impl Whitener {
     /// For noise of a kind with standard deviation `b` (declared noise = 1).
     pub fn new(noise: Noise, b: f64, problem: &Problem) -> Whitener {
         match noise {
-            Noise::White => Whitener { kind: Kind::White, ln_det: 0.0 },
+            Noise::White => Whitener::then([]),
             Noise::Place => groups(problem, b, false),
             Noise::Visit => groups(problem, b, true),
             Noise::Memory => memory(problem, |_| Share::of_declared(b)),
             Noise::Sensor => memory(problem, sensor(b)),
             Noise::SensorAndPlace => sensor_and_place(problem, b),
-            Noise::Slack(_) => slack(noise, problem, b),
-            Noise::Tracked => wider(problem, b, |dwell| dwell.tracked),
-            Noise::TrackedAndPlace => {
-                let [tracked, place] =
-                    [(Noise::Tracked, b), (Noise::Place, 1.0)].map(|(n, b)| Whitener::new(n, b, problem));
-                let ln_det = tracked.ln_det + place.ln_det;
-                Whitener { kind: Kind::Then(Box::new([tracked, place])), ln_det }
+            Noise::Slack(_) => {
+                noise.direction(problem).map_or_else(|| Whitener::then([]), |v| slack(&v, problem, b))
             }
-            Noise::Seated => wider(problem, b, |dwell| !dwell.tracked),
+            Noise::Tracked => scaled(problem, 1.0 + b * b, |dwell| dwell.tracked),
+            Noise::TrackedAndPlace => Whitener::then(
+                [(Noise::Tracked, b), (Noise::Place, 1.0)].map(|(n, b)| Whitener::new(n, b, problem)),
+            ),
+            Noise::Seated => scaled(problem, 1.0 + b * b, |dwell| !dwell.tracked),
         }
+    }
+
+    /// One after the other.
+    fn then<const N: usize>(all: [Whitener; N]) -> Whitener {
+        let ln_det = all.iter().map(|one| one.ln_det).sum();
+        Whitener { kind: Kind::Then(all.into_iter().map(|one| one.kind).collect()), ln_det }
     }
 
     /// Whitens columns in place.
     pub fn apply(&self, columns: &mut DMatrix<f64>) {
-        match &self.kind {
-            Kind::White => {}
+        self.kind.apply(columns);
+    }
+}
+
+impl Kind {
+    fn apply(&self, columns: &mut DMatrix<f64>) {
+        match self {
             Kind::Groups(unit, groups) => {
                 for (rows, p) in groups {
                     let x = columns.select_rows(rows);
@@ -98,27 +98,11 @@ impl Whitener {
                     }
                 }
             }
-            Kind::Then(both) => both.iter().for_each(|one| one.apply(columns)),
+            Kind::Then(all) => all.iter().for_each(|one| one.apply(columns)),
             Kind::Rows(factors) => {
                 columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
             }
-            Kind::Dwells(dwells, p) => {
-                for mut column in columns.column_iter_mut() {
-                    for rows in dwells {
-                        let own = p.rows(rows.start, rows.len());
-                        let mut x = column.rows_mut(rows.start, rows.len());
-                        let shared = own.dot(&x);
-                        x.axpy(-shared, &own, 1.0);
-                    }
-                }
-            }
             Kind::Memory(filters) => innovations(filters, columns),
-            Kind::Both { scale, filters, p } => {
-                columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(scale));
-                innovations(filters, columns);
-                let shared = inner(p, columns);
-                columns.gemm(-1.0, p, &shared, 1.0);
-            }
         }
     }
 }
@@ -140,25 +124,23 @@ fn innovations(filters: &[Filter], columns: &mut DMatrix<f64>) {
 
 /// `C = D (C_sensor + Z Z') D`: seated rows, half their variance the place's, are scaled back to the declared noise.
 fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
-    let Whitener { kind, mut ln_det } = memory(problem, sensor(b));
-    let Kind::Memory(filters) = kind else { return Whitener { kind, ln_det } };
+    let memory = memory(problem, sensor(b));
     let seated: Vec<&DwellRow> = problem.dwells.iter().filter(|d| !d.tracked && d.place.is_some()).collect();
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
-    let mut scale = DVector::from_element(problem.rows(), 1.0);
     for d in &seated {
         let next = place.len();
         place.entry(d.place.as_deref().unwrap_or_default()).or_insert(next);
-        scale.rows_mut(d.first_row, d.rows).fill(2f64.sqrt());
-        ln_det -= d.rows as f64 * 2f64.ln();
     }
     let mut shared = DMatrix::zeros(problem.rows(), 3 * place.len());
     for d in &seated {
         let k = 3 * place[d.place.as_deref().unwrap_or_default()];
         shared.view_mut((d.first_row, k), (d.rows, 3)).copy_from(&d.seat);
     }
-    innovations(&filters, &mut shared);
-    let (p, grown) = shares(&shared, 1.0);
-    Whitener { kind: Kind::Both { scale, filters, p }, ln_det: ln_det + grown }
+    memory.apply(&mut shared);
+    let (p, ln_det) = shares(&shared, 1.0);
+    let places = Whitener { kind: Kind::Groups(1.0, vec![((0..problem.rows()).collect(), p)]), ln_det };
+    let halved = scaled(problem, 0.5, |d| !d.tracked && d.place.is_some());
+    Whitener::then([halved, memory, places])
 }
 
 /// P with `(I - P P')^2 = (I + b^2 Z Z')^-1`, and ln of the determinant of `I + b^2 Z Z'`.
@@ -175,12 +157,11 @@ fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
     (p, ln_det)
 }
 
-/// `(1 + b^2) I` in the dwells that `scatter`.
-fn wider(problem: &Problem, b: f64, scatter: impl Fn(&DwellRow) -> bool) -> Whitener {
-    let variance = 1.0 + b * b;
+/// This variance in some of the dwells, one in the others.
+fn scaled(problem: &Problem, variance: f64, those: impl Fn(&DwellRow) -> bool) -> Whitener {
     let mut factors = DVector::from_element(problem.rows(), 1.0);
     let mut ln_det = 0.0;
-    for dwell in problem.dwells.iter().filter(|d| scatter(d)) {
+    for dwell in problem.dwells.iter().filter(|d| those(d)) {
         factors.rows_mut(dwell.first_row, dwell.rows).fill(variance.sqrt().recip());
         ln_det += dwell.rows as f64 * variance.ln();
     }
@@ -188,17 +169,16 @@ fn wider(problem: &Problem, b: f64, scatter: impl Fn(&DwellRow) -> bool) -> Whit
 }
 
 /// `I + b^2 v v'` in every dwell.
-fn slack(noise: Noise, problem: &Problem, b: f64) -> Whitener {
-    let Some(mut p) = noise.direction(problem) else { return Whitener { kind: Kind::White, ln_det: 0.0 } };
-    let dwells: Vec<Range<usize>> = problem.dwells.iter().map(DwellRow::range).collect();
+fn slack(v: &DVector<f64>, problem: &Problem, b: f64) -> Whitener {
     let mut ln_det = 0.0;
-    for rows in &dwells {
-        let own = DMatrix::from_column_slice(rows.len(), 1, p.rows(rows.start, rows.len()).as_slice());
-        let (share, grown) = shares(&own, b);
-        p.rows_mut(rows.start, rows.len()).copy_from(&share);
+    let mut group = |dwell: &DwellRow| {
+        let own = v.rows(dwell.first_row, dwell.rows).into_owned();
+        let (p, grown) = shares(&DMatrix::from_column_slice(dwell.rows, 1, own.as_slice()), b);
         ln_det += grown;
-    }
-    Whitener { kind: Kind::Dwells(dwells, p), ln_det }
+        (dwell.range().collect(), p)
+    };
+    let groups = problem.dwells.iter().map(&mut group).collect();
+    Whitener { kind: Kind::Groups(1.0, groups), ln_det }
 }
 
 fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {

@@ -71,12 +71,12 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
-    let Chosen { new, transfer, left_out } = chosen(named, &pipeline, &settled, &progress)?;
+    let geometry = settled.fitted.geometry.clone();
+    let mut effects = frames::effect_specs(&pipeline, &geometry)?;
+    let Chosen { new, transfer, left_out } = chosen(named, &pipeline, &settled, &effects, &progress)?;
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
-    let geometry = settled.fitted.geometry.clone();
-    let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     effects.extend(new.iter().cloned());
     let (mut run, recordings) = settled.into_run(&pipeline, Diagnosed::NOT_ASKED);
     let before = PastRun::of(&run);
@@ -127,19 +127,16 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
 }
 
 /// What is added: what the user names, or of what the diagnosis suggests that which another session and the other
-/// recordings do not contradict.
+/// recordings do not contradict. `base` are the pipeline's own effects.
 fn chosen(
     named: Option<Vec<EffectSpec>>,
     pipeline: &Pipeline,
     settled: &Settled,
+    base: &[EffectSpec],
     progress: &Progress,
 ) -> Result<Chosen, Error> {
     let Fitted { geometry, observations, .. } = &settled.fitted;
-    let base = frames::effect_specs(pipeline, geometry)?;
-    let checked = |new: &[EffectSpec]| {
-        progress.step("fitting without each recording in turn");
-        transfers(pipeline, geometry, &base, new, observations)
-    };
+    let checked = |new: &[EffectSpec]| transfers(pipeline, geometry, (base, new), observations, progress);
     if let Some(new) = named {
         let transfer = checked(&new)?;
         return Ok(Chosen { new, transfer, left_out: Vec::new() });
@@ -155,10 +152,9 @@ fn chosen(
     let mut left_out: Vec<LeftOut> = of_time.collect();
     let mut transfer = checked(&new)?;
     if transfer.iter().any(Transfer::harms) {
-        let harmful = |effect: &str| transfer.iter().find(|t| t.effect == effect && t.harms());
-        let reasons = new.iter().filter_map(|e| harmful(&e.to_string()));
-        left_out.extend(reasons.map(|t| LeftOut { effect: t.effect.clone(), reason: t.sentence() }));
-        new.retain(|e| left_out.iter().all(|l| l.effect != e.to_string()));
+        let harmful = transfer.iter().filter(|t| t.harms());
+        left_out.extend(harmful.map(|t| LeftOut { effect: t.effect.clone(), reason: t.sentence() }));
+        new = new.into_iter().zip(&transfer).filter(|(_, t)| !t.harms()).map(|(effect, _)| effect).collect();
         transfer = checked(&new)?;
     }
     if new.is_empty() {

@@ -405,10 +405,11 @@ fn what_shows_only_beside_an_unlisted_shape_is_tentative() {
 
 #[test]
 fn doubtful_steps_are_given_a_few_more() {
-    // Play that grows with the angle: plain play is a part of it, without a name; with it or before it that of another joint.
+    // Play that grows with the angle: plain play is a part of it, without a name. As long as it may be slack of that joint
+    // the play of another one says more.
     let (steps, _) = stepped(&beside("worn", "backlash:3", 0.4), Vec::new(), &quick());
     assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
-    assert!(names(&steps).contains(&"backlash:3"), "{:?}", names(&steps));
+    assert_eq!(names(&steps), ["backlash:3", "backlash:1"]);
 }
 
 #[test]

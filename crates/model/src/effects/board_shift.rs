@@ -23,12 +23,13 @@
 //! Rigid motion (eq. 7-10 of Li et al. 2016, for the board); notes of the project.
 
 use super::drivers::Drivers;
+use super::frame_shift::{about, rigid_motion};
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitudes_xyz};
+use super::placing::Placing;
 use super::spec::Since;
-use crate::rigid::{Scalar, rotation_of_vector};
-use armcal_core::{Reference, Unit};
+use crate::rigid::Scalar;
+use armcal_core::Reference;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -64,10 +65,8 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     {
         return Err(format!("the board's pose in recording {recording} is estimated already"));
     }
-    let deg = 1f64.to_radians();
-    let mut amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift along the board's");
-    amplitudes.extend(amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, "turn about the board's"));
-    Ok(Placement::new(amplitudes, BoardShift { middles_m: placing.session.board_centres_m.clone() }))
+    let physics = BoardShift { middles_m: placing.session.board_centres_m.clone() };
+    Ok(Placement::new(rigid_motion(" the board's"), physics))
 }
 
 impl Physics for BoardShift {
@@ -76,9 +75,9 @@ impl Physics for BoardShift {
         let recording = x.observation.dwell.recording;
         let middle_m = self.middles_m.get(&recording).copied().unwrap_or_else(Vector3::zeros);
         let arm_m = (in_board_m - middle_m).map(D::from);
-        let turned_m = rotation_of_vector(&Vector3::new(theta[3], theta[4], theta[5])) * arm_m;
+        let back_m = about(&arm_m, [theta[3], theta[4], theta[5]]);
         for axis in 0..3 {
-            change.seat_m[axis] += theta[axis] + turned_m[axis] - arm_m[axis];
+            change.seat_m[axis] += theta[axis] - back_m[axis];
         }
     }
 }

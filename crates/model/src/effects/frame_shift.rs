@@ -26,7 +26,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitudes_xyz};
 use crate::rigid::{Scalar, rotation_of_vector};
-use armcal_core::Unit;
+use armcal_core::{Parameter, Unit};
 use nalgebra::Vector3;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -51,9 +51,7 @@ struct FrameShift {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
-    let deg = 1f64.to_radians();
-    let mut amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift along");
-    amplitudes.extend(amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, "turn about"));
+    let amplitudes = rigid_motion("");
     let physics = FrameShift { centre_m: placing.volume_centre_m() };
     Ok(Placement::twisting(0, amplitudes, physics))
 }
@@ -64,6 +62,14 @@ impl Physics for FrameShift {
         let move_m = about(&self.centre_m.map(D::from), turn);
         change.twist(0, [theta[0] + move_m[0], theta[1] + move_m[1], theta[2] + move_m[2]], turn);
     }
+}
+
+/// A shift along the axes of a frame and a turn about them, of the size of a knock; `of` says whose axes.
+pub(super) fn rigid_motion(of: &str) -> Vec<Parameter> {
+    let deg = 1f64.to_radians();
+    let shift = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &format!("shift along{of}"));
+    let turn = amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, &format!("turn about{of}"));
+    shift.into_iter().chain(turn).collect()
 }
 
 /// The translation that makes a turn about the frame's origin one about `pivot`: `c - Exp(w) c`.

@@ -104,7 +104,10 @@ pub(crate) fn place(
         meaning: shape.meaning.to_owned(),
     }));
     let share = parameters.iter().position(|p| p.name == state::SEATED.name);
-    let physics = share.map_or_else(|| physics.clone(), |share| state::shared(physics.clone(), count, share));
+    let physics = match share {
+        Some(share) => state::shared(physics, count, share),
+        None => physics,
+    };
     for (quantity, change) in &spec.overrides {
         let known = || parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
         let message = || {

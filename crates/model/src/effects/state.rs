@@ -12,7 +12,7 @@ use super::placing::Placing;
 use armcal_core::{Observation, Unit};
 use nalgebra::Vector3;
 use num_dual::Dual64;
-use std::ops::Range;
+use std::ops::{MulAssign, Range};
 use std::sync::Arc;
 
 /// How much of what gravity does acts while a cavity holds the tip.
@@ -36,11 +36,15 @@ pub(super) const LED: Shape = Shape {
 
 /// In a cavity a joint may rest within its play: less than all of it.
 fn led(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    if placing.session.seated_and_tracked() { vec![-1.0, -0.75, -0.5, 0.0, 0.5] } else { Vec::new() }
+    worth_trying(placing, &[-1.0, -0.75, -0.5, 0.0, 0.5])
 }
 
 fn carried(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    if placing.session.seated_and_tracked() { vec![0.0] } else { Vec::new() }
+    worth_trying(placing, &[0.0])
+}
+
+fn worth_trying(placing: &Placing<'_>, shares: &[f64]) -> Vec<f64> {
+    if placing.session.seated_and_tracked() { shares.to_vec() } else { Vec::new() }
 }
 
 /// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does.
@@ -66,23 +70,28 @@ struct Shared {
     share: usize,
 }
 
+impl Shared {
+    /// The parameters with their amplitudes as they count there.
+    fn in_part<T: Copy + MulAssign>(&self, theta: &[T]) -> Vec<T> {
+        let mut own = theta.to_vec();
+        own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[self.share]);
+        own
+    }
+}
+
 impl AnyPhysics for Shared {
     fn predict(&self, theta: &[f64], x: &Drivers<'_>, change: &mut Deformation<f64>) {
         if !seated(x) || theta[self.share] == 1.0 {
             return self.physics.predict(theta, x, change);
         }
-        let mut own = theta.to_vec();
-        own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[self.share]);
-        self.physics.predict(&own, x, change);
+        self.physics.predict(&self.in_part(theta), x, change);
     }
 
     fn differentiate(&self, theta: &[Dual64], x: &Drivers<'_>, change: &mut Deformation<Dual64>) {
         if !seated(x) {
             return self.physics.differentiate(theta, x, change);
         }
-        let mut own = theta.to_vec();
-        own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[self.share]);
-        self.physics.differentiate(&own, x, change);
+        self.physics.differentiate(&self.in_part(theta), x, change);
     }
 
     fn predict_seen(&self, theta: &[f64], point_m: &Vector3<f64>) -> Vector3<f64> {
