@@ -173,9 +173,8 @@ pub struct ModelSection {
     pub base_link: Option<String>,
     /// Last link of the chain, with `urdf`.
     pub tip_link: Option<String>,
-    /// How far a joint origin may be from nominal, with `urdf`; a DH file says it itself.
-    #[serde(default)]
-    pub deviation: Deviation,
+    /// How far a joint origin may be from nominal, with `urdf`; a DH file says it itself. Learnt where nothing says it.
+    pub deviation: Option<Deviation>,
 }
 
 /// What is known about the frames that are not the board.

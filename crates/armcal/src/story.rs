@@ -7,8 +7,8 @@ use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
-use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, diagnose};
-use armcal_model::{EffectSpec, Model};
+use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, diagnose, nested};
+use armcal_model::{EffectSpec, Model, Session};
 use armcal_recording::Recording;
 use armcal_report::{Refit, Run, Undiagnosed};
 use armcal_table::{Association, Place};
@@ -196,6 +196,23 @@ impl Settled {
         diagnosis(pipeline, model, calibration, observations, progress)
     }
 
+    /// The choice of what the diagnosis found, made again without each part of the hold-out.
+    ///
+    /// # Errors
+    /// A part without which nothing can be calibrated or diagnosed.
+    pub fn nested(
+        &self,
+        pipeline: &Pipeline,
+        found: &Diagnosis,
+        progress: &Progress,
+    ) -> Result<Option<Nested>, Error> {
+        progress.step("choosing again without each part of the hold-out");
+        let Fitted { model, calibration, observations, .. } = &self.fitted;
+        let session = frames::session(pipeline, observations);
+        let calibrated = calibrated(pipeline, model, calibration, observations, &session);
+        Ok(nested(&calibrated, found, &pipeline.diagnosis)?)
+    }
+
     /// Everything for the report.
     pub fn into_run(self, pipeline: &Pipeline, diagnosed: Diagnosed) -> (Run, Vec<Recording>) {
         let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
@@ -326,15 +343,19 @@ fn diagnosis(
     }
     progress.step("diagnosing");
     let session = frames::session(pipeline, observations);
-    let calibrated = Calibrated {
-        model,
-        calibration,
-        observations,
-        session: &session,
-        fit: &pipeline.fit,
-        holdout: &pipeline.holdout,
-    };
+    let calibrated = calibrated(pipeline, model, calibration, observations, &session);
     Ok(Some(diagnose(&calibrated, &pipeline.diagnosis)?))
+}
+
+fn calibrated<'a>(
+    pipeline: &'a Pipeline,
+    model: &'a Model,
+    calibration: &'a Calibration,
+    observations: &'a [Observation],
+    session: &'a Session,
+) -> Calibrated<'a> {
+    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
+    Calibrated { model, calibration, observations, session, fit, holdout }
 }
 
 /// The geometry with effects, or as it is without any.

@@ -34,6 +34,19 @@ pub fn calibrate(
     calibrate_scene(model.into(), observations, config, holdout)
 }
 
+/// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
+///
+/// # Errors
+/// A hold-out that does not fit these observations.
+pub fn holdout_turns(
+    model: &Model,
+    observations: &[Observation],
+    holdout: &HoldoutConfig,
+) -> Result<Vec<Vec<usize>>, CalibrateError> {
+    let frame_names = frames::frame_names(model);
+    Ok(holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?.turns)
+}
+
 /// The same for a model or a pool.
 pub(crate) fn calibrate_scene(
     scene: Scene<'_>,

@@ -45,6 +45,9 @@ pub struct FitConfig {
     /// at nominal; what they can determine it moves by far less than its interval. `"paper"` minimises without it and
     /// uses it for the intervals only.
     pub bounds_as_prior: bool,
+    /// Whether the default prior of the robot's parameters, where the pipeline and the model declare none, narrows to
+    /// what the data say about lengths, angles between axes and joint zeros; default true. Not for `"paper"`.
+    pub learn_priors: bool,
     /// `a` of eq. 4, the average accuracy asked for [mm]; default: none, so that `E <= k a` is not asked.
     pub average_accuracy_mm: Option<f64>,
     /// Limit of iterations of one solve; default 200.
@@ -59,6 +62,7 @@ impl Default for FitConfig {
             scale: Scale::Estimated,
             use_orientation: false,
             bounds_as_prior: true,
+            learn_priors: true,
             average_accuracy_mm: None,
             max_iterations: 200,
         }

@@ -8,7 +8,7 @@ use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Settings};
 use crate::statistics::{self, Uncertainty};
 use crate::whitened::{Point, Whitened};
-use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, undetermined};
+use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, priors, undetermined};
 use armcal_core::{Observation, Parameter, Role};
 use armcal_model::Model;
 use nalgebra::DVector;
@@ -73,13 +73,26 @@ fn fit_from(
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
     config.check()?;
-    let white = Whitened::new(Box::new(problem), start, free, config)?;
-    enough_equations(&white)?;
-    let solved = solve(&white, sigma_scale, config)?;
+    let declared = Whitened::new(Box::new(problem), start, free, config)?;
+    enough_equations(&declared)?;
+    let solved = solve(&declared, sigma_scale, config)?;
+    let learnt = priors::learnt(problem, (&declared, &solved), free, config)?;
+    let said = learnt.as_ref().and_then(|(white, _)| priors::said(white));
+    let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
+    let (white, solved) = learnt.unwrap_or((declared, solved));
     let (residual, squares) = (&solved.at.residual, white.squares(&solved.at));
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
-    let uncertainty = statistics::uncertainty(&cost, residual, &squares, &name)?;
+    let mut uncertainty = statistics::uncertainty(&cost, residual, &squares, &name)?;
+    if let Some(values) = values {
+        // What the data determine is asked of them alone: a narrow prior that they taught is no reason to doubt them.
+        let wide = Whitened::new(Box::new(problem), &values, free, config)?;
+        let at = wide.at(wide.start())?;
+        let cost = RobustCost::new(&wide, config, solved.sigma_scale);
+        let of_data = statistics::uncertainty(&cost, &at.residual, &wide.squares(&at), &name)?;
+        let Uncertainty { determined, rank, undetermined, .. } = of_data;
+        uncertainty = Uncertainty { determined, rank, undetermined, ..uncertainty };
+    }
     let fitted = statistics::fitted_directions(&uncertainty.variances, &white.axes);
     let weights = match solved.paper {
         Some(_) => vec![1.0; white.blocks()],
@@ -104,6 +117,7 @@ fn fit_from(
         warnings: Vec::new(),
     };
     fit.warnings = fit_warnings::of(&fit, &white);
+    fit.warnings.extend(said);
     Ok(fit)
 }
 

@@ -11,6 +11,7 @@
 //! * `rho`: Huber on the norm of an observation (`loss`), `s`: its robust scale (`robust`);
 //! * the minimum: `solver`; eq. 4 of the paper instead: `paper`;
 //! * covariance, intervals, rank, what the data cannot determine: `statistics`, `undetermined`, `words`;
+//! * priors that nobody declared: `priors` learns how far lengths, angles and joint zeros of this arm are from nominal;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
 //! * many recordings of one arm, each with parameters of its own: [`PooledModel`], [`calibrate_pooled`];
@@ -35,6 +36,7 @@ mod paired;
 mod paper;
 mod pooled;
 mod poses;
+mod priors;
 pub mod problem;
 mod products;
 mod rigid_fit;
@@ -51,7 +53,7 @@ mod words;
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
 mod tests;
 
-pub use calibration::calibrate;
+pub use calibration::{calibrate, holdout_turns};
 pub use closed_chain::{
     ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, LengthKnowledge,
     calibrate_closed_chain, closed_chain_nominal,

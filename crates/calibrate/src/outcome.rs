@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 /// One parameter after the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// The parameter as the model declared it.
+    /// The parameter as the model declared it; with the prior that was learnt where it declared none.
     pub parameter: Parameter,
     /// Value after the fit, SI.
     pub value: f64,

@@ -103,7 +103,7 @@ fn residual_variance(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, freedom
 }
 
 /// `(squares * data + P)^-1`.
-fn posterior(
+pub(crate) fn posterior(
     squares: &Curvature,
     axes: &[Axis],
     data: f64,

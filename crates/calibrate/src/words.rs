@@ -241,6 +241,7 @@ mod tests {
                 lower: -1.0,
                 upper: 1.0,
                 prior_sigma: None,
+                assumed: None,
                 free: true,
                 role: Role::Robot,
                 meaning: String::new(),

@@ -18,6 +18,10 @@ pub struct Parameter {
     pub upper: f64,
     /// Standard deviation of what is known about it before the data; `None` means nothing is.
     pub prior_sigma: Option<f64>,
+    /// Where nobody declared bounds and prior: what it is one of. A fit may then learn how far those of a kind are from
+    /// nominal; `prior_sigma` is the most that it may be.
+    #[serde(skip)]
+    pub assumed: Option<ParameterKind>,
     /// Whether the fit may change it.
     pub free: bool,
     /// Whether it places a frame (base, tip point, board) rather than describing the robot.
@@ -25,6 +29,29 @@ pub struct Parameter {
     pub role: Role,
     /// What it means, in words.
     pub meaning: String,
+}
+
+/// What robot parameters are built and adjusted like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ParameterKind {
+    /// A length between joints: machined.
+    Length,
+    /// An angle between axes: machined.
+    Angle,
+    /// The zero of a joint: set by whoever mounted the encoder.
+    JointZero,
+}
+
+impl ParameterKind {
+    /// In words, many of them.
+    pub fn words(self) -> &'static str {
+        match self {
+            ParameterKind::Length => "lengths",
+            ParameterKind::Angle => "angles between axes",
+            ParameterKind::JointZero => "joint zeros",
+        }
+    }
 }
 
 /// What a parameter belongs to.

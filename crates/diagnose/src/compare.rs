@@ -15,13 +15,22 @@ pub fn compare_heldout(
     observations: &[Observation],
     config: &DiagnosisConfig,
 ) -> Option<HeldOut> {
-    let later: BTreeMap<DwellId, f64> =
-        after.residuals.iter().filter(|r| r.held_out).map(|r| (r.dwell, r.fitted_m.norm())).collect();
+    let after = after.residuals.iter().filter(|r| r.held_out).map(|r| (r.dwell, r.fitted_m.norm())).collect();
+    compare_norms(before, &after, observations, config)
+}
+
+/// The same with the errors after by dwell [m].
+pub(crate) fn compare_norms(
+    before: &Calibration,
+    after: &BTreeMap<DwellId, f64>,
+    observations: &[Observation],
+    config: &DiagnosisConfig,
+) -> Option<HeldOut> {
     let place: BTreeMap<DwellId, String> =
         observations.iter().filter_map(|o| Some((o.dwell, o.cavity()?.to_string()))).collect();
     let mut groups: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
     for r in before.residuals.iter().filter(|r| r.held_out) {
-        if let Some(norm) = later.get(&r.dwell) {
+        if let Some(norm) = after.get(&r.dwell) {
             let alone = || format!("\u{1}{}", r.dwell);
             let key = place.get(&r.dwell).cloned().unwrap_or_else(alone);
             groups.entry(key).or_default().push((r.fitted_m.norm() * 1e3, norm * 1e3));

@@ -2,7 +2,7 @@
 //! decide.
 //!
 //! * *nothing missing* is said only of errors at the floor, of noise about as declared, and of a model that is not
-//!   improbable;
+//!   improbable, or that nothing unlisted could improve: errors no larger than what the noise alone may give;
 //! * a name stays only where the refitted model errs less, by an amount worth a name and clear of chance;
 //! * what is neither explained nor at the floor is `unexplained`, and says how much, where, and what was tried.
 
@@ -18,6 +18,11 @@ use armcal_core::{Observation, Severity, Stage, Warning};
 const CONFIRMED_SHARE: f64 = 0.95;
 /// Mean errors that fall by less than this share of the floor are not worth a name.
 const WORTH_NAMING: f64 = 0.02;
+
+/// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
+const SPREAD_OF_NORM: f64 = 0.422;
+/// Standard errors by which a mean error of nothing but noise stays below its expectation with 99.5 %.
+const CHANCE: f64 = 2.58;
 
 /// Where more than this many times the floor remains, a name stays only if it explains at least this share of what lay above
 /// the floor: what leaves the most unexplained has only leaned on another cause.
@@ -48,17 +53,18 @@ impl Diagnosis {
 
         let mut refuted = Vec::new();
         let left = left_over(after.unwrap_or(before));
-        let withheld = match after {
-            Some(after) => {
+        let least = after.map_or(f64::INFINITY, Calibration::times_floor).min(self.noise.sigma_ratio);
+        let noise_alone = noise_alone(before, least.min(1.0));
+        let withheld = (self.verdict == Verdict::Unknown && noise_alone)
+            || after.is_some_and(|after| {
                 !confirms(before, after, observations, config)
                     || left > config.unexplained_factor
                     || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
-            }
-            None => false,
-        };
+            });
         if withheld {
-            let names = refitted.iter().flat_map(|r| &r.effects).map(ToString::to_string).collect::<Vec<_>>();
-            refuted.push((names.join(" + "), self.holdout_mm));
+            let names =
+                refitted.iter().map(|r| r.effects.iter().map(ToString::to_string).collect::<Vec<_>>());
+            refuted.extend(names.map(|names| (names.join(" + "), self.holdout_mm)));
             self.holdout_mm.after = self.holdout_mm.before;
             self.effects.clear();
             self.unlisted.clear();
@@ -68,7 +74,8 @@ impl Diagnosis {
             self.refitted = refitted.map(Box::new);
         }
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
-        let agrees = agrees(before, self.p_nothing, config);
+        let improbable = self.p_nothing < config.max_probability_nothing;
+        let agrees = at_floor(before, config) && (noise_alone || !improbable);
         self.verdict = match self.verdict {
             Verdict::NothingMissing if agrees => Verdict::NothingMissing,
             Verdict::NothingMissing | Verdict::Unexplained => Verdict::Unexplained,
@@ -81,7 +88,7 @@ impl Diagnosis {
             self.names.clear();
         }
         self.probability = match self.verdict {
-            Verdict::NothingMissing => Some(self.p_nothing),
+            Verdict::NothingMissing => (!improbable).then_some(self.p_nothing),
             Verdict::Unexplained => None,
             _ => self.probability,
         };
@@ -119,12 +126,22 @@ impl Diagnosis {
     }
 }
 
-/// Whether the calibrated errors are what the declared noise gives: at the floor, scattering about as declared, and
-/// not improbable.
-fn agrees(calibration: &Calibration, p_nothing: f64, config: &DiagnosisConfig) -> bool {
-    calibration.times_floor() <= config.floor_factor
-        && calibration.fit.sigma_scale <= config.floor_factor
-        && p_nothing >= config.max_probability_nothing
+/// Whether the calibrated errors are at the floor and scatter about as declared.
+fn at_floor(calibration: &Calibration, config: &DiagnosisConfig) -> bool {
+    calibration.times_floor() <= config.floor_factor && calibration.fit.sigma_scale <= config.floor_factor
+}
+
+/// Whether the mean of the judged errors is no larger than noise of this share of what is declared may give by chance:
+/// whatever looks like structure in them is too small to be worth a claim without a name.
+fn noise_alone(calibration: &Calibration, share: f64) -> bool {
+    let judged = calibration.residuals.iter().filter(|r| r.held_out == calibration.held_out());
+    let (mut excess_m, mut variance_m2) = (0.0, 0.0);
+    for r in judged {
+        let expected_m = share * r.expected_norm_m;
+        excess_m += r.fitted_m.norm() - expected_m;
+        variance_m2 += (SPREAD_OF_NORM * expected_m).powi(2);
+    }
+    excess_m <= CHANCE * variance_m2.sqrt()
 }
 
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;

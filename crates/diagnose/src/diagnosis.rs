@@ -60,7 +60,8 @@ pub struct Diagnosis {
     /// Names, most probable first: one for each effect when identified, all members of the sets when ambiguous.
     pub names: Vec<String>,
     /// Probability of the answer (the least probable effect's, when there are several); none where the answer is that
-    /// nothing explains the errors, or that of a verdict which the refit has taken back.
+    /// nothing explains the errors, where noise alone is improbable and nothing is worth a name, or that of a verdict which
+    /// the refit has taken back.
     pub probability: Option<f64>,
     /// Largest family-wise p-value of the effects named; of the best candidate when none is.
     pub p_adjusted: f64,
@@ -108,6 +109,13 @@ pub struct Diagnosis {
     /// The calibration with everything that was found; none where nothing was, or where it cannot be fitted.
     #[serde(skip)]
     pub refitted: Option<Box<Refitted>>,
+}
+
+impl Diagnosis {
+    /// Whether nothing is named though noise alone is improbable: the errors are no larger than noise may give.
+    pub fn not_worth_a_name(&self) -> bool {
+        self.verdict == Verdict::NothingMissing && self.probability.is_none()
+    }
 }
 
 /// Which errors a number is about.

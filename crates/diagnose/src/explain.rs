@@ -14,12 +14,13 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
         "p_nothing",
         format!(
             "with the prior odds {} : {} : {} for nothing, a listed effect and an unlisted one, the data leave a \
-             probability of {:.2e} that nothing is missing; below {} something is",
+             probability of {:.2e} that nothing is missing; below {} something is{}",
             config.prior_nothing,
             config.prior_catalogue,
             config.prior_unknown,
             d.p_nothing,
-            config.max_probability_nothing
+            config.max_probability_nothing,
+            if d.not_worth_a_name() { ", here something too small to be worth a name" } else { "" }
         ),
     );
     say(
@@ -101,6 +102,11 @@ fn verdict(d: &Diagnosis) -> String {
         (None, _) => "",
     };
     match d.verdict {
+        Verdict::NothingMissing if d.not_worth_a_name() => {
+            "the errors are no larger than the noise alone may give; what is improbable as noise in them is too small to be worth \
+             a name"
+                .to_owned()
+        }
         Verdict::NothingMissing => {
             "nothing is missing that these data can show; the list of what they cannot show belongs to this answer".to_string()
         }

@@ -18,6 +18,7 @@
 //! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
 //!   explains;
 //! * `implied`: what each dwell says about each joint, for the eye;
+//! * `nested`: the choice made again without each part of the hold-out;
 //! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
@@ -45,6 +46,7 @@ mod implied;
 mod inner;
 mod judge;
 mod knowledge;
+mod nested;
 mod next;
 mod noise;
 mod observed;
@@ -86,6 +88,7 @@ pub use error_places::ErrorPlace;
 pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
 pub use knowledge::Knowledge;
+pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use planned::plan_dwells;

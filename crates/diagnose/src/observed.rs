@@ -34,7 +34,8 @@ pub struct Calibrated<'a> {
 
 /// Diagnoses a calibrated model: which effect do its observations ask for?
 pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
-    let Calibrated { model, calibration, observations, session, fit, .. } = *calibrated;
+    let Calibrated { calibration, observations, session, fit, .. } = *calibrated;
+    let model = &as_fitted(calibrated)?;
     let joint_names = model.chain().joint_names();
     let values = calibration.fit.values();
     let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
@@ -55,6 +56,18 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     let refitted = refitted(calibrated, &diagnosis);
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
+}
+
+/// The model with the priors that its fit learnt, which hold for all that is tried beside it.
+fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
+    let mut model = calibrated.model.clone();
+    let learnt = calibrated.calibration.fit.estimates.iter().map(|e| &e.parameter);
+    for parameter in learnt.filter(|p| p.assumed.is_some()) {
+        model.set_parameter(&parameter.name, |p| {
+            (p.prior_sigma, p.assumed) = (parameter.prior_sigma, None);
+        })?;
+    }
+    Ok(model)
 }
 
 /// The model with everything that was found, on the same observations and hold-out. None where nothing was found, or

@@ -5,7 +5,7 @@
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
 use armcal_diagnose::{
-    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, compare_heldout, diagnose, plan_dwells,
+    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, compare_heldout, diagnose, nested, plan_dwells,
 };
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
 use nalgebra::{Matrix3, Vector3};
@@ -73,11 +73,18 @@ fn calibration(model: &Model, observations: &[Observation]) -> Calibration {
 }
 
 fn diagnosed(model: &Model, calibration: &Calibration, observations: &[Observation]) -> Diagnosis {
+    with_calibrated(model, calibration, observations, |c| diagnose(c, &config()).unwrap())
+}
+
+fn with_calibrated<T>(
+    model: &Model,
+    calibration: &Calibration,
+    observations: &[Observation],
+    of: impl Fn(&Calibrated<'_>) -> T,
+) -> T {
     let (session, fit, holdout) =
         (Session::of(observations), FitConfig::default(), HoldoutConfig::CavityFolds { k: 5 });
-    let calibrated =
-        Calibrated { model, calibration, observations, session: &session, fit: &fit, holdout: &holdout };
-    diagnose(&calibrated, &config()).unwrap()
+    of(&Calibrated { model, calibration, observations, session: &session, fit: &fit, holdout: &holdout })
 }
 
 fn config() -> DiagnosisConfig {
@@ -109,6 +116,49 @@ fn a_complete_model_misses_nothing() {
     assert_eq!((d.judged, d.holdout_mm.before), (JudgedOn::HeldOut, 1e3 * fit.holdout.fitted.mean_m));
     assert_eq!(d.floor_mm, 1e3 * fit.noise_floor_m);
     assert_eq!(d.probability, Some(d.p_nothing));
+}
+
+#[test]
+fn what_is_no_larger_than_noise_is_not_worth_a_claim_however_improbable() {
+    // Nearly everything counts as improbable here: what is left to say is that the errors are those of noise.
+    let config = DiagnosisConfig { max_probability_nothing: 0.9999, ..config() };
+    let mut improbable = 0;
+    for seed in 20..26 {
+        let (model, observations) = observed(&[], 0.0, seed);
+        let fit = calibration(&model, &observations);
+        let d = with_calibrated(&model, &fit, &observations, |c| diagnose(c, &config).unwrap());
+        assert_eq!(d.verdict, Verdict::NothingMissing, "seed {seed}: {:?} {}", d.names, fit.times_floor());
+        assert!(d.unlisted.is_empty() && d.unexplained.is_none());
+        assert_eq!(d.not_worth_a_name(), d.p_nothing < 0.9999);
+        improbable += usize::from(d.not_worth_a_name());
+    }
+    assert!(improbable > 2, "{improbable}");
+}
+
+#[test]
+fn a_choice_made_without_the_held_out_points_is_no_better_on_them_than_one_made_with_them() {
+    let (model, observations) = observed(&["backlash:2"], 1.0, 1);
+    let before = calibration(&model, &observations);
+    let d = diagnosed(&model, &before, &observations);
+    let again =
+        with_calibrated(&model, &before, &observations, |c| nested(c, &d, &config()).unwrap()).unwrap();
+    // The effect is there: every turn finds it by itself, and it predicts what had no part in the choice.
+    assert_eq!(again.chosen.len(), 5);
+    assert!(again.chosen.iter().flatten().all(|e| e.starts_with("backlash:2")), "{:?}", again.chosen);
+    assert!((again.held_out.before - d.holdout_mm.before).abs() < 1e-9, "{again:?} {}", d.holdout_mm.before);
+    assert_eq!(again.chosen_on_all_mm, d.holdout_mm.after);
+    assert!(
+        again.held_out.after < 1.1 * d.holdout_mm.after && again.held_out.change_ci95[1] < 0.0,
+        "{again:?}"
+    );
+    assert!(again.sentence().contains("in 5 of 5"), "{}", again.sentence());
+
+    let (model, observations) = observed(&[], 0.0, 2);
+    let complete = calibration(&model, &observations);
+    let nothing = diagnosed(&model, &complete, &observations);
+    let again =
+        with_calibrated(&model, &complete, &observations, |c| nested(c, &nothing, &config()).unwrap());
+    assert_eq!(again, None);
 }
 
 #[test]

@@ -74,6 +74,7 @@ pub(crate) fn robot_parameter(
         lower: nominal - bound,
         upper: nominal + bound,
         prior_sigma: prior_sigma.is_finite().then_some(prior_sigma),
+        assumed: None,
         free: true,
         role: Role::Robot,
         meaning,

@@ -4,7 +4,7 @@
 //! name = "two links"
 //! convention = "standard"        # default; or "modified" (Craig)
 //!
-//! [deviation]                    # optional; these are the defaults
+//! [deviation]                    # optional; these are the defaults. Without it, fits learn how near to nominal the arm is
 //! bound_mm = 5.0
 //! bound_deg = 2.0
 //! prior_sigma_mm = 4.0
@@ -24,7 +24,7 @@ use crate::chain::Source;
 use crate::deviation::{check_positive, from_display, robot_parameter};
 use crate::segment::{Geometry, Joint, Motion, Segment};
 use crate::{Chain, Deviation, ModelError};
-use armcal_core::{Parameter, Unit};
+use armcal_core::{Parameter, ParameterKind, Unit};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -39,8 +39,7 @@ pub(crate) struct DhTable {
     name: String,
     #[serde(default)]
     convention: Convention,
-    #[serde(default)]
-    deviation: Deviation,
+    deviation: Option<Deviation>,
     rows: Vec<Row>,
 }
 
@@ -144,7 +143,7 @@ impl Chain {
 
 impl DhTable {
     fn check(&self, path: &Path) -> Result<(), ModelError> {
-        self.deviation.check(path)?;
+        self.deviation.unwrap_or_default().check(path)?;
         let mut names = BTreeSet::new();
         for (index, row) in self.rows.iter().enumerate() {
             if row.name.is_empty() {
@@ -190,7 +189,7 @@ impl DhTable {
                 Convention::Modified => Geometry::ModifiedDh { hayati },
             };
             let first = parameters.len();
-            parameters.extend(row.fields().map(|field| field.parameter(&row.name, &self.deviation)));
+            parameters.extend(row.fields().map(|field| field.parameter(row, self.deviation)));
             let parameters = first..parameters.len();
             segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters });
         }
@@ -219,13 +218,15 @@ impl DhTable {
             Convention::Modified => "modified",
         };
         let mut text = format!("name = {}\nconvention = \"{convention}\"\n", quoted(&self.name));
-        let d = &self.deviation;
-        for (key, value) in [
-            ("\n[deviation]\nbound_mm", d.bound_mm),
-            ("bound_deg", d.bound_deg),
-            ("prior_sigma_mm", d.prior_sigma_mm),
-            ("prior_sigma_deg", d.prior_sigma_deg),
-        ] {
+        let declared = self.deviation.map(|d| {
+            [
+                ("\n[deviation]\nbound_mm", d.bound_mm),
+                ("bound_deg", d.bound_deg),
+                ("prior_sigma_mm", d.prior_sigma_mm),
+                ("prior_sigma_deg", d.prior_sigma_deg),
+            ]
+        });
+        for (key, value) in declared.into_iter().flatten() {
             // Writing to a String cannot fail.
             let _ = writeln!(text, "{key} = {value:?}");
         }
@@ -268,17 +269,27 @@ impl Row {
 }
 
 impl Field<'_> {
-    fn parameter(&self, row: &str, deviation: &Deviation) -> Parameter {
+    fn kind(&self, joint: JointKind) -> ParameterKind {
+        match (joint, self.quantity) {
+            (JointKind::Revolute, "theta") | (JointKind::Prismatic, "d") => ParameterKind::JointZero,
+            _ if self.unit == Unit::Metre => ParameterKind::Length,
+            _ => ParameterKind::Angle,
+        }
+    }
+
+    fn parameter(&self, row: &Row, declared: Option<Deviation>) -> Parameter {
+        let deviation = declared.unwrap_or_default();
         let own = |value: Option<f64>, default: f64| value.map_or(default, |v| from_display(self.unit, v));
         let parameter = robot_parameter(
-            format!("{row}.{}", self.quantity),
+            format!("{}.{}", row.name, self.quantity),
             self.unit,
             from_display(self.unit, self.entry.nominal),
             own(self.entry.bound, deviation.bound(self.unit)),
             own(self.entry.prior_sigma, deviation.prior_sigma(self.unit)),
-            format!("{row}: {}", self.meaning),
+            format!("{}: {}", row.name, self.meaning),
         );
-        Parameter { free: self.entry.free, ..parameter }
+        let known = declared.is_some() || self.entry.bound.is_some() || self.entry.prior_sigma.is_some();
+        Parameter { free: self.entry.free, assumed: (!known).then(|| self.kind(row.joint)), ..parameter }
     }
 }
 

@@ -112,6 +112,7 @@ impl Frame {
                     // A measurement without error leaves nothing to fit.
                     free: free && prior_sigma != Some(0.0),
                     prior_sigma: prior_sigma.filter(|sigma| *sigma > 0.0),
+                    assumed: None,
                     role,
                     meaning,
                 }

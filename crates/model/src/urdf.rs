@@ -11,11 +11,14 @@ use crate::error::nearest;
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Joint, Motion, Segment};
 use crate::{Chain, Deviation, ModelError};
-use armcal_core::{Parameter, Pose, Unit};
+use armcal_core::{Parameter, ParameterKind, Pose, Unit};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+
+/// Component of a unit vector from which on it is one of the axes (2.5 deg).
+const ALONG: f64 = 0.999;
 
 /// What writing a joint back needs to know.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +60,7 @@ impl Chain {
         Ok(chain)
     }
 
-    /// The same chain with other bounds and priors for all its parameters.
+    /// The same chain with bounds and priors that were declared for all its parameters.
     ///
     /// Errors when an entry is not a positive number; `path` is the file that is named then.
     pub fn with_deviation(mut self, deviation: &Deviation, path: &Path) -> Result<Chain, ModelError> {
@@ -185,7 +188,8 @@ impl<'a, 'x> Reader<'a, 'x> {
             });
             return Ok(source);
         };
-        chain.parameters.extend(origin_parameters(name, &nominal));
+        let axis = self.axis(joint, &subject)?;
+        chain.parameters.extend(origin_parameters(name, &nominal, (motion, &axis)));
         let end = chain.parameters.len();
         chain.segments.push(Segment {
             frame: None,
@@ -195,7 +199,7 @@ impl<'a, 'x> Reader<'a, 'x> {
         });
         chain.segments.push(Segment {
             frame: Some(link.to_owned()),
-            geometry: Geometry::Axis(self.axis(joint, &subject)?),
+            geometry: Geometry::Axis(axis),
             joint: Some(Joint { index: chain.joint_names.len(), motion }),
             parameters: end..end,
         });
@@ -272,19 +276,31 @@ impl<'a, 'x> Reader<'a, 'x> {
     }
 }
 
-fn origin_parameters(joint: &str, nominal: &Pose) -> impl Iterator<Item = Parameter> {
+fn origin_parameters(
+    joint: &str,
+    nominal: &Pose,
+    (motion, axis): (Motion, &Vector3<f64>),
+) -> impl Iterator<Item = Parameter> {
     let deviation = Deviation::default();
+    // A turn of the origin about the axis of the joint is its zero.
+    let zero = |k: usize| match (motion, axis[k].abs() > ALONG) {
+        (Motion::Revolute, true) => ParameterKind::JointZero,
+        _ => ParameterKind::Angle,
+    };
+    let length = ParameterKind::Length;
     let at = nominal.translation.vector;
     [
-        ("x", Unit::Metre, at.x, "origin along the parent's x"),
-        ("y", Unit::Metre, at.y, "origin along the parent's y"),
-        ("z", Unit::Metre, at.z, "origin along the parent's z"),
-        ("rx", Unit::Radian, 0.0, "rotation of the origin about its own x"),
-        ("ry", Unit::Radian, 0.0, "rotation of the origin about its own y"),
-        ("rz", Unit::Radian, 0.0, "rotation of the origin about its own z"),
+        ("x", Unit::Metre, at.x, "origin along the parent's x", length),
+        ("y", Unit::Metre, at.y, "origin along the parent's y", length),
+        ("z", Unit::Metre, at.z, "origin along the parent's z", length),
+        ("rx", Unit::Radian, 0.0, "rotation of the origin about its own x", zero(0)),
+        ("ry", Unit::Radian, 0.0, "rotation of the origin about its own y", zero(1)),
+        ("rz", Unit::Radian, 0.0, "rotation of the origin about its own z", zero(2)),
     ]
-    .map(|(quantity, unit, nominal, meaning)| {
-        deviation.parameter(format!("{joint}.{quantity}"), unit, nominal, format!("{joint}: {meaning}"))
+    .map(|(quantity, unit, nominal, meaning, kind)| {
+        let parameter =
+            deviation.parameter(format!("{joint}.{quantity}"), unit, nominal, format!("{joint}: {meaning}"));
+        Parameter { assumed: Some(kind), ..parameter }
     })
     .into_iter()
 }

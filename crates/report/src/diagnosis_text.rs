@@ -92,7 +92,10 @@ pub fn headline(d: &Diagnosis) -> String {
                 0 => String::new(),
                 n => format!(" ({n} effects of realistic size would not have shown)"),
             };
-            format!("Nothing is missing that these data can show{not_shown}.")
+            match d.not_worth_a_name() {
+                true => format!("Nothing is missing that is worth a name{not_shown}."),
+                false => format!("Nothing is missing that these data can show{not_shown}."),
+            }
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));

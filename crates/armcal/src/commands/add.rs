@@ -9,7 +9,7 @@ use crate::stages::frames;
 use crate::story::{self, Diagnosed, Fitted, Settled};
 use crate::transfer::{Transfer, transfers};
 use crate::view;
-use armcal_diagnose::Diagnosis;
+use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
@@ -42,6 +42,8 @@ struct Added<'a> {
     left_out: &'a [LeftOut],
     /// Each effect fitted on all recordings but one and judged on that one.
     transfer: &'a [Transfer],
+    /// What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
+    nested: &'a Option<Nested>,
     pipeline: &'a Path,
     comparison: &'a Comparison,
     remaining: &'a Option<Diagnosis>,
@@ -59,6 +61,7 @@ struct Chosen {
     new: Vec<EffectSpec>,
     transfer: Vec<Transfer>,
     left_out: Vec<LeftOut>,
+    nested: Option<Nested>,
 }
 
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
@@ -73,7 +76,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let settled = story::settle(&pipeline, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
-    let Chosen { new, transfer, left_out } = chosen(named, &pipeline, &settled, &effects, &progress)?;
+    let Chosen { new, transfer, left_out, nested } = chosen(named, &pipeline, &settled, &effects, &progress)?;
     let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
 
     progress.step("calibrating without and with");
@@ -95,6 +98,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
             added,
             left_out: &left_out,
             transfer: &transfer,
+            nested: &nested,
             pipeline: &extended.path,
             comparison: &comparison,
             remaining: &run.diagnosis,
@@ -108,6 +112,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         print(&comparison.terminal(style()))?;
         for transfer in &transfer {
             print(&format!("\nTransfer: {}.\n", transfer.sentence()))?;
+        }
+        if let Some(nested) = &nested {
+            print(&format!("\nThe choice: {}.\n", nested.sentence()))?;
         }
         print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());
@@ -139,10 +146,14 @@ fn chosen(
     let checked = |new: &[EffectSpec]| transfers(pipeline, geometry, (base, new), observations, progress);
     if let Some(new) = named {
         let transfer = checked(&new)?;
-        return Ok(Chosen { new, transfer, left_out: Vec::new() });
+        return Ok(Chosen { new, transfer, left_out: Vec::new(), nested: None });
     }
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
+    let nested = match &diagnosis {
+        Some(found) => settled.nested(pipeline, found, progress)?,
+        None => None,
+    };
     let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
     let (mut new, of_time) = lasting.unwrap_or_default();
     let of_time = of_time.iter().map(|e| LeftOut {
@@ -161,7 +172,7 @@ fn chosen(
         let reasons = left_out.iter().map(|l| format!("{}: {}", l.effect, l.reason)).collect();
         return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: reasons });
     }
-    Ok(Chosen { new, transfer, left_out })
+    Ok(Chosen { new, transfer, left_out, nested })
 }
 
 /// A pipeline with more effects, and where it is written.

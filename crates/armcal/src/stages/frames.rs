@@ -30,8 +30,11 @@ pub fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), 
     let path = folder.join(model.urdf.as_deref().unwrap_or(Path::new("")));
     let link = |name: &Option<String>| name.clone().unwrap_or_default();
     let text = read("URDF", &path)?;
-    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?
-        .with_deviation(&model.deviation, &path)?;
+    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?;
+    let chain = match &model.deviation {
+        Some(declared) => chain.with_deviation(declared, &path)?,
+        None => chain,
+    };
     Ok((text, chain))
 }
 
@@ -78,6 +81,7 @@ pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> 
                 (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));
             }
             p.prior_sigma = change.prior.map(si).or(p.prior_sigma);
+            p.assumed = p.assumed.filter(|_| change.prior.is_none());
         })?;
     }
     Ok(())

@@ -194,6 +194,7 @@ impl Closure {
             lower: 0.0,
             upper: f64::INFINITY,
             prior_sigma,
+            assumed: None,
             free,
             role,
             meaning: "distance of the two tips on the link".into(),

@@ -99,6 +99,7 @@ pub(crate) fn place(
         lower: shape.lower,
         upper: shape.upper,
         prior_sigma: None,
+        assumed: None,
         free: false,
         role: Role::Effect,
         meaning: shape.meaning.to_owned(),

@@ -181,6 +181,7 @@ pub(crate) fn amplitude(
         lower: -bound,
         upper: bound,
         prior_sigma: Some(prior_sigma),
+        assumed: None,
         free: true,
         role: Role::Effect,
         meaning: meaning.into(),

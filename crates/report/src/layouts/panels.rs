@@ -22,7 +22,7 @@ const STEPS: [&str; 4] = [GREEN, SKY, BLUE, PURPLE];
 
 pub(super) fn verdict() -> Content {
     let rules = vec![
-        ["nothing_missing", GREEN, "nothing is missing that these data can show"],
+        ["nothing_missing", GREEN, "nothing is missing that these data can show and that is worth a name"],
         ["identified", BLUE, "the missing effect has a name"],
         ["ambiguous", ORANGE, "an effect is missing; more than one name fits"],
         ["unknown", VERMILION, "an effect is missing that is not listed"],

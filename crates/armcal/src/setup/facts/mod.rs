@@ -9,8 +9,9 @@ pub use bodies::still_tip;
 
 use super::trial::Inputs;
 use crate::story::Fitted;
-use armcal_core::{Certainty, Pose, Role, SetupFinding};
+use armcal_core::{Certainty, Observation, Pose, Reference, Role, SetupFinding};
 use armcal_table::Tilt;
+use nalgebra::{Matrix3, Vector3};
 
 /// A joint that turned by this much did move [rad].
 const TURNS_RAD: f64 = 0.1;
@@ -21,6 +22,8 @@ const TILT_RAD: f64 = 0.07;
 /// much as this too [m], [rad].
 const SIGMAS: f64 = 8.0;
 const OFF: f64 = 5e-3;
+/// Visited cavities nearer than this to one line do not show the board's normal [m].
+const FLAT_M: f64 = 0.01;
 /// Errors below this many times the floor say that nothing of importance is wrong.
 const SOUND: f64 = 1.5;
 
@@ -59,13 +62,18 @@ pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
     all
 }
 
-/// Declared tilts against the board's poses: between two recordings the board turns as its tilts say.
+/// Declared tilts against the board's poses: between two recordings the board turns as its tilts say. A board without a
+/// mechanism stands as it was put, and cavities on one line do not show how it turned about that.
 fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
-    let Some(board) = &inputs.board else { return Vec::new() };
+    let Some(board) = inputs.board.as_ref().filter(|b| b.mechanism.is_some()) else { return Vec::new() };
     let values = fitted.calibration.fit.values();
     let pose = |r: usize| -> Option<(Pose, Pose)> {
-        let dwells = fitted.observations.iter().filter(|o| o.dwell.recording == r && o.cavity().is_some());
-        if dwells.count() < 4 {
+        let seated_m = |o: &Observation| match &o.reference {
+            Reference::Seated { in_board_m, .. } if o.dwell.recording == r => Some(*in_board_m),
+            _ => None,
+        };
+        let seated_m: Vec<Vector3<f64>> = fitted.observations.iter().filter_map(seated_m).collect();
+        if seated_m.len() < 4 || width_m(&seated_m) < FLAT_M {
             return None;
         }
         let tilt: Tilt = inputs.pipeline.recordings[r].tilt;
@@ -76,9 +84,9 @@ fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
     for (r, later) in poses.iter().enumerate().skip(1) {
         let (Some((declared_a, found_a)), Some((declared_b, found_b))) = (poses[0], *later) else { continue };
         // The later normal as the earlier board sees it: free of where the board stands, and of turns about its normal.
-        let normal = |a: &Pose, b: &Pose| a.rotation.inverse() * b.rotation * nalgebra::Vector3::z();
+        let normal = |a: &Pose, b: &Pose| a.rotation.inverse() * b.rotation * Vector3::z();
         let (declared, found) = (normal(&declared_a, &declared_b), normal(&found_a, &found_b));
-        let from_upright = |n: &nalgebra::Vector3<f64>| n.angle(&nalgebra::Vector3::z());
+        let from_upright = |n: &Vector3<f64>| n.angle(&Vector3::z());
         let (declared_rad, found_rad) = (from_upright(&declared), from_upright(&found));
         let apart_rad = declared.angle(&found);
         if apart_rad > TILT_RAD {
@@ -98,6 +106,16 @@ fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
         }
     }
     all
+}
+
+/// Root mean square distance of points from the line that fits them best.
+fn width_m(points_m: &[Vector3<f64>]) -> f64 {
+    let count = points_m.len().max(1) as f64;
+    let mean_m = points_m.iter().sum::<Vector3<f64>>() / count;
+    let scatter_m2 =
+        points_m.iter().map(|p| (p - mean_m) * (p - mean_m).transpose()).sum::<Matrix3<f64>>() / count;
+    let along = scatter_m2.symmetric_eigenvalues();
+    (along.sum() - along.max()).max(0.0).sqrt()
 }
 
 /// Measured frames that the fit has moved far from their measurement.
@@ -146,5 +164,18 @@ fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding
         before_mm: None,
         after_mm: None,
         alternatives: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_cavities_and_a_row_of_them_have_no_width() {
+        let row: Vec<Vector3<f64>> = (0..6).map(|k| Vector3::new(0.05, 0.03, 0.0) * f64::from(k)).collect();
+        assert!(width_m(&row[..2]) < 1e-9 && width_m(&row) < 1e-8);
+        let square = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.1, 0.1]].map(|[x, y]| Vector3::new(x, y, 0.0));
+        assert!((width_m(&square) - 0.05).abs() < 1e-12, "{}", width_m(&square));
     }
 }

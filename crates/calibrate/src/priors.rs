@@ -1,0 +1,168 @@
+//! How far the arm is from nominal where nobody declared it: the scale of each kind of parameter, learnt from the data.
+//!
+//! Lengths, angles between axes and joint zeros of one arm are each drawn from `N(nominal, s^2)` with one s a kind. The s
+//! that makes the data most probable satisfies, with the posterior variances v of the parameters of a kind in units of s,
+//!
+//! ```text
+//! s_new^2 = s^2 sum x_k^2 / sum (1 - v_k)
+//! ```
+//!
+//! (MacKay, Bayesian Interpolation, Neural Computation 4, 1992, eq. 2.17 and 2.18); where the data hardly know the kind,
+//! one step of expectation-maximisation, `s_new^2 = s^2 sum (x_k^2 + v_k) / n`, which never overshoots. The default prior
+//! is the widest it becomes, and bounds stay where they are.
+
+use crate::fit::{Solved, solve};
+use crate::problem::{Known, Linearised, Problem, Symmetry};
+use crate::statistics::posterior;
+use crate::whitened::Whitened;
+use crate::{CalibrateError, FitConfig, Objective};
+use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Rounds of fit and scale.
+const ROUNDS: usize = 30;
+/// Relative change of a scale below which it is kept.
+const TOLERANCE: f64 = 0.01;
+/// A scale changes by no more than this factor in one round.
+const LARGEST_STEP: f64 = 5.0;
+/// Smallest share of the default prior.
+const SMALLEST: f64 = 1e-3;
+/// Parameters of a kind that the data must know before the fast formula is used.
+const WELL_KNOWN: f64 = 1.0;
+
+/// A problem with other priors.
+struct WithPriors<'a> {
+    problem: &'a dyn Problem,
+    parameters: Vec<Parameter>,
+}
+
+impl Problem for WithPriors<'_> {
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn blocks(&self) -> usize {
+        self.problem.blocks()
+    }
+
+    fn name(&self, block: usize) -> String {
+        self.problem.name(block)
+    }
+
+    fn joint_rad(&self, block: usize) -> &[f64] {
+        self.problem.joint_rad(block)
+    }
+
+    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
+        self.problem.residual(block, p)
+    }
+
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
+        self.problem.linearised(block, p)
+    }
+
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
+        self.problem.linearised_each(blocks, p)
+    }
+
+    fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
+        self.problem.covariance(block, p)
+    }
+
+    fn known(&self) -> Vec<Known> {
+        self.problem.known()
+    }
+
+    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
+        self.problem.symmetries(p)
+    }
+}
+
+/// A fit with priors as narrow as the data ask for, from the fit with the default ones; none where all are declared.
+pub(crate) fn learnt<'a>(
+    problem: &'a dyn Problem,
+    (white, solved): (&Whitened<'_>, &Solved),
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Option<(Whitened<'a>, Solved)>, CalibrateError> {
+    let assumed = white.axes.iter().any(|a| problem.parameters()[a.index].assumed.is_some());
+    if !assumed || !config.learn_priors || config.objective == Objective::Paper {
+        return Ok(None);
+    }
+    let mut scales: BTreeMap<ParameterKind, f64> = BTreeMap::new();
+    let mut latest: Option<(Whitened<'a>, Solved)> = None;
+    for _ in 0..ROUNDS {
+        let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
+        let next = rescaled(&scales, white, solved)?;
+        let kept = |(kind, scale): (&ParameterKind, &f64)| {
+            scales.get(kind).is_some_and(|old| (scale / old - 1.0).abs() < TOLERANCE)
+        };
+        if next.iter().all(kept) {
+            break;
+        }
+        scales = next;
+        let mut parameters = problem.parameters().to_vec();
+        for p in &mut parameters {
+            let scale = p.assumed.and_then(|kind| scales.get(&kind));
+            p.prior_sigma = p.prior_sigma.map(|sigma| sigma * scale.unwrap_or(&1.0));
+        }
+        let start = white.parameters_at(&solved.at.x);
+        let again = Whitened::new(Box::new(WithPriors { problem, parameters }), &start, free, config)?;
+        let mut better = solve(&again, Some(solved.sigma_scale), config)?;
+        better.iterations += solved.iterations;
+        latest = Some((again, better));
+    }
+    Ok(latest)
+}
+
+/// The scale of each kind as the fit at these scales has it, as a share of the default prior.
+fn rescaled(
+    scales: &BTreeMap<ParameterKind, f64>,
+    white: &Whitened<'_>,
+    solved: &Solved,
+) -> Result<BTreeMap<ParameterKind, f64>, CalibrateError> {
+    let parameters = white.problem.parameters();
+    let name = |index: usize| parameters[index].name.clone();
+    let data = solved.sigma_scale.powi(-2);
+    let variances = posterior(&white.squares(&solved.at), &white.axes, data, &name)?.variances();
+    // Of each kind: how many, those known, and squares of offsets and of standard deviations.
+    let mut sums: BTreeMap<ParameterKind, [f64; 4]> = BTreeMap::new();
+    for ((axis, x), variance) in white.axes.iter().zip(solved.at.x.iter()).zip(variances.iter()) {
+        let Some(kind) = parameters[axis.index].assumed else { continue };
+        let sum = sums.entry(kind).or_default();
+        *sum = [sum[0] + 1.0, sum[1] + 1.0 - variance, sum[2] + x * x, sum[3] + variance];
+    }
+    let scale = |(kind, [n, known, square, variance]): (ParameterKind, [f64; 4])| {
+        let factor = if known > WELL_KNOWN { square / known } else { (square + variance) / n };
+        let factor = factor.sqrt().clamp(LARGEST_STEP.recip(), LARGEST_STEP);
+        let old = scales.get(&kind).copied().unwrap_or(1.0);
+        (kind, (old * factor).clamp(SMALLEST, 1.0))
+    };
+    Ok(sums.into_iter().map(scale).collect())
+}
+
+/// What was learnt, in words.
+pub(crate) fn said(white: &Whitened<'_>) -> Option<Warning> {
+    let parameters = white.axes.iter().map(|a| &white.problem.parameters()[a.index]);
+    let kinds: BTreeMap<ParameterKind, String> = parameters
+        .filter_map(|p| {
+            let sigma = p.unit.to_display(p.prior_sigma?);
+            Some((p.assumed?, format!("{} {:.2} {}", p.assumed?.words(), sigma, p.unit.display_symbol())))
+        })
+        .collect();
+    let widths: Vec<&str> = kinds.values().map(String::as_str).collect();
+    let message = format!(
+        "how far this arm may be from nominal was not declared; the data say (standard deviations): {}; [model.deviation] or \
+         the model's [deviation] declare other priors",
+        widths.join(", ")
+    );
+    let subject = "priors".to_owned();
+    (!kinds.is_empty())
+        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, "priors-learnt", subject, message))
+}
+
+#[cfg(test)]
+#[path = "tests/priors.rs"]
+mod tests;

@@ -1,0 +1,129 @@
+//! Is what is learnt of a prior the textbook's?
+
+use crate::problem::{Linearised, Problem};
+use crate::{FitConfig, Objective, Scale, fit_problem};
+use armcal_core::{Parameter, ParameterKind, Role, Unit};
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const SIGMA_M: f64 = 1e-4;
+
+/// Each parameter measured by itself, three of them a block.
+struct OneEach {
+    parameters: Vec<Parameter>,
+    measured: Vec<f64>,
+}
+
+impl Problem for OneEach {
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn blocks(&self) -> usize {
+        self.measured.len() / 3
+    }
+
+    fn name(&self, block: usize) -> String {
+        format!("block {block}")
+    }
+
+    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
+        DVector::from_fn(3, |k, _| self.measured[3 * block + k] - p[3 * block + k])
+    }
+
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
+        let mut jacobian = DMatrix::zeros(3, p.len());
+        (0..3).for_each(|k| jacobian[(k, 3 * block + k)] = -1.0);
+        (self.residual(block, p), jacobian)
+    }
+
+    fn covariance(&self, _block: usize, _p: &[f64]) -> DMatrix<f64> {
+        DMatrix::identity(3, 3) * SIGMA_M.powi(2)
+    }
+}
+
+fn problem(kinds: &[(ParameterKind, f64)], each: usize, seed: u64) -> OneEach {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut all = OneEach { parameters: Vec::new(), measured: Vec::new() };
+    for (kind, spread) in kinds {
+        for _ in 0..each {
+            let [true_m, noise_m] = [*spread, SIGMA_M].map(|s| s * rng.sample::<f64, _>(StandardNormal));
+            all.measured.push(true_m + noise_m);
+            all.parameters.push(Parameter {
+                name: format!("p{}", all.parameters.len()),
+                unit: Unit::Metre,
+                nominal: 0.0,
+                lower: -5e-3,
+                upper: 5e-3,
+                prior_sigma: Some(4e-3),
+                assumed: Some(*kind),
+                free: true,
+                role: Role::Robot,
+                meaning: String::new(),
+            });
+        }
+    }
+    all
+}
+
+fn config() -> FitConfig {
+    FitConfig { objective: Objective::LeastSquares, scale: Scale::Declared, ..FitConfig::default() }
+}
+
+/// The learnt prior of the parameters of each kind.
+fn learnt(problem: &OneEach, config: &FitConfig) -> Vec<f64> {
+    let start = vec![0.0; problem.parameters.len()];
+    let fit = fit_problem(problem, &start, &|p| p.free, config).unwrap();
+    fit.estimates.iter().map(|e| e.parameter.prior_sigma.unwrap()).collect()
+}
+
+#[test]
+fn the_most_probable_scale_is_the_scatter_beyond_the_noise() {
+    // y ~ N(0, s^2 + sigma^2): the maximum of the evidence is at s^2 = mean(y^2) - sigma^2.
+    for seed in 0..10 {
+        let problem = problem(&[(ParameterKind::Length, 3e-4), (ParameterKind::JointZero, 1.5e-3)], 30, seed);
+        let sigma_m = learnt(&problem, &config());
+        for (measured, learnt_m) in problem.measured.chunks(30).zip(sigma_m.chunks(30)) {
+            let mean_square = measured.iter().map(|y| y * y).sum::<f64>() / 30.0;
+            let expected_m = (mean_square - SIGMA_M.powi(2)).sqrt();
+            assert!(
+                (learnt_m[0] / expected_m - 1.0).abs() < 0.03,
+                "seed {seed}: {} {expected_m}",
+                learnt_m[0]
+            );
+            assert!(learnt_m.iter().all(|s| *s == learnt_m[0]));
+        }
+    }
+}
+
+#[test]
+fn a_perfect_arm_is_taken_for_one_and_a_bad_one_keeps_the_default() {
+    let perfect = learnt(&problem(&[(ParameterKind::Angle, 0.0)], 60, 3), &config());
+    assert!(perfect[0] < 0.5 * SIGMA_M, "{}", perfect[0]);
+    let mut bad = problem(&[(ParameterKind::Angle, 0.0)], 60, 3);
+    bad.measured.iter_mut().enumerate().for_each(|(k, y)| *y += if k % 2 == 0 { 4.9e-3 } else { -4.9e-3 });
+    assert_eq!(learnt(&bad, &config())[0], 4e-3);
+}
+
+#[test]
+fn what_is_declared_is_kept() {
+    let mut problem = problem(&[(ParameterKind::Length, 1e-3)], 6, 4);
+    let off = FitConfig { learn_priors: false, ..config() };
+    assert!(learnt(&problem, &off).iter().all(|s| *s == 4e-3));
+    problem.parameters[0].assumed = None;
+    let sigma_m = learnt(&problem, &config());
+    assert_eq!(sigma_m[0], 4e-3);
+    assert!(sigma_m[1] < 3e-3, "{sigma_m:?}");
+}
+
+#[test]
+fn what_was_learnt_is_said() {
+    let problem = problem(&[(ParameterKind::JointZero, 1e-3)], 6, 5);
+    let fit = fit_problem(&problem, &[0.0; 6], &|p| p.free, &config()).unwrap();
+    let said = fit.warnings.iter().find(|w| w.code == "priors-learnt").unwrap();
+    let mm = 1e3 * fit.estimates[0].parameter.prior_sigma.unwrap();
+    assert!(said.message.contains(&format!("joint zeros {mm:.2} mm")), "{}", said.message);
+    assert!(fit.estimates.iter().all(|e| e.determined), "the data know each of them");
+}

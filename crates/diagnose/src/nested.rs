@@ -1,0 +1,133 @@
+//! What a choice is worth on points that had no part in it: the whole search again without each part of the hold-out.
+//!
+//! A hold-out keeps points from the fit, not from the choice of what is fitted: of hundreds of explanations the one that
+//! suits the held-out points best looks better on them than it is (Varma and Simon, BMC Bioinformatics 7:91, 2006). Here
+//! every turn of the hold-out is diagnosed without its points, with a hold-out of its own inside, and what that finds
+//! predicts them.
+
+use crate::compare::compare_norms;
+use crate::config::DiagnosisConfig;
+use crate::crossval::HeldOut;
+use crate::observed::{Calibrated, diagnose};
+use crate::{DiagnoseError, Diagnosis};
+use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
+use armcal_core::{DwellId, Observation};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Folds inside a turn where the hold-out itself cannot be taken once more.
+const INNER_FOLDS: usize = 4;
+/// Resamplings of the bootstrap inside a turn: enough for the gate at one percent.
+const RESAMPLINGS: usize = 199;
+
+/// Errors on held-out points with effects that were chosen without them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nested {
+    /// Without any effect, and with those chosen without these points.
+    pub held_out: HeldOut,
+    /// Mean error there with the effects chosen on all points [mm]: what it is less is the worth of having chosen on them.
+    pub chosen_on_all_mm: f64,
+    /// What was chosen in each turn, as a pipeline spells it.
+    pub chosen: Vec<Vec<String>>,
+}
+
+impl Nested {
+    /// In one sentence.
+    pub fn sentence(&self) -> String {
+        let turns = self.chosen.len();
+        let named = |effects: &Vec<String>| match effects.is_empty() {
+            true => "nothing".to_owned(),
+            false => effects.join(" + "),
+        };
+        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+        self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
+        let chosen: Vec<String> =
+            counts.iter().map(|(names, count)| format!("{names} in {count} of {turns}")).collect();
+        let [low, high] = self.held_out.change_ci95;
+        format!(
+            "chosen without the held-out points ({}), it changes the mean error there from {:.3} to {:.3} mm (95 % {low:+.3} to \
+             {high:+.3}); chosen with them, to {:.3} mm",
+            chosen.join(", "),
+            self.held_out.before,
+            self.held_out.after,
+            self.chosen_on_all_mm
+        )
+    }
+}
+
+/// Chooses again in every turn of the hold-out; none where nothing was found, or nothing is held out.
+///
+/// # Errors
+/// A turn that cannot be calibrated or diagnosed.
+pub fn nested(
+    calibrated: &Calibrated<'_>,
+    found: &Diagnosis,
+    config: &DiagnosisConfig,
+) -> Result<Option<Nested>, DiagnoseError> {
+    let Calibrated { model, calibration, observations, holdout, .. } = *calibrated;
+    let Some(refitted) = &found.refitted else { return Ok(None) };
+    let turns = holdout_turns(model, observations, holdout)?;
+    let config = DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
+    let done: Vec<Result<Turn, DiagnoseError>> =
+        turns.par_iter().map(|held| turn(calibrated, held, &config)).collect();
+    let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let after: BTreeMap<DwellId, f64> = done.iter().flat_map(|t| t.errors_m.iter().copied()).collect();
+    let held_out = compare_norms(calibration, &after, observations, &config);
+    Ok(held_out.map(|held_out| Nested {
+        held_out,
+        chosen_on_all_mm: refitted.calibration.holdout.fitted.mean_m * 1e3,
+        chosen: done.into_iter().map(|t| t.chosen).collect(),
+    }))
+}
+
+/// What was chosen without some points, and the errors that it leaves on them.
+struct Turn {
+    chosen: Vec<String>,
+    errors_m: Vec<(DwellId, f64)>,
+}
+
+fn turn(
+    calibrated: &Calibrated<'_>,
+    held: &[usize],
+    config: &DiagnosisConfig,
+) -> Result<Turn, DiagnoseError> {
+    let Calibrated { model, observations, session, fit, .. } = *calibrated;
+    let is_held = |i: usize| held.binary_search(&i).is_ok();
+    let seen: Vec<Observation> =
+        observations.iter().enumerate().filter(|(i, _)| !is_held(*i)).map(|(_, o)| o.clone()).collect();
+    let (holdout, calibration) = inner(calibrated, &seen)?;
+    let within =
+        Calibrated { model, calibration: &calibration, observations: &seen, session, fit, holdout: &holdout };
+    let effects = diagnose(&within, config)?.suggested(model.chain().joint_names())?;
+    let model = match effects.is_empty() {
+        true => model.clone(),
+        false => model.with_effects(&effects, session)?,
+    };
+    let dwells = held.iter().map(|i| observations[*i].dwell).map(|d| [d.recording, d.dwell]).collect();
+    let predicted = calibrate(&model, observations, fit, &HoldoutConfig::Dwells { dwells })?;
+    let errors = predicted.residuals.iter().filter(|r| r.held_out).map(|r| (r.dwell, r.fitted_m.norm()));
+    Ok(Turn { chosen: effects.iter().map(ToString::to_string).collect(), errors_m: errors.collect() })
+}
+
+/// The hold-out once more among what a turn sees, or folds of it where too little is left for that.
+fn inner(
+    calibrated: &Calibrated<'_>,
+    seen: &[Observation],
+) -> Result<(HoldoutConfig, Calibration), DiagnoseError> {
+    let Calibrated { model, fit, holdout, .. } = *calibrated;
+    let again = match holdout {
+        HoldoutConfig::EachRecording | HoldoutConfig::RecordingFolds { .. } => HoldoutConfig::EachRecording,
+        HoldoutConfig::CavityFolds { k } => HoldoutConfig::CavityFolds { k: *k },
+        _ => HoldoutConfig::CavityFolds { k: INNER_FOLDS },
+    };
+    let several = seen.iter().any(|o| o.dwell.recording != seen[0].dwell.recording);
+    let by_recording = again == HoldoutConfig::EachRecording;
+    let folds = HoldoutConfig::CavityFolds { k: INNER_FOLDS };
+    for holdout in [again, folds].into_iter().skip(usize::from(by_recording && !several)) {
+        if let Ok(calibration) = calibrate(model, seen, fit, &holdout) {
+            return Ok((holdout, calibration));
+        }
+    }
+    Ok((HoldoutConfig::None, calibrate(model, seen, fit, &HoldoutConfig::None)?))
+}
