@@ -1,5 +1,7 @@
 //! Is what is learnt of a prior the textbook's?
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use crate::problem::{Linearised, Problem};
 use crate::{FitConfig, Objective, Scale, fit_problem};
 use armcal_core::{Parameter, ParameterKind, Role, Unit};
