@@ -85,6 +85,9 @@ mod counted_once;
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;
 
+/// Does what one session taught help in another, effect by effect?
+mod transfer;
+
 /// Does the calibration table do without a camera?
 mod camera_free;
 

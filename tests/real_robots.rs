@@ -59,6 +59,15 @@ fn panda_unit_4_from_the_fixtures_without_a_camera() {
     let [nominal, fitted] = held_out_mm(&summary);
     assert!(fitted <= 0.25 && nominal > 5.0 * fitted, "{nominal} -> {fitted} mm");
     assert_sound(&summary);
+    // What effects claim on the held-out placements, chosen with them, and what they are worth there, chosen without.
+    let nested = &summary["diagnosis"]["nested"];
+    let [geometry, worth, claimed] =
+        ["/held_out/before", "/held_out/after", "/chosen_on_all_mm"].map(|at| number(nested, at));
+    println!(
+        "mukca-panda4.toml: chosen with {geometry:.3} -> {claimed:.3}, without {geometry:.3} -> {worth:.3} mm"
+    );
+    assert!((geometry - fitted).abs() < 1e-6, "one quantity, one value: {geometry} and {fitted} mm");
+    assert!(claimed < worth && worth < 1.02 * geometry, "{nested}");
     assert_every_dwell(&summary, &root().join("fixtures/mukca-panda4"));
 }
 

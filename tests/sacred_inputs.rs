@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 /// Paths that a command only reads, by command and argument.
-const READ: [(&str, &str); 19] = [
+const READ: [(&str, &str); 21] = [
     ("run", "pipeline"),
     ("inspect", "inputs"),
     ("diagnose", "input"),
@@ -23,6 +23,8 @@ const READ: [(&str, &str); 19] = [
     ("compare", "after"),
     ("verify", "result"),
     ("verify", "pipeline"),
+    ("transfer", "from"),
+    ("transfer", "to"),
     ("compensate", "result"),
     ("compensate", "targets"),
     ("view", "input"),

@@ -1,5 +1,6 @@
 use crate::support::browser::{browser, scripted};
 use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
+use crate::transfer::transfer;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -101,6 +102,17 @@ fn the_papers_experiment_and_what_it_becomes_with_the_effect() {
         );
         assert!(encoders[1] < 0.05 * encoders[0] && planned[1] < 0.1 * planned[0]);
     }
+
+    // Each effect by its absence, in the same new recordings: all three are there.
+    let carried = transfer(&extended, &verifying, &[], 0);
+    let effects = carried["effects"].as_array().expect("effects");
+    assert_eq!(effects.len(), 3, "{effects:?}");
+    for effect in effects {
+        println!("  {}: {}", effect["effect"], effect["held_out"]);
+        assert_eq!(effect["verdict"], "it helps there", "{effect}");
+    }
+    let together = number(&carried, "/together/after");
+    assert!((together - points[1]).abs() < 0.05 * points[1], "{together} and {points:?}");
 
     // The clock of the new recordings against the truth, opened only now.
     let truth = read_json(&folder.join("truth.json"));

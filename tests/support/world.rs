@@ -79,6 +79,9 @@ impl World {
             .replace(&format!("{pipelines}/boards/paper.toml"), "board.toml")
             .replace(&format!("{pipelines}/models/right_arm.toml"), "arm.toml");
         world.write("p.toml", &pipeline);
+        let rolled =
+            format!("\"{}/fixtures/paper/roll.mcap\"]\ntilt = {{ roll_deg = 11.7 }}", root().display());
+        world.write("other.toml", &pipeline.replace("\"./normal.mcap\"]", &rolled));
         world.write("check.toml", &format!("{pipeline}\n[check]\nmin_dwells = 3\n"));
         world.write("two.toml", &shipped("two-arms.toml"));
         let lab = shipped("lab/paper-small.toml").replace("../boards/paper.toml", "board.toml");
@@ -245,6 +248,7 @@ pub fn printing() -> Vec<Vec<&'static str>> {
         vec!["reduce"],
         vec!["compare", "result", "result"],
         vec!["verify", "result", "p.toml"],
+        vec!["transfer", "p.toml", "other.toml"],
         vec!["compensate", "result", "targets.csv"],
         vec!["view", "p.toml"],
         vec!["score", "nothing", "--seeds", "1"],

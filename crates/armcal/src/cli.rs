@@ -211,6 +211,21 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Does what one session taught help in another? The first is calibrated, the second judges, effect by effect.
+    ///
+    /// Exit code 3 when something that was learnt does harm there, by more than chance.
+    Transfer {
+        /// Pipeline file of the session that teaches.
+        from: PathBuf,
+        /// Pipeline file of the session that judges: the same nominal arm.
+        to: PathBuf,
+        /// Effects beside those of the first pipeline, such as backlash:1. With none at all, those that its diagnosis
+        /// suggests.
+        effects: Vec<String>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Set-points that bring the calibrated arm to Cartesian targets: its model with all effects, inverted.
     Compensate(Compensate),
     /// The report of a run, served to this machine's browser only: any combination of effects and any hold-out is

@@ -305,12 +305,22 @@ pub enum Error {
         mistakes: String,
     },
     /// A mistake of the setup stands before any diagnosis.
-    #[error("the setup contradicts the data, so no physical effect is looked for [{code}]: {message}")]
+    #[error(
+        "the setup of `{pipeline}` contradicts the data, so no physical effect is looked for [{code}]: {message}"
+    )]
     SetupFirst {
+        /// Name of the pipeline.
+        pipeline: String,
         /// Stable name of the mistake.
         code: &'static str,
         /// What would undo it.
         message: String,
+    },
+    /// `armcal transfer` to a session that shows nothing.
+    #[error("no dwell of `{pipeline}` has a place that anything could be judged by; see `armcal run` of it")]
+    NothingToJudge {
+        /// Name of the pipeline.
+        pipeline: String,
     },
     /// `armcal add suggested` where nothing is, or nothing that holds elsewhere.
     #[error(

@@ -5,7 +5,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
-use armcal_calibrate::{Calibration, calibrate};
+use armcal_calibrate::{Calibration, calibrate, holdout_turns};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, diagnose, nested};
 use armcal_model::{EffectSpec, Model, Session};
@@ -21,6 +21,11 @@ const MAX_ROUNDS: usize = 4;
 const ALTERNATIVES: [usize; 2] = [8, 2];
 /// Observations fitted for all of them together: thousands of poses make every refit slow.
 const REFITTED_OBSERVATIONS: usize = 4000;
+
+/// Observations, and parts of the hold-out, of which a run makes the choice of effects again without each part: each is
+/// a diagnosis of its own, and of more `armcal add suggested` makes them.
+const CHOSEN_AGAIN_OBSERVATIONS: usize = 1000;
+const CHOSEN_AGAIN_PARTS: usize = 3;
 
 /// Runs a pipeline up to its results in memory; nothing is written.
 ///
@@ -184,14 +189,26 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
 }
 
 impl Settled {
+    /// Of a session whose setup contradicts its data, every further sentence would be about the mistake.
+    ///
+    /// # Errors
+    /// The first mistake.
+    pub fn refuse_mistakes(&self) -> Result<(), Error> {
+        self.setup.mistakes().next().map_or(Ok(()), |mistake| {
+            Err(Error::SetupFirst {
+                pipeline: self.inputs.pipeline.name.clone(),
+                code: mistake.code,
+                message: mistake.message.clone(),
+            })
+        })
+    }
+
     /// Looks for the effect that the calibrated model is missing, if the pipeline wants to know.
     ///
     /// # Errors
     /// A mistake of the setup, which would get the name of an effect; a diagnosis that cannot be made.
     pub fn diagnose(&self, pipeline: &Pipeline, progress: &Progress) -> Result<Option<Diagnosis>, Error> {
-        if let Some(mistake) = self.setup.mistakes().next() {
-            return Err(Error::SetupFirst { code: mistake.code, message: mistake.message.clone() });
-        }
+        self.refuse_mistakes()?;
         let Fitted { model, calibration, observations, .. } = &self.fitted;
         diagnosis(pipeline, model, calibration, observations, progress)
     }
@@ -262,9 +279,36 @@ pub fn recalibrate(
     add_refits(run, pipeline, progress)
 }
 
+/// Makes the choice of what was found again without each part of the hold-out. The verdict stands without it: what stops
+/// it is said in its place.
+fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
+    let Some(mut diagnosis) = run.diagnosis.take_if(|_| !run.steps.is_empty()) else { return };
+    let poses = run.observations.len();
+    let parts =
+        holdout_turns(&run.model, &run.observations, &pipeline.holdout).map_or(0, |turns| turns.len());
+    if poses > CHOSEN_AGAIN_OBSERVATIONS || parts > CHOSEN_AGAIN_PARTS {
+        let why = format!(
+            "a run does so for up to {CHOSEN_AGAIN_OBSERVATIONS} poses and {CHOSEN_AGAIN_PARTS} parts of the hold-out, here \
+             are {poses} and {parts}; `armcal add suggested` does it for any"
+        );
+        diagnosis.chosen_again(Err(why));
+    } else {
+        progress.step("choosing again without each part of the hold-out");
+        let Run { model, calibration, observations, session, .. } = &*run;
+        let calibrated = calibrated(pipeline, model, calibration, observations, session);
+        match nested(&calibrated, &diagnosis, &pipeline.diagnosis) {
+            Ok(Some(nested)) => diagnosis.chosen_again(Ok(nested)),
+            Ok(None) => {}
+            Err(e) => diagnosis.chosen_again(Err(e.to_string())),
+        }
+    }
+    run.diagnosis = Some(diagnosis);
+}
+
 /// What the run's model would become: with what was found, and with each of the best candidates.
 pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Result<(), Error> {
     add_steps(run, pipeline, progress)?;
+    choose_again(run, pipeline, progress);
     progress.step("fitting the best candidates");
     run.alternatives = alternatives(run, pipeline);
     Ok(())

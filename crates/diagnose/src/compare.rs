@@ -5,35 +5,47 @@ use crate::config::DiagnosisConfig;
 use crate::crossval::sign_flip;
 use armcal_calibrate::{Calibration, grouped_ci95};
 use armcal_core::{DwellId, Observation};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Of fewer places than this no interval can be told: what a change does to an error differs with the posture in which the
+/// arm reaches a place, so each pose counts by itself there.
+const FEWEST_PLACES: usize = 6;
 
 /// Errors on held-out dwells of two calibrations of the same observations, paired by dwell, in groups of one place
-/// (cavity) each. None where they share no held-out dwell.
+/// (cavity) each where there are enough of them. None where they share no held-out dwell.
 pub fn compare_heldout(
     before: &Calibration,
     after: &Calibration,
     observations: &[Observation],
     config: &DiagnosisConfig,
 ) -> Option<HeldOut> {
-    let after = after.residuals.iter().filter(|r| r.held_out).map(|r| (r.dwell, r.fitted_m.norm())).collect();
-    compare_norms(before, &after, observations, config)
+    compare_errors(&held_out_errors_m(before), &held_out_errors_m(after), observations, config)
 }
 
-/// The same with the errors after by dwell [m].
-pub(crate) fn compare_norms(
-    before: &Calibration,
+/// Errors of a calibration on the dwells that were held out of it, by dwell [m].
+pub(crate) fn held_out_errors_m(calibration: &Calibration) -> BTreeMap<DwellId, f64> {
+    let held_out = calibration.residuals.iter().filter(|r| r.held_out);
+    held_out.map(|r| (r.dwell, r.fitted_m.norm())).collect()
+}
+
+/// The same of errors by dwell [m], before and after, wherever they come from.
+pub fn compare_errors(
+    before: &BTreeMap<DwellId, f64>,
     after: &BTreeMap<DwellId, f64>,
     observations: &[Observation],
     config: &DiagnosisConfig,
 ) -> Option<HeldOut> {
-    let place: BTreeMap<DwellId, String> =
+    let mut place: BTreeMap<DwellId, String> =
         observations.iter().filter_map(|o| Some((o.dwell, o.cavity()?.to_string()))).collect();
+    if place.values().collect::<BTreeSet<_>>().len() < FEWEST_PLACES {
+        place.clear();
+    }
     let mut groups: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
-    for r in before.residuals.iter().filter(|r| r.held_out) {
-        if let Some(norm) = after.get(&r.dwell) {
-            let alone = || format!("\u{1}{}", r.dwell);
-            let key = place.get(&r.dwell).cloned().unwrap_or_else(alone);
-            groups.entry(key).or_default().push((r.fitted_m.norm() * 1e3, norm * 1e3));
+    for (dwell, before_m) in before {
+        if let Some(after_m) = after.get(dwell) {
+            let alone = || format!("\u{1}{dwell}");
+            let key = place.get(dwell).cloned().unwrap_or_else(alone);
+            groups.entry(key).or_default().push((before_m * 1e3, after_m * 1e3));
         }
     }
     let pairs: Vec<(f64, f64)> = groups.values().flatten().copied().collect();

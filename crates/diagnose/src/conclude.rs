@@ -11,6 +11,7 @@ use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
 use crate::error_places::{DwellError, error_places};
 use crate::explain::explanations;
+use crate::next::lead;
 use armcal_calibrate::Calibration;
 use armcal_core::{Observation, Severity, Stage, Warning};
 
@@ -122,6 +123,7 @@ impl Diagnosis {
             self.warnings.extend(warning(self.verdict, &unexplained, times_floor, config));
             self.unexplained = Some(unexplained);
         }
+        lead(self, observations, joint_names);
         self.explanations = explanations(self, config);
     }
 }

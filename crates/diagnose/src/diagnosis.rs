@@ -4,6 +4,7 @@ use crate::combination::Combination;
 use crate::contrasts::Contrast;
 use crate::crossval::HeldOut;
 use crate::error_places::ErrorPlace;
+use crate::nested::Nested;
 use crate::noise::Noise;
 use crate::structure::Structure;
 use armcal_calibrate::Calibration;
@@ -106,6 +107,8 @@ pub struct Diagnosis {
     pub warnings: Vec<Warning>,
     /// Each number of the verdict in a plain sentence.
     pub explanations: Vec<Explanation>,
+    /// What the choice is worth on points that had no part in it, where it was made again ([`crate::nested`]).
+    pub nested: Option<Nested>,
     /// The calibration with everything that was found; none where nothing was, or where it cannot be fitted.
     #[serde(skip)]
     pub refitted: Option<Box<Refitted>>,
@@ -115,6 +118,16 @@ impl Diagnosis {
     /// Whether nothing is named though noise alone is improbable: the errors are no larger than noise may give.
     pub fn not_worth_a_name(&self) -> bool {
         self.verdict == Verdict::NothingMissing && self.probability.is_none()
+    }
+
+    /// Keeps what the choice is worth on points that had no part in it, or says why that was not asked.
+    pub fn chosen_again(&mut self, nested: Result<Nested, String>) {
+        let sentence = match &nested {
+            Ok(nested) => nested.sentence(),
+            Err(why) => format!("not chosen again without the held-out points: {why}"),
+        };
+        self.explanations.push(Explanation { number: "nested".to_owned(), sentence });
+        self.nested = nested.ok();
     }
 }
 

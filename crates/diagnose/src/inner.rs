@@ -111,6 +111,7 @@ fn assemble(
         unknown: unlisted.first().cloned(),
         unlisted,
         explanations: Vec::new(),
+        nested: None,
     };
     diagnosis.record_next = next::record_next(problem, &diagnosis);
     diagnosis.explanations = explanations(&diagnosis, config);

@@ -78,7 +78,7 @@ extern crate self as armcal_diagnose;
 
 pub use armcal_model::Toggle;
 pub use combination::{Combination, Term};
-pub use compare::compare_heldout;
+pub use compare::{compare_errors, compare_heldout};
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;
 pub use crossval::HeldOut;

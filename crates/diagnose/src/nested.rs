@@ -5,7 +5,7 @@
 //! every turn of the hold-out is diagnosed without its points, with a hold-out of its own inside, and what that finds
 //! predicts them.
 
-use crate::compare::compare_norms;
+use crate::compare::{compare_errors, held_out_errors_m};
 use crate::config::DiagnosisConfig;
 use crate::crossval::HeldOut;
 use crate::observed::{Calibrated, diagnose};
@@ -73,7 +73,7 @@ pub fn nested(
         turns.par_iter().map(|held| turn(calibrated, held, &config)).collect();
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     let after: BTreeMap<DwellId, f64> = done.iter().flat_map(|t| t.errors_m.iter().copied()).collect();
-    let held_out = compare_norms(calibration, &after, observations, &config);
+    let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, &config);
     Ok(held_out.map(|held_out| Nested {
         held_out,
         chosen_on_all_mm: refitted.calibration.holdout.fitted.mean_m * 1e3,

@@ -1,8 +1,81 @@
 //! What to record next, in words.
 
-use crate::diagnosis::{Diagnosis, Verdict};
+use crate::diagnosis::{Diagnosis, FoundEffect, Verdict};
 use crate::problem::Problem;
+use armcal_core::{Observation, Unit};
 use std::collections::BTreeSet;
+
+/// What shows effects that the geometry takes over, where no other finding comes first.
+const WITH_A_LOAD: &str =
+    "repeat a dozen dwells with a known load, and add free poses over a wider range of every joint";
+/// Readings of a joint nearer to each other than this are one angle [rad].
+const ONE_ANGLE_RAD: f64 = 1e-4;
+/// A gap between angles is worth a pose when it is so many times as wide as the usual one, and at least this [rad].
+const WIDE: f64 = 3.0;
+const WIDE_RAD: f64 = 0.02;
+/// Poses that each period of an error needs at least.
+const A_PERIOD: f64 = 4.0;
+/// Gaps that one sentence names.
+const GAPS: usize = 3;
+
+/// Puts what the finding itself asks for before all else: the angles where a curve over a joint was not seen, the dwells in
+/// which unexplained errors are largest.
+pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names: &[String]) {
+    let over_its_angle = |joint: &str, frequency: Option<f64>| {
+        let by_name = joint_names.iter().position(|name| name == joint);
+        let index = by_name.or_else(|| joint.parse::<usize>().ok()?.checked_sub(1))?;
+        let gaps = gaps(observations.iter().filter_map(|o| o.joint_rad.get(index).copied()), frequency)?;
+        Some(format!("turn joint {} ({}) {gaps}", index + 1, joint_names.get(index)?))
+    };
+    let mut first: Vec<String> = Vec::new();
+    for u in d.unlisted.iter().filter(|u| u.unit == Unit::Radian) {
+        let own = u.channel.strip_prefix("joint").filter(|joint| u.driver == format!("q{joint}"));
+        first.extend(own.and_then(|joint| over_its_angle(joint, None)));
+    }
+    let turning = |e: &&FoundEffect| e.parameters.iter().all(|p| p.unit == Unit::Radian);
+    for e in d.effects.iter().filter(turning).filter_map(|e| e.name.strip_prefix("periodic:")) {
+        let (joint, frequency) = e.split_once(",frequency=").unwrap_or((e, ""));
+        first.extend(over_its_angle(joint, frequency.parse().ok()));
+    }
+    if let Some(unexplained) = &d.unexplained {
+        first.extend(unexplained.places.iter().map(|p| {
+            format!(
+                "look first at {}: the mean error of these {} dwells is {:.3} mm, that of the others {:.3} mm",
+                p.place, p.dwells, p.error_mm, p.elsewhere_mm
+            )
+        }));
+    }
+    if matches!(d.verdict, Verdict::Unknown | Verdict::Unexplained) {
+        d.record_next.retain(|next| next != WITH_A_LOAD);
+    }
+    d.record_next.splice(0..0, first);
+}
+
+/// Where a joint was not read finely enough for an error over its own angle: of `frequency` periods a turn, or of a shape
+/// that no formula follows. None where it was.
+fn gaps(angles_rad: impl Iterator<Item = f64>, frequency: Option<f64>) -> Option<String> {
+    let mut angles: Vec<f64> = angles_rad.collect();
+    angles.sort_by(f64::total_cmp);
+    angles.dedup_by(|b, a| *b - *a < ONE_ANGLE_RAD);
+    let mut gaps: Vec<[f64; 2]> = angles.windows(2).map(|w| [w[0], w[1]]).collect();
+    let width = |gap: &[f64; 2]| gap[1] - gap[0];
+    gaps.sort_by(|a, b| width(b).total_cmp(&width(a)));
+    let usual_rad = width(gaps.get(gaps.len() / 2)?);
+    let needed_rad = frequency
+        .map_or((WIDE * usual_rad).max(WIDE_RAD), |n| std::f64::consts::TAU / (A_PERIOD * n.max(1.0)));
+    let wide = gaps.iter().filter(|gap| width(gap) > needed_rad).count();
+    let named: Vec<String> = (gaps[..wide.min(GAPS)].iter())
+        .map(|[low, high]| format!("{:.1} to {:.1}", low.to_degrees(), high.to_degrees()))
+        .collect();
+    let more = if wide > GAPS { format!(" and {} more", wide - GAPS) } else { String::new() };
+    (wide > 0).then(|| {
+        format!(
+            "in steps of at most {:.1} deg through {} deg{more}: its error over its own angle is not known where no pose was",
+            needed_rad.to_degrees(),
+            named.join(", ")
+        )
+    })
+}
 
 /// Recommendations that follow from what could not be told or not be tested.
 pub(crate) fn record_next(problem: &Problem, diagnosis: &Diagnosis) -> Vec<String> {
@@ -24,10 +97,7 @@ pub(crate) fn record_next(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Strin
     }
     if untested("load never changes") || (untested("takes over") && diagnosis.verdict != Verdict::Identified)
     {
-        all.push(
-            "repeat a dozen dwells with a known load, and add free poses over a wider range of every joint"
-                .to_string(),
-        );
+        all.push(WITH_A_LOAD.to_owned());
     }
     if untested("takes over") {
         all.push(format!(
@@ -47,4 +117,26 @@ pub(crate) fn record_next(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Strin
         );
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gaps;
+
+    #[test]
+    fn gaps_are_told_by_the_period_or_by_the_usual_step() {
+        // Every 5 deg from 0 to 100, none between 40 and 70; each angle twice.
+        let degrees = (0..=20).map(|i| 5.0 * f64::from(i)).filter(|a| !(42.0..68.0).contains(a));
+        let angles: Vec<f64> = degrees.flat_map(|a| [a, a + 1e-5]).map(f64::to_radians).collect();
+        let told = |frequency| gaps(angles.iter().copied(), frequency);
+        assert!(
+            told(None)
+                .is_some_and(|g| g.starts_with("in steps of at most 15.0 deg through 40.0 to 70.0 deg:"))
+        );
+        // Ten periods a turn: a quarter of one is 9 deg. Thirty: 3 deg, which no step is below.
+        assert!(told(Some(10.0)).is_some_and(|g| g.contains("at most 9.0 deg through 40.0 to 70.0 deg:")));
+        assert!(told(Some(30.0)).is_some_and(|g| g.contains("and 12 more")));
+        assert_eq!(told(Some(2.0)), None, "a quarter of a period is 45 deg");
+        assert_eq!(gaps([0.3; 9].into_iter(), None), None, "it never turned");
+    }
 }

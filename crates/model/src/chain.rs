@@ -14,6 +14,7 @@ pub struct Chain {
     pub(crate) segments: Vec<Segment>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) joint_names: Vec<String>,
+    pub(crate) joint_limits: Vec<Option<[f64; 2]>>,
     pub(crate) source: Source,
 }
 
@@ -35,6 +36,14 @@ impl Chain {
     /// The moving joints from base to tip: the order of every joint vector.
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
+    }
+
+    /// Lowest and highest reading that a joint can have [rad] (sliding: [m]): as its file says, but at least what was
+    /// `recorded` of it; infinite where no file says.
+    pub fn joint_limits(&self, joint: usize, recorded: [f64; 2]) -> [f64; 2] {
+        let [low, high] =
+            self.joint_limits.get(joint).copied().flatten().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        [low.min(recorded[0]), high.max(recorded[1])]
     }
 
     /// Unit of a joint's reading: radian, or metre where it slides.

@@ -18,6 +18,7 @@
 //! a_mm = { nominal = 0.0, free = false }
 //! alpha_deg = 90.0
 //! beta_deg = 0.0                 # optional: Hayati's Ry(beta) at the end of the row
+//! limits_deg = [-170.0, 170.0]   # optional: what the joint can read; limits_mm where it slides
 //! ```
 
 use crate::chain::Source;
@@ -71,6 +72,8 @@ struct Row {
     a_mm: Entry,
     alpha_deg: Entry,
     beta_deg: Option<Entry>,
+    limits_deg: Option<[f64; 2]>,
+    limits_mm: Option<[f64; 2]>,
 }
 
 /// A number, or a table that says more about it; in the unit of its key.
@@ -121,8 +124,8 @@ impl Chain {
         let Source::Dh(table) = &self.source else { return None };
         let mut table = table.clone();
         let (a, b) = (table.rows.get(row)?.clone(), table.rows.get(row + 1)?.clone());
-        table.rows[row] = Row { name: a.name.clone(), joint: a.joint, ..b.clone() };
-        table.rows[row + 1] = Row { name: b.name, joint: b.joint, ..a };
+        table.rows[row] = Row { name: a.name.clone(), ..b.clone() }.with_joint_of(&a);
+        table.rows[row + 1] = Row { name: b.name.clone(), ..a }.with_joint_of(&b);
         Some(table.into_chain())
     }
 
@@ -152,6 +155,7 @@ impl DhTable {
             if !names.insert(&row.name) {
                 return Err(ModelError::DuplicateRow { path: path.to_owned(), row: row.name.clone() });
             }
+            row.check_limits(path)?;
             for field in row.fields() {
                 let key = format!("{}.{}", row.name, field.key);
                 let value = field.entry.nominal;
@@ -172,7 +176,8 @@ impl DhTable {
     }
 
     fn into_chain(self) -> Chain {
-        let (mut segments, mut parameters, mut joint_names) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut segments, mut parameters) = (Vec::new(), Vec::new());
+        let (mut joint_names, mut joint_limits) = (Vec::new(), Vec::new());
         for row in &self.rows {
             let motion = match row.joint {
                 JointKind::Revolute => Some(Motion::Revolute),
@@ -182,6 +187,7 @@ impl DhTable {
             let joint = motion.map(|motion| Joint { index: joint_names.len(), motion });
             if joint.is_some() {
                 joint_names.push(row.name.clone());
+                joint_limits.push(row.limits());
             }
             let hayati = row.beta_deg.is_some();
             let geometry = match self.convention {
@@ -193,7 +199,8 @@ impl DhTable {
             let parameters = first..parameters.len();
             segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters });
         }
-        Chain { name: self.name.clone(), segments, parameters, joint_names, source: Source::Dh(self) }
+        let name = self.name.clone();
+        Chain { name, segments, parameters, joint_names, joint_limits, source: Source::Dh(self) }
     }
 
     /// Replaces the nominal number of every entry whose value has changed, so that the others keep every digit.
@@ -240,12 +247,55 @@ impl DhTable {
             for field in row.fields() {
                 let _ = writeln!(text, "{} = {}", field.key, field.entry.to_toml());
             }
+            for (key, limits) in row.declared_limits() {
+                let _ = writeln!(text, "{key} = {limits:?}");
+            }
         }
         text
     }
 }
 
 impl Row {
+    /// This row where the joint of another one is.
+    fn with_joint_of(self, other: &Row) -> Row {
+        Row { joint: other.joint, limits_deg: other.limits_deg, limits_mm: other.limits_mm, ..self }
+    }
+
+    fn declared_limits(&self) -> impl Iterator<Item = (&'static str, [f64; 2])> {
+        let both = [("limits_deg", self.limits_deg), ("limits_mm", self.limits_mm)];
+        both.into_iter().filter_map(|(key, limits)| Some((key, limits?)))
+    }
+
+    /// Lowest and highest reading [rad], [m].
+    fn limits(&self) -> Option<[f64; 2]> {
+        let of = |unit, limits: Option<[f64; 2]>| limits.map(|l| l.map(|v| from_display(unit, v)));
+        of(Unit::Radian, self.limits_deg).or(of(Unit::Metre, self.limits_mm))
+    }
+
+    fn check_limits(&self, path: &Path) -> Result<(), ModelError> {
+        let own = match self.joint {
+            JointKind::Revolute => "limits_deg",
+            JointKind::Prismatic => "limits_mm",
+            JointKind::Fixed => "",
+        };
+        for (key, [low, high]) in self.declared_limits() {
+            let refuse = |value, expected| {
+                let key = format!("{}.{key}", self.name);
+                Err(ModelError::BadValue { path: path.to_owned(), key, value, expected })
+            };
+            if key != own {
+                return refuse(
+                    low,
+                    "limits_deg of a revolute joint, limits_mm of a prismatic one, none of a fixed one",
+                );
+            }
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                return refuse(high, "two finite numbers, the higher one after the lower one");
+            }
+        }
+        Ok(())
+    }
+
     fn fields(&self) -> impl Iterator<Item = Field<'_>> {
         let field = |key, quantity, unit, meaning, entry| Field { key, quantity, unit, meaning, entry };
         let (mm, deg) = (Unit::Metre, Unit::Radian);

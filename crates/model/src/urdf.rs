@@ -47,6 +47,7 @@ impl Chain {
             segments: Vec::new(),
             parameters: Vec::new(),
             joint_names: Vec::new(),
+            joint_limits: Vec::new(),
             source: Source::Urdf(Vec::new()),
         };
         let mut sources = Vec::new();
@@ -72,6 +73,14 @@ impl Chain {
         }
         Ok(self)
     }
+}
+
+/// What `<limit>` says of a joint that has ends; what cannot be an interval of readings says nothing.
+fn limits(joint: Node<'_, '_>) -> Option<[f64; 2]> {
+    let limit = child(joint, "limit").filter(|_| joint.attribute("type") != Some("continuous"))?;
+    let end = |name| limit.attribute(name)?.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let (low, high) = (end("lower")?, end("upper")?);
+    (low < high).then_some([low, high])
 }
 
 /// Parses XML; an error names the line.
@@ -204,6 +213,7 @@ impl<'a, 'x> Reader<'a, 'x> {
             parameters: end..end,
         });
         chain.joint_names.push(name.to_owned());
+        chain.joint_limits.push(limits(joint));
         Ok(source)
     }
 

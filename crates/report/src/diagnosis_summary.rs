@@ -3,7 +3,7 @@
 use crate::diagnosis_text::pasted;
 use armcal_core::Unit;
 use armcal_diagnose::{
-    BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, JudgedOn, NotTestable,
+    BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, JudgedOn, Nested, NotTestable,
     ParameterReport, ShapePoint, Unexplained, UnknownReport, Verdict,
 };
 use serde::Serialize;
@@ -34,6 +34,8 @@ pub(crate) struct DiagnosisSummary<'a> {
     sigma_ratio: f64,
     effects: &'a [FoundEffect],
     explanations: &'a [Explanation],
+    /// The choice made again without each part of the hold-out; `null` where it was not.
+    nested: Option<&'a Nested>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -98,6 +100,7 @@ impl<'a> DiagnosisSummary<'a> {
             sigma_ratio: d.noise.sigma_ratio,
             effects: &d.effects,
             explanations: &d.explanations,
+            nested: d.nested.as_ref(),
         }
     }
 }

@@ -78,6 +78,7 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
 pub(crate) fn brief(pen: &Pen, d: &Diagnosis) -> String {
     let mut text = pen.list(d.effects.iter().map(|e| ("-", found(e))));
     text.push_str(&pen.list(d.unlisted.iter().map(|u| ("-", unlisted(u)))));
+    text.push_str(&pen.list(d.nested.iter().map(|n| ("-", printable(&n.sentence())))));
     text.push_str(&pen.list(d.record_next.iter().map(|r| ("next:", printable(r)))));
     pen.section(&headline(d), text)
 }

@@ -15,6 +15,7 @@ mod pool;
 mod run;
 mod score;
 mod simulate;
+mod transfer;
 mod verify;
 mod view;
 
@@ -24,6 +25,7 @@ use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
 use crate::error::Error;
 use crate::stdout::print;
+use crate::transfer::Asked;
 use armcal_report::TerminalStyle;
 use std::borrow::Cow;
 use std::io::IsTerminal as _;
@@ -85,6 +87,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))
         }
         Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
+        Command::Transfer { from, to, effects, json } => transfer::run(&Asked { from, to, effects }, *json),
         Command::Verify { result, pipeline, out, json } => {
             verify::run(result, pipeline, out.as_deref(), *json)
         }

@@ -86,6 +86,9 @@ pub fn prepare<'a>(
     let chain = arms.geometry.chain();
     let si = |joint: usize, display: f64| display / chain.joint_unit(joint).to_display(1.0);
     let mut limits = Limits::none(arms.geometry.joint_count());
+    for (joint, (limit, recorded)) in limits.0.iter_mut().zip(&past.range_rad).enumerate() {
+        *limit = chain.joint_limits(joint, *recorded);
+    }
     for (joint, range) in &drive.ranges {
         limits.0[*joint] = range.map(|v| si(*joint, v));
     }

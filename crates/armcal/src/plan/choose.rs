@@ -311,8 +311,8 @@ fn sentence(pairs: &[Pair], deltas: &[f64], config: &DiagnosisConfig) -> String 
 
 fn assumptions(known: &Known<'_>, allowed: &Allowed) -> Vec<String> {
     let mut all = vec![format!(
-        "joints stay within the recorded range widened by {} deg (--margin), or what --range says; the way to a pose is not \
-         checked for collisions",
+        "joints stay within the recorded range widened by {} deg (--margin) as far as the model's joint limits allow, or what --range \
+         says; the way to a pose is not checked for collisions",
         allowed.margin_deg
     )];
     match known.tracked {

@@ -18,7 +18,7 @@ const ARRIVED_M: f64 = 1e-5;
 pub struct Limits(pub Vec<[f64; 2]>);
 
 impl Limits {
-    /// The recorded range of each joint, widened by the margin, or what the user says.
+    /// The recorded range of each joint, widened by the margin as far as the joint goes, or what the user says.
     pub fn of(known: &Known<'_>, allowed: &Allowed) -> Limits {
         let margin_rad = allowed.margin_deg.to_radians();
         let range = |joint: usize| {
@@ -29,7 +29,8 @@ impl Limits {
             let readings = known.observations.iter().filter_map(|o| o.joint_rad.get(joint));
             let [low, high] = readings
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
-            [low - margin_rad, high + margin_rad]
+            let [lowest, highest] = known.model.chain().joint_limits(joint, [low, high]);
+            [(low - margin_rad).max(lowest), (high + margin_rad).min(highest)]
         };
         Limits((0..known.model.joint_count()).map(range).collect())
     }

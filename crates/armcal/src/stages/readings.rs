@@ -13,8 +13,10 @@ const HELD: usize = 5;
 const HELD_NS: i64 = 200_000_000;
 const STEP_RAD: f64 = 0.1;
 const TIMES: usize = 5;
-/// Stamps of which most follow each other so many times as close as even ones would come in bursts.
+/// Stamps of which most follow each other so many times as close as even ones would come in bursts; faster than any robot
+/// sends its joints [ns], they are no clock's. A recorder that is switched on for each pose makes bursts of the usual rate.
 const BURST: f64 = 20.0;
+const TOO_FAST_NS: f64 = 1e5;
 /// Readings a dwell from which on their scatter says something.
 const MANY: usize = 10;
 /// A dwell whose joints read one value in this share of its readings does not scatter.
@@ -60,7 +62,7 @@ fn stamps(time_ns: &[i64], repeated: u64) -> Option<String> {
     }
     let between_ns: Vec<f64> = time_ns.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
     let (middle, mean) = (median(&between_ns), between_ns.iter().sum::<f64>() / between_ns.len() as f64);
-    (rows > MANY && middle < mean / BURST).then(|| {
+    (rows > MANY && middle < mean / BURST && middle < TOO_FAST_NS).then(|| {
         format!(
             "the stamps of the joints come in bursts, {:.3} ms apart where {:.0} ms would be even: they are of another time unit \
              or rounded",
@@ -192,6 +194,10 @@ mod tests {
         let microseconds: Vec<i64> =
             even.iter().map(|t| t / 1_000_000_000 * 1_000_000_000 + t % 1_000_000_000 / 1000).collect();
         assert!(stamps(&microseconds, 0).is_some_and(|why| why.contains("0.010 ms apart where 9 ms")));
+        // A recorder that is switched on for a second at each pose, a minute apart.
+        let paused: Vec<i64> =
+            even.iter().map(|t| t / 1_000_000_000 * 60_000_000_000 + t % 1_000_000_000).collect();
+        assert_eq!(stamps(&paused, 0), None);
     }
 
     #[test]

@@ -14,10 +14,9 @@ use crate::progress::Progress;
 use crate::stages::past::{Placed, place};
 use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe, perceive};
-use armcal_calibrate::fit_frames_from;
-use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
-use armcal_model::{Chain, Model};
-use armcal_report::{PastModel, PathSample, TipMount, Verification, VerifiedRecording};
+use armcal_core::{Observation, Severity, Warning};
+use armcal_model::Chain;
+use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -133,9 +132,6 @@ struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     /// The calibrated model in its place, and the dwells in theirs.
-    ///
-    /// Frames that nobody could know without these dwells (a board or a base whose pose is estimated; an estimated tip that
-    /// was mounted anew) are fitted to them, for both arms, which are left alone.
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
@@ -145,11 +141,11 @@ impl Surroundings<'_> {
             placed = place(self.past, self.result, self.pipeline, &model)?;
         }
         let mut observations = self.observations(&places)?;
-        let fitted = self.fit_frames(&mut placed, &observations)?;
+        let fitted = placed.fit_frames(self.pipeline, &observations)?;
         if fitted.iter().any(|w| w.code == "frame-fitted-on-verification") {
             places = self.associate(&placed, true)?;
             observations = self.observations(&places)?;
-            self.fit_frames(&mut placed, &observations)?;
+            placed.fit_frames(self.pipeline, &observations)?;
         }
         Ok((placed, observations, fitted))
     }
@@ -162,44 +158,4 @@ impl Surroundings<'_> {
     fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {
         Ok(observe::observations(self.pipeline, self.board, self.seen, places)?.observations)
     }
-
-    fn fit_frames(&self, placed: &mut Placed, observations: &[Observation]) -> Result<Vec<Warning>, Error> {
-        let (model, fit) = (&placed.model, &self.pipeline.fit);
-        let kept = self.pipeline.verify.tip == TipMount::Kept;
-        let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        let fitted = |p: &Parameter| estimated(p) && !(kept && p.name.starts_with("tip."));
-        let mut said = Vec::new();
-        if model.parameters().iter().any(fitted) {
-            placed.nominal = fit_frames_from(model, observations, placed.nominal.clone(), fit, &fitted)?;
-            placed.calibrated =
-                fit_frames_from(model, observations, placed.calibrated.clone(), fit, &fitted)?;
-            said.push(frames_fitted(&frames_of(model, &fitted)));
-        }
-        if !frames_of(model, &|p| estimated(p) && !fitted(p)).is_empty() {
-            said.push(tip_kept());
-        }
-        Ok(said)
-    }
-}
-
-/// Names of the frames of which a parameter is chosen.
-fn frames_of(model: &Model, chosen: &dyn Fn(&Parameter) -> bool) -> Vec<String> {
-    let chosen = model.parameters().iter().filter(|p| chosen(p));
-    chosen.filter_map(|p| p.name.strip_suffix(".x").map(str::to_owned)).collect()
-}
-
-fn notice(code: &'static str, subject: String, message: &str) -> Warning {
-    Warning::new(Severity::Notice, Stage::Calibrate, code, subject, message.to_owned())
-}
-
-fn frames_fitted(frames: &[String]) -> Warning {
-    let message = "nobody knows this beforehand: fitted to the dwells that are judged, for the nominal and the calibrated \
-                   arm alike; the arms themselves are left alone";
-    notice("frame-fitted-on-verification", frames.join(", "), message)
-}
-
-fn tip_kept() -> Warning {
-    let message = "as the calibration recordings gave it, to the nominal and to the calibrated arm; if tool or target were \
-                   mounted anew since, set tip = \"remounted\" in [verify]";
-    notice("tip-kept", "tip".to_owned(), message)
 }

@@ -49,6 +49,37 @@ fn calibrated_tables_read_back() {
     }
 }
 
+const SLIDE: &str = "name = \"a\"\n[[rows]]\nname = \"j\"\njoint = \"prismatic\"\ntheta_deg = 0\nd_mm = 0\na_mm = 0\nalpha_deg = 0\n";
+
+#[test]
+fn limits_of_joints_come_from_either_file_and_what_was_recorded_is_within_them() {
+    let ur10 = dh(UR10);
+    assert_eq!(ur10.joint_limits(5, [-1.0, 1.0]), [-std::f64::consts::TAU, std::f64::consts::TAU]);
+    assert_eq!(ur10.joint_limits(5, [-1.0, 7.0]), [-std::f64::consts::TAU, 7.0]);
+    let slide = dh(&format!("{SLIDE}limits_mm = [-5, 250]\n"));
+    assert_eq!(slide.joint_limits(0, [0.0, 0.1]), [-0.005, 0.25]);
+    assert_eq!(dh(SLIDE).joint_limits(0, [0.0, 0.1]), [f64::NEG_INFINITY, f64::INFINITY]);
+    for (wrong, said) in [
+        ("limits_mm = [250, -5]", "j.limits_mm = -5"),
+        ("limits_deg = [-5, 5]", "j.limits_deg = -5"),
+        ("limits_mm = [0, inf]", "two finite numbers"),
+    ] {
+        let error = dh_error(&format!("{SLIDE}{wrong}\n"));
+        assert!(error.contains(said), "{error}");
+    }
+    let urdf = |limit: &str| {
+        let xml = format!(
+            "<robot name=\"a\"><link name=\"base\"/><link name=\"hand\"/><joint name=\"j\" type=\"revolute\"><parent link=\"base\"/>\
+             <child link=\"hand\"/><axis xyz=\"0 0 1\"/>{limit}</joint></robot>"
+        );
+        let chain = Chain::from_urdf(&xml, "base", "hand", Path::new("arm.urdf")).expect("a chain");
+        chain.joint_limits(0, [0.0, 0.0])
+    };
+    assert_eq!(urdf("<limit lower=\"-2.9\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/>"), [-2.9, 1.5]);
+    // The placeholder of many generated files is no interval of readings.
+    assert_eq!(urdf("<limit lower=\"0\" upper=\"0\"/>"), [f64::NEG_INFINITY, f64::INFINITY]);
+}
+
 #[test]
 fn faulty_tables_are_refused_with_line_or_key() {
     let row = |entry: &str| {

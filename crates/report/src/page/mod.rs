@@ -29,7 +29,7 @@ use crate::text::millimetres;
 use crate::{ReportError, conclusion};
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
-use armcal_diagnose::FoundEffect;
+use armcal_diagnose::{FoundEffect, Nested};
 use armcal_model::find;
 use askama::Template;
 use document::Document;
@@ -148,7 +148,10 @@ fn verdict(run: &Run) -> Verdict {
     };
     Verdict {
         sentence: run.answer().sentence,
-        found: d.effects.iter().map(|e| found(run, e)).chain(d.unlisted.iter().map(unlisted)).collect(),
+        found: (d.effects.iter().map(|e| found(run, e)))
+            .chain(d.unlisted.iter().map(unlisted))
+            .chain(d.nested.iter().map(Nested::sentence))
+            .collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
         next: d.record_next.clone(),
         same: d.cannot_tell_apart.clone(),

@@ -3,9 +3,9 @@
 use super::{TURNS_RAD, mistake, possible, spread};
 use crate::setup::trial::Inputs;
 use crate::stages::perceive::Seen;
-use armcal_core::SetupFinding;
+use armcal_core::{Dwell, SetupFinding};
 
-/// A joint that moved less than this over all dwells did not move [rad].
+/// Values nearer to each other than this are one [rad].
 const STUCK_RAD: f64 = 2e-4;
 /// Fewest dwells in a row that make a joint stuck.
 const MANY_STILL: usize = 8;
@@ -114,45 +114,64 @@ fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f6
     (many && there.iter().any(turned)).then_some((there.len(), sign * end))
 }
 
-/// Joints that did not move while others did.
+/// Joints whose readings did not change while others turned. What an encoder reads of a joint that is held jitters as those
+/// of other joints do; where none does, a joint that nobody moved reads as one that is stuck.
 pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
     let names = inputs.chain.joint_names();
     let others_move = (0..names.len()).any(|j| spread(inputs.dwells().map(|d| d.joint_rad[j])) > TURNS_RAD);
-    let read_rad: Vec<Vec<&[f64]>> =
-        inputs.seen.iter().map(|s| s.dwells.iter().map(|d| &d.joint_rad[..]).collect()).collect();
     let mut all = Vec::new();
     for (j, name) in names.iter().enumerate().filter(|_| others_move) {
-        let still = inputs.seen.iter().zip(&read_rad).map(|(s, read)| (s, longest_still(read, j)));
-        let Some((recording, still)) = still.max_by_key(|(_, n)| *n) else { continue };
-        if still < MANY_STILL.max(recording.dwells.len() / 4) {
+        let still = inputs.seen.iter().map(|s| (s, longest_still(&s.dwells, j)));
+        let Some((recording, still)) = still.max_by_key(|(_, dwells)| dwells.len()) else { continue };
+        if still.len() < MANY_STILL.max(recording.dwells.len() / 4) {
             continue;
         }
-        all.push(mistake(
-            "joint-stuck",
-            format!("joint {} ({name})", j + 1),
-            format!(
-                "joint {} ({name}) reads the same in {still} dwells in a row of `{}` (of {}) while others move: its reading \
-                 is stuck, or read from the wrong field; mend the stream of the joints or the driver",
-                j + 1,
-                recording.name,
-                recording.dwells.len()
+        let seen = format!(
+            "joint {} ({name}) reads the same in {} dwells in a row of `{}` (of {}) while others move",
+            j + 1,
+            still.len(),
+            recording.name,
+            recording.dwells.len()
+        );
+        let subject = format!("joint {} ({name})", j + 1);
+        all.push(match still.iter().any(|d| d.joint_spread_rad.iter().any(|s| *s > EXACT_RAD)) {
+            true => mistake(
+                "joint-stuck",
+                subject,
+                format!(
+                    "{seen}, without the jitter of their readings: its reading is stuck, or read from the wrong field; mend \
+                     the stream of the joints or the driver"
+                ),
             ),
-        ));
+            false => possible(
+                "joint-stuck",
+                subject,
+                format!(
+                    "{seen}: it was not moved, or its reading is stuck or read from the wrong field; these readings have no \
+                     jitter by which to tell"
+                ),
+            ),
+        });
     }
     all
 }
 
-/// The most dwells in a row in which a joint reads the same while another one turns; of each dwell its joints [rad].
-fn longest_still(read_rad: &[&[f64]], joint: usize) -> usize {
-    let (mut longest, mut from) = (0, 0);
-    for i in 1..=read_rad.len() {
-        let first = read_rad[from];
-        if read_rad.get(i).is_some_and(|q| (q[joint] - first[joint]).abs() < STUCK_RAD) {
+/// The most dwells in a row in which the reading of a joint does not change while another one turns.
+fn longest_still(dwells: &[Dwell], joint: usize) -> &[Dwell] {
+    let (mut longest, mut from) = (&dwells[..0], 0);
+    for i in 1..=dwells.len() {
+        let first = &dwells[from];
+        let same = |d: &Dwell| {
+            (d.joint_rad[joint] - first.joint_rad[joint]).abs() < EXACT_RAD
+                && d.joint_spread_rad[joint] < EXACT_RAD
+        };
+        if dwells.get(i).is_some_and(same) {
             continue;
         }
-        let turned = |q: &&[f64]| q.iter().zip(first).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        if read_rad[from..i].iter().map(turned).fold(0.0, f64::max) > TURNS_RAD {
-            longest = longest.max(i - from);
+        let turned =
+            |d: &Dwell| d.joint_rad.iter().zip(&first.joint_rad).any(|(a, b)| (a - b).abs() > TURNS_RAD);
+        if i - from > longest.len() && dwells[from..i].iter().any(turned) {
+            longest = &dwells[from..i];
         }
         from = i;
     }
@@ -162,15 +181,37 @@ fn longest_still(read_rad: &[&[f64]], joint: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use armcal_core::{Arrival, DwellId};
+
+    fn dwell(joint_rad: &[f64], spread_rad: f64) -> Dwell {
+        Dwell {
+            id: DwellId { recording: 0, dwell: 0 },
+            start_ns: 0,
+            end_ns: 1,
+            joint_rad: joint_rad.to_vec(),
+            joint_spread_rad: vec![spread_rad; joint_rad.len()],
+            joint_sigma_rad: vec![1e-6; joint_rad.len()],
+            effort_nm: None,
+            samples: 10,
+            effective_samples: 10.0,
+            arrival: vec![Arrival::Unknown; joint_rad.len()],
+            path_memory_rad: Vec::new(),
+            pair_memory_rad: Vec::new(),
+            tip: None,
+            temperature_c: None,
+        }
+    }
 
     #[test]
     fn a_joint_is_still_only_while_another_one_turns() {
-        let turns: Vec<[f64; 2]> =
-            (0..20).map(|i| [0.1 * f64::from(i), if i < 12 { 0.5 } else { 0.7 }]).collect();
-        let read: Vec<&[f64]> = turns.iter().map(|q| &q[..]).collect();
-        assert_eq!(longest_still(&read, 0), 0, "it turns all the time");
-        assert_eq!(longest_still(&read, 1), 12);
-        assert_eq!(longest_still(&[&[0.3, 0.5][..]; 9], 1), 0, "nothing moved");
+        let second = |i: u32| if i < 12 { 0.5 } else { 0.7 };
+        let turns = |jitter_rad| -> Vec<Dwell> {
+            (0..20).map(|i| dwell(&[0.1 * f64::from(i), second(i)], jitter_rad)).collect()
+        };
+        assert_eq!(longest_still(&turns(0.0), 0).len(), 0, "it turns all the time");
+        assert_eq!(longest_still(&turns(0.0), 1).len(), 12);
+        assert_eq!(longest_still(&turns(1e-5), 1).len(), 0, "an encoder lives");
+        assert_eq!(longest_still(&vec![dwell(&[0.3, 0.5], 0.0); 9], 1).len(), 0, "nothing moved");
     }
 
     #[test]

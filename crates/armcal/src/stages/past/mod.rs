@@ -1,9 +1,11 @@
 //! A calibrated model of an earlier run among the frames of other recordings.
 
+mod fitted;
+
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use armcal_core::{Observation, Pose, Role, Severity, Stage, Warning};
-use armcal_model::{EffectSpec, Family, Model, catalogue};
+use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
 use armcal_report::{PastArms, PastModel, TipMount};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -60,14 +62,27 @@ pub fn place(
     pipeline: &Pipeline,
     surroundings: &Model,
 ) -> Result<Placed, Error> {
-    let then = past.arms()?;
+    place_arms(&past.arms()?, past.session(), result, pipeline, surroundings)
+}
+
+/// The same of arms at hand; `origin` is the file they come from.
+///
+/// # Errors
+/// As [`place`].
+pub fn place_arms(
+    then: &PastArms,
+    session: &Session,
+    origin: &Path,
+    pipeline: &Pipeline,
+    surroundings: &Model,
+) -> Result<Placed, Error> {
     let mut warnings = Vec::new();
     let specs = then.model.effects().iter().map(|e| e.spec.clone());
     let lasting: Vec<EffectSpec> = specs.filter(|s| lasts(s, &mut warnings)).collect();
     let model = if lasting.is_empty() {
         surroundings.clone()
     } else {
-        surroundings.with_effects(&lasting, past.session())?
+        surroundings.with_effects(&lasting, session)?
     };
     let mut nominal = model.nominal();
     let mut calibrated = nominal.clone();
@@ -76,13 +91,13 @@ pub fn place(
             continue;
         }
         let known = then.model.index(&parameter.name).ok_or_else(|| Error::NotInResult {
-            result: result.to_owned(),
+            result: origin.to_owned(),
             parameter: parameter.name.clone(),
         })?;
         let nominal_then = then.model.parameters()[known].nominal;
         if parameter.role == Role::Robot && (nominal_then - parameter.nominal).abs() > 1e-9 {
             return Err(Error::OtherArm {
-                result: result.to_owned(),
+                result: origin.to_owned(),
                 parameter: parameter.name.clone(),
                 then: nominal_then,
                 now: parameter.nominal,
@@ -94,8 +109,8 @@ pub fn place(
         put_frame(&model, "tip", &then.geometry.tip_in_last_link(&then.nominal_values), &mut nominal);
         put_frame(&model, "tip", &then.model.tip_in_last_link(&then.values), &mut calibrated);
     }
-    warnings.extend(tip_overruled(&then, pipeline, &model));
-    put_frame(&model, "base", &base(&then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
+    warnings.extend(tip_overruled(then, pipeline, &model));
+    put_frame(&model, "base", &base(then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
     Ok(Placed { model, nominal, calibrated, warnings })
 }
 
@@ -114,7 +129,7 @@ fn tip_overruled(then: &PastArms, pipeline: &Pipeline, model: &Model) -> Option<
 }
 
 /// Whether an effect holds beyond the recordings it was fitted on; what time does to it is doubtful.
-fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
+pub fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
     let mut say = |code, message: &str| {
         warnings.push(Warning::new(
             Severity::Notice,

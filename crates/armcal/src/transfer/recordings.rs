@@ -1,5 +1,6 @@
 //! Does what was learnt in all recordings but one help in that one? Effect by effect.
 
+use super::{harms, verdict};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -22,7 +23,7 @@ pub struct Transfer {
 impl Transfer {
     /// Whether it raises the error of recordings that it was not fitted to, by more than chance.
     pub fn harms(&self) -> bool {
-        self.held_out.as_ref().is_some_and(|h| h.change_ci95[0] > 0.0)
+        self.held_out.as_ref().is_some_and(harms)
     }
 
     /// In one sentence.
@@ -31,15 +32,13 @@ impl Transfer {
             return format!("{} is an event: no other recording can tell whether it happened", self.effect);
         };
         let [low, high] = h.change_ci95;
-        let verdict = match (high < 0.0, low > 0.0) {
-            (true, _) => "it helps there",
-            (_, true) => "it does harm there",
-            _ => "no more than chance",
-        };
         format!(
             "{} fitted without each recording in turn changes the mean error there from {:.3} to {:.3} mm \
-             (95 % {low:+.3} to {high:+.3}): {verdict}",
-            self.effect, h.before, h.after
+             (95 % {low:+.3} to {high:+.3}): {}",
+            self.effect,
+            h.before,
+            h.after,
+            verdict(h)
         )
     }
 }
