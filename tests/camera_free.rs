@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, root, run_pipeline};
+use crate::support::{armcal, number, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::Path;
 
@@ -30,13 +30,9 @@ fn the_cameras_recordings_verify_what_the_table_taught() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out");
     run_pipeline(&root().join("pipelines/paper-camera-free.toml"), &out, &[0]);
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join("paper-verify.toml")).expect("pipeline");
+    let text = shipped("paper-verify.toml");
     let base = text.find("[frames.base]").expect("its base");
-    let text = format!("{}[frames.base]\npose = \"estimated\"\n", &text[..base])
-        .replace("\"../fixtures", &format!("\"{}/../fixtures", pipelines.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let text = format!("{}[frames.base]\npose = \"estimated\"\n", &text[..base]);
     let verifying = folder.path().join("verifying.toml");
     std::fs::write(&verifying, text).expect("pipeline");
     let output = armcal([Path::new("verify"), &out, &verifying, Path::new("--json")]);

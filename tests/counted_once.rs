@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, quick_pipeline, read_json, root, run_pipeline};
+use crate::support::{armcal, number, quick_pipeline, read_json, root, run_pipeline, shipped};
 use armcal_recording::Recording;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -116,11 +116,7 @@ fn a_recording_listed_twice_in_any_shape_is_refused_wherever_recordings_are_read
 #[test]
 fn a_recording_of_two_arms_listed_twice_is_refused() {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let text = std::fs::read_to_string(root().join("pipelines/two-arms.toml")).expect("pipeline");
-    let pipelines = root().join("pipelines");
-    let text = text
-        .replace("\"../fixtures", &format!("\"{}/../fixtures", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let text = shipped("two-arms.toml");
     let (_, rest) = text.split_once("paths = [\"").expect("a recording");
     let (source, _) = rest.split_once('"').expect("its path");
     let copy = rewritten(Path::new(source), 0.0..2.0, &folder.path().join("copy.mcap"), None);

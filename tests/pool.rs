@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, read_json, root, run_pipeline};
+use crate::support::{armcal, number, read_json, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -44,9 +44,8 @@ fn simulate(folder: &Path, days: &[(&str, f64, f64)]) {
 }
 
 /// A shipped pipeline on some of the days, without diagnosis; `more` is appended.
-fn pipeline(shipped: &str, folder: &Path, days: &[(&str, f64, f64)], more: &str) -> String {
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join(shipped)).expect("pipeline");
+fn pipeline(name: &str, folder: &Path, days: &[(&str, f64, f64)], more: &str) -> String {
+    let text = shipped(name);
     let (_, behind) = text.split_once("[streams.joints]").expect("streams");
     let (sections, _) = behind.split_once("[check]").unwrap_or((behind, ""));
     let mut own = String::from("name = \"week\"\n");
@@ -56,9 +55,6 @@ fn pipeline(shipped: &str, folder: &Path, days: &[(&str, f64, f64)], more: &str)
             "[[recordings]]\npaths = [{path:?}]\ntilt = {{ roll_deg = {roll_deg:?}, pitch_deg = {pitch_deg:?} }}\n"
         );
     }
-    let sections = sections
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
     format!(
         "{own}\n[streams.joints]{sections}\n[diagnosis]\nenabled = false\n[output]\ninput = \"reference\"\n{more}"
     )

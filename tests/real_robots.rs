@@ -1,4 +1,4 @@
-use crate::support::{number, real_recordings, root, run_pipeline};
+use crate::support::{number, real_recordings, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -80,15 +80,12 @@ fn assert_sound(summary: &Value) {
 
 /// A shipped pipeline without what it declares of the arm's deviations, beside its files.
 fn without_priors(pipeline: &str, folder: &Path) -> PathBuf {
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join(pipeline)).expect("pipeline");
+    let text = shipped(pipeline);
     let from = text.find("[model.deviation]").expect("a declared deviation");
     let to = text.find("[frames.tip]").expect("a tip");
-    let text = format!("{}{}", &text[..from], &text[to..])
-        .replace("\"../", &format!("\"{}/../", pipelines.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()));
     let own = folder.join(pipeline);
-    std::fs::write(&own, format!("{text}\n[diagnosis]\nenabled = false\n")).expect("pipeline");
+    let (before, behind) = (&text[..from], &text[to..]);
+    std::fs::write(&own, format!("{before}{behind}\n[diagnosis]\nenabled = false\n")).expect("pipeline");
     own
 }
 
@@ -127,10 +124,7 @@ fn ur10_seen_by_a_laser_tracker() {
     if real_recordings().is_none() {
         return;
     }
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join("ur10-tracker.toml")).expect("pipeline");
-    let text = text.replace("\"../../shared", &format!("\"{}/../../shared", pipelines.display()));
-    let text = text.replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let text = shipped("ur10-tracker.toml");
     let out = tempfile::tempdir().expect("temporary folder");
     let own = out.path().join("ur10.toml");
     std::fs::write(&own, format!("{text}\n[diagnosis]\nenabled = false\n")).expect("pipeline");

@@ -1,8 +1,8 @@
-use crate::support::{armcal, number, real_recordings, root, run_pipeline, skip};
+use crate::support::{armcal, number, real_recordings, root, run_pipeline, shipped, skip};
 use std::path::{Path, PathBuf};
 
 /// Every pipeline of `pipelines/`, in order.
-fn shipped() -> Vec<PathBuf> {
+fn all_shipped() -> Vec<PathBuf> {
     let entries = std::fs::read_dir(root().join("pipelines")).expect("pipelines");
     let paths = entries.map(|entry| entry.expect("entry").path());
     let mut all: Vec<PathBuf> = paths.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
@@ -51,7 +51,7 @@ fn needs_more_than_a_clone(pipeline: &Path) -> bool {
 #[test]
 fn every_shipped_pipeline_runs() {
     let mut from_a_clone = Vec::new();
-    for pipeline in shipped() {
+    for pipeline in all_shipped() {
         let name = pipeline.file_name().expect("a name").to_string_lossy().into_owned();
         if needs_more_than_a_clone(&pipeline) {
             if real_recordings().is_none() {
@@ -64,13 +64,8 @@ fn every_shipped_pipeline_runs() {
         let out = tempfile::tempdir().expect("temporary folder");
         let mut ran = pipeline.clone();
         if name == "ur10-tracker.toml" {
-            let folder = root().join("pipelines");
-            let here = |text: String| {
-                let text = text.replace("\"../../shared", &format!("\"{}/../../shared", folder.display()));
-                text.replace("\"models/", &format!("\"{}/models/", folder.display()))
-            };
             ran = out.path().join(&name);
-            let own = here(text(&pipeline)) + "\n[diagnosis]\nenabled = false\n";
+            let own = shipped(&name) + "\n[diagnosis]\nenabled = false\n";
             std::fs::write(&ran, own).expect("pipeline");
         }
         let summary = run_pipeline(&ran, &out.path().join("out"), &[0, 3]);
@@ -93,7 +88,7 @@ fn every_shipped_pipeline_runs() {
 /// A file that every clone has: recordings that are fetched are big, and would end in the repository by mistake.
 #[test]
 fn pipelines_that_run_from_a_clone_name_files_of_the_repository_alone() {
-    for pipeline in shipped().into_iter().filter(|p| !needs_more_than_a_clone(p)) {
+    for pipeline in all_shipped().into_iter().filter(|p| !needs_more_than_a_clone(p)) {
         for file in files_named(&pipeline) {
             let path = root().join("pipelines").join(&file);
             assert!(path.is_file(), "{}: {}", pipeline.display(), file.display());
@@ -111,7 +106,7 @@ fn pipelines_that_run_from_a_clone_name_files_of_the_repository_alone() {
 /// In a folder where nothing of what they name is, as in a clone: the message names the file, and what to fetch to where.
 #[test]
 fn pipelines_that_need_more_say_so_and_what_to_fetch() {
-    let needing: Vec<PathBuf> = shipped().into_iter().filter(|p| needs_more_than_a_clone(p)).collect();
+    let needing: Vec<PathBuf> = all_shipped().into_iter().filter(|p| needs_more_than_a_clone(p)).collect();
     assert_eq!(needing.len(), 3);
     for pipeline in needing {
         let comment: String = text(&pipeline).lines().take_while(|line| line.starts_with('#')).collect();

@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, root, run_pipeline};
+use crate::support::{armcal, number, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::Path;
 
@@ -57,12 +57,7 @@ fn what_cannot_judge_is_refused() {
     let (normal, verify) = (pipelines("paper-normal.toml"), pipelines("paper-verify.toml"));
     refused(&normal, &pipelines("paper.toml"), "", 1, &["normal"]);
     refused(&normal, &verify, "backlsh:1", 2, &["backlash"]);
-    let text = std::fs::read_to_string(&verify).expect("pipeline");
-    let folder_of = root().join("pipelines");
-    let other = text
-        .replace("\"../fixtures", &format!("\"{}/../fixtures", folder_of.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", folder_of.display()))
-        .replace("\"models/right_arm", &format!("\"{}/models/left_arm", folder_of.display()));
+    let other = shipped("paper-verify.toml").replace("models/right_arm", "models/left_arm");
     let path = folder.path().join("other.toml");
     std::fs::write(&path, other).expect("pipeline");
     // The setup of that session contradicts its data, or the arms differ by name: no sentence about effects.

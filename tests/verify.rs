@@ -1,5 +1,5 @@
 use crate::support::browser::{browser, scripted};
-use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, shipped};
 use crate::transfer::transfer;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -183,16 +183,10 @@ fn a_board_nobody_measured_is_placed_by_its_dwells() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out");
     run_pipeline(&root().join("pipelines/paper-normal.toml"), &out, &[0]);
-    let text = std::fs::read_to_string(root().join("pipelines/paper-verify.toml")).expect("pipeline");
-    let pipelines = root().join("pipelines");
-    let text = text
-        .replace("\"../fixtures", &format!("\"{}/../fixtures", pipelines.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()))
-        .replace(
-            "pose = \"measured\"                        # Vicon sees markers on the board",
-            "pose = \"estimated\" # ",
-        );
+    let text = shipped("paper-verify.toml").replace(
+        "pose = \"measured\"                        # Vicon sees markers on the board",
+        "pose = \"estimated\" # ",
+    );
     assert!(text.contains("pose = \"estimated\""));
     let camera_free = folder.path().join("camera-free.toml");
     std::fs::write(&camera_free, text).expect("pipeline");
@@ -221,12 +215,7 @@ fn another_arm_is_refused_by_the_parameter_that_differs() {
 
 /// The pipeline of the shipped verification, usable from any folder, with more appended.
 fn verifying(folder: &Path, name: &str, more: &str) -> PathBuf {
-    let text = std::fs::read_to_string(root().join("pipelines/paper-verify.toml")).expect("pipeline");
-    let pipelines = root().join("pipelines");
-    let text = text
-        .replace("\"../fixtures", &format!("\"{}/../fixtures", pipelines.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
+    let text = shipped("paper-verify.toml");
     let path = folder.join(format!("{name}.toml"));
     std::fs::write(&path, format!("{text}\n{more}")).expect("pipeline");
     path

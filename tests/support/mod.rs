@@ -65,25 +65,30 @@ pub fn files_made(command: &mut Command, out: &Path) -> BTreeMap<String, Vec<u8>
         .collect()
 }
 
+/// The text of a shipped pipeline, usable from any folder: its files are found where they are.
+pub fn shipped(name: &str) -> String {
+    let pipelines = root().join("pipelines");
+    let text = std::fs::read_to_string(pipelines.join(name)).expect("a shipped pipeline");
+    ["../", "boards/", "models/"].iter().fold(text, |text, beside| {
+        text.replace(&format!("\"{beside}"), &format!("\"{}/{beside}", pipelines.display()))
+    })
+}
+
+/// The same, its recordings of the paper's rig looked for in `recordings`.
+fn shipped_on(name: &str, recordings: &Path) -> String {
+    let fixtures = format!("\"{}/../fixtures/paper/", root().join("pipelines").display());
+    shipped(name).replace(&fixtures, &format!("\"{}/", recordings.display()))
+}
+
 /// The text of `pipelines/paper.toml`, usable from any folder, its recordings looked for in `recordings`.
 pub fn paper_pipeline(recordings: &Path) -> String {
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join("paper.toml")).expect("pipeline");
-    text.replace("\"../fixtures/paper/", &format!("\"{}/", recordings.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()))
+    shipped_on("paper.toml", recordings)
 }
 
 /// The text of `pipelines/paper-normal.toml` without its diagnosis, usable from any folder, its recording looked for in
 /// `recordings`.
 pub fn quick_pipeline(recordings: &Path) -> String {
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join("paper-normal.toml")).expect("pipeline");
-    let text = text
-        .replace("\"../fixtures/paper/", &format!("\"{}/", recordings.display()))
-        .replace("\"boards/", &format!("\"{}/boards/", pipelines.display()))
-        .replace("\"models/", &format!("\"{}/models/", pipelines.display()));
-    text + "\n[diagnosis]\nenabled = false\n"
+    shipped_on("paper-normal.toml", recordings) + "\n[diagnosis]\nenabled = false\n"
 }
 
 /// Runs a pipeline; panics with its words unless it exits with one of `codes`. Returns `summary.json`.

@@ -223,11 +223,8 @@ impl Settled {
         found: &Diagnosis,
         progress: &Progress,
     ) -> Result<Option<Nested>, Error> {
-        progress.step("choosing again without each part of the hold-out");
         let Fitted { model, calibration, observations, .. } = &self.fitted;
-        let session = frames::session(pipeline, observations);
-        let calibrated = calibrated(pipeline, model, calibration, observations, &session);
-        Ok(nested(&calibrated, found, &pipeline.diagnosis)?)
+        chosen_again(pipeline, (model, calibration, observations), found, progress)
     }
 
     /// Everything for the report.
@@ -293,10 +290,8 @@ fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
         );
         diagnosis.chosen_again(Err(why));
     } else {
-        progress.step("choosing again without each part of the hold-out");
-        let Run { model, calibration, observations, session, .. } = &*run;
-        let calibrated = calibrated(pipeline, model, calibration, observations, session);
-        match nested(&calibrated, &diagnosis, &pipeline.diagnosis) {
+        let Run { model, calibration, observations, .. } = &*run;
+        match chosen_again(pipeline, (model, calibration, observations), &diagnosis, progress) {
             Ok(Some(nested)) => diagnosis.chosen_again(Ok(nested)),
             Ok(None) => {}
             Err(e) => diagnosis.chosen_again(Err(e.to_string())),
@@ -389,6 +384,18 @@ fn diagnosis(
     let session = frames::session(pipeline, observations);
     let calibrated = calibrated(pipeline, model, calibration, observations, &session);
     Ok(Some(diagnose(&calibrated, &pipeline.diagnosis)?))
+}
+
+/// The choice of what was found, made again without each part of the hold-out.
+fn chosen_again(
+    pipeline: &Pipeline,
+    (model, calibration, observations): (&Model, &Calibration, &[Observation]),
+    found: &Diagnosis,
+    progress: &Progress,
+) -> Result<Option<Nested>, Error> {
+    progress.step("choosing again without each part of the hold-out");
+    let session = frames::session(pipeline, observations);
+    Ok(nested(&calibrated(pipeline, model, calibration, observations, &session), found, &pipeline.diagnosis)?)
 }
 
 fn calibrated<'a>(

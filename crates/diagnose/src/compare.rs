@@ -1,8 +1,8 @@
 //! Before against after, on dwells that neither fit saw.
 
-use crate::HeldOut;
 use crate::config::DiagnosisConfig;
 use crate::crossval::sign_flip;
+use crate::held_out::HeldOut;
 use armcal_calibrate::{Calibration, grouped_ci95};
 use armcal_core::{DwellId, Observation};
 use std::collections::{BTreeMap, BTreeSet};

@@ -159,7 +159,7 @@ fn confirms(
     let worth = gain_m > WORTH_NAMING * before.noise_floor_m;
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
     match compare_heldout(before, after, observations, config) {
-        Some(held) => (worth && held.change_ci95[1] < 0.0) || (fitted && gain_m >= 0.0),
+        Some(held) => (worth && held.helps()) || (fitted && gain_m >= 0.0),
         None => worth,
     }
 }

@@ -5,6 +5,7 @@
 //! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
 
 use crate::config::DiagnosisConfig;
+use crate::held_out::HeldOut;
 use crate::places::units;
 use crate::problem::Problem;
 use crate::projection::cholesky_upper;
@@ -14,7 +15,6 @@ use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Prior precision of an effect's amplitude while it is fitted: ten typical sizes.
@@ -147,23 +147,6 @@ pub(crate) fn norms_m(problem: &Problem, rows: &DVector<f64>) -> Vec<f64> {
             (d.metres * Vector3::new(rows[d.first_row], rows[d.first_row + 1], rows[d.first_row + 2])).norm()
         })
         .collect()
-}
-
-/// What an effect does to errors on groups the fit did not see.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct HeldOut {
-    /// Mean error without it [mm].
-    pub before: f64,
-    /// Mean error with it [mm].
-    pub after: f64,
-    /// 95 % interval of the mean change (after - before) over groups [mm].
-    pub change_ci95: [f64; 2],
-    /// Relative fall of the squared whitened error, 0 to 1; below 0 it grew.
-    pub gain: f64,
-    /// Sign-flip p-value that the fall is chance.
-    pub p: f64,
-    /// Number of groups.
-    pub groups: usize,
 }
 
 /// What `effect` columns do to errors on the groups, each predicted without itself. Where the noise remembers, whether

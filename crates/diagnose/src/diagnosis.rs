@@ -2,8 +2,8 @@
 
 use crate::combination::Combination;
 use crate::contrasts::Contrast;
-use crate::crossval::HeldOut;
 use crate::error_places::ErrorPlace;
+use crate::held_out::HeldOut;
 use crate::nested::Nested;
 use crate::noise::Noise;
 use crate::structure::Structure;

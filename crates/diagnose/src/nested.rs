@@ -7,7 +7,7 @@
 
 use crate::compare::{compare_errors, held_out_errors_m};
 use crate::config::DiagnosisConfig;
-use crate::crossval::HeldOut;
+use crate::held_out::HeldOut;
 use crate::observed::{Calibrated, diagnose};
 use crate::{DiagnoseError, Diagnosis};
 use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
@@ -44,13 +44,10 @@ impl Nested {
         self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
         let chosen: Vec<String> =
             counts.iter().map(|(names, count)| format!("{names} in {count} of {turns}")).collect();
-        let [low, high] = self.held_out.change_ci95;
         format!(
-            "chosen without the held-out points ({}), it changes the mean error there from {:.3} to {:.3} mm (95 % {low:+.3} to \
-             {high:+.3}); chosen with them, to {:.3} mm",
+            "chosen without the held-out points ({}), it {}; chosen with them, to {:.3} mm",
             chosen.join(", "),
-            self.held_out.before,
-            self.held_out.after,
+            self.held_out.change_text(),
             self.chosen_on_all_mm
         )
     }
@@ -72,7 +69,8 @@ pub fn nested(
     let done: Vec<Result<Turn, DiagnoseError>> =
         turns.par_iter().map(|held| turn(calibrated, held, &config)).collect();
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let after: BTreeMap<DwellId, f64> = done.iter().flat_map(|t| t.errors_m.iter().copied()).collect();
+    let after: BTreeMap<DwellId, f64> =
+        done.iter().flat_map(|t| t.errors_m.iter().map(|(d, e)| (*d, *e))).collect();
     let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, &config);
     Ok(held_out.map(|held_out| Nested {
         held_out,
@@ -84,7 +82,7 @@ pub fn nested(
 /// What was chosen without some points, and the errors that it leaves on them.
 struct Turn {
     chosen: Vec<String>,
-    errors_m: Vec<(DwellId, f64)>,
+    errors_m: BTreeMap<DwellId, f64>,
 }
 
 fn turn(
@@ -106,8 +104,8 @@ fn turn(
     };
     let dwells = held.iter().map(|i| observations[*i].dwell).map(|d| [d.recording, d.dwell]).collect();
     let predicted = calibrate(&model, observations, fit, &HoldoutConfig::Dwells { dwells })?;
-    let errors = predicted.residuals.iter().filter(|r| r.held_out).map(|r| (r.dwell, r.fitted_m.norm()));
-    Ok(Turn { chosen: effects.iter().map(ToString::to_string).collect(), errors_m: errors.collect() })
+    let chosen = effects.iter().map(ToString::to_string).collect();
+    Ok(Turn { chosen, errors_m: held_out_errors_m(&predicted) })
 }
 
 /// The hold-out once more among what a turn sees, or folds of it where too little is left for that.

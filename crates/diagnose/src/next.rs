@@ -1,8 +1,9 @@
 //! What to record next, in words.
 
-use crate::diagnosis::{Diagnosis, FoundEffect, Verdict};
+use crate::diagnosis::{Diagnosis, FoundEffect, UnknownReport, Verdict};
 use crate::problem::Problem;
 use armcal_core::{Observation, Unit};
+use armcal_model::EffectSpec;
 use std::collections::BTreeSet;
 
 /// What shows effects that the geometry takes over, where no other finding comes first.
@@ -21,21 +22,17 @@ const GAPS: usize = 3;
 /// Puts what the finding itself asks for before all else: the angles where a curve over a joint was not seen, the dwells in
 /// which unexplained errors are largest.
 pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names: &[String]) {
-    let over_its_angle = |joint: &str, frequency: Option<f64>| {
-        let by_name = joint_names.iter().position(|name| name == joint);
-        let index = by_name.or_else(|| joint.parse::<usize>().ok()?.checked_sub(1))?;
-        let gaps = gaps(observations.iter().filter_map(|o| o.joint_rad.get(index).copied()), frequency)?;
-        Some(format!("turn joint {} ({}) {gaps}", index + 1, joint_names.get(index)?))
+    let over_its_angle = |joint: usize, frequency: Option<f64>| {
+        let gaps = gaps(observations.iter().filter_map(|o| o.joint_rad.get(joint).copied()), frequency)?;
+        Some(format!("turn joint {} ({}) {gaps}", joint + 1, joint_names.get(joint)?))
     };
-    let mut first: Vec<String> = Vec::new();
-    for u in d.unlisted.iter().filter(|u| u.unit == Unit::Radian) {
-        let own = u.channel.strip_prefix("joint").filter(|joint| u.driver == format!("q{joint}"));
-        first.extend(own.and_then(|joint| over_its_angle(joint, None)));
-    }
+    let curves = d.unlisted.iter().filter(|u| u.unit == Unit::Radian).filter_map(UnknownReport::own_angle);
+    let mut first: Vec<String> = curves.filter_map(|joint| over_its_angle(joint, None)).collect();
     let turning = |e: &&FoundEffect| e.parameters.iter().all(|p| p.unit == Unit::Radian);
-    for e in d.effects.iter().filter(turning).filter_map(|e| e.name.strip_prefix("periodic:")) {
-        let (joint, frequency) = e.split_once(",frequency=").unwrap_or((e, ""));
-        first.extend(over_its_angle(joint, frequency.parse().ok()));
+    let named = d.effects.iter().filter(turning).filter_map(|e| EffectSpec::parse(&e.name, joint_names).ok());
+    for e in named.filter(|e| e.kind == "periodic") {
+        let frequency = e.shape.iter().find(|(name, _)| name == "frequency").map(|(_, n)| *n);
+        first.extend(e.target.and_then(|joint| over_its_angle(joint, frequency)));
     }
     if let Some(unexplained) = &d.unexplained {
         first.extend(unexplained.places.iter().map(|p| {

@@ -42,16 +42,17 @@ impl Diagnosis {
 }
 
 impl UnknownReport {
+    /// Index of the joint whose error follows its own angle; none of anything else.
+    pub fn own_angle(&self) -> Option<usize> {
+        let joint = self.channel.strip_prefix("joint").filter(|joint| self.driver == format!("q{joint}"))?;
+        joint.parse::<usize>().ok()?.checked_sub(1)
+    }
+
     /// What to add for it: the expression that was fitted, or the error curve of a joint over its own angle where no
     /// formula follows it. `None` where neither reaches the shape.
     pub fn effect(&self) -> Option<EffectSpec> {
-        let own_angle = self
-            .channel
-            .strip_prefix("joint")
-            .filter(|joint| self.driver == format!("q{joint}"))
-            .and_then(|joint| joint.parse::<usize>().ok()?.checked_sub(1));
         let formula = self.expression.as_ref();
-        if let Some(joint) = own_angle
+        if let Some(joint) = self.own_angle()
             && formula.is_none_or(|e| e.share_of_shape < FORMULA_SHARE)
         {
             return Some(EffectSpec::new("error_curve").at(joint).with("harmonics", HARMONICS));

@@ -7,7 +7,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story::{self, Diagnosed, Fitted, Settled};
-use crate::transfer::{Transfer, transfers};
+use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
 use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::{EffectSpec, effects_toml};
@@ -47,13 +47,6 @@ struct Added<'a> {
     pipeline: &'a Path,
     comparison: &'a Comparison,
     remaining: &'a Option<Diagnosis>,
-}
-
-/// A suggestion that is not added.
-#[derive(Debug, Serialize)]
-struct LeftOut {
-    effect: String,
-    reason: String,
 }
 
 /// What is added, what it does to recordings that did not teach it, and what is left out for that.
@@ -156,11 +149,7 @@ fn chosen(
     };
     let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
     let (mut new, of_time) = lasting.unwrap_or_default();
-    let of_time = of_time.iter().map(|e| LeftOut {
-        effect: e.to_string(),
-        reason: "a formula of this session's time, which no other session has".to_owned(),
-    });
-    let mut left_out: Vec<LeftOut> = of_time.collect();
+    let mut left_out: Vec<LeftOut> = of_time.iter().map(LeftOut::of_time).collect();
     let mut transfer = checked(&new)?;
     if transfer.iter().any(Transfer::harms) {
         let harmful = transfer.iter().filter(|t| t.harms());

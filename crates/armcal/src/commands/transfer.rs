@@ -3,7 +3,7 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::transfer::{Asked, SessionTransfer, between, verdict};
+use crate::transfer::{Asked, SessionTransfer, between};
 use armcal_diagnose::HeldOut;
 use armcal_report::{number, plain_table, table_text};
 use comfy_table::Cell;
@@ -30,7 +30,7 @@ fn text(transfer: &SessionTransfer) -> String {
             number(format!("{:.3}", h.before)),
             number(format!("{:.3}", h.after)),
             number(format!("{low:+.3} to {high:+.3}")),
-            Cell::new(verdict(h)),
+            Cell::new(h.verdict()),
         ]);
     };
     row(format!("the arm as {from} calibrates it"), calibration);

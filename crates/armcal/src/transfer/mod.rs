@@ -7,21 +7,30 @@ mod recordings;
 mod sessions;
 
 pub use recordings::{Transfer, transfers};
-pub use sessions::{Asked, Carried, LeftBehind, SessionTransfer, between};
+pub use sessions::{Asked, Carried, SessionTransfer, between};
 
-use armcal_diagnose::HeldOut;
+use armcal_model::EffectSpec;
+use serde::Serialize;
 
-/// What an interval of a change says.
-pub(crate) fn verdict(held_out: &HeldOut) -> &'static str {
-    let [low, high] = held_out.change_ci95;
-    match (high < 0.0, low > 0.0) {
-        (true, _) => "it helps there",
-        (_, true) => "it does harm there",
-        _ => "no more than chance",
-    }
+/// An effect that does not go along.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// As a pipeline spells it.
+    pub effect: String,
+    /// Why.
+    pub reason: String,
 }
 
-/// Whether it raises the error by more than chance.
-pub(crate) fn harms(held_out: &HeldOut) -> bool {
-    held_out.change_ci95[0] > 0.0
+impl LeftOut {
+    /// A formula of absolute time.
+    pub(crate) fn of_time(effect: &EffectSpec) -> LeftOut {
+        let reason = "a formula of this session's time, which no other session has".to_owned();
+        LeftOut { effect: effect.to_string(), reason }
+    }
+
+    /// An event of one session.
+    fn event(effect: &EffectSpec) -> LeftOut {
+        let reason = "an event of this session: no other one can tell whether it happened".to_owned();
+        LeftOut { effect: effect.to_string(), reason }
+    }
 }

@@ -1,6 +1,5 @@
 //! Does what was learnt in all recordings but one help in that one? Effect by effect.
 
-use super::{harms, verdict};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -23,23 +22,17 @@ pub struct Transfer {
 impl Transfer {
     /// Whether it raises the error of recordings that it was not fitted to, by more than chance.
     pub fn harms(&self) -> bool {
-        self.held_out.as_ref().is_some_and(harms)
+        self.held_out.as_ref().is_some_and(HeldOut::harms)
     }
 
     /// In one sentence.
     pub fn sentence(&self) -> String {
-        let Some(h) = &self.held_out else {
-            return format!("{} is an event: no other recording can tell whether it happened", self.effect);
+        let Transfer { effect, held_out } = self;
+        let Some(held_out) = held_out else {
+            return format!("{effect} is an event: no other recording can tell whether it happened");
         };
-        let [low, high] = h.change_ci95;
-        format!(
-            "{} fitted without each recording in turn changes the mean error there from {:.3} to {:.3} mm \
-             (95 % {low:+.3} to {high:+.3}): {}",
-            self.effect,
-            h.before,
-            h.after,
-            verdict(h)
-        )
+        let (change, verdict) = (held_out.change_text(), held_out.verdict());
+        format!("{effect} fitted without each recording in turn {change}: {verdict}")
     }
 }
 

@@ -4,7 +4,7 @@
 //! predicts in the second is compared, pose by pose, with what all of them predict. Nothing of the arm is fitted to the
 //! second session; frames that nobody could know without it are, alike for every model.
 
-use super::{harms, verdict};
+use super::LeftOut;
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -52,7 +52,7 @@ pub struct SessionTransfer {
     /// Each effect by its absence.
     pub effects: Vec<Carried>,
     /// Effects that no other session can share.
-    pub left_behind: Vec<LeftBehind>,
+    pub left_behind: Vec<LeftOut>,
     /// What could not be known without the poses that judge, and the like.
     pub warnings: Vec<Warning>,
 }
@@ -68,19 +68,10 @@ pub struct Carried {
     pub verdict: &'static str,
 }
 
-/// An effect that is not judged.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LeftBehind {
-    /// As a pipeline spells it.
-    pub effect: String,
-    /// Why.
-    pub reason: String,
-}
-
 impl SessionTransfer {
     /// Whether something that was learnt raises the error there, by more than chance.
     pub fn harms(&self) -> bool {
-        harms(&self.calibration) || self.effects.iter().any(|e| harms(&e.held_out))
+        self.calibration.harms() || self.effects.iter().any(|e| e.held_out.harms())
     }
 }
 
@@ -106,15 +97,19 @@ pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer
     let carrier =
         Carrier { path: asked.from, from: &from, taught: &taught.fitted, to: &to, judge: &judge.fitted };
     let bare = carrier.carried(&[])?;
-    let all = carrier.carried(&effects)?;
+    let with = |effects: &[EffectSpec]| match effects.is_empty() {
+        true => Ok(bare.clone()),
+        false => carrier.carried(effects),
+    };
+    let all = with(&effects)?;
     let compare = |before: &Errors, after: &Errors| {
         let held_out = compare_errors(before, after, &judge.fitted.observations, &to.diagnosis);
         held_out.ok_or_else(|| Error::NothingToJudge { pipeline: to.name.clone() })
     };
     let carried = |effect: &EffectSpec| -> Result<Carried, Error> {
         let others: Vec<EffectSpec> = effects.iter().filter(|e| *e != effect).cloned().collect();
-        let held_out = compare(&carrier.carried(&others)?.errors_m, &all.errors_m)?;
-        Ok(Carried { effect: effect.to_string(), held_out, verdict: verdict(&held_out) })
+        let held_out = compare(&with(&others)?.errors_m, &all.errors_m)?;
+        Ok(Carried { effect: effect.to_string(), held_out, verdict: held_out.verdict() })
     };
     let each: Vec<Result<Carried, Error>> = effects.par_iter().map(carried).collect();
     Ok(SessionTransfer {
@@ -143,7 +138,7 @@ fn effects(
     from: &Pipeline,
     taught: &Settled,
     progress: &Progress,
-) -> Result<(Vec<EffectSpec>, Vec<LeftBehind>), Error> {
+) -> Result<(Vec<EffectSpec>, Vec<LeftOut>), Error> {
     let geometry = &taught.fitted.geometry;
     let mut all = frames::effect_specs(from, geometry)?;
     all.extend(named);
@@ -154,15 +149,11 @@ fn effects(
         // Both sessions together are several recordings: a formula of one's time says nothing of the other.
         let (lasting, of_time) = found.lasting(geometry.chain().joint_names(), 2)?;
         all = lasting;
-        let reason = "a formula of this session's time, which no other session has".to_owned();
-        let behind = |e: EffectSpec| LeftBehind { effect: e.to_string(), reason: reason.clone() };
-        left_behind.extend(of_time.into_iter().map(behind));
+        left_behind.extend(of_time.iter().map(LeftOut::of_time));
     }
     // What is said of the lasting ones is said where they are carried over.
     let (lasting, events): (Vec<_>, Vec<_>) = all.into_iter().partition(|e| lasts(e, &mut Vec::new()));
-    let reason = "an event of this session: no other one can tell whether it happened".to_owned();
-    let behind = |e: EffectSpec| LeftBehind { effect: e.to_string(), reason: reason.clone() };
-    left_behind.extend(events.into_iter().map(behind));
+    left_behind.extend(events.iter().map(LeftOut::event));
     Ok((lasting, left_behind))
 }
 
@@ -179,6 +170,7 @@ struct Carrier<'a> {
 }
 
 /// What a model of the first session leaves in the second.
+#[derive(Clone)]
 struct CarriedOver {
     nominal_errors_m: Errors,
     errors_m: Errors,

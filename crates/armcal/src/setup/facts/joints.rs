@@ -5,8 +5,8 @@ use crate::setup::trial::Inputs;
 use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, SetupFinding};
 
-/// Values nearer to each other than this are one [rad].
-const STUCK_RAD: f64 = 2e-4;
+/// Readings that end within this of each other end at one value [rad].
+const ONE_END_RAD: f64 = 2e-4;
 /// Fewest dwells in a row that make a joint stuck.
 const MANY_STILL: usize = 8;
 /// A value that so many times as many dwells share as any other is one at which a reading ends.
@@ -105,8 +105,8 @@ fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f6
     let mut sorted: Vec<f64> = read_rad.iter().map(|q| sign * q[joint]).collect();
     sorted.sort_by(|a, b| b.total_cmp(a));
     let end = *sorted.first()?;
-    let like = |value: f64| sorted.iter().filter(|q| (*q - value).abs() < STUCK_RAD).count();
-    let there: Vec<&&[f64]> = read_rad.iter().filter(|q| end - sign * q[joint] < STUCK_RAD).collect();
+    let like = |value: f64| sorted.iter().filter(|q| (*q - value).abs() < ONE_END_RAD).count();
+    let there: Vec<&&[f64]> = read_rad.iter().filter(|q| end - sign * q[joint] < ONE_END_RAD).collect();
     let elsewhere = sorted[there.len()..].iter().map(|q| like(*q)).max()?;
     let first = there.first()?;
     let turned = |q: &&&[f64]| q.iter().zip(first.iter()).any(|(a, b)| (a - b).abs() > TURNS_RAD);
