@@ -40,6 +40,9 @@ pub struct Pipeline {
     pub dwell: DwellConfig,
     /// The calibration table; absent when the tip is only tracked.
     pub table: Option<TableSection>,
+    /// What is known of the position sensor itself.
+    #[serde(default)]
+    pub sensor: SensorSection,
     /// The nominal arm.
     pub model: ModelSection,
     /// What is known about base and tip.
@@ -161,6 +164,14 @@ pub enum MarkersOn {
     Frame,
 }
 
+/// What is known of the position sensor itself.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSection {
+    /// Standard error of its scale along each axis [ppm], beyond which no explanation goes; 0 takes the scale as exact.
+    pub scale_sigma_ppm: Option<f64>,
+}
+
 /// The nominal arm: a DH file or a URDF chain.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -238,7 +249,7 @@ pub enum FramePose {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterOverride {
-    /// Name or glob.
+    /// Name or glob; of an effect, a spec and a quantity (`backlash:2.width`, `sensor_scale.*`).
     pub name: String,
     /// Whether the fit may change it.
     pub free: Option<bool>,
@@ -437,6 +448,9 @@ impl Pipeline {
         }
         if self.table.is_none() && self.streams.tip.is_none() {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
+        }
+        if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
+            return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }
         self.pool.check(path)?;
         match (&self.model.dh, &self.model.urdf) {

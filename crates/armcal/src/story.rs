@@ -416,10 +416,9 @@ pub(crate) fn with_effects(
     effects: &[EffectSpec],
     observations: &[Observation],
 ) -> Result<Model, Error> {
-    if effects.is_empty() {
-        return Ok(geometry.clone());
-    }
-    Ok(geometry.with_effects(effects, &frames::session(pipeline, observations))?)
+    let session = frames::session(pipeline, observations);
+    geometry.check_declared(&session)?;
+    Ok(geometry.with_effects(effects, &session)?)
 }
 
 fn closing_warnings(rounds: usize, calibration: &Calibration) -> Vec<Warning> {

@@ -198,6 +198,10 @@ impl View<'_> {
         let Some(first) = members.first() else { return Ok(Vec::new()) };
         let like = self.candidates(std::slice::from_ref(first))?;
         let Some(like) = like.first() else { return Ok(Vec::new()) };
+        if like.amplitudes.len() < 2 {
+            // One of the two is held: what is left is no product.
+            return self.candidates(members);
+        }
         let joint = first.target.unwrap_or_default();
         let at = |member: &EffectSpec| {
             let frequency = member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1);

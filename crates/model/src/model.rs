@@ -2,7 +2,7 @@
 
 mod linearisation;
 
-use crate::effects::{Effects, NominalPose, PlacedEffect, Session};
+use crate::effects::{Declared, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
 use crate::path::{follow, joint_twists};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
@@ -14,6 +14,7 @@ use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
 use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// A robot in its surroundings.
 ///
@@ -31,6 +32,8 @@ pub struct Model {
     boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
     effects: Option<Effects>,
+    /// What is known of the parameters of effects, of those that are not in the model too.
+    pub(crate) declared: Arc<[Declared]>,
 }
 
 /// What is measured and what is predicted of one observation.
@@ -56,7 +59,7 @@ impl Model {
             frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         check_names(&parameters)?;
         let path = [base].into_iter().chain(chain.segments.iter().cloned()).chain([tip]).collect();
-        Ok(Model { chain, parameters, path, boards, effects: None })
+        Ok(Model { chain, parameters, path, boards, effects: None, declared: Arc::default() })
     }
 
     /// The arm.
@@ -133,6 +136,7 @@ impl Model {
             path: self.path.clone(),
             boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
             effects: self.effects.as_ref().map(|e| e.moved(behind - end, &self.path, index.len())),
+            declared: self.declared.clone(),
         };
         (model, index)
     }

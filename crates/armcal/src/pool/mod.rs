@@ -78,7 +78,8 @@ fn pooled_model(
     let tip = frames::frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation);
     let boards = collected.recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, boards })?;
-    frames::override_parameters(&mut model, &pipeline.parameters)?;
+    frames::declare(&mut model, pipeline)?;
+    model.check_declared(session)?;
     let effects = frames::effect_specs(pipeline, &model)?;
     let model = model.with_effects(&effects, session)?;
     let recording = |r: &CollectedRecording| PooledRecording {

@@ -8,11 +8,14 @@ use crate::pipeline::{
 use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
-use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
+use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, Session, is_of_effect};
 use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
+
+/// The scale of a sensor is within so many of its standard errors.
+const SURELY: f64 = 5.0;
 
 /// Reads the DH or URDF file of the pipeline: its text and the chain in it.
 pub fn nominal_chain(pipeline: &Pipeline) -> Result<(String, Chain), Error> {
@@ -67,13 +70,31 @@ pub fn nominal_model(
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?;
-    override_parameters(&mut model, &pipeline.parameters)?;
+    declare(&mut model, pipeline)?;
     Ok(model)
 }
 
-/// Applies the changes to single parameters, in their order.
+/// What the pipeline says of sensor and parameters.
+pub fn declare(model: &mut Model, pipeline: &Pipeline) -> Result<(), Error> {
+    if let Some(sigma_ppm) = pipeline.sensor.scale_sigma_ppm {
+        let sigma = sigma_ppm * 1e-6;
+        let known = match sigma > 0.0 {
+            true => Override { prior: Some(sigma), bound: Some(SURELY * sigma), ..Override::default() },
+            false => Override { free: Some(false), ..Override::default() },
+        };
+        model.declare("sensor_scale.*", known)?;
+    }
+    override_parameters(model, &pipeline.parameters)
+}
+
+/// Applies the changes to single parameters, in their order; those of effects wait for the effects.
 pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> Result<(), Error> {
     for change in changes {
+        if is_of_effect(&change.name) {
+            let ParameterOverride { free, bound, prior, .. } = *change;
+            model.declare(&change.name, Override { free, bound, prior, ..Override::default() })?;
+            continue;
+        }
         model.set_parameter(&change.name, |p| {
             let si = |display: f64| display / p.unit.to_display(1.0);
             p.free = change.free.unwrap_or(p.free);

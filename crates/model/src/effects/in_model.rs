@@ -64,7 +64,7 @@ impl Model {
                 Offered::Scanned | Offered::Never => {}
             }
         }
-        specs.retain(|spec| placed::place(self, session, spec, &zero, 0).is_ok());
+        specs.retain(|spec| self.offers(spec, session, &zero));
         specs
     }
 
@@ -93,7 +93,7 @@ impl Model {
                             .map(|v| spec.clone().with(shape.name, readable(*v))),
                     );
                 }
-                members.retain(|spec| placed::place(self, session, spec, &zero, 0).is_ok());
+                members.retain(|spec| self.offers(spec, session, &zero));
                 if !members.is_empty() {
                     families.push((spec, members));
                 }
@@ -111,7 +111,17 @@ impl Model {
         Drivers::of(session, pose, board.map(|board| board.translation.vector), o)
     }
 
-    fn targets(&self, kind: &EffectKind, spec: EffectSpec) -> impl Iterator<Item = EffectSpec> + use<> {
+    /// Whether an effect could be added here, with something for a fit to find.
+    fn offers(&self, spec: &EffectSpec, session: &Session, zero: &NominalPose) -> bool {
+        let placed = placed::place(self, session, spec, zero, 0);
+        placed.is_ok_and(|(effect, own)| own[..effect.amplitudes].iter().any(|p| p.free))
+    }
+
+    pub(super) fn targets(
+        &self,
+        kind: &EffectKind,
+        spec: EffectSpec,
+    ) -> impl Iterator<Item = EffectSpec> + use<> {
         let joints = match kind.target {
             Target::Joint => (0..self.joint_count()).map(Some).collect(),
             Target::Whole => vec![None],

@@ -26,6 +26,7 @@ mod board_shift;
 mod clock_offset;
 mod compliance;
 mod crossed_backlash;
+mod declared;
 mod drivers;
 mod eccentricity;
 mod effort_compliance;
@@ -65,6 +66,7 @@ mod zero_slip;
 #[cfg(test)]
 mod tests;
 
+pub use declared::is_of_effect;
 pub use drivers::{Drivers, Torque};
 pub use expression::Expression;
 pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
@@ -73,6 +75,7 @@ pub use session::Session;
 pub use spec::{EffectSpec, Since};
 pub use table::{EffectTable, Extra, Override, Word, effects_toml};
 
+pub(crate) use declared::Declared;
 pub(crate) use drivers::NominalPose;
 pub(crate) use placed::Effects;
 

@@ -109,6 +109,9 @@ pub(crate) fn place(
         Some(share) => state::shared(physics, count, share),
         None => physics,
     };
+    for parameter in &mut parameters {
+        model.declared.iter().try_for_each(|declared| declared.apply(spec, parameter)).map_err(bad)?;
+    }
     for (quantity, change) in &spec.overrides {
         let known = || parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
         let message = || {

@@ -119,11 +119,12 @@ impl EffectSpec {
         Ok(spec)
     }
 
-    /// Whether what is said of this one holds for another: where it names no joint or no time, for every one.
+    /// Whether what is said of this one holds for another: where it names no joint, no time or no shape, for every one.
     pub fn covers(&self, other: &EffectSpec) -> bool {
         self.kind == other.kind
             && (self.target.is_none() || self.target == other.target)
             && (self.since.is_none() || self.since == other.since)
+            && self.shape.iter().all(|said| other.shape.contains(said))
     }
 
     /// The entry of the catalogue; errors name the nearest one.

@@ -1,6 +1,7 @@
 //! Tests of the effects, by question.
 
 mod contract;
+mod declared;
 mod neighbours;
 mod physics;
 mod rig;

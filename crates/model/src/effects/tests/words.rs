@@ -204,6 +204,9 @@ fn a_spec_covers_what_it_does_not_say() {
         ("zero_slip:2", "zero_slip:2@1.17", true),
         ("zero_slip:2@1", "zero_slip:2@1.17", false),
         ("frame_shift", "zero_slip:2@1", false),
+        ("periodic:1", "periodic:1,frequency=30", true),
+        ("periodic,frequency=30", "periodic:1,frequency=30", true),
+        ("periodic:1,frequency=17", "periodic:1,frequency=30", false),
     ] {
         assert_eq!(spec(wide).covers(&spec(own)), covered, "{wide} and {own}");
     }
