@@ -141,3 +141,34 @@ fn an_excluded_effect_is_not_tried_and_the_reason_is_told() {
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(words.contains("diagnosis.exclude") && words.contains("\"backlash\""), "{words}");
 }
+
+/// A camera whose scale is off is named; where the user knows the scale better than that, it explains nothing, and what it
+/// does is not called sound.
+#[test]
+fn a_sensor_is_trusted_as_far_as_the_user_says() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let lab = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
+    let board = format!("\"{}/pipelines/boards/", root().display());
+    let hidden = "[[mechanisms]]\nkind = \"camera_scale\"\npercent = [0.6, -0.5, 0.4]\n";
+    let scaled = folder.path().join("lab.toml");
+    std::fs::write(&scaled, format!("{}\n{hidden}", lab.replace("\"../boards/", &board))).expect("lab");
+    let pipeline = recorded(&scaled.to_string_lossy(), folder.path());
+    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
+    let of_scale = |summary: &Value| names(&summary["diagnosis"]).iter().any(|n| n.contains("sensor_scale"));
+    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[0, 3]);
+    assert!(of_scale(&before), "{:#}", before["diagnosis"]["names"]);
+
+    for ppm in ["10.0", "0.0"] {
+        std::fs::write(&pipeline, format!("{text}\n[sensor]\nscale_sigma_ppm = {ppm}\n")).expect("pipeline");
+        let trusting = run_pipeline(&pipeline, &folder.path().join(ppm), &[3]);
+        assert!(!of_scale(&trusting), "{ppm}: {:#}", trusting["diagnosis"]["names"]);
+        assert_ne!(trusting["diagnosis"]["verdict"], "nothing_missing");
+        let warnings = trusting["warnings"].as_array().expect("warnings");
+        assert_eq!(warnings.iter().any(|w| w["code"] == "not-tried"), ppm == "0.0");
+    }
+    let misspelt = "[[parameters]]\nname = \"sensor_scale.xy\"\nfree = false\n";
+    std::fs::write(&pipeline, format!("{text}\n{misspelt}")).expect("pipeline");
+    let output = armcal([Path::new("run"), &pipeline, Path::new("--out"), &folder.path().join("refused")]);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && words.contains("sensor_scale.xy"), "{words}");
+}

@@ -6,6 +6,7 @@ use crate::error_places::ErrorPlace;
 use crate::held_out::HeldOut;
 use crate::nested::Nested;
 use crate::noise::Noise;
+use crate::ripple::Ripple;
 use crate::structure::Structure;
 use armcal_calibrate::Calibration;
 use armcal_core::{DwellId, Unit, Warning};
@@ -319,6 +320,8 @@ pub struct UnknownReport {
     pub unit: Unit,
     /// The shape along the driver, with its band.
     pub shape: Vec<ShapePoint>,
+    /// What repeats in it, of a joint's error over its own angle.
+    pub ripple: Option<Ripple>,
     /// The expression effect to paste.
     pub expression: Option<Expression>,
     /// Errors on places the fit did not see, with this shape in the model.

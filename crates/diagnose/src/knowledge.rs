@@ -47,8 +47,8 @@ impl Knowledge {
         covering(&self.known, spec)
     }
 
-    /// What was not tried and why, for the user to remember.
-    pub(crate) fn warning(&self) -> Option<Warning> {
+    /// What was not tried and why, and which parameters of effects are held, for the user to remember.
+    pub(crate) fn warning(&self, held: &[String]) -> Option<Warning> {
         let with_reason = |all: &Reasons| -> Vec<String> {
             all.iter().map(|(spec, reason)| format!("{spec} (\"{reason}\")")).collect()
         };
@@ -58,6 +58,9 @@ impl Knowledge {
         }
         if !self.only.is_empty() {
             said.push(format!("of the catalogue only {} tried", listed(&with_reason(&self.only))));
+        }
+        if !held.is_empty() {
+            said.push(format!("{} held", listed(held)));
         }
         let message = format!("as the pipeline says: {}", said.join("; "));
         let notice = Warning::new(Severity::Notice, Stage::Diagnose, "not-tried", "diagnosis", message);
@@ -92,7 +95,7 @@ mod tests {
         assert!(!tried("belt_backlash:1") && !tried("belt_backlash:2"));
         assert!(!tried("zero_slip:2@1") && !tried("zero_slip:2@0.4") && tried("zero_slip:1@1"));
         assert!(tried("backlash:1"));
-        let said = k.warning().expect("said").message;
+        let said = k.warning(&[]).expect("said").message;
         assert_eq!(
             said,
             "as the pipeline says: belt_backlash (\"no belts\"), zero_slip:2 (\"an absolute encoder\") not tried"
@@ -115,7 +118,7 @@ mod tests {
             (k.acts(&of("compliance:2")), k.acts(&of("compliance:1"))),
             (Some("seen with a dial gauge"), None)
         );
-        assert!(Knowledge::default().warning().is_none() && Knowledge::default().tries(&of("backlash:1")));
+        assert!(Knowledge::default().warning(&[]).is_none() && Knowledge::default().tries(&of("backlash:1")));
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         knowledge: Knowledge::of(config, joint_names)?,
     };
     let mut diagnosis = diagnose_problem(&mut refit, config)?;
-    diagnosis.warnings.extend(refit.knowledge.warning());
+    diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
     let refitted = refitted(calibrated, &diagnosis);
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)

@@ -9,6 +9,7 @@ use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::expression;
 use crate::judge::independent_groups;
 use crate::problem::{Channel, Problem};
+use crate::ripple::ripple;
 use crate::weigh::{Outside, Weighed};
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
@@ -46,10 +47,15 @@ pub(crate) fn described(
     let places = gain(problem, &effect, &groups, memory, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
-    let mut shape = Vec::new();
+    let (mut shape, mut repeats) = (Vec::new(), None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
         shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
+        if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
+            let per = driver.basis.ncols();
+            let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
+            repeats = ripple(&driver.value, curve.as_slice());
+        }
     }
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.
     let formulable = |u: &&Outside| {
@@ -83,6 +89,7 @@ pub(crate) fn described(
         log_evidence: ln,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
+        ripple: repeats,
         expression: formula,
         places,
         rivals: rivals.into_iter().map(|u| u.what.name.clone()).collect(),

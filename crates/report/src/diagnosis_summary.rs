@@ -4,7 +4,7 @@ use crate::diagnosis_text::pasted;
 use armcal_core::Unit;
 use armcal_diagnose::{
     BeforeAfter, CandidateReport, Diagnosis, Explanation, FoundEffect, JudgedOn, Nested, NotTestable,
-    ParameterReport, ShapePoint, Unexplained, UnknownReport, Verdict,
+    ParameterReport, Ripple, ShapePoint, Unexplained, UnknownReport, Verdict,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -76,6 +76,8 @@ struct Unknown<'a> {
     holdout_mm: BeforeAfter,
     unit: Unit,
     shape: &'a [ShapePoint],
+    /// What repeats in a joint's error over its own angle; null where nothing does.
+    ripple: Option<Ripple>,
     rivals: &'a [String],
 }
 
@@ -134,6 +136,7 @@ fn unknown(u: &UnknownReport) -> Unknown<'_> {
         holdout_mm: BeforeAfter { before: u.places.before, after: u.places.after },
         unit: u.unit,
         shape: &u.shape,
+        ripple: u.ripple,
         rivals: &u.rivals,
     }
 }

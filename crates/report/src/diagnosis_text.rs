@@ -16,6 +16,8 @@ use serde_json::Value;
 const RANKED: usize = 8;
 /// Heading of errors that no calibration gave.
 const PREDICTED: &str = "linearised, left out [mm]";
+/// Share of a curve [%] from which the multiples of a ripple are worth a word.
+const BENT_PERCENT: f64 = 5.0;
 /// Heading of the tables that add what is unlisted.
 const PASTE: &str = "To paste into the pipeline";
 
@@ -283,13 +285,23 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
         (Some(from), Some(to)) => format!(", known for {} from {:.3} to {:.3}", u.driver, from.at, to.at),
         _ => String::new(),
     };
+    let ripple = u.ripple.as_ref().map_or(String::new(), |r| {
+        let (percent, amplitude) = (100.0 * r.share, u.unit.to_display(r.amplitude));
+        let more = 100.0 * r.share_with_multiples - percent;
+        let bent = if more >= BENT_PERCENT { format!(", {more:.0} % more with twice and three times that") } else { String::new() };
+        format!(
+            "; {percent:.0} % of it beside its slow part is a ripple of {:.1} periods a turn, amplitude {amplitude:.4} {}{bent}",
+            r.periods_per_turn,
+            u.unit.display_symbol()
+        )
+    });
     let formula = u
         .expression
         .as_ref()
         .map_or(String::new(), |e| format!("; as a formula on {}: {}", e.acts_on, e.formula));
     printable(&format!(
         "unlisted, at {} over {}: linearised, each place left out in turn: {:.3} -> {:.3} mm with its \
-         shape{range}{formula}",
+         shape{range}{ripple}{formula}",
         u.channel, u.driver, u.places.before, u.places.after
     ))
 }

@@ -57,6 +57,11 @@ impl Model {
         Ok(())
     }
 
+    /// Names of what is declared to be held, as the user wrote them.
+    pub fn declared_held(&self) -> Vec<String> {
+        self.declared.iter().filter(|d| d.change.free == Some(false)).map(|d| d.name.clone()).collect()
+    }
+
     /// Whether everything declared has a parameter to act on, where its effect can be had from these observations.
     ///
     /// # Errors

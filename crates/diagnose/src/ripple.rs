@@ -1,0 +1,155 @@
+//! What repeats in a joint's error curve: the teeth, lines and pole pairs of what turns with it.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// Fewest periods that a joint must have gone through, and fewest in a turn: the first two harmonics are called by other
+/// names.
+const FEWEST_PERIODS: f64 = 4.0;
+const FEWEST_A_TURN: f64 = 3.0;
+/// A period needs so many angles.
+const A_PERIOD: f64 = 4.0;
+/// Least share of a curve, beside its slow part, that is called a ripple.
+const LEAST_SHARE: f64 = 0.5;
+/// Steps of the search, in periods over the whole range: a fraction of what the range resolves.
+const STEP: f64 = 0.05;
+/// Multiples of the ripple that give it a shape.
+const MULTIPLES: usize = 3;
+
+/// A periodic part of an error curve over a joint's own angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Ripple {
+    /// Periods in one turn of the joint.
+    pub periods_per_turn: f64,
+    /// Amplitude of its sine, in the unit of the curve.
+    pub amplitude: f64,
+    /// Share of the curve's squares, beside the slow part, that the sine is.
+    pub share: f64,
+    /// Share with twice and three times its frequency.
+    pub share_with_multiples: f64,
+}
+
+/// The strongest ripple of a curve, given at the angles [rad] where the joint was; none where no ripple is half of what the
+/// curve is beside its slow part (a straight line and the first two harmonics of the turn).
+pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
+    let mut sorted = angles_rad.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    let range_rad = sorted.last()? - sorted.first()?;
+    let mut gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual_rad = *gaps.get(gaps.len() / 2)?;
+    let slow = Waves::slow(angles_rad);
+    let rest = slow.without(&DVector::from_column_slice(curve));
+    let all = rest.norm_squared();
+    let at = |n: f64, multiples: usize| {
+        let waves = slow.joined(angles_rad, n, multiples);
+        1.0 - waves.without(&rest).norm_squared() / all
+    };
+    let [least, most] = [FEWEST_A_TURN.max(FEWEST_PERIODS * TAU / range_rad), TAU / (A_PERIOD * usual_rad)];
+    let step = STEP * TAU / range_rad;
+    let steps = ((most - least) / step).floor();
+    if !(steps >= 0.0 && all > 0.0) {
+        return None;
+    }
+    let tried = (0..=steps as usize).map(|k| least + step * k as f64).map(|n| (n, at(n, 1)));
+    let (n, share) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let amplitude = slow.joined(angles_rad, n, 1).last_amplitude(&rest);
+    let multiples = MULTIPLES.min((most / n) as usize).max(1);
+    let found =
+        Ripple { periods_per_turn: n, amplitude, share, share_with_multiples: at(n, multiples).max(share) };
+    (share >= LEAST_SHARE).then_some(found)
+}
+
+/// Columns that are fitted together.
+struct Waves(DMatrix<f64>);
+
+impl Waves {
+    /// A straight line and the first two harmonics.
+    fn slow(angles_rad: &[f64]) -> Waves {
+        let column = |q: f64| [1.0, q, q.sin(), q.cos(), (2.0 * q).sin(), (2.0 * q).cos()];
+        Waves(DMatrix::from_fn(angles_rad.len(), 6, |i, k| column(angles_rad[i])[k]))
+    }
+
+    /// The same with the sines and cosines of `n` a turn and its multiples.
+    fn joined(&self, angles_rad: &[f64], n: f64, multiples: usize) -> Waves {
+        let slow = self.0.ncols();
+        Waves(DMatrix::from_fn(angles_rad.len(), slow + 2 * multiples, |i, k| match k.checked_sub(slow) {
+            None => self.0[(i, k)],
+            Some(k) => {
+                let (sine, cosine) = (n * (k / 2 + 1) as f64 * angles_rad[i]).sin_cos();
+                if k % 2 == 0 { sine } else { cosine }
+            }
+        }))
+    }
+
+    fn fitted(&self, curve: &DVector<f64>) -> DVector<f64> {
+        let svd = self.0.clone().svd(true, true);
+        let floor = 1e-9 * svd.singular_values.max();
+        svd.solve(curve, floor).unwrap_or_else(|_| DVector::zeros(self.0.ncols()))
+    }
+
+    fn without(&self, curve: &DVector<f64>) -> DVector<f64> {
+        curve - &self.0 * self.fitted(curve)
+    }
+
+    /// Length of the last two coefficients.
+    fn last_amplitude(&self, curve: &DVector<f64>) -> f64 {
+        let fitted = self.fitted(curve);
+        let last = fitted.len();
+        fitted[last - 1].hypot(fitted[last - 2])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ripple;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::f64::consts::TAU;
+
+    /// Angles as a session has them: uneven, over 130 deg.
+    fn angles(seed: u64, count: usize) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..count).map(|_| rng.random_range(-2.3..0.0)).collect()
+    }
+
+    #[test]
+    fn a_planted_ripple_is_found_with_its_order_and_size() {
+        let q = angles(1, 300);
+        let slow = |q: f64| 0.3 * q + 2.0 * (q + 0.4).cos();
+        let sine: Vec<f64> = q.iter().map(|q| slow(*q) + 1.5 * (17.0 * q + 0.2).sin()).collect();
+        let found = ripple(&q, &sine).expect("a ripple");
+        assert!((found.periods_per_turn - 17.0).abs() < 0.1, "{found:?}");
+        assert!((found.amplitude - 1.5).abs() < 0.03 && found.share > 0.98, "{found:?}");
+        // A sawtooth: its sine is 6/pi^2 of its squares, three harmonics 6/pi^2 (1 + 1/4 + 1/9).
+        let saw: Vec<f64> = q.iter().map(|q| slow(*q) + (17.0 * q / TAU).fract()).collect();
+        let found = ripple(&q, &saw).expect("a ripple");
+        let of_sine = 6.0 / std::f64::consts::PI.powi(2);
+        assert!((found.periods_per_turn - 17.0).abs() < 0.1, "{found:?}");
+        assert!((found.share - of_sine).abs() < 0.06, "{found:?}");
+        assert!((found.share_with_multiples - of_sine * (1.0 + 0.25 + 1.0 / 9.0)).abs() < 0.06, "{found:?}");
+    }
+
+    /// Random smooth curves, sums of waves of every length from a tenth of the range: a ripple is seldom claimed.
+    #[test]
+    fn what_only_varies_is_seldom_a_ripple() {
+        let mut claimed = 0;
+        for seed in 0..40 {
+            let q = angles(seed, 200);
+            let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
+            let waves: Vec<[f64; 3]> = (0..60)
+                .map(|_| {
+                    [rng.random_range(-1.0..1.0), rng.random_range(0.0..27.0), rng.random_range(0.0..TAU)]
+                })
+                .collect();
+            let curve: Vec<f64> =
+                q.iter().map(|q| waves.iter().map(|[a, n, phase]| a * (n * q + phase).sin()).sum()).collect();
+            claimed += usize::from(ripple(&q, &curve).is_some());
+        }
+        assert!(claimed <= 4, "{claimed} of 40");
+        assert_eq!(ripple(&angles(3, 60), &[0.0; 60]), None, "a curve of nothing");
+        assert_eq!(ripple(&[0.3; 9], &[1.0; 9]), None, "it never turned");
+    }
+}
