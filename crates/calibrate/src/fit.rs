@@ -25,6 +25,9 @@ const GENEROUS: f64 = 3.0;
 const SCALE_TOLERANCE: f64 = 3e-3;
 /// Rounds of fit and scale.
 const SCALE_ROUNDS: usize = 30;
+/// Rounds of fit and noise, and the change of a parameter, in units of its prior, that ends them.
+const NOISE_ROUNDS: usize = 8;
+const NOISE_TOLERANCE: f64 = 1e-3;
 /// Huber's constant whose asymptotics stand in for those of the sum of norms (its limit c -> 0 divides by zero at
 /// a point that is fitted exactly).
 const PAPER_HUBER_C: f64 = 0.25;
@@ -76,6 +79,7 @@ fn fit_from(
     let declared = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&declared)?;
     let solved = solve(&declared, sigma_scale, config)?;
+    let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let learnt = priors::learnt(problem, (&declared, &solved), free, config)?;
     let said = learnt.as_ref().and_then(|(white, _)| priors::said(white));
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
@@ -119,6 +123,33 @@ fn fit_from(
     fit.warnings = fit_warnings::of(&fit, &white);
     fit.warnings.extend(said);
     Ok(fit)
+}
+
+/// The fit again with the noise of what it found, until that changes nothing: where the noise depends on what is estimated,
+/// as of a joint that rests anywhere in a gap whose width is.
+fn with_its_noise<'a>(
+    problem: &'a dyn Problem,
+    (mut white, mut solved): (Whitened<'a>, Solved),
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<(Whitened<'a>, Solved), CalibrateError> {
+    if !problem.noise_depends() || config.objective == Objective::Paper {
+        return Ok((white, solved));
+    }
+    for _ in 0..NOISE_ROUNDS {
+        let values = white.parameters_at(&solved.at.x);
+        let again = Whitened::new(Box::new(problem), &values, free, config)?;
+        let mut better = solve(&again, Some(solved.sigma_scale), config)?;
+        better.iterations += solved.iterations;
+        let found = again.parameters_at(&better.at.x);
+        let moved = again.axes.iter().map(|a| (found[a.index] - values[a.index]).abs() / a.scale);
+        let settled = moved.fold(0.0, f64::max) < NOISE_TOLERANCE;
+        (white, solved) = (again, better);
+        if settled {
+            break;
+        }
+    }
+    Ok((white, solved))
 }
 
 /// Where the parameters ended, and the scale the loss was judged at.

@@ -1,7 +1,8 @@
 //! The calibration of a model against observations, as a [`Problem`].
 //!
 //! The covariance of an observation is what was measured plus what the encoders add:
-//! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading. Cross-covariance between
+//! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading; to sigma_q^2 comes the slack of
+//! joints that rest anywhere in their gaps. Cross-covariance between
 //! position and orientation enters through the encoders only.
 
 use crate::problem::{Known, Linearised, Problem};
@@ -18,7 +19,11 @@ const JOINT_STEP_RAD: f64 = 1e-6;
 /// Covariance of measured minus predicted position of an observation at parameters `p` [m^2].
 pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matrix3<f64> {
     let mut jacobian = model.joint_jacobian(p, o);
-    for (mut column, sigma) in jacobian.column_iter_mut().zip(&o.joint_sigma_rad) {
+    let mut sigma_rad = o.joint_sigma_rad.clone();
+    for (joint, variance_rad2) in model.slack(p, o) {
+        sigma_rad[joint] = sigma_rad[joint].hypot(variance_rad2.sqrt());
+    }
+    for (mut column, sigma) in jacobian.column_iter_mut().zip(&sigma_rad) {
         column *= *sigma;
     }
     o.covariance_m2 + &jacobian * jacobian.transpose()
@@ -157,6 +162,10 @@ impl Problem for ModelProblem<'_> {
             column *= *sigma;
         }
         covariance + &spread * spread.transpose()
+    }
+
+    fn noise_depends(&self) -> bool {
+        self.scene.model().has_gaps()
     }
 
     fn known(&self) -> Vec<Known> {

@@ -71,6 +71,10 @@ impl Problem for WithPriors<'_> {
         self.problem.covariance(block, p)
     }
 
+    fn noise_depends(&self) -> bool {
+        self.problem.noise_depends()
+    }
+
     fn known(&self) -> Vec<Known> {
         self.problem.known()
     }

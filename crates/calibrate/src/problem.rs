@@ -51,6 +51,10 @@ pub trait Problem: Sync {
     }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
+    /// Whether the covariance depends on what is estimated by more than where the arm stands.
+    fn noise_depends(&self) -> bool {
+        false
+    }
     /// Which blocks know which parameters, in the order of the blocks; all of them know all where nothing is said. What
     /// only one group knows is solved for within it, so that work and memory grow with the number of groups.
     fn known(&self) -> Vec<Known> {
@@ -94,6 +98,10 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         (**self).covariance(block, p)
+    }
+
+    fn noise_depends(&self) -> bool {
+        (**self).noise_depends()
     }
 
     fn known(&self) -> Vec<Known> {

@@ -12,4 +12,5 @@ mod pooled; // has a pool solved recording by recording the optimum of one dense
 mod refusals; // does impossible input get an error that names it?
 pub mod rig; // the planted arm of these tests
 mod robust; // do outliers leave the answer alone?
+mod slack; // is where a joint rests in its gap noise of known size?
 mod solvers; // do SciPy and basin find the same optimum, and how fast?

@@ -12,6 +12,9 @@ const FEWEST_A_TURN: f64 = 3.0;
 const A_PERIOD: f64 = 4.0;
 /// Least share of a curve, beside its slow part, that is called a ripple.
 const LEAST_SHARE: f64 = 0.5;
+/// Nothing else, further off than the range resolves, is more than this share of the ripple: of a curve that only varies
+/// some period always stands out a little.
+const NEXT_AT_MOST: f64 = 1.0 / 3.0;
 /// Steps of the search, in periods over the whole range: a fraction of what the range resolves.
 const STEP: f64 = 0.05;
 /// Multiples of the ripple that give it a shape.
@@ -30,8 +33,8 @@ pub struct Ripple {
     pub share_with_multiples: f64,
 }
 
-/// The strongest ripple of a curve, given at the angles [rad] where the joint was; none where no ripple is half of what the
-/// curve is beside its slow part (a straight line and the first two harmonics of the turn).
+/// The ripple of a curve, given at the angles [rad] where the joint was; none where no period stands alone and is half of what
+/// the curve is beside its slow part (a straight line and the first two harmonics of the turn).
 pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
     let mut sorted = angles_rad.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -53,13 +56,18 @@ pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
     if !(steps >= 0.0 && all > 0.0) {
         return None;
     }
-    let tried = (0..=steps as usize).map(|k| least + step * k as f64).map(|n| (n, at(n, 1)));
-    let (n, share) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let tried: Vec<(f64, f64)> =
+        (0..=steps as usize).map(|k| least + step * k as f64).map(|n| (n, at(n, 1))).collect();
+    let strongest = |all: &mut dyn Iterator<Item = (f64, f64)>| all.max_by(|a, b| a.1.total_cmp(&b.1));
+    let (n, share) = strongest(&mut tried.iter().copied())?;
+    let resolved = TAU / range_rad;
+    let apart = |(other, _): &(f64, f64)| (1..=MULTIPLES).all(|m| (other - m as f64 * n).abs() > resolved);
+    let next = strongest(&mut tried.iter().copied().filter(apart)).map_or(0.0, |(_, share)| share);
     let amplitude = slow.joined(angles_rad, n, 1).last_amplitude(&rest);
     let multiples = MULTIPLES.min((most / n) as usize).max(1);
     let found =
         Ripple { periods_per_turn: n, amplitude, share, share_with_multiples: at(n, multiples).max(share) };
-    (share >= LEAST_SHARE).then_some(found)
+    (share >= LEAST_SHARE && next <= NEXT_AT_MOST * share).then_some(found)
 }
 
 /// Columns that are fitted together.

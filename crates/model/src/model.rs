@@ -256,6 +256,22 @@ impl Model {
         (residual, jacobian)
     }
 
+    /// Joints that may rest anywhere in the gaps of their drives while a cavity holds the tip, and the variance of where they
+    /// do [rad^2] (prismatic: [m^2]): noise that no reading shows.
+    pub fn slack(&self, p: &[f64], o: &Observation) -> Vec<(usize, f64)> {
+        match &self.effects {
+            Some(effects) if o.cavity().is_some() && effects.has_gaps() => {
+                effects.slack(p, &effects.drivers(self, o))
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Whether [`Model::slack`] depends on the parameters of effects.
+    pub fn has_gaps(&self) -> bool {
+        self.effects.as_ref().is_some_and(Effects::has_gaps)
+    }
+
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
             None => joint_twists(&self.path, p, &o.joint_rad).1,

@@ -14,7 +14,9 @@
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
-//! link there and it lags elsewhere.
+//! link there and it lags elsewhere. Where it is between -1 and 1, nothing holds the joint on a flank there: it rests
+//! anywhere in its gap, with variance `(b/2)^2 (1 - seated^2) / 3`, a third of which an even spread over the gap has. Nothing
+//! predicts that; it is part of the noise of these dwells.
 //!
 //! # Signature in the data
 //! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
@@ -69,5 +71,9 @@ impl Physics for Backlash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let memory = x.path_memory_rad(self.joint);
         change.joint(self.joint, lagging(theta[0], self.resolved, memory, x.arrival[self.joint]));
+    }
+
+    fn gap(&self, theta: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint, theta[0]))
     }
 }

@@ -73,6 +73,11 @@ pub(crate) trait Physics: Debug + Send + Sync + 'static {
         Vector3::repeat(D::from(0.0))
     }
 
+    /// A joint with a gap in its drive, and the width of the gap [rad] (prismatic: [m]).
+    fn gap(&self, _theta: &[f64]) -> Option<(usize, f64)> {
+        None
+    }
+
     /// The entries of `theta` that can matter to this observation.
     fn touched(&self, _x: &Drivers<'_>, count: usize) -> Range<usize> {
         0..count
@@ -89,6 +94,13 @@ pub(crate) trait AnyPhysics: Debug + Send + Sync {
     fn predict_seen(&self, theta: &[f64], point_m: &Vector3<f64>) -> Vector3<f64>;
     /// [`Physics::seen`], differentiating.
     fn differentiate_seen(&self, theta: &[Dual64], point_m: &Vector3<Dual64>) -> Vector3<Dual64>;
+    /// [`Physics::gap`].
+    fn gap_of(&self, theta: &[f64]) -> Option<(usize, f64)>;
+    /// A joint that may rest anywhere in its gap, and the variance of where it does [rad^2] (prismatic: [m^2]): what no
+    /// prediction can know.
+    fn slack(&self, _theta: &[f64], _x: &Drivers<'_>) -> Option<(usize, f64)> {
+        None
+    }
     /// [`Physics::touched`].
     fn touched_entries(&self, x: &Drivers<'_>, count: usize) -> Range<usize>;
 }
@@ -108,6 +120,10 @@ impl<P: Physics> AnyPhysics for P {
 
     fn differentiate_seen(&self, theta: &[Dual64], point_m: &Vector3<Dual64>) -> Vector3<Dual64> {
         self.seen(theta, point_m)
+    }
+
+    fn gap_of(&self, theta: &[f64]) -> Option<(usize, f64)> {
+        self.gap(theta)
     }
 
     fn touched_entries(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {

@@ -264,6 +264,19 @@ impl Effects {
         joints
     }
 
+    /// Joints that may rest anywhere in a gap, and the variance of where they do [rad^2].
+    pub fn slack(&self, p: &[f64], x: &Drivers<'_>) -> Vec<(usize, f64)> {
+        let acting = self.placed.iter().filter(|effect| effect.acts_on(x));
+        acting.filter_map(|effect| effect.physics.slack(&p[effect.parameters.clone()], x)).collect()
+    }
+
+    /// Whether a gap of some width would leave a joint free somewhere.
+    pub fn has_gaps(&self) -> bool {
+        let gap =
+            |effect: &PlacedEffect| effect.physics.gap_of(&vec![0.0; effect.parameters.len()]).is_some();
+        self.placed.iter().any(gap)
+    }
+
     /// Parameters with the twists behind them, joint readings, and the seated point.
     fn deformed(&self, p: &[f64], x: &Drivers<'_>) -> (Vec<f64>, Vec<f64>, Vector3<f64>) {
         let mut change = Deformation::none();

@@ -102,6 +102,16 @@ impl AnyPhysics for Shared {
         self.physics.differentiate_seen(theta, point_m)
     }
 
+    fn gap_of(&self, theta: &[f64]) -> Option<(usize, f64)> {
+        self.physics.gap_of(theta)
+    }
+
+    fn slack(&self, theta: &[f64], x: &Drivers<'_>) -> Option<(usize, f64)> {
+        let (joint, width) = self.physics.gap_of(theta).filter(|_| seated(x))?;
+        let free = 1.0 - theta[self.share].powi(2);
+        (free > 0.0).then(|| (joint, (0.5 * width).powi(2) * free / 3.0))
+    }
+
     fn touched_entries(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {
         self.physics.touched_entries(x, count)
     }
