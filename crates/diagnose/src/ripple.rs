@@ -11,10 +11,10 @@ const FEWEST_A_TURN: f64 = 3.0;
 /// A period needs so many angles.
 const A_PERIOD: f64 = 4.0;
 /// Least share of a curve, beside its slow part, that is called a ripple.
-const LEAST_SHARE: f64 = 0.5;
-/// Nothing else, further off than the range resolves, is more than this share of the ripple: of a curve that only varies
-/// some period always stands out a little.
-const NEXT_AT_MOST: f64 = 1.0 / 3.0;
+const LEAST_SHARE: f64 = 0.55;
+/// Nothing else, further off than the range resolves, is more than this share of the ripple. Of curves that only vary, 4 in
+/// 100 have a period that stands out so far.
+const NEXT_AT_MOST: f64 = 0.25;
 /// Steps of the search, in periods over the whole range: a fraction of what the range resolves.
 const STEP: f64 = 0.05;
 /// Multiples of the ripple that give it a shape.
@@ -33,7 +33,7 @@ pub struct Ripple {
     pub share_with_multiples: f64,
 }
 
-/// The ripple of a curve, given at the angles [rad] where the joint was; none where no period stands alone and is half of what
+/// The ripple of a curve, given at the angles [rad] where the joint was; none where no period stands alone and is most of what
 /// the curve is beside its slow part (a straight line and the first two harmonics of the turn).
 pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
     let mut sorted = angles_rad.to_vec();
