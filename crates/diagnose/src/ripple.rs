@@ -35,7 +35,9 @@ pub struct Ripple {
 
 /// The ripple of a curve, given at the angles [rad] where the joint was; none where no period stands alone and is most of what
 /// the curve is beside its slow part (a straight line and the first two harmonics of the turn).
-pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
+///
+/// `functions` is how many the curve was put together from: it shows half as many periods at most.
+pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64], functions: usize) -> Option<Ripple> {
     let mut sorted = angles_rad.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.dedup();
@@ -50,8 +52,11 @@ pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
         let waves = slow.joined(angles_rad, n, multiples);
         1.0 - waves.without(&rest).norm_squared() / all
     };
-    let [least, most] = [FEWEST_A_TURN.max(FEWEST_PERIODS * TAU / range_rad), TAU / (A_PERIOD * usual_rad)];
-    let step = STEP * TAU / range_rad;
+    // Periods a turn that go once through the range.
+    let once = TAU / range_rad;
+    let least = FEWEST_A_TURN.max(FEWEST_PERIODS * once);
+    let most = (TAU / (A_PERIOD * usual_rad)).min(0.5 * functions as f64 * once);
+    let step = STEP * once;
     let steps = ((most - least) / step).floor();
     if !(steps >= 0.0 && all > 0.0) {
         return None;
@@ -60,8 +65,7 @@ pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64]) -> Option<Ripple> {
         (0..=steps as usize).map(|k| least + step * k as f64).map(|n| (n, at(n, 1))).collect();
     let strongest = |all: &mut dyn Iterator<Item = (f64, f64)>| all.max_by(|a, b| a.1.total_cmp(&b.1));
     let (n, share) = strongest(&mut tried.iter().copied())?;
-    let resolved = TAU / range_rad;
-    let apart = |(other, _): &(f64, f64)| (1..=MULTIPLES).all(|m| (other - m as f64 * n).abs() > resolved);
+    let apart = |(other, _): &(f64, f64)| (1..=MULTIPLES).all(|m| (other - m as f64 * n).abs() > once);
     let next = strongest(&mut tried.iter().copied().filter(apart)).map_or(0.0, |(_, share)| share);
     let amplitude = slow.joined(angles_rad, n, 1).last_amplitude(&rest);
     let multiples = MULTIPLES.min((most / n) as usize).max(1);
@@ -128,12 +132,12 @@ mod tests {
         let q = angles(1, 300);
         let slow = |q: f64| 0.3 * q + 2.0 * (q + 0.4).cos();
         let sine: Vec<f64> = q.iter().map(|q| slow(*q) + 1.5 * (17.0 * q + 0.2).sin()).collect();
-        let found = ripple(&q, &sine).expect("a ripple");
+        let found = ripple(&q, &sine, 60).expect("a ripple");
         assert!((found.periods_per_turn - 17.0).abs() < 0.1, "{found:?}");
         assert!((found.amplitude - 1.5).abs() < 0.03 && found.share > 0.98, "{found:?}");
         // A sawtooth: its sine is 6/pi^2 of its squares, three harmonics 6/pi^2 (1 + 1/4 + 1/9).
         let saw: Vec<f64> = q.iter().map(|q| slow(*q) + (17.0 * q / TAU).fract()).collect();
-        let found = ripple(&q, &saw).expect("a ripple");
+        let found = ripple(&q, &saw, 60).expect("a ripple");
         let of_sine = 6.0 / std::f64::consts::PI.powi(2);
         assert!((found.periods_per_turn - 17.0).abs() < 0.1, "{found:?}");
         assert!((found.share - of_sine).abs() < 0.06, "{found:?}");
@@ -154,10 +158,10 @@ mod tests {
                 .collect();
             let curve: Vec<f64> =
                 q.iter().map(|q| waves.iter().map(|[a, n, phase]| a * (n * q + phase).sin()).sum()).collect();
-            claimed += usize::from(ripple(&q, &curve).is_some());
+            claimed += usize::from(ripple(&q, &curve, 60).is_some());
         }
         assert!(claimed <= 4, "{claimed} of 40");
-        assert_eq!(ripple(&angles(3, 60), &[0.0; 60]), None, "a curve of nothing");
-        assert_eq!(ripple(&[0.3; 9], &[1.0; 9]), None, "it never turned");
+        assert_eq!(ripple(&angles(3, 60), &[0.0; 60], 60), None, "a curve of nothing");
+        assert_eq!(ripple(&[0.3; 9], &[1.0; 9], 60), None, "it never turned");
     }
 }

@@ -54,7 +54,7 @@ pub(crate) fn described(
         if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
             let per = driver.basis.ncols();
             let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
-            repeats = ripple(&driver.value, curve.as_slice());
+            repeats = ripple(&driver.value, curve.as_slice(), per);
         }
     }
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.

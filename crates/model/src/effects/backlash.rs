@@ -15,8 +15,8 @@
 //! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
 //! link there and it lags elsewhere. Where it is between -1 and 1, nothing holds the joint on a flank there: it rests
-//! anywhere in its gap, with variance `(b/2)^2 (1 - seated^2) / 3`, a third of which an even spread over the gap has. Nothing
-//! predicts that; it is part of the noise of these dwells.
+//! anywhere in its gap, with variance `(b/2)^2 (1 - seated^2) / 3`: at 0 that of an even spread over the gap. Nothing
+//! predicts it; it is part of the noise of these dwells.
 //!
 //! # Signature in the data
 //! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
