@@ -259,17 +259,13 @@ impl Model {
     /// Joints that may rest anywhere in the gaps of their drives while a cavity holds the tip, and the variance of where they
     /// do [rad^2] (prismatic: [m^2]): noise that no reading shows.
     pub fn slack(&self, p: &[f64], o: &Observation) -> Vec<(usize, f64)> {
-        match &self.effects {
-            Some(effects) if o.cavity().is_some() && effects.has_gaps() => {
-                effects.slack(p, &effects.drivers(self, o))
-            }
-            _ => Vec::new(),
-        }
+        let effects = self.effects.as_ref().filter(|_| o.cavity().is_some());
+        effects.map_or_else(Vec::new, |effects| effects.slack(p, o.dwell))
     }
 
-    /// Whether [`Model::slack`] depends on the parameters of effects.
+    /// Whether [`Model::slack`] depends on what is estimated.
     pub fn has_gaps(&self) -> bool {
-        self.effects.as_ref().is_some_and(Effects::has_gaps)
+        self.effects.as_ref().is_some_and(|effects| effects.has_gaps(&self.nominal()))
     }
 
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {

@@ -13,7 +13,7 @@ use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::twist::Twist;
 use crate::{Model, ModelError};
-use armcal_core::{Parameter, Reference, Role};
+use armcal_core::{DwellId, Parameter, Reference, Role};
 use nalgebra::{Matrix3, Vector3};
 use num_dual::Dual64;
 use std::ops::Range;
@@ -44,7 +44,11 @@ impl PartialEq for PlacedEffect {
 
 impl PlacedEffect {
     fn acts_on(&self, x: &Drivers<'_>) -> bool {
-        self.spec.since.is_none_or(|since| since.holds(x.observation.dwell))
+        self.acts_in(x.observation.dwell)
+    }
+
+    fn acts_in(&self, dwell: DwellId) -> bool {
+        self.spec.since.is_none_or(|since| since.holds(dwell))
     }
 }
 
@@ -264,17 +268,20 @@ impl Effects {
         joints
     }
 
-    /// Joints that may rest anywhere in a gap, and the variance of where they do [rad^2].
-    pub fn slack(&self, p: &[f64], x: &Drivers<'_>) -> Vec<(usize, f64)> {
-        let acting = self.placed.iter().filter(|effect| effect.acts_on(x));
-        acting.filter_map(|effect| effect.physics.slack(&p[effect.parameters.clone()], x)).collect()
+    /// Joints that may rest anywhere in a gap while a cavity holds the tip of dwell `at`, and the variance of where they do
+    /// [rad^2].
+    pub fn slack(&self, p: &[f64], at: DwellId) -> Vec<(usize, f64)> {
+        let acting = self.placed.iter().filter(|effect| effect.acts_in(at));
+        acting.filter_map(|effect| effect.physics.slack(&p[effect.parameters.clone()])).collect()
     }
 
-    /// Whether a gap of some width would leave a joint free somewhere.
-    pub fn has_gaps(&self) -> bool {
-        let gap =
-            |effect: &PlacedEffect| effect.physics.gap_of(&vec![0.0; effect.parameters.len()]).is_some();
-        self.placed.iter().any(gap)
+    /// Whether a gap of some width would leave a joint free somewhere; `nominal` are the parameters.
+    pub fn has_gaps(&self, nominal: &[f64]) -> bool {
+        self.placed.iter().any(|effect| {
+            let mut theta = nominal[effect.parameters.clone()].to_vec();
+            theta[..effect.amplitudes].fill(1.0);
+            effect.physics.slack(&theta).is_some()
+        })
     }
 
     /// Parameters with the twists behind them, joint readings, and the seated point.

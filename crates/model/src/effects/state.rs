@@ -106,8 +106,8 @@ impl AnyPhysics for Shared {
         self.physics.gap_of(theta)
     }
 
-    fn slack(&self, theta: &[f64], x: &Drivers<'_>) -> Option<(usize, f64)> {
-        let (joint, width) = self.physics.gap_of(theta).filter(|_| seated(x))?;
+    fn slack(&self, theta: &[f64]) -> Option<(usize, f64)> {
+        let (joint, width) = self.physics.gap_of(theta)?;
         let free = 1.0 - theta[self.share].powi(2);
         (free > 0.0).then(|| (joint, (0.5 * width).powi(2) * free / 3.0))
     }
