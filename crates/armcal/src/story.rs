@@ -7,7 +7,7 @@ use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate, holdout_turns};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
-use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, diagnose, nested};
+use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, Verdict, diagnose, nested};
 use armcal_model::{EffectSpec, Model, Session};
 use armcal_recording::Recording;
 use armcal_report::{Refit, Run, Undiagnosed};
@@ -232,6 +232,10 @@ impl Settled {
         let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
         let mut warnings = closing_warnings(rounds, &calibration);
         warnings.extend(diagnosed.warning);
+        let mut setup = self.setup;
+        if let Some(named) = diagnosed.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {
+            setup.outdone_by(named.holdout_mm.after);
+        }
         let run = Run {
             pipeline_name: pipeline.name.clone(),
             pipeline_text: pipeline.text.clone(),
@@ -242,7 +246,7 @@ impl Settled {
             session: frames::session(pipeline, &observations),
             observations,
             calibration,
-            setup: self.setup,
+            setup,
             diagnosis: diagnosed.diagnosis,
             undiagnosed: diagnosed.undiagnosed,
             steps: Vec::new(),

@@ -84,9 +84,46 @@ impl SetupReport {
         self.findings.iter().filter(|f| f.certainty == Certainty::Mistake)
     }
 
+    /// Drops changes that were only possible where something physical was named that leaves no more of the errors [mm] than
+    /// they would: a frame that is let go follows much that is no mistake of the setup.
+    pub fn outdone_by(&mut self, physics_mm: f64) {
+        let better = |f: &SetupFinding| f.after_mm.is_none_or(|mm| mm < physics_mm);
+        self.findings.retain(|f| f.certainty == Certainty::Mistake || f.before_mm.is_none() || better(f));
+    }
+
     /// Everything that was found, and what could not be, for every output.
     pub fn warnings(&self) -> Vec<Warning> {
         let unseen = self.not_testable.iter().map(Unseen::warning);
         self.findings.iter().map(SetupFinding::warning).chain(unseen).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_only_possible_gives_way_to_physics_that_leaves_no_more() {
+        let finding = |certainty, before_mm, after_mm| SetupFinding {
+            code: "board-pose",
+            subject: "the board".to_owned(),
+            message: String::new(),
+            certainty,
+            before_mm,
+            after_mm,
+            alternatives: Vec::new(),
+        };
+        let possible = finding(Certainty::Possible, Some(0.61), Some(0.19));
+        let sure = finding(Certainty::Mistake, Some(0.61), Some(0.19));
+        let seen = finding(Certainty::Possible, None, None);
+        let findings = vec![sure.clone(), possible.clone(), seen.clone()];
+        let report = SetupReport { findings, ..SetupReport::default() };
+        let left = |physics_mm| {
+            let mut report = report.clone();
+            report.outdone_by(physics_mm);
+            report.findings
+        };
+        assert_eq!(left(0.18), [sure.clone(), seen.clone()]);
+        assert_eq!(left(0.20), [sure, possible, seen], "the change leaves less than what was named");
     }
 }

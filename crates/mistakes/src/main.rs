@@ -34,6 +34,9 @@ struct Args {
     /// Sound sessions.
     #[arg(long, default_value_t = 200, value_name = "N")]
     sound: usize,
+    /// Number of the first of them; with `--seeds 0` and `--sound 1` one session again by itself.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    sound_from: usize,
     /// Write the table here.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -109,7 +112,7 @@ fn suite(args: &Args) -> Result<ExitCode, Error> {
             Ok(case)
         });
         let cases = cases.collect::<Result<_, Error>>()?;
-        let sound = (0..args.sound).into_par_iter().map(|number| {
+        let sound = (args.sound_from..args.sound_from + args.sound).into_par_iter().map(|number| {
             let name = format!("sound-{number}-{}", args.seed);
             let sound = within(args.keep.as_deref(), &name, |folder| {
                 sound::sound(&armcal, number, args.seed, folder)
