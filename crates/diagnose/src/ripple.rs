@@ -12,8 +12,9 @@ const FEWEST_A_TURN: f64 = 3.0;
 const A_PERIOD: f64 = 4.0;
 /// Least share of a curve, beside its slow part, that is called a ripple.
 const LEAST_SHARE: f64 = 0.55;
-/// Nothing else, further off than the range resolves, is more than this share of the ripple. Of curves that only vary, 4 in
-/// 100 have a period that stands out so far.
+/// Nothing else, further off than this many times what the range resolves, is more than this share of the ripple. Of curves
+/// that only vary, 6 in 100 have a period that stands out so far.
+const APART: f64 = 1.5;
 const NEXT_AT_MOST: f64 = 0.25;
 /// Steps of the search, in periods over the whole range: a fraction of what the range resolves.
 const STEP: f64 = 0.05;
@@ -65,7 +66,8 @@ pub(crate) fn ripple(angles_rad: &[f64], curve: &[f64], functions: usize) -> Opt
         (0..=steps as usize).map(|k| least + step * k as f64).map(|n| (n, at(n, 1))).collect();
     let strongest = |all: &mut dyn Iterator<Item = (f64, f64)>| all.max_by(|a, b| a.1.total_cmp(&b.1));
     let (n, share) = strongest(&mut tried.iter().copied())?;
-    let apart = |(other, _): &(f64, f64)| (1..=MULTIPLES).all(|m| (other - m as f64 * n).abs() > once);
+    let apart =
+        |(other, _): &(f64, f64)| (1..=MULTIPLES).all(|m| (other - m as f64 * n).abs() > APART * once);
     let next = strongest(&mut tried.iter().copied().filter(apart)).map_or(0.0, |(_, share)| share);
     let amplitude = slow.joined(angles_rad, n, 1).last_amplitude(&rest);
     let multiples = MULTIPLES.min((most / n) as usize).max(1);
