@@ -28,16 +28,22 @@ export async function open(browser, address, { colorScheme = "light" } = {}) {
   return { page, seen };
 }
 
-// Brings every chart into sight, so that all are drawn, and returns to the top.
+// Brings a chart into sight and waits until it shows what it should now show; on a busy machine that takes seconds.
+async function fresh(page, box) {
+  await box.evaluate((own) => own.scrollIntoView({ block: "center" }));
+  await page.waitForFunction((own) => own.data && !charts.get(own).stale, box, { timeout: 60000 });
+}
+
+// Draws every chart, and returns to the top.
 export async function drawn(page) {
-  await page.evaluate(async () => {
-    for (const box of document.querySelectorAll(".plot")) {
-      box.scrollIntoView({ block: "center" });
-      await new Promise((done) => setTimeout(done, 60));
-    }
-    scrollTo(0, 0);
-  });
-  await page.waitForFunction(() => [...document.querySelectorAll(".plot")].every((box) => box.data), null, { timeout: 60000 });
+  for (const box of await page.$$(".plot")) await fresh(page, box);
+  await page.evaluate(() => scrollTo(0, 0));
+}
+
+// The numbers that a chart should now show, once it does.
+export async function shown(page, selector) {
+  await fresh(page, await page.$(selector));
+  return data(page, selector);
 }
 
 // The numbers behind a chart.

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
-import { data, drawn, launch, number, open } from "./browser.mjs";
+import { data, drawn, launch, number, open, shown } from "./browser.mjs";
 
 const [report, summaryPath, folder] = process.argv.slice(2);
 const summary = JSON.parse(readFileSync(summaryPath, "utf8"));
@@ -32,9 +32,7 @@ try {
     assert.ok(refit, `summary.json has the refit with ${spec}`);
     assert.equal(await number(page, "#n-after"), side(refit).fitted_mm.mean, spec);
     assert.ok((await page.textContent("#sentence")).includes(`to ${(await page.textContent("#n-after")).replace(" mm", "")} mm`));
-    await page.locator("#time").scrollIntoViewIfNeeded();
-    await page.waitForTimeout(150);
-    const after = await data(page, "#time");
+    const after = await shown(page, "#time");
     assert.notDeepEqual(after, before, `${spec} changes the plot over time`);
     // What is drawn is what the headline averages.
     const errors = after.filter((t) => t.name && t.name.startsWith("+") && t.name.endsWith("held out")).flatMap((t) => t.y).slice(0, refit.holdout.n);
@@ -42,9 +40,7 @@ try {
       const mean = errors.reduce((a, b) => a + b, 0) / errors.length;
       assert.ok(Math.abs(mean - refit.holdout.fitted_mm.mean) < 2e-3 * mean + 1e-4, `${mean} and ${refit.holdout.fitted_mm.mean}`);
     }
-    await page.locator("#joints .plot").first().scrollIntoViewIfNeeded();
-    await page.waitForTimeout(150);
-    assert.notDeepEqual(await data(page, "#joints .plot"), joint, `${spec} changes the joints`);
+    assert.notDeepEqual(await shown(page, "#joints .plot"), joint, `${spec} changes the joints`);
     assert.ok(await page.locator(`tr.selected[data-spec="${spec}"]`).count() === 1);
     console.log(`${spec}: ${await page.textContent("#n-after")} on screen, ${side(refit).fitted_mm.mean} in summary.json`);
   }
