@@ -17,6 +17,7 @@ use crate::holdout::{self, Holdout};
 use crate::model_problem::{ModelProblem, describe, position_covariance_m2};
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
+use crate::priors::scales_of;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, Scene, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
@@ -231,7 +232,8 @@ impl Judge<'_> {
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
         let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
         let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
-        Near { values, sigma_scale: fit.sigma_scale }
+        let prior_scales = scales_of(fit, self.scene.parameters());
+        Near { values, sigma_scale: fit.sigma_scale, prior_scales }
     }
 
     /// Estimated frames (and what else a recording of a pool has for itself, unless it was measured) that `test` says

@@ -3,6 +3,7 @@
 use crate::covariance::Covariance;
 use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
+use crate::priors::PriorScales;
 use crate::problem::Problem;
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Settings};
@@ -49,15 +50,16 @@ pub fn fit_problem(
     fit_from(problem, start, None, free, config)
 }
 
-/// [`fit_problem`] from where another fit ended, at the scale it found: the same minimum in a few steps when most of the
-/// blocks are the same. Not for eq. 4, which ends anywhere within its limit, so that the start is part of the answer.
+/// [`fit_problem`] from where another fit ended, at the scales it found: the same minimum in a few steps when most of the
+/// blocks are the same. It is asked for values and weights alone: what it does not determine is not looked for. Not for
+/// eq. 4, which ends anywhere within its limit, so that the start is part of the answer.
 pub(crate) fn fit_near(
     problem: &dyn Problem,
     near: &Near,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
-    fit_from(problem, &near.values, Some(near.sigma_scale), free, config)
+    fit_from(problem, &near.values, Some(near), free, config)
 }
 
 /// Where another fit ended.
@@ -66,21 +68,24 @@ pub(crate) struct Near {
     pub values: Vec<f64>,
     /// Scale of the residuals in units of the declared noise.
     pub sigma_scale: f64,
+    /// Scales of the priors that it learnt.
+    pub prior_scales: PriorScales,
 }
 
 fn fit_from(
     problem: &dyn Problem,
     start: &[f64],
-    sigma_scale: Option<f64>,
+    near: Option<&Near>,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
     config.check()?;
     let declared = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&declared)?;
-    let solved = solve(&declared, sigma_scale, config)?;
+    let solved = solve(&declared, near.map(|n| n.sigma_scale), config)?;
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
-    let learnt = priors::learnt(problem, (&declared, &solved), free, config)?;
+    let known = near.map(|n| &n.prior_scales);
+    let learnt = priors::learnt(problem, (&declared, &solved), known, free, config)?;
     let said = learnt.as_ref().and_then(|(white, _)| priors::said(white));
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
     let (white, solved) = learnt.unwrap_or((declared, solved));
@@ -88,7 +93,7 @@ fn fit_from(
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
     let mut uncertainty = statistics::uncertainty(&cost, residual, &squares, &name)?;
-    if let Some(values) = values {
+    if let (Some(values), None) = (values, near) {
         // What the data determine is asked of them alone: a narrow prior that they taught is no reason to doubt them.
         let wide = Whitened::new(Box::new(problem), &values, free, config)?;
         let at = wide.at(wide.start())?;
@@ -102,6 +107,15 @@ fn fit_from(
         Some(_) => vec![1.0; white.blocks()],
         None => cost.weights(residual),
     };
+    let undetermined = match near {
+        Some(_) => Vec::new(),
+        None => undetermined::directions(
+            &uncertainty.undetermined,
+            &white.axes,
+            problem.parameters(),
+            &problem.symmetries(&white.parameters_at(&solved.at.x)),
+        ),
+    };
     let mut fit = Fit {
         objective: in_words(config).to_string(),
         estimates: estimates(&white, &solved.at.x, &uncertainty),
@@ -109,12 +123,7 @@ fn fit_from(
         weights,
         sigma_scale: proposal2_scale(&cost, residual, fitted),
         rank: uncertainty.rank,
-        undetermined: undetermined::directions(
-            &uncertainty.undetermined,
-            &white.axes,
-            problem.parameters(),
-            &problem.symmetries(&white.parameters_at(&solved.at.x)),
-        ),
+        undetermined,
         paper: solved.paper,
         status: solved.status,
         iterations: solved.iterations,

@@ -12,6 +12,7 @@
 //! is the widest it becomes, and bounds stay where they are.
 
 use crate::fit::{Solved, solve};
+use crate::outcome::{Estimate, Fit};
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::statistics::posterior;
 use crate::whitened::Whitened;
@@ -84,10 +85,23 @@ impl Problem for WithPriors<'_> {
     }
 }
 
-/// A fit with priors as narrow as the data ask for, from the fit with the default ones; none where all are declared.
+/// Scale of each kind of prior, as a share of the default one.
+pub(crate) type PriorScales = BTreeMap<ParameterKind, f64>;
+
+/// The scales that a fit learnt of the default priors of `parameters`.
+pub(crate) fn scales_of(fit: &Fit, parameters: &[Parameter]) -> PriorScales {
+    let scale = |(e, default): (&Estimate, &Parameter)| {
+        Some((default.assumed?, e.parameter.prior_sigma? / default.prior_sigma?))
+    };
+    fit.estimates.iter().zip(parameters).filter(|(e, _)| e.parameter.free).filter_map(scale).collect()
+}
+
+/// A fit with priors as narrow as the data ask for, from the fit with the default ones and from the scales that a fit to
+/// nearly the same data learnt; none where all are declared.
 pub(crate) fn learnt<'a>(
     problem: &'a dyn Problem,
     (white, solved): (&Whitened<'_>, &Solved),
+    near: Option<&PriorScales>,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Option<(Whitened<'a>, Solved)>, CalibrateError> {
@@ -95,11 +109,15 @@ pub(crate) fn learnt<'a>(
     if !assumed || !config.learn_priors || config.objective == Objective::Paper {
         return Ok(None);
     }
-    let mut scales: BTreeMap<ParameterKind, f64> = BTreeMap::new();
+    let mut scales = PriorScales::new();
     let mut latest: Option<(Whitened<'a>, Solved)> = None;
+    let mut proposed = near.filter(|scales| !scales.is_empty()).cloned();
     for _ in 0..ROUNDS {
         let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
-        let next = rescaled(&scales, white, solved)?;
+        let next = match proposed.take() {
+            Some(scales) => scales,
+            None => rescaled(&scales, white, solved)?,
+        };
         let kept = |(kind, scale): (&ParameterKind, &f64)| {
             scales.get(kind).is_some_and(|old| (scale / old - 1.0).abs() < TOLERANCE)
         };
@@ -121,12 +139,12 @@ pub(crate) fn learnt<'a>(
     Ok(latest)
 }
 
-/// The scale of each kind as the fit at these scales has it, as a share of the default prior.
+/// The scale of each kind as the fit at these scales has it.
 fn rescaled(
-    scales: &BTreeMap<ParameterKind, f64>,
+    scales: &PriorScales,
     white: &Whitened<'_>,
     solved: &Solved,
-) -> Result<BTreeMap<ParameterKind, f64>, CalibrateError> {
+) -> Result<PriorScales, CalibrateError> {
     let parameters = white.problem.parameters();
     let name = |index: usize| parameters[index].name.clone();
     let data = solved.sigma_scale.powi(-2);

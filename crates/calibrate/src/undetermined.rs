@@ -95,7 +95,11 @@ fn unseen<'s>(
 
 /// What of a direction is orthogonal to those already spanned.
 fn beyond(direction: &DVector<f64>, spanned: &[DVector<f64>]) -> DVector<f64> {
-    spanned.iter().fold(direction.clone(), |rest, s| &rest - s * s.dot(&rest))
+    let mut rest = direction.clone();
+    for s in spanned {
+        rest.axpy(-s.dot(&rest), s, 1.0);
+    }
+    rest
 }
 
 /// The parameters that matter in a direction, largest share first and positive.
@@ -135,12 +139,21 @@ fn simple_basis(
         spanned.push(beyond(direction, &spanned).normalize());
     }
     let mut chosen = named;
+    let mut single = vec![false; weak.nrows()];
     for (_, i, j) in candidates {
+        if spanned.len() >= weak.ncols() {
+            break;
+        }
+        // Of two chosen parameters every mixture is spanned.
+        if i != j && single[i] && single[j] {
+            continue;
+        }
         let Some(direction) = inside(&projector, i, j) else { continue };
         let rest = beyond(&direction, &spanned);
         if rest.norm_squared() >= NEW {
             spanned.push(rest.normalize());
             chosen.push(direction);
+            single[i] |= i == j;
         }
     }
     chosen.extend(remainder(weak, &spanned));

@@ -322,6 +322,9 @@ pub struct UnknownReport {
     pub shape: Vec<ShapePoint>,
     /// What repeats in it, of a joint's error over its own angle.
     pub ripple: Option<Ripple>,
+    /// Harmonics of the turn that the poses resolve, of a joint's error over its own angle.
+    #[serde(skip)]
+    pub harmonics: Option<u32>,
     /// The expression effect to paste.
     pub expression: Option<Expression>,
     /// Errors on places the fit did not see, with this shape in the model.

@@ -7,8 +7,6 @@ use armcal_model::{EffectSpec, Expression, ModelError, Override};
 const FORMULA_SHARE: f64 = 0.9;
 /// The driver of what depends on the time since the start of the session.
 const TIME: &str = "t";
-/// Harmonics of an error curve that stands for an unlisted shape over a joint's own angle.
-const HARMONICS: f64 = 30.0;
 
 impl Diagnosis {
     /// The effects found, the most probable name of each; where none has a name, all unlisted shapes.
@@ -52,10 +50,10 @@ impl UnknownReport {
     /// formula follows it. `None` where neither reaches the shape.
     pub fn effect(&self) -> Option<EffectSpec> {
         let formula = self.expression.as_ref();
-        if let Some(joint) = self.own_angle()
+        if let (Some(joint), Some(harmonics)) = (self.own_angle(), self.harmonics)
             && formula.is_none_or(|e| e.share_of_shape < FORMULA_SHARE)
         {
-            return Some(EffectSpec::new("error_curve").at(joint).with("harmonics", HARMONICS));
+            return Some(EffectSpec::new("error_curve").at(joint).with("harmonics", f64::from(harmonics)));
         }
         let formula = formula?;
         let mut spec = EffectSpec::new("expression");

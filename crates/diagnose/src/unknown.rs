@@ -13,7 +13,12 @@ use crate::ripple::ripple;
 use crate::weigh::{Outside, Weighed};
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
 
+/// Angles in a half wave of the last harmonic, and between how many harmonics a curve is offered.
+const A_HALF_WAVE: f64 = 4.0;
+const FEWEST_HARMONICS: f64 = 16.0;
+const MOST_HARMONICS: f64 = 60.0;
 /// Points of a shape.
 const POINTS: usize = 41;
 
@@ -47,7 +52,7 @@ pub(crate) fn described(
     let places = gain(problem, &effect, &groups, memory, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
-    let (mut shape, mut repeats) = (Vec::new(), None);
+    let (mut shape, mut repeats, mut harmonics) = (Vec::new(), None, None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
         shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
@@ -55,6 +60,7 @@ pub(crate) fn described(
             let per = driver.basis.ncols();
             let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
             repeats = ripple(&driver.value, curve.as_slice(), per);
+            harmonics = Some(resolved(&driver.value));
         }
     }
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.
@@ -90,10 +96,22 @@ pub(crate) fn described(
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
         ripple: repeats,
+        harmonics,
         expression: formula,
         places,
         rivals: rivals.into_iter().map(|u| u.what.name.clone()).collect(),
     })
+}
+
+/// Harmonics of a turn that these angles resolve: a half wave of the last one holds [`A_HALF_WAVE`] of them, at their usual
+/// distance.
+fn resolved(angles_rad: &[f64]) -> u32 {
+    let mut sorted = angles_rad.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual_rad = gaps.get(gaps.len() / 2).copied().unwrap_or(PI);
+    (PI / (A_HALF_WAVE * usual_rad)).clamp(FEWEST_HARMONICS, MOST_HARMONICS) as u32
 }
 
 /// The axis whose fitted part moves the residual most.
@@ -150,5 +168,22 @@ fn points(
                 at(v, basis)
             })
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::resolved;
+
+    #[test]
+    fn more_poses_resolve_more_of_a_curve() {
+        let evenly = |n: usize, deg: f64| -> Vec<f64> {
+            (0..=n).map(|k| (deg * k as f64 / n as f64).to_radians()).collect()
+        };
+        // 1.5 deg apart: a half wave of four is 6 deg, 30 of which make half a turn.
+        assert_eq!(resolved(&evenly(60, 90.0)), 30);
+        assert_eq!(resolved(&evenly(1000, 90.0)), 60);
+        assert_eq!(resolved(&evenly(5, 90.0)), 16);
+        assert_eq!(resolved(&[0.4; 7]), 16, "it never turned");
     }
 }

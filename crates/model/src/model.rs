@@ -202,7 +202,15 @@ impl Model {
 
     /// Where the tip was, in the world: as the sensor saw it, or the cavity of the board [m].
     pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
-        self.sides(p, o).measured_m
+        // Where the arm comes into it only through what effects do to the seat, it need not be followed.
+        match (&o.reference, &self.effects) {
+            (Reference::Tracked { position_m, .. }, _) => *position_m,
+            (Reference::Seated { .. }, None) => {
+                let board = self.board_under(o).map(|board| board.transform(p, &[]));
+                measured_m(o, board.as_ref(), &seated_m(o))
+            }
+            (Reference::Seated { .. }, Some(_)) => self.sides(p, o).measured_m,
+        }
     }
 
     /// Where the model puts the tip, in the world [m], effects included.

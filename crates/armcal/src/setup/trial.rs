@@ -16,6 +16,8 @@ const CAP: f64 = 300.0;
 const MOST_ITERATIONS: usize = 25;
 /// Dwells that still change their places after so many rounds have none.
 const MOST_ROUNDS: usize = 3;
+/// The effect that is no mechanism: hundreds of amplitudes that take whatever a joint's angle goes with.
+const CURVE: &str = "error_curve";
 /// Dwells that take part in trials; of more, as many are drawn evenly over time.
 const MOST_DWELLS: usize = 150;
 
@@ -105,13 +107,16 @@ impl Misfit {
 }
 
 impl Inputs {
-    /// The same with a plain robust fit to everything, nothing held out, no effects, and not more dwells than decide.
+    /// The same with a plain robust fit to everything, nothing held out, priors as they come, no curves that follow any
+    /// error of a joint, and not more dwells than decide.
     pub fn for_trials(&self) -> Inputs {
         let mut inputs = self.clone();
         inputs.pipeline.holdout = HoldoutConfig::None;
         if inputs.pipeline.fit.objective == Objective::Paper {
             inputs.pipeline.fit.objective = Objective::Robust;
         }
+        inputs.pipeline.fit.learn_priors = false;
+        inputs.pipeline.effects.retain(|effect| effect.kind != CURVE);
         inputs.pipeline.fit.max_iterations = inputs.pipeline.fit.max_iterations.min(MOST_ITERATIONS);
         inputs.most_rounds = inputs.most_rounds.min(MOST_ROUNDS);
         let total: usize = inputs.seen.iter().map(|s| s.dwells.len()).sum();

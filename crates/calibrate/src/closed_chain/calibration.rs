@@ -8,6 +8,7 @@ use crate::calibration::{Judged, Turn, judged};
 use crate::fit::{Near, fit_near};
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Fit, Residual};
+use crate::priors::scales_of;
 use crate::problem::Problem as _;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem, holdout};
 use armcal_core::{Observation, Parameter, Role};
@@ -86,7 +87,8 @@ impl Judged for Judge<'_> {
         let free = |p: &Parameter| p.free;
         let fit = match near {
             Some(fit) => {
-                let near = Near { values: fit.values(), sigma_scale: fit.sigma_scale };
+                let prior_scales = scales_of(fit, train.parameters());
+                let near = Near { values: fit.values(), sigma_scale: fit.sigma_scale, prior_scales };
                 fit_near(&train, &near, &free, self.config)?
             }
             None => fit_problem(&train, &nominal_values, &free, self.config)?,
