@@ -111,7 +111,8 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
     let impossible = impossible(&weighed.entries[entry].candidate.amplitudes, &fitted, residual_variance);
     // What came out as no such mechanism can is no better answer than what looks the same.
-    let within_nats = if impossible.is_empty() { config.margin_nats } else { f64::INFINITY };
+    let of_shape = weighed.detail_nats(entry, config);
+    let within_nats = if impossible.is_empty() { of_shape } else { f64::INFINITY };
     let set = answer(problem, weighed, metric, (entry, within_nats), config);
 
     let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
@@ -215,7 +216,7 @@ fn answer(
     for k in (0..weighed.entries.len()).filter(|k| *k != entry) {
         let like = likeness(projection, &own, &fitted.estimate, &white(k), variance);
         // Alike to the eye is one answer only while the evidence is: where the noise is small, the data tell apart what
-        // differs by little.
+        // differs by little, down to the detail of a shape that no formula of the catalogue has exactly.
         let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
         let alike = like.cosine > config.merge_cosine || like.delta < config.min_delta;
         if alike && gap < within_nats && !set.contains(&k) {

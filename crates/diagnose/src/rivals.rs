@@ -20,7 +20,8 @@ use nalgebra::DMatrix;
 const RIVALS: usize = 3;
 /// What the linearised fit puts further behind cannot come back [nats].
 const OUT_OF_REACH: f64 = 40.0;
-/// A name that the linearised fit left in the answer leaves it so many margins behind the best refit.
+/// A name that the linearised fit left in the answer leaves it so many margins behind the best refit, if that is more than
+/// the detail of its shape.
 const FAR_BEHIND: f64 = 2.0;
 
 /// What a refit leaves.
@@ -132,12 +133,8 @@ fn decided(found: &Accepted, evidence: &[(usize, f64)], config: &DiagnosisConfig
     }
     let lead = of(judged.entry)?.max(best_ln);
     let weighed = &found.room.weighed;
-    let kept = found
-        .judged
-        .set
-        .iter()
-        .copied()
-        .filter(|k| of(*k).is_none_or(|ln| ln > lead - FAR_BEHIND * config.margin_nats));
+    let far_behind = (FAR_BEHIND * config.margin_nats).max(weighed.detail_nats(judged.entry, config));
+    let kept = found.judged.set.iter().copied().filter(|k| of(*k).is_none_or(|ln| ln > lead - far_behind));
     let mut alike: Vec<(usize, f64)> =
         evidence.iter().copied().filter(|(_, ln)| *ln > lead - config.margin_nats).collect();
     alike.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -111,7 +111,7 @@ fn resolved(angles_rad: &[f64]) -> u32 {
     let mut gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0).collect();
     gaps.sort_by(f64::total_cmp);
     let usual_rad = gaps.get(gaps.len() / 2).copied().unwrap_or(PI);
-    (PI / (A_HALF_WAVE * usual_rad)).clamp(FEWEST_HARMONICS, MOST_HARMONICS) as u32
+    (PI / (A_HALF_WAVE * usual_rad)).round().clamp(FEWEST_HARMONICS, MOST_HARMONICS) as u32
 }
 
 /// The axis whose fitted part moves the residual most.

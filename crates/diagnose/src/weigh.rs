@@ -213,6 +213,13 @@ impl Weighed {
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    /// Evidence that is no more than the detail of an entry's shape: a name that looks the same and is this little behind
+    /// may be the true one. Masses, radii and stiffnesses are never quite those of a formula, so that of the evidence for
+    /// an effect a small share goes to whichever formula happens to have the detail.
+    pub fn detail_nats(&self, entry: usize, config: &DiagnosisConfig) -> f64 {
+        config.margin_nats.max(config.leftover_share * self.entries[entry].ln_evidence)
+    }
+
     /// Whether the noise probably remembers the dwells before.
     pub fn remembers(&self) -> bool {
         self.probably(&[Noise::Memory, Noise::Sensor, Noise::SensorAndPlace])

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
+use crate::fit::{Near, fit_near};
+use crate::priors::scales_of;
 use crate::problem::{Linearised, Problem};
 use crate::{FitConfig, Objective, Scale, fit_problem};
 use armcal_core::{Parameter, ParameterKind, Role, Unit};
@@ -107,6 +109,24 @@ fn a_perfect_arm_is_taken_for_one_and_a_bad_one_keeps_the_default() {
     let mut bad = problem(&[(ParameterKind::Angle, 0.0)], 60, 3);
     bad.measured.iter_mut().enumerate().for_each(|(k, y)| *y += if k % 2 == 0 { 4.9e-3 } else { -4.9e-3 });
     assert_eq!(learnt(&bad, &config())[0], 4e-3);
+}
+
+/// A turn of a hold-out begins at the scales of the fit to everything, and ends at its own.
+#[test]
+fn from_the_scales_of_other_data_a_fit_comes_to_its_own() {
+    let all = problem(&[(ParameterKind::Length, 3e-4)], 30, 6);
+    let mut own = problem(&[(ParameterKind::Length, 3e-4)], 30, 6);
+    own.measured.iter_mut().for_each(|y| *y *= 2.0);
+    let fit = fit_problem(&all, &[0.0; 30], &|p| p.free, &config()).unwrap();
+    let near = Near {
+        values: fit.values(),
+        sigma_scale: fit.sigma_scale,
+        prior_scales: scales_of(&fit, &all.parameters),
+    };
+    let turn = fit_near(&own, &near, &|p| p.free, &config()).unwrap();
+    let (found, alone) = (turn.estimates[0].parameter.prior_sigma.unwrap(), learnt(&own, &config())[0]);
+    assert!((found / alone - 1.0).abs() < 0.02, "{found} and {alone}");
+    assert!(found > 1.5 * fit.estimates[0].parameter.prior_sigma.unwrap());
 }
 
 #[test]
