@@ -14,7 +14,7 @@ use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
 use armcal_core::{DwellId, Observation};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Folds inside a turn where the hold-out itself cannot be taken once more.
 const INNER_FOLDS: usize = 4;
@@ -36,9 +36,16 @@ impl Nested {
     /// In one sentence.
     pub fn sentence(&self) -> String {
         let turns = self.chosen.len();
+        // The order in which they were found is no other choice.
         let named = |effects: &Vec<String>| match effects.is_empty() {
             true => "nothing".to_owned(),
-            false => effects.join(" + "),
+            false => effects
+                .iter()
+                .map(String::as_str)
+                .collect::<BTreeSet<_>>()
+                .into_iter()
+                .collect::<Vec<_>>()
+                .join(" + "),
         };
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
