@@ -7,6 +7,8 @@ use armcal_core::{Dwell, JointSamples, Severity, Stage, Warning};
 pub const LEAP_RAD: f64 = 0.3;
 /// Readings further apart in time say nothing of leaps [ns].
 const NEXT_NS: i64 = 200_000_000;
+/// A step so many times as large as the smaller of its neighbours is none of a joint that speeds up and slows down.
+const BEYOND_NEIGHBOURS: f64 = 3.0;
 /// Readings that repeat the one before them at least so often and so long [ns], and then step by more than this [rad], are
 /// not read anew; so many times are no accident.
 const HELD: usize = 5;
@@ -87,12 +89,17 @@ fn exact(joints: &JointSamples, dwell: &Dwell) -> Option<Vec<f64>> {
     joints.joint_rad.iter().map(one).collect()
 }
 
-/// Joints that leap from one reading to the next.
+/// Joints that leap from one reading to the next. A joint that only turns fast comes to its speed, and leaves it, in steps.
 pub fn leaps(joints: &JointSamples, recording: &str) -> Vec<Warning> {
     let near: Vec<bool> = joints.time_ns.windows(2).map(|w| w[1] - w[0] <= NEXT_NS).collect();
     let leap = |column: &Vec<f64>| -> Vec<f64> {
-        let steps = column.windows(2).map(|w| (w[1] - w[0]).abs()).zip(&near);
-        steps.filter(|(step, near)| **near && *step > LEAP_RAD).map(|(step, _)| step).collect()
+        let steps: Vec<f64> = column.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let step = |i: usize| steps.get(i).copied().unwrap_or(0.0);
+        let is_leap = |i: &usize| {
+            let beside = step(i.wrapping_sub(1)).min(step(i + 1));
+            near[*i] && step(*i) > LEAP_RAD && step(*i) > BEYOND_NEIGHBOURS * beside
+        };
+        (0..steps.len()).filter(is_leap).map(step).collect()
     };
     let columns = joints.joint_rad.iter().enumerate().map(|(j, column)| (j, leap(column)));
     columns
@@ -171,6 +178,18 @@ mod tests {
             found[0].message.starts_with("joint 2 (j1) leaps 2 times")
                 && found[0].message.contains("22.3 deg")
         );
+        // A spike is two leaps, there and back.
+        let spike = (0..100).map(|i| if i == 50 { 1.0 } else { 0.0 }).collect();
+        assert!(leaps(&stream(vec![spike]), "a")[0].message.contains("leaps 2 times"));
+    }
+
+    #[test]
+    fn a_joint_that_only_turns_fast_does_not_leap() {
+        // Half a turn in ten readings, with a sine as speed: 0.49 rad at most from one to the next.
+        let turn =
+            |i: i32| 0.5 * std::f64::consts::PI * (1.0 - (f64::from(i) * 0.1 * std::f64::consts::PI).cos());
+        let fast = (0..60).map(|i: i32| turn((i - 20).clamp(0, 10))).collect();
+        assert!(leaps(&stream(vec![fast]), "a").is_empty());
     }
 
     #[test]
