@@ -28,10 +28,15 @@ export async function open(browser, address, { colorScheme = "light" } = {}) {
   return { page, seen };
 }
 
-// Brings a chart into sight and waits until it shows what it should now show; on a busy machine that takes seconds.
+// Keeps a chart in sight until it shows what it should now show: charts above it that grow while they are drawn push it out
+// again, and on a busy machine a drawing takes seconds.
 async function fresh(page, box) {
-  await box.evaluate((own) => own.scrollIntoView({ block: "center" }));
-  await page.waitForFunction((own) => own.data && !charts.get(own).stale, box, { timeout: 60000 });
+  const ready = (own) => {
+    if (own.data && !charts.get(own).stale) return true;
+    own.scrollIntoView({ block: "center" });
+    return false;
+  };
+  await page.waitForFunction(ready, box, { timeout: 120000, polling: 100 });
 }
 
 // Draws every chart, and returns to the top.

@@ -56,6 +56,8 @@ try {
   await page.emulateMedia({ media: "print" });
   await page.waitForTimeout(400);
   await page.screenshot({ path: join(folder, "print.png"), fullPage: true });
+  // A page behind another one need not be drawn.
+  await page.close();
 
   const night = await open(browser, address, { colorScheme: "dark" });
   await drawn(night.page);
