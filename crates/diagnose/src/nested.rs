@@ -14,7 +14,7 @@ use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
 use armcal_core::{DwellId, Observation};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Folds inside a turn where the hold-out itself cannot be taken once more.
 const INNER_FOLDS: usize = 4;
@@ -37,15 +37,10 @@ impl Nested {
     pub fn sentence(&self) -> String {
         let turns = self.chosen.len();
         // The order in which they were found is no other choice.
-        let named = |effects: &Vec<String>| match effects.is_empty() {
-            true => "nothing".to_owned(),
-            false => effects
-                .iter()
-                .map(String::as_str)
-                .collect::<BTreeSet<_>>()
-                .into_iter()
-                .collect::<Vec<_>>()
-                .join(" + "),
+        let named = |effects: &Vec<String>| {
+            let mut names = effects.clone();
+            names.sort();
+            if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
         };
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
