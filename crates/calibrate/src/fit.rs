@@ -9,8 +9,10 @@ use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Settings};
 use crate::statistics::{self, Uncertainty};
 use crate::whitened::{Point, Whitened};
-use crate::{CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, priors, undetermined};
-use armcal_core::{Observation, Parameter, Role};
+use crate::{
+    CalibrateError, FitConfig, Objective, Scale, fit_warnings, frames, paper, priors, undetermined, wider,
+};
+use armcal_core::{Observation, Parameter, Role, Warning};
 use armcal_model::Model;
 use nalgebra::DVector;
 
@@ -86,7 +88,8 @@ fn fit_from(
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let known = near.map(|n| &n.prior_scales);
     let learnt = priors::learnt(problem, (&declared, &solved), known, free, config)?;
-    let said = learnt.as_ref().and_then(|(white, _)| priors::said(white));
+    let said: Vec<Warning> = learnt.iter().filter_map(|(white, _)| priors::said(white)).collect();
+    let widened = learnt.as_ref().and_then(|(white, solved)| wider::said(problem, white, solved));
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
     let (white, solved) = learnt.unwrap_or((declared, solved));
     let (residual, squares) = (&solved.at.residual, white.squares(&solved.at));
@@ -130,7 +133,7 @@ fn fit_from(
         warnings: Vec::new(),
     };
     fit.warnings = fit_warnings::of(&fit, &white);
-    fit.warnings.extend(said);
+    fit.warnings.extend(said.into_iter().chain(widened));
     Ok(fit)
 }
 

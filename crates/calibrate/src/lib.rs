@@ -47,6 +47,7 @@ mod statistics;
 mod structure;
 mod undetermined;
 mod whitened;
+mod wider;
 mod words;
 
 #[cfg(test)]

@@ -9,13 +9,14 @@
 //!
 //! (MacKay, Bayesian Interpolation, Neural Computation 4, 1992, eq. 2.17 and 2.18); where the data hardly know the kind,
 //! one step of expectation-maximisation, `s_new^2 = s^2 sum (x_k^2 + v_k) / n`, which never overshoots. The default prior
-//! is the widest it becomes, and bounds stay where they are.
+//! is the widest it becomes. Bounds that the arm goes beyond are [`crate::wider`]'s matter.
 
 use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::statistics::posterior;
 use crate::whitened::Whitened;
+use crate::wider::wider;
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
 use nalgebra::{DMatrix, DVector};
@@ -33,10 +34,10 @@ const SMALLEST: f64 = 1e-3;
 /// Parameters of a kind that the data must know before the fast formula is used.
 const WELL_KNOWN: f64 = 1.0;
 
-/// A problem with other priors.
-struct WithPriors<'a> {
-    problem: &'a dyn Problem,
-    parameters: Vec<Parameter>,
+/// A problem with other priors and bounds.
+pub(crate) struct WithPriors<'a> {
+    pub problem: &'a dyn Problem,
+    pub parameters: Vec<Parameter>,
 }
 
 impl Problem for WithPriors<'_> {
@@ -136,7 +137,9 @@ pub(crate) fn learnt<'a>(
         better.iterations += solved.iterations;
         latest = Some((again, better));
     }
-    Ok(latest)
+    let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
+    let wider = wider(problem, (white, solved), free, config)?;
+    Ok(wider.or(latest))
 }
 
 /// The scale of each kind as the fit at these scales has it.

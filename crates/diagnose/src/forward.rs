@@ -3,7 +3,9 @@
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
 use crate::curves::{Curve, error_curves};
+use crate::events::moved;
 use crate::judge::{Grade, Judged};
+use crate::lead;
 use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms, as_candidate};
@@ -153,8 +155,8 @@ fn confirm(
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
-            let (verdict, instead_of) = as_known(&room, room.judge(entry, config), config);
-            let verdict = as_possible(&room, verdict, config);
+            let (verdict, instead_of) = lead::as_known(&room, room.judge(entry, config), config);
+            let verdict = lead::as_measured(&room, lead::as_possible(&room, verdict, config), config);
             let entry = verdict.entry;
             let grade = verdict.grade(weighed, config);
             let ln = weighed.entries[entry].ln_evidence;
@@ -171,32 +173,6 @@ fn confirm(
     }
 }
 
-/// Of names that these data cannot tell apart, those that the user knows to act are the answer; with the others.
-fn as_known(room: &Room, judged: Judged, config: &DiagnosisConfig) -> (Judged, Vec<String>) {
-    let of = |k: &usize| &room.weighed.entries[*k].candidate;
-    let Some(known) = judged.set.iter().copied().find(|k| of(k).known.is_some()) else {
-        return (judged, Vec::new());
-    };
-    let mut judged = room.judge(known, config);
-    let others: Vec<String> =
-        judged.set.iter().map(of).filter(|c| c.known.is_none()).map(|c| c.spec.clone()).collect();
-    judged.set.retain(|k| of(k).known.is_some());
-    (judged, others)
-}
-
-/// Of names that look the same, one that came out as no such mechanism can is told after one that could be.
-fn as_possible(room: &Room, judged: Judged, config: &DiagnosisConfig) -> Judged {
-    if judged.impossible.is_empty() {
-        return judged;
-    }
-    let possible = |j: &Judged| j.impossible.is_empty() && j.grade(&room.weighed, config) != Grade::Refused;
-    let mut others = judged.set[1..].iter().map(|k| room.judge(*k, config));
-    let Some(mut other) = others.find(possible) else { return judged };
-    other.set = vec![other.entry];
-    other.set.extend(judged.set.iter().filter(|k| **k != other.entry));
-    other
-}
-
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
 /// all, the best that has a place and a driver, or the best listed one.
 pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
@@ -211,12 +187,13 @@ pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
     best.into_iter().chain(cell).chain(listed).any(|columns| room.predicts_with(columns, config))
 }
 
-/// The entry of a candidate; a scan may have moved to another shape.
+/// The entry of a candidate; a scan may have moved to another shape, or an event to a dwell nearby.
 fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
     let exact = weighed.entries.iter().position(|e| e.candidate.spec == candidate.spec);
     exact.or_else(|| {
         let alike = |c: &Candidate| c.family == candidate.family && c.target == candidate.target;
-        weighed.entries.iter().position(|e| alike(&e.candidate))
+        let entry = weighed.entries.iter().position(|e| alike(&e.candidate));
+        entry.or_else(|| weighed.entries.iter().position(|e| moved(&candidate.spec, &e.candidate.spec)))
     })
 }
 
@@ -297,7 +274,7 @@ fn one_by_one(step: Step, problem: &Problem) -> Vec<Step> {
     if !step.candidate.is_group() {
         return vec![step];
     }
-    let of = |spec: &str| problem.candidates.iter().find(|c| c.spec == spec).cloned();
+    let of = |spec: &str| all_of(problem).find(|c| c.spec == spec).cloned();
     let members = step.candidate.members().filter_map(of).collect::<Vec<_>>();
     let share = 1.0 / members.len().max(1) as f64;
     let one = |candidate| Step {
@@ -344,8 +321,11 @@ fn beats_a_cell(steps: &[Step], config: &DiagnosisConfig) -> bool {
 
 /// A candidate as this problem has it.
 fn listed<'p>(problem: &'p Problem, candidate: &Candidate) -> Option<&'p Candidate> {
-    let all = problem.candidates.iter().chain(problem.scans.iter().flat_map(|s| &s.points));
-    all.into_iter().find(|c| c.spec == candidate.spec)
+    all_of(problem).find(|c| c.spec == candidate.spec)
+}
+
+fn all_of(problem: &Problem) -> impl Iterator<Item = &Candidate> {
+    problem.candidates.iter().chain(problem.scans.iter().flat_map(|s| &s.points))
 }
 
 #[cfg(test)]

@@ -1,12 +1,26 @@
-//! One family at all joints together.
+//! One family at all joints together: a cause that is likely to be in every joint, such as a make of gear.
 
-use crate::problem::{Amplitude, Candidate, Columns};
-use nalgebra::DMatrix;
+use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Families whose cause, a make of gear or encoder, is likely to be in every joint.
-const OF_A_MAKE: [&str; 6] =
-    ["backlash", "friction_windup", "eccentricity", "second_harmonic", "gear_ratio", "zero_drift"];
+/// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
+const OF_A_MAKE: [&str; 8] = [
+    "backlash",
+    "friction_windup",
+    "eccentricity",
+    "second_harmonic",
+    "gear_ratio",
+    "zero_drift",
+    "bearing_compliance",
+    "effort_compliance",
+];
+/// The family whose frequency gears of one make share.
+const PERIODIC: &str = "periodic";
+/// Frequencies of all joints together that are weighed in full.
+const WEIGHED: usize = 12;
+/// Largest difference of frequencies that are one [1/turn]; joints have grids of their own.
+const ONE_FREQUENCY: f64 = 0.5;
 
 /// The candidates, and for gears of one make all joints together: each joint alone may be hidden by the others.
 pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
@@ -16,29 +30,107 @@ pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
         if members.len() < 2 {
             continue;
         }
-        let columns: Vec<_> = members
-            .iter()
-            .filter_map(|c| match &c.columns {
-                Columns::Dense(own) => Some(own.column_iter().map(|column| column.into_owned())),
-                Columns::Product { .. } => None,
-            })
-            .flatten()
-            .collect();
-        let group = Candidate {
-            spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
-            target: "all joints".to_owned(),
-            known: None,
-            amplitudes: members.iter().flat_map(|c| named(c)).collect(),
-            columns: Columns::Dense(Arc::new(DMatrix::from_columns(&columns))),
-            ..members[0].clone()
-        };
+        let group = grouped(&members, &[]);
         all.push(group);
     }
     all
+}
+
+/// Periodic errors of one frequency at all joints that have one, at the frequencies where they promise most: by
+/// `sum_k (X_k' r)^2 / (1 + |X_k|^2)`, X their whitened columns and r the residual.
+pub(crate) fn one_frequency(scans: &[Scan], dwells: &[DwellRow], residual: &DVector<f64>) -> Option<Scan> {
+    let joints: Vec<&Scan> =
+        scans.iter().filter(|s| s.points.first().is_some_and(|p| p.family == PERIODIC)).collect();
+    let finest = joints.iter().max_by_key(|s| s.points.len())?;
+    let mut tried: Vec<(f64, Candidate)> = Vec::new();
+    for frequency in finest.points.iter().filter_map(frequency) {
+        let off = |p: &Candidate| crate::group::frequency(p).map_or(f64::INFINITY, |f| (f - frequency).abs());
+        let nearest = |s: &&Scan| -> Option<Candidate> {
+            let point = s.points.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+            (off(point) <= ONE_FREQUENCY).then(|| point.clone())
+        };
+        let members: Vec<Candidate> = joints.iter().filter_map(nearest).collect();
+        if members.len() < 2 {
+            continue;
+        }
+        let group = grouped(&members.iter().collect::<Vec<_>>(), dwells);
+        tried.push((promise(&group, residual), group));
+        // Only the best are kept in memory.
+        if tried.len() > 2 * WEIGHED {
+            keep_best(&mut tried);
+        }
+    }
+    keep_best(&mut tried);
+    let points: Vec<Candidate> = tried.into_iter().map(|(_, group)| group).collect();
+    (!points.is_empty()).then(|| Scan {
+        name: format!("{PERIODIC} of one frequency at all joints"),
+        tried: finest.points.len(),
+        points,
+    })
+}
+
+fn keep_best(tried: &mut Vec<(f64, Candidate)>) {
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    tried.truncate(WEIGHED);
+}
+
+fn promise(group: &Candidate, residual: &DVector<f64>) -> f64 {
+    let Columns::Dense(columns) = &group.columns else { return 0.0 };
+    columns.column_iter().map(|x| x.dot(residual).powi(2) / (1.0 + x.norm_squared())).sum()
+}
+
+/// The frequency in the name of a point of a scan [1/turn].
+fn frequency(point: &Candidate) -> Option<f64> {
+    point.spec.split_once("frequency=")?.1.parse().ok()
+}
+
+/// All of them as one, each with amplitudes of its own; `dwells` serve those that are products.
+fn grouped(members: &[&Candidate], dwells: &[DwellRow]) -> Candidate {
+    let columns: Vec<DVector<f64>> = members
+        .iter()
+        .map(|c| c.columns.dense(dwells, 1.0))
+        .flat_map(|own| own.column_iter().map(|column| column.into_owned()).collect::<Vec<_>>())
+        .collect();
+    Candidate {
+        spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
+        target: "all joints".to_owned(),
+        known: None,
+        amplitudes: members.iter().flat_map(|c| named(c)).collect(),
+        columns: Columns::Dense(Arc::new(DMatrix::from_columns(&columns))),
+        ..members[0].clone()
+    }
 }
 
 /// Its amplitudes, told apart from those of the other members.
 fn named(c: &Candidate) -> Vec<Amplitude> {
     let full = |a: &Amplitude| Amplitude { name: format!("{}.{}", c.spec, a.name), ..a.clone() };
     c.amplitudes.iter().map(full).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::arm::{Noise, design, problem, rng};
+
+    #[test]
+    fn gears_of_one_make_err_at_one_frequency() {
+        let mut r = rng(5);
+        let poses = design(0, &mut r);
+        let mut p = problem(&poses, &[], Noise::White, &mut r, true);
+        // A typical error at every joint, 23 times a turn, none of it large.
+        for scan in p.scans.iter().filter(|s| s.points[0].family == PERIODIC) {
+            let own = scan.points.iter().find(|c| c.spec.ends_with("frequency=23")).unwrap();
+            p.residual += own.columns.dense(&p.dwells, 1.0) * DVector::from_vec(vec![0.8, -0.6]);
+        }
+        let fitted = crate::crossval::left_out(&p, None, &[]);
+        let all = one_frequency(&p.scans, &p.dwells, &fitted).unwrap();
+        assert_eq!(
+            all.points[0].spec,
+            "periodic:1,frequency=23+periodic:2,frequency=23+periodic:3,frequency=23"
+        );
+        assert_eq!((all.points[0].amplitudes.len(), all.points.len(), all.tried), (6, WEIGHED, 77));
+        assert_eq!(all.points[0].amplitudes[5].name, "periodic:3,frequency=23.a1");
+        p.scans.retain(|s| s.name == "periodic:2");
+        assert!(one_frequency(&p.scans, &p.dwells, &p.residual).is_none(), "one joint is no make");
+    }
 }

@@ -6,6 +6,7 @@ use crate::crossval::{by_place, left_out, norms_m};
 use crate::diagnosis::{
     BeforeAfter, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
 };
+use crate::events::together;
 use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
 use crate::judge::{Grade, Judged};
@@ -235,6 +236,14 @@ fn warnings(
         let message =
             format!("the scatter is {kind} (probability {p:.2}); more repeats of the same kind average less");
         add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
+    }
+    let names: Vec<&str> = search.accepted.iter().map(|a| a.candidate.spec.as_str()).collect();
+    for of_one in together(&names) {
+        let message = format!(
+            "{} tell of one moment: one event, such as a collision, a restart or a remounted part, may have done all of it",
+            of_one.join(" and ")
+        );
+        add(Severity::Notice, "one-event", of_one[0].to_owned(), message);
     }
     for a in &search.accepted {
         if let Some(reason) = a.candidate.known.as_ref().filter(|_| !a.instead_of.is_empty()) {

@@ -58,13 +58,14 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     Ok(diagnosis)
 }
 
-/// The model with the priors that its fit learnt, which hold for all that is tried beside it.
+/// The model with the priors that its fit learnt and the bounds that it took, which hold for all that is tried beside it.
 fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
     let mut model = calibrated.model.clone();
     let learnt = calibrated.calibration.fit.estimates.iter().map(|e| &e.parameter);
     for parameter in learnt.filter(|p| p.assumed.is_some()) {
         model.set_parameter(&parameter.name, |p| {
             (p.prior_sigma, p.assumed) = (parameter.prior_sigma, None);
+            (p.lower, p.upper) = (parameter.lower, parameter.upper);
         })?;
     }
     Ok(model)

@@ -132,6 +132,15 @@ pub struct Scan {
     pub name: String,
     /// One candidate for each point of the grid.
     pub points: Vec<Candidate>,
+    /// Points that were tried, those that promised too little to be here with them.
+    pub tried: usize,
+}
+
+impl Scan {
+    /// A grid with all of its points.
+    pub fn of(name: impl Into<String>, points: Vec<Candidate>) -> Scan {
+        Scan { name: name.into(), tried: points.len(), points }
+    }
 }
 
 /// A way an effect may enter: `joint1`, `link 2 length`, `shift`.
@@ -322,8 +331,7 @@ impl Problem {
         };
         let mut candidate = |c: &Candidate| Candidate { columns: columns(&c.columns), ..c.clone() };
         let candidates = self.candidates.iter().map(&mut candidate).collect();
-        let scan =
-            |s: &Scan| Scan { name: s.name.clone(), points: s.points.iter().map(&mut candidate).collect() };
+        let scan = |s: &Scan| Scan { points: s.points.iter().map(&mut candidate).collect(), ..s.clone() };
         let scans = self.scans.iter().map(scan).collect();
         let channels = self
             .channels

@@ -18,8 +18,10 @@ use nalgebra::DMatrix;
 
 /// Entries that are no part of the answer and are refitted all the same, the best of them.
 const RIVALS: usize = 3;
-/// What the linearised fit puts further behind cannot come back [nats].
+/// What the linearised fit puts further behind cannot come back [nats], nor what it puts further behind than this share of
+/// the evidence: an angle of 6 deg is linear to a twentieth.
 const OUT_OF_REACH: f64 = 40.0;
+const REACH_SHARE: f64 = 0.1;
 /// A name that the linearised fit left in the answer leaves it so many margins behind the best refit, if that is more than
 /// the detail of its shape.
 const FAR_BEHIND: f64 = 2.0;
@@ -107,7 +109,7 @@ fn rivals(found: &Accepted, room: &Room) -> Vec<usize> {
     let another = |k: &usize| {
         let entry = &weighed.entries[*k];
         !entry.candidate.is_group()
-            && entry.ln_evidence > own - OUT_OF_REACH
+            && entry.ln_evidence > own - OUT_OF_REACH.max(REACH_SHARE * own)
             && found.judged.set.iter().all(|s| !weighed.one_name(*s, *k))
     };
     weighed.ranking().into_iter().filter(another).take(RIVALS).collect()

@@ -5,10 +5,11 @@
 //! modulates a joint (a periodic error), the columns are kept as products.
 
 use crate::DiagnoseError;
-use crate::group::with_groups;
+use crate::group::{one_frequency, with_groups};
 use crate::knowledge::Knowledge;
 use crate::places::places;
 use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
+use crate::stretches::stretches;
 use armcal_calibrate::{FitConfig, Linearisation, linearise};
 use armcal_core::{DwellId, Observation, Reference, Unit};
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
@@ -38,14 +39,17 @@ impl View<'_> {
         specs.retain(|spec| self.tried(spec));
         let base = self.linearised(&[])?.1;
         let channels = self.channels(&base);
+        let dwells = self.dwells(&base);
+        let mut scans = self.scans(&channels, &base)?;
+        scans.extend(one_frequency(&scans, &dwells, &base.residual));
         Ok(Problem {
-            dwells: self.dwells(&base),
+            dwells,
             residual: base.residual.clone(),
             geometry: -&base.jacobian,
             geometry_offset: base.axes.iter().map(|a| a.offset).collect::<Vec<_>>().into(),
             geometry_precision: base.axes.iter().map(|a| a.precision).collect::<Vec<_>>().into(),
             candidates: with_groups(self.candidates(&specs)?),
-            scans: self.scans(&channels)?,
+            scans,
             channels,
         })
     }
@@ -143,7 +147,7 @@ impl View<'_> {
     }
 
     /// Every family with a shape: products where the shape switches or modulates, columns of their own otherwise.
-    fn scans(&self, channels: &[Channel]) -> Result<Vec<Scan>, DiagnoseError> {
+    fn scans(&self, channels: &[Channel], base: &Linearisation) -> Result<Vec<Scan>, DiagnoseError> {
         let dwells: Vec<DwellId> = self.observations.iter().map(|o| o.dwell).collect();
         let Some(first) = dwells.iter().min().copied() else { return Ok(Vec::new()) };
         let mut scans = Vec::new();
@@ -156,28 +160,46 @@ impl View<'_> {
             let joint = family.target.map(|j| format!("joint{}", j + 1));
             let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
             let points = match channel {
-                _ if steps => self.stepped(&family, first, &members, &dwells)?,
+                _ if steps => {
+                    let always = family.clone().since(Since::Dwell(first));
+                    if let Some(whole) = self.candidates(&[always])?.first() {
+                        scans.push(Scan::of(family.to_string(), self.switched(whole, &members, &dwells)));
+                        scans.extend(self.passing(&family, whole, &dwells, base));
+                    }
+                    continue;
+                }
                 Some(channel) if family.kind == "periodic" => self.modulated(channel, &members)?,
                 _ => self.candidates(&members)?,
             };
-            scans.push(Scan { name: family.to_string(), points });
+            scans.push(Scan::of(family.to_string(), points));
         }
         Ok(scans)
     }
 
-    /// One column for all steps: the effect from the first dwell on, switched on at the step.
-    fn stepped(
+    /// An event that ends again, in the stretches of dwells where it promises most.
+    fn passing(
         &self,
         family: &EffectSpec,
-        first: DwellId,
-        members: &[EffectSpec],
+        whole: &Candidate,
         dwells: &[DwellId],
-    ) -> Result<Vec<Candidate>, DiagnoseError> {
-        let always = family.clone().since(Since::Dwell(first));
-        let whole = self.candidates(&[always])?;
-        let Some(Candidate { columns: Columns::Dense(base), .. }) = whole.first() else {
-            return Ok(Vec::new());
-        };
+        base: &Linearisation,
+    ) -> Option<Scan> {
+        let Columns::Dense(columns) = &whole.columns else { return None };
+        let found = stretches(dwells, &base.rows, columns, &base.residual);
+        let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
+        let members: Vec<EffectSpec> =
+            found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
+        let points = self.switched(whole, &members, dwells);
+        (!points.is_empty()).then(|| Scan {
+            name: format!("{family} for some dwells"),
+            tried: found.tried,
+            points,
+        })
+    }
+
+    /// One column for all events: the effect in all dwells, `whole`, switched on where the event acts.
+    fn switched(&self, whole: &Candidate, members: &[EffectSpec], dwells: &[DwellId]) -> Vec<Candidate> {
+        let Columns::Dense(base) = &whole.columns else { return Vec::new() };
         let at = |member: &EffectSpec| {
             let since = member.since.as_ref();
             let on = |dwell: &DwellId| f64::from(since.is_some_and(|s| s.holds(*dwell)));
@@ -187,10 +209,10 @@ impl View<'_> {
                 known: self.knowledge.acts(member).map(str::to_owned),
                 target: self.target(member),
                 columns: Columns::Product { base: base.clone(), basis: Arc::new(basis) },
-                ..whole[0].clone()
+                ..whole.clone()
             }
         };
-        Ok(members.iter().map(at).collect())
+        members.iter().map(at).collect()
     }
 
     /// A periodic error turns its joint by a sine and a cosine of the reading.
@@ -339,12 +361,13 @@ fn words(since: &Since) -> String {
     match since {
         Since::Recording(recording) => format!("in recording {recording}"),
         Since::Dwell(dwell) => format!("from {dwell} on"),
+        Since::Dwells { first, last } => format!("from {first} to dwell {last}"),
     }
 }
 
 fn toggle(effect: &PlacedEffect) -> Toggle {
     match effect.spec.since {
-        Some(Since::Dwell(_)) => Toggle::Time,
+        Some(Since::Dwell(_) | Since::Dwells { .. }) => Toggle::Time,
         Some(Since::Recording(_)) => Toggle::Recording,
         None => effect.kind.toggle,
     }

@@ -98,7 +98,7 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
         let all = scanned(problem, scan, scale, &metrics, config);
         let totals: Vec<f64> = all.iter().map(|ln| ln_sum_exp(ln.iter().copied())).collect();
         let Some(best) = (0..totals.len()).max_by(|a, b| totals[*a].total_cmp(&totals[*b])) else { continue };
-        let ln_points = (totals.len() as f64).ln();
+        let ln_points = (scan.tried.max(totals.len()) as f64).ln();
         let ln_evidence = ln_sum_exp(totals.iter().copied()) - ln_points - ln_null;
         let mixed: Vec<f64> =
             (0..metrics.len()).map(|m| ln_sum_exp(all.iter().map(|ln| ln[m])) - ln_points).collect();
@@ -185,7 +185,8 @@ impl Weighed {
             let spec = &self.entries[k].candidate.spec;
             spec.split_once(',').map_or(spec.as_str(), |(placed, _)| placed)
         };
-        k == l || (k.max(l) >= self.given && placed(k) == placed(l))
+        let single = |k: usize| !self.entries[k].candidate.is_group();
+        k == l || (k.max(l) >= self.given && single(k) && single(l) && placed(k) == placed(l))
     }
 
     /// Entries by falling evidence.

@@ -111,7 +111,7 @@ fn two_values_of_a_shape_are_one_name() {
     let mut p = problem(&poses, &hidden, Noise::White, &mut r, false);
     let mut shaped = p.candidates.iter().find(|c| c.spec == "backlash:1").unwrap().clone();
     shaped.spec = "backlash:1,shape=2".to_string();
-    p.scans.push(Scan { name: "backlash:1".to_string(), points: vec![shaped] });
+    p.scans.push(Scan::of("backlash:1", vec![shaped]));
     let d = run(p);
     let of_joint = |set: &[String]| set.iter().filter(|n| n.starts_with("backlash:1")).count();
     assert_eq!(d.effects.len(), 1, "{:?}", d.names);

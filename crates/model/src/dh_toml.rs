@@ -197,7 +197,7 @@ impl DhTable {
             let first = parameters.len();
             parameters.extend(row.fields().map(|field| field.parameter(row, self.deviation)));
             let parameters = first..parameters.len();
-            segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters });
+            segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters, body: None });
         }
         let name = self.name.clone();
         Chain { name, segments, parameters, joint_names, joint_limits, source: Source::Dh(self) }

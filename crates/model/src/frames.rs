@@ -87,6 +87,7 @@ impl Frame {
             geometry: Geometry::Origin { nominal, freedom },
             joint: None,
             parameters: first..first + parameters.len(),
+            body: None,
         };
         Ok((segment, parameters))
     }

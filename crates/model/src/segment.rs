@@ -70,6 +70,15 @@ pub(crate) enum Freedom {
     Full,
 }
 
+/// What weighs on a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Body {
+    /// Mass [kg].
+    pub mass_kg: f64,
+    /// Its centre [m]; of a segment's own body in the frame at its end.
+    pub centre_m: Vector3<f64>,
+}
+
 /// One segment of the path.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segment {
@@ -81,6 +90,8 @@ pub(crate) struct Segment {
     pub joint: Option<Joint>,
     /// Where its parameters are in the parameter vector.
     pub parameters: Range<usize>,
+    /// The mass of its link, where the file of the arm tells it.
+    pub body: Option<Body>,
 }
 
 /// A segment's transform and how its end moves.

@@ -4,12 +4,13 @@
 //! moving joint is calibrated: `<joint>.x/.y/.z` [m] and `<joint>.rx/.ry/.rz` [rad], a rotation vector about
 //! the origin's own axes, zero at nominal. A fixed joint is a constant: whatever it could correct, the
 //! origin of the moving joint before or after it (or base, or tip) corrects already. Its link keeps its
-//! frame for drawing. Side branches, and what hangs on them (grippers, mimic joints), are not looked at.
+//! frame for drawing. Mass and centre of `<inertial>` of the links on the way say what gravity does to elastic effects.
+//! Side branches, and what hangs on them (grippers, mimic joints), are not looked at.
 
 use crate::chain::Source;
 use crate::error::nearest;
 use crate::rigid::Rigid;
-use crate::segment::{Freedom, Geometry, Joint, Motion, Segment};
+use crate::segment::{Body, Freedom, Geometry, Joint, Motion, Segment};
 use crate::{Chain, Deviation, ModelError};
 use armcal_core::{Parameter, ParameterKind, Pose, Unit};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -52,7 +53,7 @@ impl Chain {
         };
         let mut sources = Vec::new();
         for joint in joints {
-            sources.push(reader.push(joint, &mut chain)?);
+            sources.push(reader.push(robot, joint, &mut chain)?);
         }
         chain.source = Source::Urdf(sources);
         if chain.joint_names.is_empty() {
@@ -119,6 +120,10 @@ impl<'a, 'x> Reader<'a, 'x> {
         robot.children().filter(|c| c.is_element() && c.tag_name().name() == "joint")
     }
 
+    fn links(robot: Node<'a, 'x>) -> impl Iterator<Item = Node<'a, 'x>> {
+        robot.children().filter(|c| c.is_element() && c.tag_name().name() == "link")
+    }
+
     /// The joints from base to tip, in this order.
     fn path_between(
         &self,
@@ -164,7 +169,12 @@ impl<'a, 'x> Reader<'a, 'x> {
         Ok(joints)
     }
 
-    fn push(&self, joint: Node<'a, 'x>, chain: &mut Chain) -> Result<UrdfJoint, ModelError> {
+    fn push(
+        &self,
+        robot: Node<'a, 'x>,
+        joint: Node<'a, 'x>,
+        chain: &mut Chain,
+    ) -> Result<UrdfJoint, ModelError> {
         let name = self.required(joint, "joint", "name")?;
         let subject = format!("joint \"{name}\"");
         let motion = match self.required(joint, &subject, "type")? {
@@ -194,6 +204,7 @@ impl<'a, 'x> Reader<'a, 'x> {
                 geometry: Geometry::Origin { nominal: Rigid::from(&nominal), freedom: Freedom::Constant },
                 joint: None,
                 parameters: first..first,
+                body: self.body(robot, link)?,
             });
             return Ok(source);
         };
@@ -205,12 +216,14 @@ impl<'a, 'x> Reader<'a, 'x> {
             geometry: Geometry::Origin { nominal: Rigid::from(&nominal), freedom: Freedom::Full },
             joint: None,
             parameters: first..end,
+            body: None,
         });
         chain.segments.push(Segment {
             frame: Some(link.to_owned()),
             geometry: Geometry::Axis(axis),
             joint: Some(Joint { index: chain.joint_names.len(), motion }),
             parameters: end..end,
+            body: self.body(robot, link)?,
         });
         chain.joint_names.push(name.to_owned());
         chain.joint_limits.push(limits(joint));
@@ -226,6 +239,18 @@ impl<'a, 'x> Reader<'a, 'x> {
             Translation3::from(xyz),
             UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z),
         ))
+    }
+
+    /// Mass and centre of `<inertial>`; none where a link has none, or none that weighs.
+    fn body(&self, robot: Node<'a, 'x>, link: &str) -> Result<Option<Body>, ModelError> {
+        let Some(node) = Self::links(robot).find(|node| node.attribute("name") == Some(link)) else {
+            return Ok(None);
+        };
+        let Some(inertial) = child(node, "inertial") else { return Ok(None) };
+        let mass = child(inertial, "mass").and_then(|mass| mass.attribute("value"));
+        let mass_kg = mass.and_then(|value| value.trim().parse::<f64>().ok()).unwrap_or(0.0);
+        let centre_m = self.origin(inertial, &format!("inertial of link \"{link}\""))?.translation.vector;
+        Ok((mass_kg.is_finite() && mass_kg > 0.0).then_some(Body { mass_kg, centre_m }))
     }
 
     fn axis(&self, joint: Node<'a, 'x>, subject: &str) -> Result<Vector3<f64>, ModelError> {
@@ -262,12 +287,7 @@ impl<'a, 'x> Reader<'a, 'x> {
     }
 
     fn check_link(&self, robot: Node<'a, 'x>, link: &str) -> Result<(), ModelError> {
-        let links = || {
-            robot
-                .children()
-                .filter(|c| c.is_element() && c.tag_name().name() == "link")
-                .filter_map(|c| c.attribute("name"))
-        };
+        let links = || Self::links(robot).filter_map(|link| link.attribute("name"));
         if links().any(|name| name == link) {
             return Ok(());
         }

@@ -413,7 +413,7 @@ pub struct JointErrors {
     /// Reading of the joint.
     #[prost(double, repeated, tag = "8")]
     pub reading: ::prost::alloc::vec::Vec<f64>,
-    /// Gravity torque on the joint, for links of 2.5 kg/m and the declared load (prismatic: N).
+    /// Gravity torque on the joint: links with the masses of their URDF or of 2.5 kg/m, and the declared load (prismatic: N).
     #[prost(double, repeated, tag = "9")]
     pub torque_nm: ::prost::alloc::vec::Vec<f64>,
     /// Measured effort; empty unless every dwell has it.

@@ -81,7 +81,7 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
     ))
 }
 
-/// `, from dwell 17 of `roll` on`; `, in `roll` as against the others`.
+/// `, from dwell 17 of `roll` on`; `, in dwells 17 to 25 of `roll`; `, in `roll` as against the others`.
 fn when(run: &Run, since: Option<Since>) -> String {
     let name = |index: usize| run.recordings.get(index).map_or("?", |r| r.name.as_str());
     match since {
@@ -89,6 +89,9 @@ fn when(run: &Run, since: Option<Since>) -> String {
         Some(Since::Recording(index)) => format!(", in `{}` as against the other recordings", name(index)),
         Some(Since::Dwell(dwell)) => {
             format!(", from dwell {} of `{}` on", dwell.dwell, name(dwell.recording))
+        }
+        Some(Since::Dwells { first, last }) => {
+            format!(", in dwells {} to {last} of `{}`", first.dwell, name(first.recording))
         }
     }
 }

@@ -115,25 +115,34 @@ fn same_effect(truth: &str, name: &str) -> bool {
         // A step at the first dwell of a recording and one between recordings are one event.
         (Some(a), None) | (None, Some(a)) => a <= DWELLS,
     };
-    truth.place == name.place && truth.recording == name.recording && near
+    let ends_near = match (truth.last, name.last) {
+        (Some(a), Some(b)) => a.abs_diff(b) <= DWELLS,
+        (a, b) => a == b,
+    };
+    truth.place == name.place && truth.recording == name.recording && near && ends_near
 }
 
 struct Parts<'a> {
     place: &'a str,
     recording: Option<&'a str>,
     dwell: Option<usize>,
+    last: Option<usize>,
 }
 
 impl<'a> Parts<'a> {
     fn of(spec: &'a str) -> Parts<'a> {
         let head = spec.split(',').next().unwrap_or(spec);
         let (place, since) = head.split_once('@').map_or((head, None), |(p, s)| (p, Some(s)));
-        let (recording, dwell) = match since.map(|s| s.split_once('.').ok_or(s)) {
-            Some(Ok((recording, dwell))) => (Some(recording), dwell.parse().ok()),
+        let (recording, dwells) = match since.map(|s| s.split_once('.').ok_or(s)) {
+            Some(Ok((recording, dwells))) => (Some(recording), Some(dwells)),
             Some(Err(recording)) => (Some(recording), None),
             None => (None, None),
         };
-        Parts { place, recording, dwell }
+        let (first, last) = dwells.map_or((None, None), |dwells| {
+            dwells.split_once('-').map_or((Some(dwells), None), |(first, last)| (Some(first), Some(last)))
+        });
+        let number = |text: Option<&str>| text.and_then(|text| text.parse().ok());
+        Parts { place, recording, dwell: number(first), last: number(last) }
     }
 }
 
@@ -148,6 +157,11 @@ mod tests {
         assert!(
             same_effect("tool_shift@1.17", "tool_shift@1.19")
                 && !same_effect("tool_shift@1.17", "tool_shift@1.20")
+        );
+        assert!(
+            same_effect("tool_shift@1.17-25", "tool_shift@1.18-24")
+                && !same_effect("tool_shift@1.17-25", "tool_shift@1.17")
+                && !same_effect("tool_shift@1.17-25", "tool_shift@1.17-30")
         );
         assert!(
             same_effect("zero_slip:2@1", "zero_slip:2@1.0") && !same_effect("zero_slip:2@1", "zero_slip:2@2")

@@ -16,7 +16,7 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
         return None;
     }
     let alone = |r: usize| {
-        let mut own = inputs.for_trials();
+        let mut own = inputs.for_trials(Some(together));
         own.pipeline.frames.base.pose = FramePose::Estimated;
         own.seen.iter_mut().enumerate().filter(|(k, _)| *k != r).for_each(|(_, s)| s.dwells.clear());
         let fitted = own.fit().ok()?;

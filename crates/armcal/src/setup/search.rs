@@ -22,7 +22,7 @@ type Found = (Hypothesis, Vec<String>);
 /// Searches one mistake after the other while each divides the errors, and adds what it finds to the report.
 /// `fitted` is the calibration as it came; none where there was no way to calibrate.
 pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport) {
-    let now = inputs.for_trials();
+    let now = inputs.for_trials(fitted);
     let first = now.fit().ok();
     let begun = first.as_ref().map_or_else(Misfit::of_nothing, |f| now.misfit(f));
     if !in_doubt(&begun) {

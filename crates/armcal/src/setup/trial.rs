@@ -5,7 +5,7 @@ use crate::pipeline::Pipeline;
 use crate::stages::perceive::Seen;
 use crate::story::{self, Fitted};
 use armcal_calibrate::{HoldoutConfig, Objective};
-use armcal_core::Dwell;
+use armcal_core::{Dwell, Parameter};
 use armcal_model::Chain;
 use armcal_table::{Board, Place};
 use std::collections::BTreeSet;
@@ -93,6 +93,18 @@ fn saturating(ratio: f64) -> f64 {
     0.5 * (1.0 + ratio.min(CAP).powi(2)).ln()
 }
 
+/// The bounds that a calibration had to widen.
+fn widened(fitted: &Fitted) -> Vec<Change> {
+    let assumed = fitted.model.parameters().iter();
+    let taken = fitted.calibration.fit.estimates.iter().map(|e| &e.parameter);
+    let width = |p: &Parameter| p.upper - p.lower;
+    assumed
+        .zip(taken)
+        .filter(|(assumed, taken)| width(taken) > width(assumed))
+        .map(|(assumed, taken)| Change::widened(&taken.name, width(taken) / width(assumed)))
+        .collect()
+}
+
 impl Misfit {
     /// Of inputs that cannot be fitted.
     pub fn of_nothing() -> Misfit {
@@ -108,9 +120,11 @@ impl Misfit {
 
 impl Inputs {
     /// The same with a plain robust fit to everything, nothing held out, priors as they come, no curves that follow any
-    /// error of a joint, and not more dwells than decide.
-    pub fn for_trials(&self) -> Inputs {
+    /// error of a joint, and not more dwells than decide; bounds that nobody declared are as wide as the calibration, where
+    /// there is one, found them.
+    pub fn for_trials(&self, calibrated: Option<&Fitted>) -> Inputs {
         let mut inputs = self.clone();
+        inputs.changes.extend(calibrated.into_iter().flat_map(widened));
         inputs.pipeline.holdout = HoldoutConfig::None;
         if inputs.pipeline.fit.objective == Objective::Paper {
             inputs.pipeline.fit.objective = Objective::Robust;

@@ -29,6 +29,12 @@ pub fn finding(
         _ => "",
     };
     let falls = match before_m {
+        Some(before_m) if before_m <= after_m && ended.seated == begun.seated => format!(
+            "a quick fit leaves {} instead of {} mm (the calibration {} either way)",
+            millimetres(ended.mean_m),
+            millimetres(begun.mean_m),
+            millimetres(after_m)
+        ),
         Some(before_m) if before_m <= after_m => format!(
             "{} instead of {} dwells sit in a cavity, and their mean {held_out}error is {} mm",
             ended.seated,

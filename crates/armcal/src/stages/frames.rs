@@ -102,7 +102,7 @@ pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> 
                 (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));
             }
             p.prior_sigma = change.prior.map(si).or(p.prior_sigma);
-            p.assumed = p.assumed.filter(|_| change.prior.is_none());
+            p.assumed = p.assumed.filter(|_| change.prior.is_none() && change.bound.is_none());
         })?;
     }
     Ok(())

@@ -129,6 +129,33 @@ fn from_the_scales_of_other_data_a_fit_comes_to_its_own() {
     assert!(found > 1.5 * fit.estimates[0].parameter.prior_sigma.unwrap());
 }
 
+/// An arm of which one length is 6 mm off: a millimetre more than anybody assumed.
+#[test]
+fn bounds_that_nobody_declared_are_widened_where_that_explains_the_errors() {
+    let outcome = |off_m: f64, others_m: f64, declared: bool| {
+        let mut all = problem(&[(ParameterKind::Length, 1e-3)], 30, 6);
+        all.measured[0] = off_m;
+        // What no parameter can follow: an error of the block that is not its own.
+        all.measured[1] += others_m;
+        if declared {
+            all.parameters.iter_mut().for_each(|p| p.assumed = None);
+        }
+        let fit = fit_problem(&all, &[0.0; 30], &|p| p.free, &config()).unwrap();
+        let said = fit.warnings.iter().find(|w| w.code == "bound-widened").map(|w| w.message.clone());
+        (fit.estimates[0].value, fit.estimates[0].parameter.upper, said)
+    };
+    let (value, upper, said) = outcome(6e-3, 0.0, false);
+    assert!((value - 6e-3).abs() < 1e-4 && (upper - 7.5e-3).abs() < 1e-12, "{value} {upper}");
+    let said = said.unwrap();
+    assert!(said.contains("p0 is off by +") && said.contains("5.000 was assumed"), "{said}");
+    // Within the bounds nothing is said; further than half as wide again, or beside errors of another kind, they stay.
+    assert_eq!(outcome(4.9e-3, 0.0, false).2, None);
+    assert_eq!((outcome(9e-3, 0.0, false).1, outcome(9e-3, 0.0, false).2), (5e-3, None));
+    assert_eq!((outcome(6e-3, 0.02, false).1, outcome(6e-3, 0.02, false).2), (5e-3, None));
+    // So do those that were declared.
+    assert_eq!((outcome(6e-3, 0.0, true).1, outcome(6e-3, 0.0, true).2), (5e-3, None));
+}
+
 #[test]
 fn what_is_declared_is_kept() {
     let mut problem = problem(&[(ParameterKind::Length, 1e-3)], 6, 4);

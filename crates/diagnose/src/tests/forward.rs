@@ -342,7 +342,7 @@ fn a_point_of_a_scan_is_listed_too() {
     let mut p = planted(&[], 0, 1);
     let point = Candidate { spec: "scale:2,shape=3".into(), ..own(&p, "scale:2") };
     assert!(listed(&p, &point).is_none());
-    p.scans.push(Scan { name: "scale:2".into(), points: vec![point.clone()] });
+    p.scans.push(Scan::of("scale:2", vec![point.clone()]));
     assert_eq!(listed(&p, &point).unwrap().spec, point.spec);
     let zeros = DMatrix::<f64>::zeros(1, 1);
     assert_eq!(listed(&p, &own(&p, "scale:3")).unwrap().columns.len(), zeros.ncols());

@@ -111,7 +111,7 @@ fn several_effects_are_as_sure_as_the_least_sure() {
 fn an_effects_probability_is_that_of_all_that_its_set_means() {
     let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
     let own_point = Candidate { spec: "backlash:1,shape=2".into(), ..own(&p, "backlash:1") };
-    p.scans.push(crate::Scan { name: "backlash:1".into(), points: vec![own_point] });
+    p.scans.push(crate::Scan::of("backlash:1", vec![own_point]));
     p.candidates.push(Candidate { spec: "backlash:1+backlash:2".into(), ..own(&p, "backlash:1") });
     let config = quick();
     let mut a = accepted(&p, "backlash:1");
@@ -201,6 +201,9 @@ fn a_change_between_recordings_may_be_a_load_that_is_not_declared() {
         codes(&warnings(&noise, &[], 198, &s, &quick())).iter().map(|c| c.to_string()).collect::<Vec<_>>()
     };
     assert_eq!(of(&p, "tool_shift@1"), ["event-or-load"]);
+    let mut two = searched(&planted(&[], 0, 5));
+    two.accepted = vec![accepted(&p, "tool_shift@1"), accepted(&p, "scale:1"), accepted(&p, "tool_shift@1")];
+    assert_eq!(codes(&warnings(&noise, &[], 198, &two, &quick()))[0], "one-event");
     assert!(of(&p, "scale:1").is_empty());
     p.dwells.iter_mut().for_each(|d| d.load_kg = if d.id.recording == 1 { 2.0 } else { 0.0 });
     assert!(of(&p, "tool_shift@1").is_empty(), "the load is declared");

@@ -220,7 +220,7 @@ fn groups_and_second_values_are_no_names_of_their_own() {
     p.candidates.push(Candidate { spec: "twin+more".into(), ..twin.clone() });
     for shape in [2, 3] {
         let point = Candidate { spec: format!("backlash:1,shape={shape}"), ..own(&p, "backlash:1") };
-        p.scans.push(crate::Scan { name: "backlash:1".into(), points: vec![point] });
+        p.scans.push(crate::Scan::of("backlash:1", vec![point]));
     }
     let weighed = weigh(&p, &config);
     let j = judge(&p, &weighed, entry(&weighed, "backlash:1"), &config);
@@ -310,7 +310,7 @@ fn the_gate_runs_over_entries_and_thinned_scans() {
     let mut p = planted(&[], 0, 1);
     let entries = p.candidates.len();
     let point = own(&p, "scale:2");
-    let scan = |n: usize| crate::Scan { name: "scan".into(), points: vec![point.clone(); n] };
+    let scan = |n: usize| crate::Scan::of("scan", vec![point.clone(); n]);
     let mut with = |scans: Vec<crate::Scan>| {
         p.scans = scans;
         let weighed = weigh(&p, &quick());

@@ -89,6 +89,24 @@ fn a_rival_counts_as_its_refit_does() {
 }
 
 #[test]
+fn rivals_are_as_far_behind_as_a_linearised_fit_may_put_them() {
+    let config = quick();
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut found = search.accepted[0].clone();
+    let within = |found: &mut Accepted, own: f64, behind: f64| {
+        let room = std::rc::Rc::make_mut(&mut found.room);
+        let at = entry(&room.weighed, "zero_drift:1");
+        room.weighed.entries.iter_mut().for_each(|e| e.ln_evidence = 0.0);
+        room.weighed.entries[found.judged.entry].ln_evidence = own;
+        room.weighed.entries[at].ln_evidence = own - behind;
+        rivals(found, &found.room).contains(&at)
+    };
+    assert!(within(&mut found, 200.0, 39.0) && !within(&mut found, 200.0, 41.0));
+    assert!(within(&mut found, 2000.0, 199.0) && !within(&mut found, 2000.0, 201.0));
+}
+
+#[test]
 fn what_is_known_or_repeats_is_not_asked() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();

@@ -316,7 +316,7 @@ fn periodic_scan(poses: &[Pose], j: usize, joint: &Arc<DMatrix<f64>>) -> Scan {
             columns: Columns::Product { base: joint.clone(), basis: Arc::new(basis) },
         }
     });
-    Scan { name: format!("periodic:{}", j + 1), points: points.collect() }
+    Scan::of(format!("periodic:{}", j + 1), points.collect())
 }
 
 type Make<'a> = dyn Fn(usize, &dyn Fn(&Pose, usize) -> Vector3<f64>) -> DMatrix<f64> + 'a;

@@ -1,4 +1,5 @@
-//! Something is knocked, once, and stays where it came to rest: a rigid motion of everything after that moment.
+//! Something is knocked, once, and stays where it came to rest until it is put back, if it is: a rigid motion of
+//! everything after that moment.
 
 use super::{Hidden, Keys, happened};
 use crate::arm::AxisArm;
@@ -26,6 +27,9 @@ pub struct Bump {
     /// When in it [s]. Default 0: before it begins.
     #[serde(default)]
     pub at_s: f64,
+    /// When in that recording it is put back [s]. Default never.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
 }
 
 /// What can be knocked.
@@ -56,7 +60,7 @@ impl Bump {
     /// Whether it has happened to `body`; a bump of no size never does.
     fn hit(&self, now: &Moment<'_>, body: BumpedBody) -> bool {
         let moved = self.shift_mm.iter().chain(&self.turn_deg).any(|v| *v != 0.0);
-        moved && self.body == body && happened(now, self.recording, self.at_s)
+        moved && self.body == body && happened(now, self.recording, self.at_s, self.until_s)
     }
 }
 
@@ -108,7 +112,7 @@ impl Hidden for Bump {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         self.shift_mm.iter().try_for_each(|v| keys.within("shift_mm", *v, [-100.0, 100.0]))?;
         self.turn_deg.iter().try_for_each(|v| keys.within("turn_deg", *v, [-30.0, 30.0]))?;
-        keys.event(self.recording, self.at_s)
+        keys.event(self.recording, self.at_s, self.until_s)
     }
 
     fn mechanism(&self) -> Box<dyn Mechanism> {

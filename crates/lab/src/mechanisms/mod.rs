@@ -18,8 +18,8 @@
 //! | `gear_ratio` | the gear has another ratio than the drawing | `joint`, `error_percent` |
 //! | `belt_coupling` | a joint drags another one along | `joint`, `by`, `share_percent` |
 //! | `axis_tilt` | an axis is not parallel to the one before | `joint`, `tilt_deg` |
-//! | `zero_slip` | a pulley slips on its shaft | `joint`, `slip_deg`, `recording`, `at_s` |
-//! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `shift_mm`, `turn_deg`, `recording`, `at_s` |
+//! | `zero_slip` | a pulley slips on its shaft | `joint`, `slip_deg`, `recording`, `at_s`, `until_s` |
+//! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `shift_mm`, `turn_deg`, `recording`, `at_s`, `until_s` |
 //! | `thermal_growth` | links follow the thermometer | `links`, `per_kelvin_ppm` |
 //! | `warm_up` | links are heated by motors the thermometer does not see | `links`, `per_kelvin_ppm`, `rise_k`, `time_constant_s` |
 //! | `zero_drift` | the zero of a potentiometer drifts | `joint`, `deg_per_hour` |
@@ -201,12 +201,18 @@ impl Keys {
         Err(self.wrong(key, format!("must not be negative, is {v}")))
     }
 
-    fn event(&self, recording: usize, at_s: f64) -> Result<(), LabError> {
+    fn event(&self, recording: usize, at_s: f64, until_s: Option<f64>) -> Result<(), LabError> {
         if recording >= self.recordings {
             let why = format!("is {recording}, but recordings count from 0 to {}", self.recordings - 1);
             return Err(self.wrong("recording", why));
         }
-        self.not_negative("at_s", at_s)
+        self.not_negative("at_s", at_s)?;
+        match until_s {
+            Some(until_s) if until_s.is_nan() || until_s <= at_s => {
+                Err(self.wrong("until_s", format!("is {until_s}, not after at_s = {at_s}")))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -225,9 +231,10 @@ fn motor_of_play(now: &Moment<'_>, before: Option<[f64; 2]>, link_rad: f64, half
 /// A link that moved less between two moments stood still [rad].
 const STILL_RAD: f64 = 1e-9;
 
-/// Whether something that happens `at_s` into a recording has happened.
-fn happened(now: &Moment<'_>, recording: usize, at_s: f64) -> bool {
-    now.recording > recording || (now.recording == recording && now.time_s >= at_s)
+/// Whether something that happens `at_s` into a recording, and is put back `until_s` into it, holds now.
+fn happened(now: &Moment<'_>, recording: usize, at_s: f64, until_s: Option<f64>) -> bool {
+    let reached = |time_s| now.recording > recording || (now.recording == recording && now.time_s >= time_s);
+    reached(at_s) && !until_s.is_some_and(reached)
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use super::{Hidden, Keys, happened};
 use crate::{LabError, Mechanism, Moment};
 use serde::{Deserialize, Serialize};
 
-/// `kind = "zero_slip"`: from the event on the link is further than the motor says, to the end of the session.
+/// `kind = "zero_slip"`: from the event on the link is further than the motor says, to the end of the session
+/// or until it is put back.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZeroSlip {
@@ -17,11 +18,14 @@ pub struct ZeroSlip {
     /// When in it [s]. Default 0: before it begins.
     #[serde(default)]
     pub at_s: f64,
+    /// When in that recording it is put back [s]. Default never.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_s: Option<f64>,
 }
 
 impl ZeroSlip {
     fn slip_rad(&self, now: &Moment<'_>) -> f64 {
-        if happened(now, self.recording, self.at_s) { self.slip_deg.to_radians() } else { 0.0 }
+        if happened(now, self.recording, self.at_s, self.until_s) { self.slip_deg.to_radians() } else { 0.0 }
     }
 }
 
@@ -43,7 +47,7 @@ impl Hidden for ZeroSlip {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         keys.joint("joint", self.joint)?;
         keys.within("slip_deg", self.slip_deg, [-30.0, 30.0])?;
-        keys.event(self.recording, self.at_s)
+        keys.event(self.recording, self.at_s, self.until_s)
     }
 
     fn mechanism(&self) -> Box<dyn Mechanism> {

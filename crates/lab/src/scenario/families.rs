@@ -114,32 +114,63 @@ impl Draw {
         format!("{name}:{}", self.joint)
     }
 
-    /// Draws when an event happens: before a recording, or between two dwells of one. Returns recording, time in it
-    /// [s], and the moment as the catalogue would write it.
-    pub fn event(&mut self, config: &LabConfig, within: bool) -> Result<(usize, f64, String), LabError> {
+    /// Draws when an event happens: before a recording, or between two dwells of one, and between which two it ends.
+    pub fn event(&mut self, config: &LabConfig, timing: Timing) -> Result<Event, LabError> {
         let recordings = config.recordings.len();
         let pick = self.draw.uniform([0.0, 1.0]);
-        if !within && recordings > 1 {
+        if timing == Timing::Before && recordings > 1 {
             // Before the second recording only the first one differs from the rest, before the last only the last.
             let last = recordings - 1;
             let before = self.target.filter(|_| self.joint == 0).unwrap_or(if pick < 0.5 { 1 } else { last });
             let (before, odd) = if before <= 1 { (1, 0) } else { (last, last) };
             self.recording = Some(odd);
-            return Ok((before, 0.0, format!("@{odd}")));
+            return Ok(Event { recording: before, at_s: 0.0, until_s: None, when: format!("@{odd}") });
         }
         let recording = (pick * recordings as f64) as usize % recordings;
         let rehearsal = observe(config)?;
         let of_it = rehearsal.observations.iter().filter(|o| o.dwell.recording == recording);
         let times_ns: Vec<i64> = of_it.map(|o| o.time_ns).collect();
+        let before_dwell = |dwell: usize| -> Result<f64, LabError> {
+            let around = dwell.checked_sub(1).and_then(|from| times_ns.get(from..=dwell));
+            let Some([before, after]) = around.and_then(|t| t.first_chunk()) else {
+                return Err(value("scenario.design", "has too few dwells for an event between two".into()));
+            };
+            Ok((before + (after - before) / 2 - config.start_ns(recording)) as f64 * 1e-9)
+        };
         let share = self.draw.uniform([0.25, 0.75]);
         let dwell = ((share * times_ns.len() as f64) as usize).max(1);
-        let Some([before, after]) = times_ns.get(dwell - 1..=dwell).and_then(|t| t.first_chunk()) else {
-            return Err(value("scenario.design", "has too few dwells for an event between two".into()));
-        };
-        let at_ns = before + (after - before) / 2 - config.start_ns(recording);
+        let at_s = before_dwell(dwell)?;
         (self.recording, self.dwell) = (Some(recording), Some(dwell));
-        Ok((recording, at_ns as f64 * 1e-9, format!("@{recording}.{dwell}")))
+        if timing != Timing::Passing {
+            return Ok(Event { recording, at_s, until_s: None, when: format!("@{recording}.{dwell}") });
+        }
+        // A fifth of the recording, 4 to 12 dwells.
+        let end = dwell + (times_ns.len() / 5).clamp(4, 12);
+        let when = format!("@{recording}.{dwell}-{}", end - 1);
+        Ok(Event { recording, at_s, until_s: Some(before_dwell(end)?), when })
     }
+}
+
+/// When an event may happen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Timing {
+    /// Before a recording, where there are several.
+    Before,
+    /// Between two dwells of one.
+    Within,
+    /// Between two dwells of one, and it is over again before the recording is.
+    Passing,
+}
+
+/// When an event happens.
+pub(super) struct Event {
+    pub recording: usize,
+    /// Time in the recording [s].
+    pub at_s: f64,
+    /// When it ends there [s].
+    pub until_s: Option<f64>,
+    /// The moment as the catalogue would write it.
+    pub when: String,
 }
 
 /// Largest torques of gravity on joints 2 and 3 of the drawn arm, stretched out level [N m].
@@ -240,8 +271,22 @@ pub(super) const FAMILIES: &[Family] = &[
         unit: "deg",
         build: zero_slip_within,
     },
+    Family {
+        name: "zero_slip@dwells",
+        joints: &[1, 2, 3],
+        range: [0.3, 2.0],
+        unit: "deg",
+        build: zero_slip_passing,
+    },
     Family { name: "tool_shift", joints: &[], range: [0.3, 3.0], unit: "mm", build: tool_shift },
     Family { name: "tool_shift@dwell", joints: &[], range: [1.0, 5.0], unit: "mm", build: tool_shift_within },
+    Family {
+        name: "tool_shift@dwells",
+        joints: &[],
+        range: [1.0, 5.0],
+        unit: "mm",
+        build: tool_shift_passing,
+    },
     Family { name: "frame_shift", joints: &[], range: [0.3, 3.0], unit: "mm", build: frame_shift },
     Family {
         name: "frame_shift@dwell",

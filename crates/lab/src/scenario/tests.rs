@@ -91,9 +91,16 @@ fn designs_have_the_dwells_they_say() {
 
 #[test]
 fn an_event_happens_between_the_dwells_it_names() {
-    for name in
-        ["zero_slip@dwell", "tool_shift@dwell", "frame_shift@dwell", "zero_slip", "tool_shift", "frame_shift"]
-    {
+    for name in [
+        "zero_slip@dwell",
+        "tool_shift@dwell",
+        "frame_shift@dwell",
+        "zero_slip@dwells",
+        "tool_shift@dwells",
+        "zero_slip",
+        "tool_shift",
+        "frame_shift",
+    ] {
         for seed in 0..4 {
             let scenario =
                 Scenario { size: Size::Large, ..Scenario::new(name, Design::ThreeTiltsBothWays, seed) };
@@ -103,10 +110,15 @@ fn an_event_happens_between_the_dwells_it_names() {
             planted.config.mechanisms.clear();
             let without = observe(&planted.config).unwrap();
             let recording = hidden.recording.unwrap();
-            assert!(hidden.effect.unwrap().contains(&format!("@{recording}")));
+            let effect = hidden.effect.unwrap();
+            assert!(effect.contains(&format!("@{recording}")));
+            let last: usize = effect.split_once('-').map_or(usize::MAX, |(_, last)| last.parse().unwrap());
             for (a, b) in with.observations.iter().zip(&without.observations) {
                 let moved = a.joint_rad.iter().zip(&b.joint_rad).any(|(p, q)| (p - q).abs() > 2e-4);
                 let since = match hidden.dwell {
+                    Some(dwell) if last < usize::MAX => {
+                        a.dwell.recording == recording && (dwell..=last).contains(&a.dwell.dwell)
+                    }
                     Some(dwell) => (a.dwell.recording, a.dwell.dwell) >= (recording, dwell),
                     // Before the second recording: the first is the odd one out; before the last: the last is.
                     None if recording == 0 => a.dwell.recording > 0,

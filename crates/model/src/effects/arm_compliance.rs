@@ -8,8 +8,8 @@
 //! `dq_j = c_j tau_j` for every turning joint j, `tau_j` the gravity torque of the links and of the load.
 //!
 //! # Parameters and units
-//! `compliance<j>` c_j [rad/(N m)], one a turning joint, of the links with their default masses (2.5 kg a metre; each
-//! absorbs the true scale at its joint). Prior: 0.1 deg with the nominal arm stretched out, the size of an industrial
+//! `compliance<j>` c_j [rad/(N m)], one a turning joint, of the links with the masses of their URDF or 2.5 kg a
+//! metre (each absorbs the true scale at its joint). Prior: 0.1 deg with the nominal arm stretched out, the size of an industrial
 //! gear.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
 //! arm there.

@@ -7,9 +7,9 @@
 //! `dq = c tau`, `tau` the gravity torque of the outer links and of the load, positive towards +q.
 //!
 //! # Parameters and units
-//! `compliance` c [rad/(N m)] of the links with their default masses (2.5 kg a metre; it absorbs the true scale),
-//! `compliance_outer` the correction for the share of the outer links, `compliance_load` the true c, seen under a
-//! known load, where the session has one. Prior: 0.4 deg with the nominal arm stretched out.
+//! `compliance` c [rad/(N m)] of the links with the masses of their URDF or 2.5 kg a metre (it absorbs the true
+//! scale), `compliance_outer` the correction for the share of the outer links, `compliance_load` the true c, seen
+//! under a known load, where the session has one. Prior: 0.4 deg with the nominal arm stretched out.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
 //! arm there.
 //!

@@ -1,14 +1,14 @@
 //! What drives the effects in one observation: pose, arrival, gravity torque, time, load, temperature.
 //!
-//! Everything here is worked out at the nominal chain, so that it does not move while the fit does. Masses are
-//! nobody's secret and nobody's knowledge: each link weighs 2.5 kg for every metre between its two joints (the
-//! last: between joint and tip), evenly spread. Only the proportions matter, because the amplitude of an effect
-//! absorbs the scale and a second amplitude the share of the outer links.
+//! Everything here is worked out at the nominal chain, so that it does not move while the fit does. Links have the
+//! masses and centres of their URDF, where it gives all of them; else each weighs 2.5 kg for every metre between its
+//! two joints (the last: between joint and tip), evenly spread. Only the proportions matter, because the amplitude of
+//! an effect absorbs the scale and a second amplitude the share of the outer links.
 
 use super::session::Session;
 use crate::path::Ends;
 use crate::rigid::Rigid;
-use crate::segment::{Geometry, Motion, Segment};
+use crate::segment::{Body, Geometry, Motion, Segment};
 use armcal_core::Observation;
 use nalgebra::Vector3;
 
@@ -39,6 +39,10 @@ pub(crate) struct NominalPose {
     pub joints: Vec<JointAxis>,
     /// The tip [m].
     pub tip_m: Vector3<f64>,
+    /// What each link weighs, and where in the world.
+    links: Vec<Body>,
+    /// Whether the file of the arm says so.
+    pub masses_declared: bool,
 }
 
 impl NominalPose {
@@ -69,7 +73,35 @@ impl NominalPose {
             joints.push(JointAxis { origin_m, start_m, axis, motion: joint.motion, slot });
         }
         let tip_m = slots.last().map_or_else(Vector3::zeros, |end| end.translation_m);
-        NominalPose { slots, joints, tip_m }
+        let mut pose = NominalPose { slots, joints, tip_m, links: Vec::new(), masses_declared: false };
+        let declared = pose.declared(path);
+        pose.masses_declared = declared.is_some();
+        pose.links = declared.unwrap_or_else(|| pose.spread());
+        pose
+    }
+
+    /// The links as their file declares them; none where it leaves one without a mass.
+    fn declared(&self, path: &[Segment]) -> Option<Vec<Body>> {
+        let mut links = vec![Body { mass_kg: 0.0, centre_m: Vector3::zeros() }; self.joints.len()];
+        for (slot, body) in path.iter().enumerate().filter_map(|(slot, s)| Some((slot, s.body.as_ref()?))) {
+            // What the first joint does not move bears no part.
+            let Some(k) = self.joints.iter().rposition(|j| j.slot <= slot) else { continue };
+            let end = &self.slots[slot + 1];
+            let (link, at_m) = (&mut links[k], end.rotation * body.centre_m + end.translation_m);
+            let mass_kg = link.mass_kg + body.mass_kg;
+            link.centre_m += (at_m - link.centre_m) * (body.mass_kg / mass_kg);
+            link.mass_kg = mass_kg;
+        }
+        links.iter().all(|link| link.mass_kg > 0.0).then_some(links)
+    }
+
+    /// Links that weigh as much as they are long.
+    fn spread(&self) -> Vec<Body> {
+        let link = |k| {
+            let (from, to) = self.link_m(k);
+            Body { mass_kg: LINK_DENSITY_KGPM * (to - from).norm(), centre_m: (from + to) * 0.5 }
+        };
+        (0..self.joints.len()).map(link).collect()
     }
 
     /// Where link `k` (from joint k to the next, or to the tip) begins and ends [m].
@@ -80,18 +112,18 @@ impl NominalPose {
 
     /// Mass of link `k` [kg].
     pub fn link_mass_kg(&self, k: usize) -> f64 {
-        let (from, to) = self.link_m(k);
-        LINK_DENSITY_KGPM * (to - from).norm()
+        self.links[k].mass_kg
+    }
+
+    /// Centre of mass of link `k` [m].
+    pub fn link_centre_m(&self, k: usize) -> Vector3<f64> {
+        self.links[k].centre_m
     }
 
     /// Moment about `pivot` of the weights of the links from `first` on [N m].
     pub fn moment_nm(&self, pivot: &Vector3<f64>, first: usize, gravity: &Vector3<f64>) -> Vector3<f64> {
-        (first..self.joints.len())
-            .map(|k| {
-                let (from, to) = self.link_m(k);
-                ((from + to) * 0.5 - pivot).cross(gravity) * self.link_mass_kg(k)
-            })
-            .sum()
+        let weight = |k| (self.link_centre_m(k) - pivot).cross(gravity) * self.link_mass_kg(k);
+        (first..self.joints.len()).map(weight).sum()
     }
 
     /// Generalised force on a joint of the weights of the links from `first` on, positive towards +q [N m]

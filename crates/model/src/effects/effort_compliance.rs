@@ -8,7 +8,8 @@
 //!
 //! # Parameters and units
 //! `compliance` c [rad/(N m)], signed as the effort of the recording is: negative where effort holds the arm up.
-//! Prior: 0.4 deg at the largest effort seen.
+//! Prior: 0.4 deg under the torque of the nominal arm stretched out, as of `compliance`: what a joint yields is not a
+//! matter of what it was asked to bear here.
 //!
 //! # Signature in the data
 //! The residual follows the measured effort, including its part that flips with the direction.
@@ -49,11 +50,10 @@ struct EffortCompliance {
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
     let efforts = placing.session.largest_effort_nm.as_ref();
-    let largest_nm = efforts
-        .and_then(|efforts| efforts.get(joint).copied())
-        .filter(|largest| *largest > 0.0)
-        .ok_or("the observations have no measured effort of this joint")?;
-    let per_deg = 1f64.to_radians() / largest_nm;
+    if efforts.and_then(|efforts| efforts.get(joint)).is_none_or(|largest_nm| *largest_nm <= 0.0) {
+        return Err("the observations have no measured effort of this joint".to_owned());
+    }
+    let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;
     let compliance = amplitude("compliance", unit, 0.4 * per_deg, 8.0 * per_deg, "angle per measured effort");
     Ok(Placement::new(vec![compliance], EffortCompliance { joint }))

@@ -9,10 +9,8 @@ use crate::{Model, ModelError};
 use armcal_core::{DwellId, Observation};
 use std::collections::BTreeSet;
 
-/// A step may happen before this many dwells at most; a longer session is thinned out evenly.
-const MOST_STEPS: usize = 250;
-/// Dwells before the first and after the last step that is tried.
-const STEP_MARGIN: usize = 3;
+/// Dwells before the first and after the last step that is tried: one alone is an outlier.
+const STEP_MARGIN: usize = 2;
 
 impl Model {
     /// The same model with more effects behind its parameters; at their nominal zero they change nothing.
@@ -111,6 +109,11 @@ impl Model {
         Drivers::of(session, pose, board.map(|board| board.translation.vector), o)
     }
 
+    /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
+    pub fn has_link_masses(&self) -> bool {
+        self.zero_pose().masses_declared
+    }
+
     /// Whether an effect could be added here, with something for a fit to find.
     fn offers(&self, spec: &EffectSpec, session: &Session, zero: &NominalPose) -> bool {
         let placed = placed::place(self, session, spec, zero, 0);
@@ -184,7 +187,5 @@ fn steps(observations: &[Observation]) -> Vec<DwellId> {
     let begins = |k: usize| k > 0 && dwells[k - 1].recording != dwells[k].recording;
     let telling = |k: &usize| !(begins(*k) && own_event.contains(&dwells[*k].recording));
     let dwells: Vec<DwellId> = (0..dwells.len()).filter(telling).map(|k| dwells[k]).collect();
-    let inner = dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]);
-    let stride = inner.len().div_ceil(MOST_STEPS).max(1);
-    inner.iter().step_by(stride).copied().collect()
+    dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]).to_vec()
 }

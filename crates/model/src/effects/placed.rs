@@ -182,6 +182,7 @@ impl Effects {
                     geometry: Geometry::Origin { nominal: Rigid::identity(), freedom: Freedom::Full },
                     joint: None,
                     parameters: first..first + 6,
+                    body: None,
                 });
             }
             path.extend(rigid.get(slot).cloned());

@@ -1,8 +1,8 @@
 //! Naming one effect in one place: `backlash:1`, `zero_slip:2@1`, `tool_shift@1.17`, `periodic:1,frequency=30`.
 //!
-//! Grammar: `kind [":" joint] ["@" recording ["." dwell]] {"," shape "=" number}`. The joint is its number from
-//! 1 or its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only; `@1.17`
-//! is from dwell 17 of recording 1 to the end of the session.
+//! Grammar: `kind [":" joint] ["@" recording ["." dwell ["-" dwell]]] {"," shape "=" number}`. The joint is its
+//! number from 1 or its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only;
+//! `@1.17` is from dwell 17 of recording 1 to the end of the session; `@1.17-25` in its dwells 17 to 25 only.
 
 use super::expression::Expression;
 use super::table::Override;
@@ -36,6 +36,13 @@ pub enum Since {
     Recording(usize),
     /// From this dwell on, to the end of the session.
     Dwell(DwellId),
+    /// In these dwells of one recording only.
+    Dwells {
+        /// The first of them.
+        first: DwellId,
+        /// Number of the last of them.
+        last: usize,
+    },
 }
 
 impl Since {
@@ -44,6 +51,9 @@ impl Since {
         match self {
             Since::Recording(recording) => dwell.recording == *recording,
             Since::Dwell(first) => dwell >= *first,
+            Since::Dwells { first, last } => {
+                dwell.recording == first.recording && (first.dwell..=*last).contains(&dwell.dwell)
+            }
         }
     }
 }
@@ -53,6 +63,7 @@ impl std::fmt::Display for Since {
         match self {
             Since::Recording(recording) => write!(f, "{recording}"),
             Since::Dwell(dwell) => write!(f, "{}.{}", dwell.recording, dwell.dwell),
+            Since::Dwells { first, last } => write!(f, "{}.{}-{last}", first.recording, first.dwell),
         }
     }
 }
@@ -62,14 +73,22 @@ impl std::str::FromStr for Since {
 
     fn from_str(text: &str) -> Result<Since, &'static str> {
         let number = |text: &str| {
-            text.parse().map_err(|_| "expected RECORDING or RECORDING.DWELL, counted from 0, after \"@\"")
+            text.parse().map_err(|_| {
+                "expected RECORDING, RECORDING.DWELL or RECORDING.FIRST-LAST, counted from 0, after \"@\""
+            })
         };
-        match text.split_once('.') {
-            None => Ok(Since::Recording(number(text)?)),
-            Some((recording, dwell)) => {
-                Ok(Since::Dwell(DwellId { recording: number(recording)?, dwell: number(dwell)? }))
-            }
+        let Some((recording, dwells)) = text.split_once('.') else {
+            return Ok(Since::Recording(number(text)?));
+        };
+        let recording = number(recording)?;
+        let Some((first, last)) = dwells.split_once('-') else {
+            return Ok(Since::Dwell(DwellId { recording, dwell: number(dwells)? }));
+        };
+        let (first, last) = (DwellId { recording, dwell: number(first)? }, number(last)?);
+        if last < first.dwell {
+            return Err("the last dwell after \"@\" comes before the first");
         }
+        Ok(Since::Dwells { first, last })
     }
 }
 

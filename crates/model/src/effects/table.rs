@@ -4,7 +4,7 @@
 //! [[effects]]
 //! kind = "periodic"
 //! target = 1                     # joint, by number from 1 or by name
-//! since = "1.17"                 # only where it matters: recording, or recording.dwell
+//! since = "1.17"                 # only where it matters: recording, recording.dwell or recording.first-last
 //! frequency = 30                 # shapes, SI
 //! parameters.sin = { prior = 0.1, bound = 2.0 }     # display units (mm, deg) unless `unit` is given
 //!

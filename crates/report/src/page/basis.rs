@@ -87,10 +87,11 @@ fn drivers(run: &Run) -> Vec<Driver> {
             values: Column::of_all(driven.iter().map(|d| unit.to_display(d.joint_rad(j)))),
         });
     }
+    let masses = if run.model.has_link_masses() { "links as in the URDF" } else { "links of 2.5 kg/m" };
     for (j, name) in names.iter().enumerate() {
         all.push(Driver {
             key: format!("tau{}", j + 1),
-            label: format!("gravity torque on {name}, links of 2.5 kg/m [N m]"),
+            label: format!("gravity torque on {name}, {masses} [N m]"),
             joint: Some(j),
             values: Column::of_all(driven.iter().map(|d| d.torque[j].total_nm())),
         });

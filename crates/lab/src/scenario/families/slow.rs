@@ -5,33 +5,41 @@ use armcal_core::Pose;
 use nalgebra::Point3;
 
 pub fn zero_slip(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    slip(draw, config, false)
+    slip(draw, config, Timing::Before)
 }
 
 pub fn zero_slip_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    slip(draw, config, true)
+    slip(draw, config, Timing::Within)
+}
+
+pub fn zero_slip_passing(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    slip(draw, config, Timing::Passing)
 }
 
 pub fn tool_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Tool, false)
+    bump(draw, config, BumpedBody::Tool, Timing::Before)
 }
 
 pub fn tool_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Tool, true)
+    bump(draw, config, BumpedBody::Tool, Timing::Within)
+}
+
+pub fn tool_shift_passing(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    bump(draw, config, BumpedBody::Tool, Timing::Passing)
 }
 
 pub fn frame_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Base, false)
+    bump(draw, config, BumpedBody::Base, Timing::Before)
 }
 
 pub fn frame_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Base, true)
+    bump(draw, config, BumpedBody::Base, Timing::Within)
 }
 
-fn slip(draw: &mut Draw, config: &LabConfig, within: bool) -> Result<Made, LabError> {
+fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, LabError> {
     let slip_deg = draw.signed();
-    let (recording, at_s, when) = draw.event(config, within)?;
-    let slip = ZeroSlip { joint: draw.joint, slip_deg, recording, at_s };
+    let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
+    let slip = ZeroSlip { joint: draw.joint, slip_deg, recording, at_s, until_s };
     let same = match draw.joint {
         1 => vec![format!("frame_shift{when}")],
         joint if joint == config.arm.drives.len() => vec![format!("tool_shift{when}")],
@@ -42,12 +50,12 @@ fn slip(draw: &mut Draw, config: &LabConfig, within: bool) -> Result<Made, LabEr
     Ok(made(MechanismConfig::ZeroSlip(slip), effect, enters).same(&same))
 }
 
-fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, within: bool) -> Result<Made, LabError> {
+fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -> Result<Made, LabError> {
     let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
     let turn_deg =
         if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };
-    let (recording, at_s, when) = draw.event(config, within)?;
-    let knock = Bump { body, shift_mm, turn_deg: turn_deg.into(), recording, at_s };
+    let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
+    let knock = Bump { body, shift_mm, turn_deg: turn_deg.into(), recording, at_s, until_s };
     let (effect, channel, alike) = match body {
         BumpedBody::Tool => {
             ("tool_shift", "tip", vec![format!("zero_slip:3{when}"), format!("frame_shift{when}")])

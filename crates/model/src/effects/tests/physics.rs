@@ -2,8 +2,8 @@
 
 use super::super::{EffectSpec, NominalPose, Session, Since};
 use super::rig::{observations, panda, paper, scara, ur10};
-use crate::Model;
 use crate::tests::{RIGHT_ARM, bare, dh, tracked};
+use crate::{Chain, Model};
 use armcal_core::{Arrival, Observation, Pose};
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
@@ -13,18 +13,60 @@ const G: f64 = 9.80665;
 /// Potential energy of the nominal links and the load [J].
 fn energy_j(model: &Model, joints: &[f64], load_kg: f64) -> f64 {
     let pose: NominalPose = model.nominal_pose(&model.nominal(), joints);
-    let links: f64 = (0..joints.len())
-        .map(|k| {
-            let (from, to) = pose.link_m(k);
-            pose.link_mass_kg(k) * G * 0.5 * (from.z + to.z)
-        })
-        .sum();
+    let links: f64 = (0..joints.len()).map(|k| pose.link_mass_kg(k) * G * pose.link_centre_m(k).z).sum();
     links + load_kg * G * pose.tip_m.z
+}
+
+/// Two links that turn about y, level at zero, with a tool on the second.
+fn weighed(masses: bool) -> Model {
+    let inertial = |kg: f64, x: f64| match masses {
+        true => format!("<inertial><origin xyz='{x} 0 0'/><mass value='{kg}'/></inertial>"),
+        false => String::new(),
+    };
+    let link = |name: &str, inertial: String| format!("<link name='{name}'>{inertial}</link>");
+    let joint = |name: &str, kind: &str, parent: &str, child: &str, x: f64| {
+        format!(
+            "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>\
+             <origin xyz='{x} 0 0'/><axis xyz='0 1 0'/></joint>"
+        )
+    };
+    let xml = [
+        "<robot name='two'>".to_owned(),
+        link("base", inertial(50.0, 0.0)),
+        link("upper", inertial(3.0, 0.2)),
+        link("fore", inertial(2.0, 0.1)),
+        link("tool", inertial(0.5, 0.05)),
+        joint("j1", "revolute", "base", "upper", 0.0),
+        joint("j2", "revolute", "upper", "fore", 0.5),
+        joint("flange", "fixed", "fore", "tool", 0.4),
+        "</robot>".to_owned(),
+    ];
+    let chain = Chain::from_urdf(&xml.concat(), "base", "tool", std::path::Path::new("two.urdf"));
+    bare(chain.expect("a chain"))
+}
+
+#[test]
+fn masses_and_centres_of_a_urdf_make_the_torque() {
+    let model = weighed(true);
+    let session = Session::of(&[]);
+    let o = tracked(&[0.0, 0.0], &Pose::identity());
+    let torque = model.drivers(&session, &o).torque;
+    // About joint 2: the forearm at 0.1 m, the tool at 0.4 + 0.05 m; about joint 1 half a metre further out, and the
+    // upper arm at 0.2 m. A weight at +x turns about +y.
+    let outer = |lever: f64| G * (2.0 * (lever + 0.1) + 0.5 * (lever + 0.45));
+    assert!((torque[1].total_nm() - outer(0.0)).abs() < 1e-9, "{torque:?}");
+    assert!((torque[0].total_nm() - outer(0.5) - G * 3.0 * 0.2).abs() < 1e-9, "{torque:?}");
+    assert!((torque[0].outer_nm - outer(0.5)).abs() < 1e-9, "{torque:?}");
+    // Without masses: 2.5 kg a metre.
+    let plain = weighed(false);
+    assert!(model.has_link_masses() && !plain.has_link_masses());
+    let torque = plain.drivers(&session, &o).torque;
+    assert!((torque[1].total_nm() - G * 2.5 * 0.4 * 0.2).abs() < 1e-9, "{torque:?}");
 }
 
 #[test]
 fn torque_is_the_slope_of_the_potential_energy() {
-    for model in [paper(), ur10(), scara(), panda()] {
+    for model in [paper(), ur10(), scara(), panda(), weighed(true)] {
         for o in observations(&model, 6, true) {
             let session = Session::of(std::slice::from_ref(&o));
             let drivers = model.drivers(&session, &o);

@@ -28,6 +28,14 @@ fn the_grammar_means_what_it_says() {
     let step = model.effect("zero_slip:2@1.17").expect("a spec").since.expect("a dwell");
     let dwell = |recording, dwell| DwellId { recording, dwell };
     assert!(!step.holds(dwell(1, 16)) && step.holds(dwell(1, 17)) && step.holds(dwell(2, 0)));
+    let passing = model.effect("tool_shift@1.17-25").expect("a spec");
+    assert_eq!(passing.to_string(), "tool_shift@1.17-25");
+    let passing = passing.since.expect("dwells");
+    assert!(passing.holds(dwell(1, 17)) && passing.holds(dwell(1, 25)));
+    assert!(!passing.holds(dwell(1, 16)) && !passing.holds(dwell(1, 26)) && !passing.holds(dwell(2, 20)));
+    let wrong = |text: &str| model.effect(text).expect_err("no such dwells").to_string();
+    assert!(wrong("tool_shift@1.25-17").contains("before the first"));
+    assert!(wrong("tool_shift@1.17-x").contains("FIRST-LAST"));
 }
 
 #[test]

@@ -1,0 +1,69 @@
+//! Events: effects that begin, or act, at a moment that their names tell.
+
+use armcal_core::DwellId;
+use armcal_model::Since;
+
+/// Dwells by which one event may be told elsewhere by another effect, or once other effects are in the model.
+const MOVED: usize = 3;
+
+/// What an event does where, and when; none for what always acts.
+fn event(spec: &str) -> Option<(&str, Since)> {
+    let (placed, since) = spec.split_once('@')?;
+    Some((placed, since.parse().ok()?))
+}
+
+/// Whether two names are one effect, told a few dwells apart.
+pub(crate) fn moved(from: &str, to: &str) -> bool {
+    let (Some((placed, from)), Some((other, to))) = (event(from), event(to)) else { return false };
+    placed == other && one_moment(from, to)
+}
+
+/// The names that tell of one moment, where there are at least two of it: a collision or a restart changes joints, tool
+/// and frames at once.
+pub(crate) fn together<'n>(names: &[&'n str]) -> Vec<Vec<&'n str>> {
+    let mut moments: Vec<(Since, Vec<&str>)> = Vec::new();
+    for name in names {
+        let Some((_, since)) = event(name) else { continue };
+        match moments.iter_mut().find(|(moment, _)| one_moment(*moment, since)) {
+            Some((_, of_it)) => of_it.push(name),
+            None => moments.push((since, vec![name])),
+        }
+    }
+    moments.into_iter().map(|(_, of_it)| of_it).filter(|of_it| of_it.len() > 1).collect()
+}
+
+fn one_moment(a: Since, b: Since) -> bool {
+    let near = |a: DwellId, b: DwellId| a.recording == b.recording && a.dwell.abs_diff(b.dwell) <= MOVED;
+    match (a, b) {
+        (Since::Recording(a), Since::Recording(b)) => a == b,
+        (Since::Dwell(a), Since::Dwell(b)) => near(a, b),
+        (Since::Dwells { first: a, last: x }, Since::Dwells { first: b, last: y }) => {
+            near(a, b) && x.abs_diff(y) <= MOVED
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_event_told_a_few_dwells_apart_is_the_same() {
+        assert!(moved("tool_shift@1.17", "tool_shift@1.20") && !moved("tool_shift@1.17", "tool_shift@1.21"));
+        assert!(
+            !moved("tool_shift@1.17", "tool_shift@2.17") && !moved("tool_shift@1.17", "zero_slip:2@1.17")
+        );
+        assert!(moved("zero_slip:2@1.17-25", "zero_slip:2@1.16-26"));
+        assert!(!moved("zero_slip:2@1.17-25", "zero_slip:2@1.17-29"));
+        assert!(!moved("zero_slip:2@1.17-25", "zero_slip:2@1.17") && !moved("backlash:1", "backlash:1"));
+    }
+
+    #[test]
+    fn effects_of_one_moment_are_one_event() {
+        let names = ["zero_slip:2@1.17", "backlash:1", "tool_shift@1.18", "zero_slip:3@2", "zero_slip:1@1"];
+        assert_eq!(together(&names), [["zero_slip:2@1.17", "tool_shift@1.18"]]);
+        assert_eq!(together(&["zero_slip:3@2", "tool_shift@2"]).len(), 1);
+        assert!(together(&names[1..]).is_empty());
+    }
+}

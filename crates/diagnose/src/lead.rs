@@ -1,0 +1,92 @@
+//! Which of the names that look the same to the data is told first.
+
+use crate::config::DiagnosisConfig;
+use crate::judge::{Grade, Judged};
+use crate::rooms::Room;
+use armcal_model::Toggle;
+
+/// The family that follows the measured effort of a joint.
+const MEASURED: &str = "effort_compliance";
+
+/// Of names that these data cannot tell apart, those that the user knows to act are the answer; with the others.
+pub(crate) fn as_known(room: &Room, judged: Judged, config: &DiagnosisConfig) -> (Judged, Vec<String>) {
+    let of = |k: &usize| &room.weighed.entries[*k].candidate;
+    let Some(known) = judged.set.iter().copied().find(|k| of(k).known.is_some()) else {
+        return (judged, Vec::new());
+    };
+    let mut judged = room.judge(known, config);
+    let others: Vec<String> =
+        judged.set.iter().map(of).filter(|c| c.known.is_none()).map(|c| c.spec.clone()).collect();
+    judged.set.retain(|k| of(k).known.is_some());
+    (judged, others)
+}
+
+/// Of names that look the same, one that came out as no such mechanism can is told after one that could be.
+pub(crate) fn as_possible(room: &Room, judged: Judged, config: &DiagnosisConfig) -> Judged {
+    if judged.impossible.is_empty() {
+        return judged;
+    }
+    let possible = |j: &Judged| j.impossible.is_empty() && j.grade(&room.weighed, config) != Grade::Refused;
+    let mut others = judged.set[1..].iter().map(|k| room.judge(*k, config));
+    let Some(mut other) = others.find(possible) else { return judged };
+    other.set = vec![other.entry];
+    other.set.extend(judged.set.iter().filter(|k| **k != other.entry));
+    other
+}
+
+/// Of names that look the same, what follows the effort that was measured is told before what reckons with a torque: masses
+/// are assumed, and no torque knows friction and contact.
+pub(crate) fn as_measured(room: &Room, judged: Judged, config: &DiagnosisConfig) -> Judged {
+    let of = |k: usize| &room.weighed.entries[k].candidate;
+    let own = of(judged.entry);
+    let measured = |k: &usize| {
+        let other = of(*k);
+        other.family == MEASURED && other.target == own.target
+    };
+    if own.toggle != Toggle::Load || own.family == MEASURED {
+        return judged;
+    }
+    let Some(at) = judged.set.iter().copied().find(measured) else { return judged };
+    let mut other = room.judge(at, config);
+    if !other.impossible.is_empty() || other.grade(&room.weighed, config) == Grade::Refused {
+        return judged;
+    }
+    other.set = std::iter::once(at).chain(judged.set.iter().copied().filter(|k| *k != at)).collect();
+    other
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{entry, own, planted, quick, room};
+    use crate::{Candidate, Columns};
+    use std::sync::Arc;
+
+    /// A session with a spring at joint 2, and a measured effort of it that tells the same but for this share.
+    fn first(share: f64) -> Vec<String> {
+        let mut p = planted(&[("compliance:2", 2.0)], 0, 3);
+        p.candidates.iter_mut().filter(|c| c.family == "compliance").for_each(|c| c.toggle = Toggle::Load);
+        let (spring, other) = (own(&p, "compliance:2"), own(&p, "backlash:1"));
+        let columns = spring.columns.dense(&p.dwells, 1.0);
+        let effort = &columns * (1.0 - share)
+            + other.columns.dense(&p.dwells, 1.0).columns(0, columns.ncols()) * share;
+        p.candidates.push(Candidate {
+            spec: "effort_compliance:2".into(),
+            family: MEASURED.into(),
+            columns: Columns::Dense(Arc::new(effort)),
+            ..spring
+        });
+        let r = room(&p, &quick());
+        let judged = as_measured(&r, r.judge(entry(&r.weighed, "compliance:2"), &quick()), &quick());
+        judged.set.iter().map(|k| r.weighed.entries[*k].candidate.spec.clone()).collect()
+    }
+
+    #[test]
+    fn effort_that_was_measured_is_told_before_a_torque_that_was_not() {
+        let alike = first(0.0);
+        assert_eq!(alike[0], "effort_compliance:2");
+        assert!(alike.contains(&"compliance:2".to_owned()), "{alike:?}");
+        // Where the data contradict it, measured or not, it is no answer.
+        assert_eq!(first(0.7)[0], "compliance:2");
+    }
+}
