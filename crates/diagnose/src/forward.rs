@@ -11,6 +11,7 @@ use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms, as_candidate};
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
+use std::collections::BTreeSet;
 use std::rc::Rc;
 
 /// Steps none of which had a name at once, and which together say less than one unlisted shape: no more are tried.
@@ -205,6 +206,8 @@ fn forward(
     config: &DiagnosisConfig,
 ) -> Result<(Vec<Step>, bool), DiagnoseError> {
     let mut may_be_shape = false;
+    // Members of a group that leave again would enter again.
+    let mut been_at: BTreeSet<Vec<String>> = BTreeSet::new();
     while steps.len() < config.max_effects {
         let mut accepted: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         accepted.extend_from_slice(cells);
@@ -253,6 +256,11 @@ fn forward(
         steps.extend(one_by_one(step, &room.problem));
         if cells.is_empty() {
             drop_superseded(&mut steps, rooms, config)?;
+        }
+        let mut names: Vec<String> = steps.iter().map(|s| s.candidate.spec.clone()).collect();
+        names.sort();
+        if !been_at.insert(names) {
+            break;
         }
         let nameless = steps.iter().rev().take_while(|s| !s.named_at_once).count();
         if nameless >= PATIENCE && !beats_a_cell(&steps, config) {

@@ -11,11 +11,12 @@
 //! independent and the geometry takes nothing of them over. The best are weighed in full.
 
 use armcal_core::DwellId;
+use armcal_model::least_dwells;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Dwells of a stretch: fewer are outliers, of more the two steps show.
+/// Dwells of a stretch: fewer may be outliers, of more the two steps show.
 const LENGTHS: Range<usize> = 3..41;
 /// Stretches that are weighed in full.
 const WEIGHED: usize = 12;
@@ -42,15 +43,17 @@ pub(crate) fn stretches(
     let mut recordings: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     order.into_iter().for_each(|i| recordings.entry(dwells[i].recording).or_default().push(i));
 
+    let least = least_dwells(columns.ncols());
+    let lengths = LENGTHS.start.max(least)..LENGTHS.end;
     let mut tried: Vec<(f64, (DwellId, usize))> = Vec::new();
     for members in recordings.values() {
         let sums = running(members, rows, columns, residual);
         for from in 0..members.len() {
-            for length in LENGTHS.take_while(|length| from + length <= members.len()) {
+            for length in lengths.clone().take_while(|length| from + length <= members.len()) {
                 let (first, last) = (dwells[members[from]], dwells[members[from + length - 1]]);
-                // What begins or ends with the session is a step, what fills a recording is that recording's.
+                // What begins or ends with the session is a step, what all but fills a recording is that recording's.
                 let step = ends.is_some_and(|ends| ends[0] == first || ends[1] == last);
-                if !step && length < members.len() {
+                if !step && length + least <= members.len() {
                     tried.push((fall(&sums[from], &sums[from + length]), (first, last.dwell)));
                 }
             }
@@ -114,10 +117,10 @@ mod tests {
     fn steps_and_whole_recordings_are_no_stretches() {
         let (dwells, rows, columns) = session();
         let seen = stretches(&dwells, &rows, &columns, &DVector::zeros(120));
-        // Of 20 dwells: 20 - L + 1 stretches of each length L from 3 to 19; those that begin with the session, or end
+        // Of 20 dwells: 20 - L + 1 stretches of each length L from 3 to 18; those that begin with the session, or end
         // with it, are one of each length and recording.
-        let all: usize = (3..20).map(|length| 20 - length + 1).sum();
-        assert_eq!(seen.tried, 2 * (all - 17));
+        let all: usize = (3..19).map(|length| 20 - length + 1).sum();
+        assert_eq!(seen.tried, 2 * (all - 16));
         let few = stretches(&dwells[..2], &rows[..2], &columns, &DVector::zeros(120));
         assert_eq!((few.tried, few.best.len()), (0, 0));
     }

@@ -5,8 +5,8 @@ use armcal_model::{EffectSpec, Expression, ModelError, Override};
 
 /// A formula must remove this share of what the free shape removes; otherwise a whole curve is offered.
 const FORMULA_SHARE: f64 = 0.9;
-/// The driver of what depends on the time since the start of the session.
-const TIME: &str = "t";
+/// The drivers of what depends on the time since the start of the session, or on which of its recordings it is.
+const OF_THE_SESSION: [&str; 2] = ["t", "recording"];
 
 impl Diagnosis {
     /// The effects found, the most probable name of each; where none has a name, all unlisted shapes.
@@ -22,8 +22,8 @@ impl Diagnosis {
         Ok(effects)
     }
 
-    /// Of the suggested effects those to keep, and those that are no part of an arm: a formula of absolute time that was
-    /// fitted over several recordings says nothing of the next one.
+    /// Of the suggested effects those to keep, and those that are no part of an arm: a formula of absolute time, or of the
+    /// recording, that was fitted over several recordings says nothing of the next one.
     ///
     /// # Errors
     /// As [`Diagnosis::suggested`].
@@ -32,8 +32,9 @@ impl Diagnosis {
         joint_names: &[String],
         recordings: usize,
     ) -> Result<(Vec<EffectSpec>, Vec<EffectSpec>), ModelError> {
+        let of_it = |u: &&UnknownReport| OF_THE_SESSION.contains(&u.driver.as_str());
         let of_time: Vec<EffectSpec> =
-            self.unlisted.iter().filter(|u| u.driver == TIME).filter_map(UnknownReport::effect).collect();
+            self.unlisted.iter().filter(of_it).filter_map(UnknownReport::effect).collect();
         let all = self.suggested(joint_names)?;
         Ok(all.into_iter().partition(|e| recordings < 2 || !of_time.contains(e)))
     }

@@ -22,9 +22,9 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    /// A formula of absolute time.
+    /// A formula of absolute time, or of the recording.
     pub(crate) fn of_time(effect: &EffectSpec) -> LeftOut {
-        let reason = "a formula of this session's time, which no other session has".to_owned();
+        let reason = "a formula of this session's time or recordings, which no other session has".to_owned();
         LeftOut { effect: effect.to_string(), reason }
     }
 

@@ -80,7 +80,12 @@ impl Model {
             for spec in self.targets(kind, EffectSpec::new(kind.name)) {
                 let mut members = Vec::new();
                 if kind.offered == Offered::Events {
-                    members.extend(steps.iter().map(|dwell| spec.clone().since(Since::Dwell(*dwell))));
+                    let at = |dwell: DwellId| spec.clone().since(Since::Dwell(dwell));
+                    let amplitudes =
+                        steps.first().map_or(0, |(dwell, _)| self.amplitudes(&at(*dwell), session));
+                    let least = least_dwells(amplitudes);
+                    members
+                        .extend(steps.iter().filter(|(_, side)| *side >= least).map(|(dwell, _)| at(*dwell)));
                 }
                 for shape in kind.shapes.iter().filter(|shape| shape.parameter) {
                     let Some(values) = shape.values else { continue };
@@ -112,6 +117,11 @@ impl Model {
     /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
     pub fn has_link_masses(&self) -> bool {
         self.zero_pose().masses_declared
+    }
+
+    /// How many amplitudes an effect would have here; none where it cannot be placed.
+    fn amplitudes(&self, spec: &EffectSpec, session: &Session) -> usize {
+        placed::place(self, session, spec, &self.zero_pose(), 0).map_or(0, |(effect, _)| effect.amplitudes)
     }
 
     /// Whether an effect could be added here, with something for a fit to find.
@@ -172,20 +182,34 @@ impl Effects {
     }
 }
 
-/// The dwells at which a step can be told from noise, in the order of time. A step that only sets the first or
-/// the last recording apart is that recording's own event.
-fn steps(observations: &[Observation]) -> Vec<DwellId> {
-    let dwells: Vec<DwellId> =
+/// Dwells that tell an event of so many amplitudes from their noise: with three rows each, twice as many rows as amplitudes.
+pub fn least_dwells(amplitudes: usize) -> usize {
+    (2 * amplitudes).div_ceil(3).max(STEP_MARGIN)
+}
+
+/// The dwells at which a step can be told from noise, in the order of time, each with how many dwells of its recording
+/// are on the shorter side of it: beyond it a pose of the board may be free. A step that only sets the first or the last
+/// recording apart is that recording's own event.
+fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
+    let all: Vec<DwellId> =
         observations.iter().map(|o| o.dwell).collect::<BTreeSet<_>>().into_iter().collect();
-    let recordings: BTreeSet<usize> = dwells.iter().map(|dwell| dwell.recording).collect();
+    let recordings: BTreeSet<usize> = all.iter().map(|dwell| dwell.recording).collect();
     let own_event: Vec<usize> = recordings
         .iter()
         .enumerate()
         .filter(|(i, _)| *i == 1 || i + 1 == recordings.len())
         .map(|(_, r)| *r)
         .collect();
-    let begins = |k: usize| k > 0 && dwells[k - 1].recording != dwells[k].recording;
-    let telling = |k: &usize| !(begins(*k) && own_event.contains(&dwells[*k].recording));
-    let dwells: Vec<DwellId> = (0..dwells.len()).filter(telling).map(|k| dwells[k]).collect();
-    dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]).to_vec()
+    let begins = |k: usize| k > 0 && all[k - 1].recording != all[k].recording;
+    let telling = |k: &usize| !(begins(*k) && own_event.contains(&all[*k].recording));
+    let dwells: Vec<DwellId> = (0..all.len()).filter(telling).map(|k| all[k]).collect();
+    let inner = dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]);
+    let side = |dwell: &DwellId| {
+        let of_it = || all.iter().filter(|d| d.recording == dwell.recording);
+        let before = of_it().filter(|d| **d < *dwell).count();
+        let after = of_it().count() - before;
+        // Between two recordings there is no shorter side.
+        (*dwell, if before == 0 { usize::MAX } else { before.min(after) })
+    };
+    inner.iter().map(side).collect()
 }

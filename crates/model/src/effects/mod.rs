@@ -69,6 +69,7 @@ mod tests;
 pub use declared::is_of_effect;
 pub use drivers::{Drivers, Torque};
 pub use expression::Expression;
+pub use in_model::least_dwells;
 pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;

@@ -54,6 +54,8 @@ fn candidates_and_scans_say_everything_once() {
     assert!(
         has("backlash:1") && has("crossed_backlash:3,from=2") && has("zero_slip:2@1") && has("axis_tilt:3")
     );
+    // 20 dwells a recording: a shift of three amplitudes needs two of them on each side, of six it needs four.
+    assert!(has("tool_shift@0.2") && !has("frame_shift@0.3") && has("frame_shift@0.4"));
     assert!(
         has("tool_shift@1.17") && !has("tool_shift@1.0") && !has("tool_shift@2.0") && !has("tool_shift@0.1")
     );
