@@ -85,16 +85,21 @@ fn without_priors(pipeline: &str, folder: &Path) -> PathBuf {
     let to = text.find("[frames.tip]").expect("a tip");
     let own = folder.join(pipeline);
     let (before, behind) = (&text[..from], &text[to..]);
-    std::fs::write(&own, format!("{before}{behind}\n[diagnosis]\nenabled = false\n")).expect("pipeline");
+    std::fs::write(&own, format!("{before}{behind}")).expect("pipeline");
     own
 }
 
-/// With default priors the scales of this arm are learnt: as good as the preset somebody chose by hand, which the pipeline
-/// ships with (0.78, 0.231 and 0.228 mm).
+/// With default priors the scales of this arm are learnt, and with the effects that are chosen without the placement left out
+/// it errs there no more than geometry with the preset somebody chose by hand, which the pipeline ships with (0.780, 0.231 and
+/// 0.228 mm); `docs/real-robots.md` has the numbers.
 #[test]
 fn what_is_not_declared_of_an_arm_is_learnt_from_its_recordings() {
-    let limits = [("mukca-panda4.toml", 0.235), ("mukca-panda.toml", 0.84), ("mukca-iiwa14.toml", 0.228)];
-    for (pipeline, limit_mm) in limits {
+    let limits = [
+        ("mukca-panda4.toml", 0.235, 0.231),
+        ("mukca-panda.toml", 0.84, 0.780),
+        ("mukca-iiwa14.toml", 0.228, 0.228),
+    ];
+    for (pipeline, limit_mm, by_hand_mm) in limits {
         if pipeline != "mukca-panda4.toml" && real_recordings().is_none() {
             continue;
         }
@@ -102,6 +107,10 @@ fn what_is_not_declared_of_an_arm_is_learnt_from_its_recordings() {
         let summary = run_pipeline(&without_priors(pipeline, out.path()), &out.path().join("out"), &[0, 3]);
         let [_, fitted_mm] = held_out_mm(&summary);
         assert!(fitted_mm < limit_mm, "{pipeline}: {fitted_mm}");
+        let chosen_mm = summary.pointer("/diagnosis/nested/held_out/after").and_then(Value::as_f64);
+        let after_mm = chosen_mm.unwrap_or(fitted_mm);
+        println!("{pipeline}: {fitted_mm:.3} mm, {after_mm:.3} mm with what is chosen without the points");
+        assert!(after_mm < by_hand_mm + 5e-4, "{pipeline}: {after_mm}");
         let warnings = summary["warnings"].as_array().expect("warnings");
         let said = warnings.iter().find(|w| w["code"] == "priors-learnt").expect("what was learnt");
         assert!(said["message"].as_str().is_some_and(|m| m.contains("lengths 0.")), "{said}");

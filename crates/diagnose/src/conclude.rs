@@ -13,7 +13,7 @@ use crate::error_places::{DwellError, error_places};
 use crate::explain::explanations;
 use crate::next::lead;
 use armcal_calibrate::Calibration;
-use armcal_core::{Observation, Severity, Stage, Warning};
+use armcal_core::{Observation, Severity, Stage, Warning, listed};
 
 /// A refit that leaves more than this share of the error that was fitted shows nothing by that.
 const CONFIRMED_SHARE: f64 = 0.95;
@@ -56,9 +56,10 @@ impl Diagnosis {
         let left = left_over(after.unwrap_or(before));
         let least = after.map_or(f64::INFINITY, Calibration::times_floor).min(self.noise.sigma_ratio);
         let noise_alone = noise_alone(before, least.min(1.0));
+        let shown = after.map(|after| shown_by(before, after, observations, config));
         let withheld = (self.verdict == Verdict::Unknown && noise_alone)
             || after.is_some_and(|after| {
-                !confirms(before, after, observations, config)
+                shown == Some(Shown::ByNothing)
                     || left > config.unexplained_factor
                     || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
             });
@@ -72,6 +73,7 @@ impl Diagnosis {
             self.unknown = None;
             self.tentative.clear();
         } else {
+            self.warnings.extend(refitted.as_ref().filter(|_| shown == Some(Shown::ByFitted)).map(by_fitted));
             self.refitted = refitted.map(Box::new);
         }
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
@@ -146,22 +148,45 @@ fn noise_alone(calibration: &Calibration, share: f64) -> bool {
     excess_m <= CHANCE * variance_m2.sqrt()
 }
 
+/// By which points a model with more effects errs less.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    /// By those that are judged: held out, or all where nothing is.
+    ByJudged,
+    /// By those that were fitted, the held-out ones being no worse.
+    ByFitted,
+    /// By none.
+    ByNothing,
+}
+
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
 /// or, where these cannot show what an effect does (it acts only in what was held out) and are not worse for it, clearly
 /// less on those that were fitted.
-fn confirms(
+fn shown_by(
     before: &Calibration,
     after: &Calibration,
     observations: &[Observation],
     config: &DiagnosisConfig,
-) -> bool {
+) -> Shown {
     let gain_m = before.judged().fitted.mean_m - after.judged().fitted.mean_m;
     let worth = gain_m > WORTH_NAMING * before.noise_floor_m;
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
     match compare_heldout(before, after, observations, config) {
-        Some(held) => (worth && held.helps()) || (fitted && gain_m >= 0.0),
-        None => worth,
+        Some(held) if worth && held.helps() => Shown::ByJudged,
+        Some(_) if fitted && gain_m >= 0.0 => Shown::ByFitted,
+        None if worth => Shown::ByJudged,
+        _ => Shown::ByNothing,
     }
+}
+
+/// What was named by the fit alone, in words.
+fn by_fitted(refitted: &Refitted) -> Warning {
+    let names: Vec<String> = refitted.effects.iter().map(ToString::to_string).collect();
+    let message = format!(
+        "{}: the held-out points gain nothing clear of chance, as where an effect acts only in what each turn leaves out; the          fitted points decided, and another hold-out (`[holdout]`) may show more",
+        listed(&names)
+    );
+    Warning::new(Severity::Notice, Stage::Diagnose, "judged-by-fit", names.join(" + "), message)
 }
 
 /// Share of the squared error above the floor that a refit with more effects explains, on the side of the hold-out that shows

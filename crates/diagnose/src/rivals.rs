@@ -25,6 +25,8 @@ const REACH_SHARE: f64 = 0.1;
 /// A name that the linearised fit left in the answer leaves it so many margins behind the best refit, if that is more than
 /// the detail of its shape.
 const FAR_BEHIND: f64 = 2.0;
+/// Where noise repeats, what leaves less than this many times the squared error leaves no more.
+const NO_MORE: f64 = 1.01;
 
 /// What a refit leaves.
 #[derive(Debug, Clone)]
@@ -82,24 +84,45 @@ fn settled(
     config: &DiagnosisConfig,
 ) -> Result<Option<Accepted>, DiagnoseError> {
     let room = found.room.clone();
-    // Noise that repeats counts the same error more than once; the weighing knows, this does not.
-    if found.candidate.known.is_some()
-        || !found.judged.impossible.is_empty()
-        || !room.weighed.probably(&[Noise::White])
-    {
+    if found.candidate.known.is_some() || !found.judged.impossible.is_empty() {
         return Ok(None);
+    }
+    let mut refitted = |k: usize| {
+        let with = [others, std::slice::from_ref(&room.weighed.entries[k].candidate)].concat();
+        rooms.refitted(&with)
+    };
+    if !room.weighed.probably(&[Noise::White]) {
+        return beside_simpler(found, &mut refitted);
     }
     let mut refits = Vec::new();
     for k in found.judged.set.iter().copied().chain(rivals(found, &room)) {
-        let with = [others, std::slice::from_ref(&room.weighed.entries[k].candidate)].concat();
-        if let Some(refit) = rooms.refitted(&with)? {
-            refits.push((k, refit));
-        }
+        refits.extend(refitted(k)?.map(|refit| (k, refit)));
     }
     let variance = refits.iter().map(|(_, r)| r.variance()).fold(f64::INFINITY, f64::min).max(1.0);
     let evidence: Vec<(usize, f64)> =
         refits.iter().filter_map(|(k, r)| Some((*k, r.ln_evidence(variance)?))).collect();
     Ok(decided(found, &evidence, config))
+}
+
+/// Noise that repeats counts the same error more than once: the weighing knows, the evidence of a refit does not. What has no
+/// more amplitudes than the name and leaves no more is no worse an answer whatever the noise: it stands beside it.
+fn beside_simpler(
+    found: &Accepted,
+    refitted: &mut dyn FnMut(usize) -> Result<Option<AfterRefit>, DiagnoseError>,
+) -> Result<Option<Accepted>, DiagnoseError> {
+    let amplitudes = |k: usize| found.room.weighed.entries[k].candidate.amplitudes.len();
+    let own = found.judged.entry;
+    let simpler: Vec<usize> =
+        rivals(found, &found.room).into_iter().filter(|k| amplitudes(*k) <= amplitudes(own)).collect();
+    let left = if simpler.is_empty() { None } else { refitted(own)? };
+    let Some(left) = left else { return Ok(None) };
+    let mut with_rivals = found.clone();
+    for k in simpler {
+        if refitted(k)?.is_some_and(|rival| rival.square < NO_MORE * left.square) {
+            with_rivals.judged.set.push(k);
+        }
+    }
+    Ok((with_rivals.judged.set != found.judged.set).then_some(with_rivals))
 }
 
 /// The best entries that are not in the answer: neither by another value of their shape, nor as a group that holds it.

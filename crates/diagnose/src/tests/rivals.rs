@@ -107,19 +107,39 @@ fn rivals_are_as_far_behind_as_a_linearised_fit_may_put_them() {
 }
 
 #[test]
-fn what_is_known_or_repeats_is_not_asked() {
+fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simple() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
-    let asked = |change: &dyn Fn(&mut Accepted)| {
-        let mut refit = Told { linear: LinearRefit::new(p.clone()), square: BTreeMap::new(), asked: 0 };
+    let after = |change: &dyn Fn(&mut Accepted), square: &[(&'static str, f64)]| {
+        let square = square.iter().copied().collect();
+        let mut refit = Told { linear: LinearRefit::new(p.clone()), square, asked: 0 };
         let first = (p.clone(), weigh(&p, &config));
         let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
         change(&mut search.accepted[0]);
         let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
         settle(&mut search, &mut rooms, &config).unwrap();
-        refit.asked
+        let a = &search.accepted[0];
+        let names = a.judged.set.iter().map(|k| a.room.weighed.entries[*k].candidate.spec.clone());
+        (refit.asked, names.collect::<Vec<_>>())
     };
-    assert!(asked(&|_| ()) >= 1);
-    assert_eq!(asked(&|a| a.candidate.known = Some("seen".into())), 0);
-    assert_eq!(asked(&|a| std::rc::Rc::make_mut(&mut a.room).weighed.p_noise = vec![(Noise::Place, 0.9)]), 0);
+    assert!(after(&|_| (), &[]).0 >= 1);
+    assert_eq!(after(&|a| a.candidate.known = Some("seen".into()), &[]).0, 0);
+    // One rival within reach, of one amplitude as the name or of more.
+    let repeats = |rival: &'static str| {
+        move |a: &mut Accepted| {
+            let own = a.judged.entry;
+            let weighed = &mut std::rc::Rc::make_mut(&mut a.room).weighed;
+            weighed.p_noise = vec![(Noise::Place, 0.9)];
+            weighed.entries.iter_mut().for_each(|e| e.ln_evidence = 0.0);
+            let at = entry(weighed, rival);
+            weighed.entries[own].ln_evidence = 500.0;
+            weighed.entries[at].ln_evidence = 480.0;
+        }
+    };
+    let alone = vec!["backlash:1".to_owned()];
+    let both = vec!["backlash:1".to_owned(), "zero_drift:1".to_owned()];
+    let (drift, play) = ("zero_drift:1", "backlash:1");
+    assert_eq!(after(&repeats(drift), &[(play, 600.0), (drift, 605.0)]), (2, both));
+    assert_eq!(after(&repeats(drift), &[(play, 600.0), (drift, 607.0)]), (2, alone.clone()));
+    assert_eq!(after(&repeats("tool_shift@1"), &[(play, 600.0), ("tool_shift@1", 100.0)]), (0, alone));
 }
