@@ -59,7 +59,7 @@ impl Diagnosis {
         let shown = after.map(|after| shown_by(before, after, observations, config));
         let withheld = (self.verdict == Verdict::Unknown && noise_alone)
             || after.is_some_and(|after| {
-                shown == Some(Shown::ByNothing)
+                shown == Some(ShownBy::Nothing)
                     || left > config.unexplained_factor
                     || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
             });
@@ -73,7 +73,7 @@ impl Diagnosis {
             self.unknown = None;
             self.tentative.clear();
         } else {
-            self.warnings.extend(refitted.as_ref().filter(|_| shown == Some(Shown::ByFitted)).map(by_fitted));
+            self.warnings.extend(refitted.as_ref().filter(|_| shown == Some(ShownBy::Fitted)).map(by_fitted));
             self.refitted = refitted.map(Box::new);
         }
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
@@ -150,13 +150,13 @@ fn noise_alone(calibration: &Calibration, share: f64) -> bool {
 
 /// By which points a model with more effects errs less.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shown {
+enum ShownBy {
     /// By those that are judged: held out, or all where nothing is.
-    ByJudged,
+    Judged,
     /// By those that were fitted, the held-out ones being no worse.
-    ByFitted,
+    Fitted,
     /// By none.
-    ByNothing,
+    Nothing,
 }
 
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
@@ -167,15 +167,15 @@ fn shown_by(
     after: &Calibration,
     observations: &[Observation],
     config: &DiagnosisConfig,
-) -> Shown {
+) -> ShownBy {
     let gain_m = before.judged().fitted.mean_m - after.judged().fitted.mean_m;
     let worth = gain_m > WORTH_NAMING * before.noise_floor_m;
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
     match compare_heldout(before, after, observations, config) {
-        Some(held) if worth && held.helps() => Shown::ByJudged,
-        Some(_) if fitted && gain_m >= 0.0 => Shown::ByFitted,
-        None if worth => Shown::ByJudged,
-        _ => Shown::ByNothing,
+        Some(held) if worth && held.helps() => ShownBy::Judged,
+        Some(_) if fitted && gain_m >= 0.0 => ShownBy::Fitted,
+        None if worth => ShownBy::Judged,
+        _ => ShownBy::Nothing,
     }
 }
 

@@ -119,11 +119,12 @@ mod tests {
         let mut p = problem(&poses, &[], Noise::White, &mut r, true);
         // A typical error at every joint, 23 times a turn, none of it large.
         for scan in p.scans.iter().filter(|s| s.points[0].family == PERIODIC) {
-            let own = scan.points.iter().find(|c| c.spec.ends_with("frequency=23")).unwrap();
-            p.residual += own.columns.dense(&p.dwells, 1.0) * DVector::from_vec(vec![0.8, -0.6]);
+            let own = scan.points.iter().find(|c| c.spec.ends_with("frequency=23"));
+            p.residual += own.expect("a point of the grid").columns.dense(&p.dwells, 1.0)
+                * DVector::from_vec(vec![0.8, -0.6]);
         }
         let fitted = crate::crossval::left_out(&p, None, &[]);
-        let all = one_frequency(&p.scans, &p.dwells, &fitted).unwrap();
+        let all = one_frequency(&p.scans, &p.dwells, &fitted).expect("three joints");
         assert_eq!(
             all.points[0].spec,
             "periodic:1,frequency=23+periodic:2,frequency=23+periodic:3,frequency=23"

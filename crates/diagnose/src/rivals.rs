@@ -19,9 +19,9 @@ use nalgebra::DMatrix;
 /// Entries that are no part of the answer and are refitted all the same, the best of them.
 const RIVALS: usize = 3;
 /// What the linearised fit puts further behind cannot come back [nats], nor what it puts further behind than this share of
-/// the evidence: an angle of 6 deg is linear to a twentieth.
+/// the evidence: around a geometry that has gone to its bounds, a slip of 2 deg in one recording is 11 % behind what it is.
 const OUT_OF_REACH: f64 = 40.0;
-const REACH_SHARE: f64 = 0.1;
+const REACH_SHARE: f64 = 0.5;
 /// A name that the linearised fit left in the answer leaves it so many margins behind the best refit, if that is more than
 /// the detail of its shape.
 const FAR_BEHIND: f64 = 2.0;
