@@ -102,7 +102,7 @@ fn rivals_are_as_far_behind_as_a_linearised_fit_may_put_them() {
         room.weighed.entries[at].ln_evidence = own - behind;
         rivals(found, &found.room).contains(&at)
     };
-    assert!(within(&mut found, 200.0, 39.0) && !within(&mut found, 200.0, 41.0));
+    assert!(within(&mut found, 60.0, 39.0) && !within(&mut found, 60.0, 41.0));
     assert!(within(&mut found, 2000.0, 999.0) && !within(&mut found, 2000.0, 1001.0));
 }
 
