@@ -88,8 +88,10 @@ fn fit_from(
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let known = near.map(|n| &n.prior_scales);
     let learnt = priors::learnt(problem, (&declared, &solved), known, free, config)?;
-    let said: Vec<Warning> = learnt.iter().filter_map(|(white, _)| priors::said(white)).collect();
-    let widened = learnt.as_ref().and_then(|(white, solved)| wider::said(problem, white, solved));
+    let of_learnt = |(white, solved): &(Whitened<'_>, Solved)| {
+        [priors::said(white), wider::said(problem, white, solved)].into_iter().flatten()
+    };
+    let said: Vec<Warning> = learnt.iter().flat_map(of_learnt).collect();
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
     let (white, solved) = learnt.unwrap_or((declared, solved));
     let (residual, squares) = (&solved.at.residual, white.squares(&solved.at));
@@ -133,7 +135,7 @@ fn fit_from(
         warnings: Vec::new(),
     };
     fit.warnings = fit_warnings::of(&fit, &white);
-    fit.warnings.extend(said.into_iter().chain(widened));
+    fit.warnings.extend(said);
     Ok(fit)
 }
 

@@ -183,7 +183,8 @@ fn shown_by(
 fn by_fitted(refitted: &Refitted) -> Warning {
     let names: Vec<String> = refitted.effects.iter().map(ToString::to_string).collect();
     let message = format!(
-        "{}: the held-out points gain nothing clear of chance, as where an effect acts only in what each turn leaves out; the          fitted points decided, and another hold-out (`[holdout]`) may show more",
+        "{}: the held-out points gain nothing clear of chance, as where an effect acts only in what each turn leaves out; the \
+         fitted points decided, and another hold-out (`[holdout]`) may show more",
         listed(&names)
     );
     Warning::new(Severity::Notice, Stage::Diagnose, "judged-by-fit", names.join(" + "), message)

@@ -1,21 +1,20 @@
 //! Events: effects that begin, or act, at a moment that their names tell.
 
-use armcal_core::DwellId;
-use armcal_model::Since;
+use armcal_model::{Since, place_and_moment};
 
 /// Dwells by which one event may be told elsewhere by another effect, or once other effects are in the model.
 const MOVED: usize = 3;
 
 /// What an event does where, and when; none for what always acts.
 fn event(spec: &str) -> Option<(&str, Since)> {
-    let (placed, since) = spec.split_once('@')?;
-    Some((placed, since.parse().ok()?))
+    let (place, since) = place_and_moment(spec)?;
+    Some((place, since?))
 }
 
 /// Whether two names are one effect, told a few dwells apart.
 pub(crate) fn moved(from: &str, to: &str) -> bool {
-    let (Some((placed, from)), Some((other, to))) = (event(from), event(to)) else { return false };
-    placed == other && one_moment(from, to)
+    let (Some((place, from)), Some((other, to))) = (event(from), event(to)) else { return false };
+    place == other && from.near(&to, MOVED)
 }
 
 /// The names that tell of one moment, where there are at least two of it: a collision or a restart changes joints, tool
@@ -24,24 +23,12 @@ pub(crate) fn together<'n>(names: &[&'n str]) -> Vec<Vec<&'n str>> {
     let mut moments: Vec<(Since, Vec<&str>)> = Vec::new();
     for name in names {
         let Some((_, since)) = event(name) else { continue };
-        match moments.iter_mut().find(|(moment, _)| one_moment(*moment, since)) {
+        match moments.iter_mut().find(|(moment, _)| moment.near(&since, MOVED)) {
             Some((_, of_it)) => of_it.push(name),
             None => moments.push((since, vec![name])),
         }
     }
     moments.into_iter().map(|(_, of_it)| of_it).filter(|of_it| of_it.len() > 1).collect()
-}
-
-fn one_moment(a: Since, b: Since) -> bool {
-    let near = |a: DwellId, b: DwellId| a.recording == b.recording && a.dwell.abs_diff(b.dwell) <= MOVED;
-    match (a, b) {
-        (Since::Recording(a), Since::Recording(b)) => a == b,
-        (Since::Dwell(a), Since::Dwell(b)) => near(a, b),
-        (Since::Dwells { first: a, last: x }, Since::Dwells { first: b, last: y }) => {
-            near(a, b) && x.abs_diff(y) <= MOVED
-        }
-        _ => false,
-    }
 }
 
 #[cfg(test)]

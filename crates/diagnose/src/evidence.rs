@@ -14,6 +14,13 @@ const EIGEN_COLUMNS: usize = 12;
 /// Columns stacked into one matrix product.
 const BLOCK_COLUMNS: usize = 1200;
 
+/// What columns promise to explain, before they are weighed in full: from `[x_k' r, |x_k|^2]` of each column and the
+/// residual, both whitened, `sum_k (x_k' r)^2 / (1 + |x_k|^2)`, the fall of the squared residual if they were independent
+/// and the geometry took nothing of them over.
+pub(crate) fn promise(columns: impl Iterator<Item = [f64; 2]>) -> f64 {
+    columns.map(|[with_residual, square]| with_residual.powi(2) / (1.0 + square)).sum()
+}
+
 /// The problem under one alternative of the noise.
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {

@@ -1,5 +1,6 @@
 //! One family at all joints together: a cause that is likely to be in every joint, such as a make of gear.
 
+use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -19,7 +20,7 @@ const OF_A_MAKE: [&str; 8] = [
 const PERIODIC: &str = "periodic";
 /// Frequencies of all joints together that are weighed in full.
 const WEIGHED: usize = 12;
-/// Largest difference of frequencies that are one [1/turn]; joints have grids of their own.
+/// Largest difference of frequencies that are one [1/turn].
 const ONE_FREQUENCY: f64 = 0.5;
 
 /// The candidates, and for gears of one make all joints together: each joint alone may be hidden by the others.
@@ -36,47 +37,55 @@ pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
     all
 }
 
-/// Periodic errors of one frequency at all joints that have one, at the frequencies where they promise most: by
-/// `sum_k (X_k' r)^2 / (1 + |X_k|^2)`, X their whitened columns and r the residual.
+/// Periodic errors of one frequency at all joints that have one, at the frequencies where they promise most.
 pub(crate) fn one_frequency(scans: &[Scan], dwells: &[DwellRow], residual: &DVector<f64>) -> Option<Scan> {
     let joints: Vec<&Scan> =
         scans.iter().filter(|s| s.points.first().is_some_and(|p| p.family == PERIODIC)).collect();
-    let finest = joints.iter().max_by_key(|s| s.points.len())?;
-    let mut tried: Vec<(f64, Candidate)> = Vec::new();
-    for frequency in finest.points.iter().filter_map(frequency) {
-        let off = |p: &Candidate| crate::group::frequency(p).map_or(f64::INFINITY, |f| (f - frequency).abs());
-        let nearest = |s: &&Scan| -> Option<Candidate> {
-            let point = s.points.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
-            (off(point) <= ONE_FREQUENCY).then(|| point.clone())
-        };
-        let members: Vec<Candidate> = joints.iter().filter_map(nearest).collect();
-        if members.len() < 2 {
-            continue;
-        }
-        let group = grouped(&members.iter().collect::<Vec<_>>(), dwells);
-        tried.push((promise(&group, residual), group));
-        // Only the best are kept in memory.
-        if tried.len() > 2 * WEIGHED {
-            keep_best(&mut tried);
-        }
+    if joints.len() < 2 {
+        return None;
     }
-    keep_best(&mut tried);
-    let points: Vec<Candidate> = tried.into_iter().map(|(_, group)| group).collect();
+    let joints: Vec<Vec<Point<'_>>> = joints
+        .into_iter()
+        .map(|s| s.points.iter().filter_map(|p| Point::of(p, dwells, residual)).collect())
+        .collect();
+    let finest = joints.iter().max_by_key(|points| points.len())?;
+    let at = |frequency: f64| {
+        let members: Vec<&Point<'_>> =
+            joints.iter().filter_map(|points| nearest(points, frequency)).collect();
+        (members.len() > 1).then(|| (members.iter().map(|p| p.promise).sum::<f64>(), members))
+    };
+    let mut tried: Vec<(f64, Vec<&Point<'_>>)> = finest.iter().filter_map(|p| at(p.frequency)).collect();
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let group =
+        |members: Vec<&Point<'_>>| grouped(&members.iter().map(|p| p.candidate).collect::<Vec<_>>(), dwells);
+    let points: Vec<Candidate> = tried.into_iter().take(WEIGHED).map(|(_, members)| group(members)).collect();
     (!points.is_empty()).then(|| Scan {
         name: format!("{PERIODIC} of one frequency at all joints"),
-        tried: finest.points.len(),
+        tried: finest.len(),
         points,
     })
 }
 
-fn keep_best(tried: &mut Vec<(f64, Candidate)>) {
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    tried.truncate(WEIGHED);
+/// A point of the scan of one joint.
+struct Point<'s> {
+    /// Periods a turn.
+    frequency: f64,
+    promise: f64,
+    candidate: &'s Candidate,
 }
 
-fn promise(group: &Candidate, residual: &DVector<f64>) -> f64 {
-    let Columns::Dense(columns) = &group.columns else { return 0.0 };
-    columns.column_iter().map(|x| x.dot(residual).powi(2) / (1.0 + x.norm_squared())).sum()
+impl<'s> Point<'s> {
+    fn of(candidate: &'s Candidate, dwells: &[DwellRow], residual: &DVector<f64>) -> Option<Point<'s>> {
+        let columns = candidate.columns.dense(dwells, 1.0);
+        let sums = columns.column_iter().map(|x| [x.dot(residual), x.norm_squared()]);
+        Some(Point { frequency: frequency(candidate)?, promise: promise(sums), candidate })
+    }
+}
+
+/// The point of a joint at a frequency; joints have grids of their own.
+fn nearest<'p, 's>(points: &'p [Point<'s>], frequency: f64) -> Option<&'p Point<'s>> {
+    let off = |p: &Point<'_>| (p.frequency - frequency).abs();
+    points.iter().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|p| off(p) <= ONE_FREQUENCY)
 }
 
 /// The frequency in the name of a point of a scan [1/turn].

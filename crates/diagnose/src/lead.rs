@@ -26,12 +26,8 @@ pub(crate) fn as_possible(room: &Room, judged: Judged, config: &DiagnosisConfig)
     if judged.impossible.is_empty() {
         return judged;
     }
-    let possible = |j: &Judged| j.impossible.is_empty() && j.grade(&room.weighed, config) != Grade::Refused;
-    let mut others = judged.set[1..].iter().map(|k| room.judge(*k, config));
-    let Some(mut other) = others.find(possible) else { return judged };
-    other.set = vec![other.entry];
-    other.set.extend(judged.set.iter().filter(|k| **k != other.entry));
-    other
+    let possible = judged.set[1..].iter().find_map(|k| led_by(*k, room, &judged, config));
+    possible.unwrap_or(judged)
 }
 
 /// Of names that look the same, what follows the effort that was measured is told before what reckons with a torque: masses
@@ -46,13 +42,18 @@ pub(crate) fn as_measured(room: &Room, judged: Judged, config: &DiagnosisConfig)
     if own.toggle != Toggle::Load || own.family == MEASURED {
         return judged;
     }
-    let Some(at) = judged.set.iter().copied().find(measured) else { return judged };
-    let mut other = room.judge(at, config);
+    let first = judged.set.iter().copied().find(measured);
+    first.and_then(|k| led_by(k, room, &judged, config)).unwrap_or(judged)
+}
+
+/// The judgement with another one of its set told first; none where that came out as no such mechanism can, or cannot be named.
+fn led_by(k: usize, room: &Room, judged: &Judged, config: &DiagnosisConfig) -> Option<Judged> {
+    let mut other = room.judge(k, config);
     if !other.impossible.is_empty() || other.grade(&room.weighed, config) == Grade::Refused {
-        return judged;
+        return None;
     }
-    other.set = std::iter::once(at).chain(judged.set.iter().copied().filter(|k| *k != at)).collect();
-    other
+    other.set = std::iter::once(k).chain(judged.set.iter().copied().filter(|l| *l != k)).collect();
+    Some(other)
 }
 
 #[cfg(test)]

@@ -99,9 +99,8 @@ fn turn(
     let (holdout, calibration) = inner(calibrated, &seen)?;
     let within =
         Calibrated { model, calibration: &calibration, observations: &seen, session, fit, holdout: &holdout };
-    let several = observations.iter().any(|o| o.dwell.recording != observations[0].dwell.recording);
     let found = diagnose(&within, config)?;
-    let (effects, _) = found.lasting(model.chain().joint_names(), 1 + usize::from(several))?;
+    let (effects, _) = found.lasting(model.chain().joint_names(), session.recordings)?;
     let model = match effects.is_empty() {
         true => model.clone(),
         false => model.with_effects(&effects, session)?,

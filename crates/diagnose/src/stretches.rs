@@ -1,15 +1,9 @@
 //! Events that end again: a tool pushed aside for a few dwells, an encoder that came back.
 //!
-//! A recording of n dwells has n^2/2 stretches, so each is tried in a short form first: with the columns `X_i` of an
-//! effect at a dwell and its residual `r_i`, both whitened, by
-//!
-//! ```text
-//! sum_k (sum_i X_ik' r_i)^2 / (1 + sum_i |X_ik|^2)
-//! ```
-//!
-//! over the dwells of the stretch, which running sums give: the fall of the squared residual if the columns are
-//! independent and the geometry takes nothing of them over. The best are weighed in full.
+//! A recording of n dwells has n^2/2 stretches, so each is tried by what it promises first ([`promise`]), which running
+//! sums over its dwells give. The best are weighed in full.
 
+use crate::evidence::promise;
 use armcal_core::DwellId;
 use armcal_model::least_dwells;
 use nalgebra::{DMatrix, DVector};
@@ -54,7 +48,9 @@ pub(crate) fn stretches(
                 // What begins or ends with the session is a step, what all but fills a recording is that recording's.
                 let step = ends.is_some_and(|ends| ends[0] == first || ends[1] == last);
                 if !step && length + least <= members.len() {
-                    tried.push((fall(&sums[from], &sums[from + length]), (first, last.dwell)));
+                    let ends = sums[from].iter().zip(&sums[from + length]);
+                    let within = ends.map(|(b, a)| [a[0] - b[0], a[1] - b[1]]);
+                    tried.push((promise(within), (first, last.dwell)));
                 }
             }
         }
@@ -83,10 +79,6 @@ fn running(
         sums.push(next);
     }
     sums
-}
-
-fn fall(before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
-    before.iter().zip(after).map(|(b, a)| (a[0] - b[0]).powi(2) / (1.0 + a[1] - b[1])).sum()
 }
 
 #[cfg(test)]

@@ -157,23 +157,35 @@ impl View<'_> {
                 continue;
             }
             let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
+            if steps {
+                scans.extend(self.events(&family, first, &members, &dwells, base)?);
+                continue;
+            }
             let joint = family.target.map(|j| format!("joint{}", j + 1));
             let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
             let points = match channel {
-                _ if steps => {
-                    let always = family.clone().since(Since::Dwell(first));
-                    if let Some(whole) = self.candidates(&[always])?.first() {
-                        scans.push(Scan::of(family.to_string(), self.switched(whole, &members, &dwells)));
-                        scans.extend(self.passing(&family, whole, &dwells, base));
-                    }
-                    continue;
-                }
                 Some(channel) if family.kind == "periodic" => self.modulated(channel, &members)?,
                 _ => self.candidates(&members)?,
             };
             scans.push(Scan::of(family.to_string(), points));
         }
         Ok(scans)
+    }
+
+    /// An event from each of some dwells on, and one that ends again.
+    fn events(
+        &self,
+        family: &EffectSpec,
+        first: DwellId,
+        steps: &[EffectSpec],
+        dwells: &[DwellId],
+        base: &Linearisation,
+    ) -> Result<Vec<Scan>, DiagnoseError> {
+        let always = family.clone().since(Since::Dwell(first));
+        let all = self.candidates(&[always])?;
+        let Some(whole) = all.first() else { return Ok(Vec::new()) };
+        let steps = Scan::of(family.to_string(), self.switched(whole, steps, dwells));
+        Ok(std::iter::once(steps).chain(self.passing(family, whole, dwells, base)).collect())
     }
 
     /// An event that ends again, in the stretches of dwells where it promises most.

@@ -39,7 +39,7 @@ pub use deviation::Deviation;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Extra, Family, Offered, Override, PlacedEffect,
     Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find, is_of_effect,
-    least_dwells,
+    least_dwells, place_and_moment,
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge};

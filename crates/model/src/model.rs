@@ -322,6 +322,11 @@ impl Model {
         self.nominal_pose(&self.nominal(), &vec![0.0; self.joint_count()])
     }
 
+    /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
+    pub fn has_link_masses(&self) -> bool {
+        self.zero_pose().declared(&self.path).is_some()
+    }
+
     /// The same model with these effects; `parameters` are all of its parameters.
     pub(crate) fn with_placed(
         &self,

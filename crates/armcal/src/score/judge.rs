@@ -3,6 +3,7 @@
 use super::case::Answer;
 use armcal_diagnose::{NOT_LISTED, Verdict};
 use armcal_lab::scenario::Hidden;
+use armcal_model::{Since, place_and_moment};
 use serde::Serialize;
 
 /// Dwells by which the moment of an event may be missed: between two dwells, nobody can tell.
@@ -108,42 +109,19 @@ fn is(hidden: &Hidden, name: &str, alike: bool) -> bool {
 
 /// The same kind at the same target; a moment may be missed by a few dwells, and shapes are not compared.
 fn same_effect(truth: &str, name: &str) -> bool {
-    let (truth, name) = (Parts::of(truth), Parts::of(name));
-    let near = match (truth.dwell, name.dwell) {
-        (Some(a), Some(b)) => a.abs_diff(b) <= DWELLS,
+    let (Some((place, truth)), Some((other, name))) = (place_and_moment(truth), place_and_moment(name))
+    else {
+        return false;
+    };
+    let one_moment = match (truth, name) {
         (None, None) => true,
         // A step at the first dwell of a recording and one between recordings are one event.
-        (Some(a), None) | (None, Some(a)) => a <= DWELLS,
+        (Some(Since::Recording(r)), Some(Since::Dwell(d)))
+        | (Some(Since::Dwell(d)), Some(Since::Recording(r))) => r == d.recording && d.dwell <= DWELLS,
+        (Some(truth), Some(name)) => truth.near(&name, DWELLS),
+        _ => false,
     };
-    let ends_near = match (truth.last, name.last) {
-        (Some(a), Some(b)) => a.abs_diff(b) <= DWELLS,
-        (a, b) => a == b,
-    };
-    truth.place == name.place && truth.recording == name.recording && near && ends_near
-}
-
-struct Parts<'a> {
-    place: &'a str,
-    recording: Option<&'a str>,
-    dwell: Option<usize>,
-    last: Option<usize>,
-}
-
-impl<'a> Parts<'a> {
-    fn of(spec: &'a str) -> Parts<'a> {
-        let head = spec.split(',').next().unwrap_or(spec);
-        let (place, since) = head.split_once('@').map_or((head, None), |(p, s)| (p, Some(s)));
-        let (recording, dwells) = match since.map(|s| s.split_once('.').ok_or(s)) {
-            Some(Ok((recording, dwells))) => (Some(recording), Some(dwells)),
-            Some(Err(recording)) => (Some(recording), None),
-            None => (None, None),
-        };
-        let (first, last) = dwells.map_or((None, None), |dwells| {
-            dwells.split_once('-').map_or((Some(dwells), None), |(first, last)| (Some(first), Some(last)))
-        });
-        let number = |text: Option<&str>| text.and_then(|text| text.parse().ok());
-        Parts { place, recording, dwell: number(first), last: number(last) }
-    }
+    place == other && one_moment
 }
 
 #[cfg(test)]

@@ -93,18 +93,6 @@ fn saturating(ratio: f64) -> f64 {
     0.5 * (1.0 + ratio.min(CAP).powi(2)).ln()
 }
 
-/// The bounds that a calibration had to widen.
-fn widened(fitted: &Fitted) -> Vec<Change> {
-    let assumed = fitted.model.parameters().iter();
-    let taken = fitted.calibration.fit.estimates.iter().map(|e| &e.parameter);
-    let width = |p: &Parameter| p.upper - p.lower;
-    assumed
-        .zip(taken)
-        .filter(|(assumed, taken)| width(taken) > width(assumed))
-        .map(|(assumed, taken)| Change::widened(&taken.name, width(taken) / width(assumed)))
-        .collect()
-}
-
 impl Misfit {
     /// Of inputs that cannot be fitted.
     pub fn of_nothing() -> Misfit {
@@ -116,6 +104,18 @@ impl Misfit {
     pub fn times_floor(&self) -> f64 {
         self.mean_m / self.floor_m
     }
+}
+
+/// The bounds that a calibration had to widen.
+fn widened(fitted: &Fitted) -> Vec<Change> {
+    let assumed = fitted.model.parameters().iter();
+    let taken = fitted.calibration.fit.estimates.iter().map(|e| &e.parameter);
+    let width = |p: &Parameter| p.upper - p.lower;
+    assumed
+        .zip(taken)
+        .filter(|(assumed, taken)| width(taken) > width(assumed))
+        .map(|(assumed, taken)| Change::widened(&taken.name, width(taken) / width(assumed)))
+        .collect()
 }
 
 impl Inputs {

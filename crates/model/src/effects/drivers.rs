@@ -41,8 +41,6 @@ pub(crate) struct NominalPose {
     pub tip_m: Vector3<f64>,
     /// What each link weighs, and where in the world.
     links: Vec<Body>,
-    /// Whether the file of the arm says so.
-    pub masses_declared: bool,
 }
 
 impl NominalPose {
@@ -73,15 +71,13 @@ impl NominalPose {
             joints.push(JointAxis { origin_m, start_m, axis, motion: joint.motion, slot });
         }
         let tip_m = slots.last().map_or_else(Vector3::zeros, |end| end.translation_m);
-        let mut pose = NominalPose { slots, joints, tip_m, links: Vec::new(), masses_declared: false };
-        let declared = pose.declared(path);
-        pose.masses_declared = declared.is_some();
-        pose.links = declared.unwrap_or_else(|| pose.spread());
+        let mut pose = NominalPose { slots, joints, tip_m, links: Vec::new() };
+        pose.links = pose.declared(path).unwrap_or_else(|| pose.spread());
         pose
     }
 
-    /// The links as their file declares them; none where it leaves one without a mass.
-    fn declared(&self, path: &[Segment]) -> Option<Vec<Body>> {
+    /// The links as the file of the arm declares them; none where it leaves one without a mass.
+    pub fn declared(&self, path: &[Segment]) -> Option<Vec<Body>> {
         let mut links = vec![Body { mass_kg: 0.0, centre_m: Vector3::zeros() }; self.joints.len()];
         for (slot, body) in path.iter().enumerate().filter_map(|(slot, s)| Some((slot, s.body.as_ref()?))) {
             // What the first joint does not move bears no part.

@@ -81,11 +81,11 @@ impl Model {
                 let mut members = Vec::new();
                 if kind.offered == Offered::Events {
                     let at = |dwell: DwellId| spec.clone().since(Since::Dwell(dwell));
-                    let amplitudes =
-                        steps.first().map_or(0, |(dwell, _)| self.amplitudes(&at(*dwell), session));
-                    let least = least_dwells(amplitudes);
-                    members
-                        .extend(steps.iter().filter(|(_, side)| *side >= least).map(|(dwell, _)| at(*dwell)));
+                    let first = steps.first().map(|(dwell, _)| at(*dwell));
+                    let placed = first.and_then(|spec| placed::place(self, session, &spec, &zero, 0).ok());
+                    let least = placed.map_or(0, |(effect, _)| least_dwells(effect.amplitudes));
+                    let telling = steps.iter().filter(|(_, side)| *side >= least);
+                    members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
                 for shape in kind.shapes.iter().filter(|shape| shape.parameter) {
                     let Some(values) = shape.values else { continue };
@@ -112,16 +112,6 @@ impl Model {
         let seated = o.cavity().is_some();
         let board = seated.then(|| self.board_in_world(&nominal, o.dwell.recording)).flatten();
         Drivers::of(session, pose, board.map(|board| board.translation.vector), o)
-    }
-
-    /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
-    pub fn has_link_masses(&self) -> bool {
-        self.zero_pose().masses_declared
-    }
-
-    /// How many amplitudes an effect would have here; none where it cannot be placed.
-    fn amplitudes(&self, spec: &EffectSpec, session: &Session) -> usize {
-        placed::place(self, session, spec, &self.zero_pose(), 0).map_or(0, |(effect, _)| effect.amplitudes)
     }
 
     /// Whether an effect could be added here, with something for a fit to find.
@@ -205,9 +195,10 @@ fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
     let dwells: Vec<DwellId> = (0..all.len()).filter(telling).map(|k| all[k]).collect();
     let inner = dwells.get(STEP_MARGIN..dwells.len().saturating_sub(STEP_MARGIN - 1)).unwrap_or(&[]);
     let side = |dwell: &DwellId| {
-        let of_it = || all.iter().filter(|d| d.recording == dwell.recording);
-        let before = of_it().filter(|d| **d < *dwell).count();
-        let after = of_it().count() - before;
+        let from = all.partition_point(|d| d.recording < dwell.recording);
+        let to = all.partition_point(|d| d.recording <= dwell.recording);
+        let at = all.partition_point(|d| d < dwell);
+        let (before, after) = (at - from, to - at);
         // Between two recordings there is no shorter side.
         (*dwell, if before == 0 { usize::MAX } else { before.min(after) })
     };

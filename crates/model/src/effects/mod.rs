@@ -73,7 +73,7 @@ pub use in_model::least_dwells;
 pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;
-pub use spec::{EffectSpec, Since};
+pub use spec::{EffectSpec, Since, place_and_moment};
 pub use table::{EffectTable, Extra, Override, Word, effects_toml};
 
 pub(crate) use declared::Declared;

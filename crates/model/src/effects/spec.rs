@@ -56,6 +56,20 @@ impl Since {
             }
         }
     }
+
+    /// Whether another one tells of the same moment, its dwells at most so many apart.
+    pub fn near(&self, other: &Since, dwells: usize) -> bool {
+        let close = |a: usize, b: usize| a.abs_diff(b) <= dwells;
+        let begin = |a: &DwellId, b: &DwellId| a.recording == b.recording && close(a.dwell, b.dwell);
+        match (self, other) {
+            (Since::Recording(a), Since::Recording(b)) => a == b,
+            (Since::Dwell(a), Since::Dwell(b)) => begin(a, b),
+            (Since::Dwells { first: a, last: x }, Since::Dwells { first: b, last: y }) => {
+                begin(a, b) && close(*x, *y)
+            }
+            _ => false,
+        }
+    }
 }
 
 impl std::fmt::Display for Since {
@@ -89,6 +103,16 @@ impl std::str::FromStr for Since {
             return Err("the last dwell after \"@\" comes before the first");
         }
         Ok(Since::Dwells { first, last })
+    }
+}
+
+/// What the name of an effect tells without an arm at hand: its kind with its place, and when it acts; none where that
+/// is no moment. Shapes are left away.
+pub fn place_and_moment(spec: &str) -> Option<(&str, Option<Since>)> {
+    let head = spec.split_once(',').map_or(spec, |(head, _)| head);
+    match head.split_once('@') {
+        None => Some((head, None)),
+        Some((place, since)) => Some((place, Some(since.parse().ok()?))),
     }
 }
 
