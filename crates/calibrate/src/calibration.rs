@@ -116,6 +116,12 @@ impl Turn {
         Turn { values: fit.values(), fit, nominal_values, weight_of, warnings: Vec::new() }
     }
 
+    /// As [`Calibration::prediction_factor`].
+    fn prediction_factor(&self) -> f64 {
+        let rows = 3 * self.weight_of.iter().flatten().count();
+        (1.0 + self.fit.rank as f64 / rows.max(1) as f64).sqrt()
+    }
+
     /// Robust weight of an observation in the fit; 1 where it did not take part.
     pub fn weight(&self, i: usize) -> f64 {
         self.weight_of[i].map_or(1.0, |at| self.fit.weights[at])
@@ -149,6 +155,10 @@ fn gathered(
     let judged = if held.is_empty() { &seen } else { &held };
     let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
     let (train, holdout_errors) = (errors(&seen), errors(&held));
+    let prediction_factor = match held.is_empty() {
+        true => 1.0,
+        false => turns.iter().map(Turn::prediction_factor).sum::<f64>() / turns.len() as f64,
+    };
     let mut warnings = last.fit.warnings.clone();
     let of_turns: Vec<&Warning> =
         holdout.warnings.iter().chain(turns.iter().flat_map(|t| &t.warnings)).collect();
@@ -164,6 +174,7 @@ fn gathered(
         train,
         holdout: holdout_errors,
         noise_floor_m,
+        prediction_factor,
         warnings,
     })
 }

@@ -19,14 +19,19 @@ const JOINT_STEP_RAD: f64 = 1e-6;
 /// Covariance of measured minus predicted position of an observation at parameters `p` [m^2].
 pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matrix3<f64> {
     let mut jacobian = model.joint_jacobian(p, o);
+    for (mut column, sigma) in jacobian.column_iter_mut().zip(joint_sigma_rad(model, p, o)) {
+        column *= sigma;
+    }
+    o.covariance_m2 + &jacobian * jacobian.transpose()
+}
+
+/// How well the readings tell where the links stand: their own noise and the slack of the joints [rad].
+fn joint_sigma_rad(model: &Model, p: &[f64], o: &Observation) -> Vec<f64> {
     let mut sigma_rad = o.joint_sigma_rad.clone();
     for (joint, variance_rad2) in model.slack(p, o) {
         sigma_rad[joint] = sigma_rad[joint].hypot(variance_rad2.sqrt());
     }
-    for (mut column, sigma) in jacobian.column_iter_mut().zip(&sigma_rad) {
-        column *= *sigma;
-    }
-    o.covariance_m2 + &jacobian * jacobian.transpose()
+    sigma_rad
 }
 
 /// A model (or a pool of them) and the observations it should explain.
@@ -158,8 +163,8 @@ impl Problem for ModelProblem<'_> {
             spread.rows_mut(3, 3).copy_from(&self.turning_jacobian(p, o));
             (3..6).for_each(|k| covariance[(k, k)] = orientation_sigma_rad.powi(2));
         }
-        for (mut column, sigma) in spread.column_iter_mut().zip(&o.joint_sigma_rad) {
-            column *= *sigma;
+        for (mut column, sigma) in spread.column_iter_mut().zip(joint_sigma_rad(model, &own, o)) {
+            column *= sigma;
         }
         covariance + &spread * spread.transpose()
     }

@@ -128,6 +128,10 @@ pub struct Calibration {
     /// Mean error expected from the declared noise alone, over the held-out points (or, without
     /// hold-out, over the training points) [m].
     pub noise_floor_m: f64,
+    /// How much larger than the floor errors on held-out points are expected to be though nothing is missing, because n
+    /// rows do not determine p parameters exactly: `sqrt(1 + p/n)` (Akaike, Ann. Inst. Stat. Math. 22, 1970: the final
+    /// prediction error), mean over the turns. 1 where nothing was held out.
+    pub prediction_factor: f64,
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }

@@ -17,6 +17,8 @@ const WIDEST_RAD: f64 = 0.25;
 pub struct Past {
     joints: Vec<Lane>,
     pairs: Vec<[Lane; 2]>,
+    /// How far each joint came in the last move [rad]; `None` where it is not known from where.
+    moved_rad: Option<Vec<f64>>,
 }
 
 /// One joint, or one pair of joints.
@@ -32,7 +34,7 @@ impl Past {
     pub fn unknown(joints: usize) -> Past {
         let lane = || Lane { turns: Vec::new(), direction: Arrival::Unknown };
         let pairs = (1..joints).map(|_| [lane(), lane()]).collect();
-        Past { joints: (0..joints).map(|_| lane()).collect(), pairs }
+        Past { joints: (0..joints).map(|_| lane()).collect(), pairs, moved_rad: None }
     }
 
     /// The arm waits at these readings [rad]; from where it came is not known.
@@ -76,6 +78,7 @@ impl Past {
         o.joint_rad.clear();
         o.joint_rad.extend_from_slice(joint_rad);
         o.arrival = self.arrival();
+        o.moved_rad = self.moved_rad;
         o.path_memory_rad = Some(self.joints.into_iter().map(|lane| lane.turns).collect());
         o.pair_memory_rad = Some(self.pairs.into_iter().map(|pair| pair.map(|lane| lane.turns)).collect());
     }
@@ -93,7 +96,8 @@ impl Past {
             [lane(sum, first + 2 * k, q[1] + q[0]), lane(difference, first + 2 * k + 1, q[1] - q[0])]
         };
         let pairs = self.pairs.iter().zip(q.windows(2)).enumerate().map(pair).collect();
-        Past { joints, pairs }
+        let moved = |from: Vec<f64>| q.iter().zip(from).map(|(q, from)| q - from).collect();
+        Past { joints, pairs, moved_rad: self.joint_rad().map(moved) }
     }
 }
 

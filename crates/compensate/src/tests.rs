@@ -48,6 +48,10 @@ fn tip_after(model: &Model, values: &[f64], path: &[Vec<f64>]) -> Vector3<f64> {
     let o = Observation {
         arrival: (0..joints).map(arrival).collect(),
         path_memory_rad: Some((0..joints).map(column).collect()),
+        moved_rad: path
+            .windows(2)
+            .last()
+            .map(|w| w[1].iter().zip(&w[0]).map(|(to, from)| to - from).collect()),
         pair_memory_rad: Some((1..joints).map(|k| [pair(k - 1, 1.0), pair(k - 1, -1.0)]).collect()),
         ..Observation::bare(DwellId { recording: 0, dwell: 0 }, rest.clone(), nowhere)
     };

@@ -86,6 +86,8 @@ pub struct Dwell {
     pub path_memory_rad: Vec<Vec<f64>>,
     /// The same of the sum and of the difference `q_(k+1) + q_k`, `q_(k+1) - q_k` of every two neighbours [rad].
     pub pair_memory_rad: Vec<[Vec<f64>; 2]>,
+    /// How far each joint is from where it was in the dwell before [rad]; `None` in the first.
+    pub moved_rad: Option<Vec<f64>>,
     /// The tip as the position sensor saw it.
     pub tip: Option<TipMeasurement>,
     /// Mean temperature [degC].

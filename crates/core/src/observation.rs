@@ -47,6 +47,10 @@ pub struct Observation {
     /// The same of the sum and of the difference `q_(k+1) + q_k`, `q_(k+1) - q_k` of every two neighbours, for gaps
     /// that lie in a belt which passes a joint. `None` where nobody worked it out.
     pub pair_memory_rad: Option<Vec<[Vec<f64>; 2]>>,
+    /// How far each joint's reading is from that of the rest before, in the same recording [rad]; `None` for the first
+    /// rest, and where nobody worked it out.
+    #[serde(default)]
+    pub moved_rad: Option<Vec<f64>>,
     /// Joint velocities [rad/s] of an observation of the moving arm; `None` in a dwell, where they are zero.
     pub joint_velocity_radps: Option<Vec<f64>>,
     /// Measured joint effort [N m], where the recording has it.
@@ -79,6 +83,7 @@ impl Observation {
             joint_rad,
             path_memory_rad: None,
             pair_memory_rad: None,
+            moved_rad: None,
             joint_velocity_radps: None,
             effort_nm: None,
             temperature_c: None,

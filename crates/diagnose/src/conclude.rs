@@ -135,13 +135,14 @@ fn at_floor(calibration: &Calibration, config: &DiagnosisConfig) -> bool {
     calibration.times_floor() <= config.floor_factor && calibration.fit.sigma_scale <= config.floor_factor
 }
 
-/// Whether the mean of the judged errors is no larger than noise of this share of what is declared may give by chance:
-/// whatever looks like structure in them is too small to be worth a claim without a name.
+/// Whether the mean of the judged errors is no larger than noise of this share of what is declared, and what a fit to such
+/// noise does not learn, may give by chance: whatever looks like structure in them is too small to be worth a claim without
+/// a name.
 fn noise_alone(calibration: &Calibration, share: f64) -> bool {
     let judged = calibration.residuals.iter().filter(|r| r.held_out == calibration.held_out());
     let (mut excess_m, mut variance_m2) = (0.0, 0.0);
     for r in judged {
-        let expected_m = share * r.expected_norm_m;
+        let expected_m = share * calibration.prediction_factor * r.expected_norm_m;
         excess_m += r.fitted_m.norm() - expected_m;
         variance_m2 += (SPREAD_OF_NORM * expected_m).powi(2);
     }

@@ -112,7 +112,7 @@ fn same_place(a: &DwellRow, b: &DwellRow, limit: f64) -> bool {
 
 fn differs(a: &DwellRow, b: &DwellRow, toggle: Toggle) -> bool {
     match toggle {
-        Toggle::Direction => a.arrival.iter().zip(&b.arrival).any(|(a, b)| a * b < 0.0),
+        Toggle::Direction | Toggle::Approach => a.arrival.iter().zip(&b.arrival).any(|(a, b)| a * b < 0.0),
         Toggle::Load => (a.load_kg - b.load_kg).abs() > 1e-6,
         Toggle::Time => true,
         Toggle::Temperature => match (a.temperature_c, b.temperature_c) {

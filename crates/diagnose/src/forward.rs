@@ -273,8 +273,13 @@ fn forward(
 /// Whether what one effect leaves behind could look like the other: an effect that turns over with the direction, or
 /// begins with a dwell or a recording, leaves only what does so too.
 fn switches_alike(first: &Candidate, next: &Candidate) -> bool {
-    let switches = matches!(first.toggle, Toggle::Direction | Toggle::Time | Toggle::Recording);
-    !switches || first.toggle == next.toggle
+    let switch = |c: &Candidate| match c.toggle {
+        // Whoever comes from the other side comes another way.
+        Toggle::Approach => Toggle::Direction,
+        other => other,
+    };
+    let switches = matches!(switch(first), Toggle::Direction | Toggle::Time | Toggle::Recording);
+    !switches || switch(first) == switch(next)
 }
 
 /// A group enters as its members, each of which is then judged among the others.

@@ -17,6 +17,7 @@
 //! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
 //! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
 //!   explains;
+//! * `rests`: where a joint rests in a gap that was found;
 //! * `implied`: what each dwell says about each joint, for the eye;
 //! * `nested`: the choice made again without each part of the hold-out;
 //! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
@@ -62,6 +63,7 @@ mod problem;
 mod projection;
 mod refit;
 mod reports;
+mod rests;
 mod ripple;
 mod rivals;
 mod rooms;

@@ -171,6 +171,7 @@ fn why(problem: &Problem, c: &Candidate, raw: f64, absorbed: f64) -> String {
     if raw <= 0.0 {
         return match c.toggle {
             Toggle::Direction => "the arrival directions are unknown or the joint never moves".to_string(),
+            Toggle::Approach => "where the joints rested before is not known, or they never move".to_string(),
             Toggle::Load => "the load never changes".to_string(),
             Toggle::Recording => "there is one recording only".to_string(),
             Toggle::Temperature => "no temperature was recorded, or it never changed".to_string(),

@@ -15,6 +15,8 @@ use rand_distr::StandardNormal;
 use std::path::Path;
 
 const SIGMA_M: f64 = 0.28e-3;
+/// Of the play of a joint that rests in it [rad].
+const WIDTH_RAD: f64 = 0.02;
 const ARM: &str = include_str!("../../../pipelines/models/right_arm.toml");
 
 fn model() -> Model {
@@ -170,6 +172,66 @@ fn the_refit_gives_the_numbers_of_the_verdict() {
     assert_eq!(d.holdout_mm.before, 1e3 * before.holdout.fitted.mean_m);
     assert_eq!(d.holdout_mm.after, 1e3 * refitted.calibration.holdout.fitted.mean_m);
     assert!(d.unexplained.is_none(), "{:?}", d.unexplained);
+}
+
+#[test]
+fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is_named() {
+    for seed in 1..=3 {
+        let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
+        let (model, mut observations) = observed(&[], 0.0, seed);
+        let truth =
+            model.with_effects(&[model.effect("backlash:1").unwrap()], &Session::of(&observations)).unwrap();
+        let mut p = truth.nominal();
+        *p.last_mut().unwrap() = 0.0;
+        p[model.parameters().len()] = WIDTH_RAD;
+        for o in &mut observations {
+            // On its way back from the flank that pushed it, as far as across two fifths of the gap.
+            let mut rested = o.clone();
+            rested.joint_rad[0] += o.arrival[0].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
+            let noise = Vector3::from_fn(|_, _| SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+            o.reference = Reference::position(truth.predicted_tip_in_world(&p, &rested) + noise);
+        }
+        let before = calibration(&model, &observations);
+        let d = diagnosed(&model, &before, &observations);
+        assert_eq!(d.verdict, Verdict::Identified, "{:?}", d.names);
+        let name = &d.names[0];
+        assert!(name.starts_with("backlash:1,rest="), "{name}");
+        // The fitted width takes the mean: from 1/2 to 1/10 of the gap are 0.6 of it, and the spread is 2/3 of that.
+        let rest: f64 = name.rsplit_once('=').unwrap().1.parse().unwrap();
+        let refitted = &d.refitted.as_ref().unwrap().calibration;
+        println!(
+            "seed {seed}: {name}, {:.2} floors, {:.2} before",
+            refitted.times_floor(),
+            before.times_floor()
+        );
+        assert!((0.5..0.85).contains(&rest) && (0.85..1.2).contains(&refitted.times_floor()), "{name}");
+        assert!(d.unexplained.is_none() && d.warnings.iter().any(|w| w.code == "rests-in-play"));
+        // It stays so when it is added.
+        let extended =
+            model.with_effects(&[model.effect(name).unwrap()], &Session::of(&observations)).unwrap();
+        let after = calibration(&extended, &observations);
+        let left = diagnosed(&extended, &after, &observations);
+        assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
+    }
+}
+
+#[test]
+fn scatter_that_is_wider_than_the_play_is_not_the_play() {
+    let (model, mut observations) = observed(&["backlash:1"], 0.5, 4);
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for o in &mut observations {
+        let mut off = o.clone();
+        off.joint_rad[0] += 4.0 * WIDTH_RAD * rng.random_range(-0.5..0.5);
+        let p = model.nominal();
+        let turned = model.predicted_tip_in_world(&p, &off) - model.predicted_tip_in_world(&p, o);
+        if let Reference::Tracked { position_m, .. } = &mut o.reference {
+            *position_m += turned;
+        }
+    }
+    let before = calibration(&model, &observations);
+    let d = diagnosed(&model, &before, &observations);
+    assert!(d.warnings.iter().all(|w| w.code != "rests-in-play"), "{:?}", d.names);
+    assert!(d.unexplained.is_some(), "{:?}", d.verdict);
 }
 
 /// Errors of the size and kind that no effect makes: each dwell off by itself, twenty times the noise.

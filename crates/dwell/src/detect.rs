@@ -43,15 +43,13 @@ pub fn detect_dwells(
 
     let summary = Summary { samples, encoders: &encoders, tip: tip.as_ref(), clock, config };
     let history = History::of(&encoders, config);
-    let dwells: Vec<Dwell> = found
-        .rows
-        .iter()
-        .enumerate()
-        .map(|(dwell, rows)| {
-            let creeps = found.crept_rad.contains_key(&dwell);
-            summary.dwell(DwellId { recording, dwell }, rows, &history, creeps)
-        })
-        .collect();
+    let mut dwells: Vec<Dwell> = Vec::with_capacity(found.rows.len());
+    for (dwell, rows) in found.rows.iter().enumerate() {
+        let creeps = found.crept_rad.contains_key(&dwell);
+        let own = summary.dwell(DwellId { recording, dwell }, rows, &history, creeps);
+        let moved_rad = dwells.last().map(|before| moved_rad(before, &own));
+        dwells.push(Dwell { moved_rad, ..own });
+    }
     let warnings = summary.warnings(&found, &dwells);
     Ok((dwells, warnings))
 }
@@ -83,6 +81,7 @@ impl Summary<'_> {
             arrival: history.arrival(rows.start, &joint_rad),
             path_memory_rad: history.path_memory(rows.start, &joint_rad),
             pair_memory_rad: history.pair_memory(rows.start, &joint_rad),
+            moved_rad: None,
             joint_rad,
             tip: self.tip_of(start_ns, end_ns, creeps),
             temperature_c: stream
@@ -228,6 +227,11 @@ impl Summary<'_> {
             config.min_duration_s
         )
     }
+}
+
+/// How far each joint went from one dwell to the next [rad].
+fn moved_rad(from: &Dwell, to: &Dwell) -> Vec<f64> {
+    to.joint_rad.iter().zip(&from.joint_rad).map(|(to, from)| to - from).collect()
 }
 
 /// The first few of a list of dwells, in words.

@@ -349,6 +349,20 @@ fn temperature_and_effort_are_averaged() {
 }
 
 #[test]
+fn a_dwell_knows_how_far_its_joints_have_come() {
+    let mut r = Random::new(3);
+    let s = Session::random(&mut r, 6, (0.5, 1.0), (0.5, 1.0));
+    let dwells = detect(&only_joints(s.encoders(&mut r, 100.0, 2e-5, 0.0))).0;
+    assert!(dwells.len() > 3 && dwells[0].moved_rad.is_none());
+    for pair in dwells.windows(2) {
+        let moved = pair[1].moved_rad.as_ref().expect("there was a dwell before");
+        let ends = pair[0].joint_rad.iter().zip(&pair[1].joint_rad).zip(moved);
+        assert!(ends.clone().all(|((from, to), moved)| (from + moved - to).abs() < 1e-12));
+        assert!(ends.into_iter().any(|(_, moved)| moved.abs() > 1e-3), "{moved:?}");
+    }
+}
+
+#[test]
 fn broken_columns_are_errors() {
     let config = DwellConfig::default();
     let bad =
@@ -382,6 +396,7 @@ proptest! {
             a.joint_sigma_rad.rotate_left(1);
             a.arrival.rotate_left(1);
             a.path_memory_rad.rotate_left(1);
+            a.moved_rad.iter_mut().for_each(|moved| moved.rotate_left(1));
             // Other joints are neighbours now.
             a.pair_memory_rad.clone_from(&b.pair_memory_rad);
             prop_assert_eq!(a, b);

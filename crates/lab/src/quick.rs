@@ -101,6 +101,7 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             arrival: past::arrivals(since, &readings.mean_rad, config.joints.count_rad()),
             path_memory_rad: Some(past::memories(since, &readings.mean_rad, config.joints.count_rad())),
             pair_memory_rad: Some(past::pair_memories(since, &readings.mean_rad, config.joints.count_rad())),
+            moved_rad: observations.last().map(|before| past::moved(&before.joint_rad, &readings.mean_rad)),
             joint_velocity_radps: None,
             joint_rad: readings.mean_rad,
             joint_sigma_rad: readings.sigma_rad,

@@ -32,6 +32,7 @@ const fn row(
 }
 
 const YIELDING: &[&str] = &[
+    "undeclared_load",
     "compliance",
     "arm_compliance",
     "hardening_compliance",
@@ -170,13 +171,13 @@ pub const CAUSES: &[Cause] = &[
             "creep",
             "updated every",
         ],
-        &[],
+        &["unsettled_reading"],
     ),
     row(
         "filtered-encoder",
         &["filter", "latency", "stale", "creep"],
         &["filter", "lag", "late by", "creep", "has not settled"],
-        &[],
+        &["unsettled_reading"],
     ),
     row(
         "outliers",

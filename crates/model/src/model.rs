@@ -2,7 +2,7 @@
 
 mod linearisation;
 
-use crate::effects::{Declared, Effects, NominalPose, PlacedEffect, Session};
+use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
 use crate::path::{follow, joint_twists};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
@@ -264,11 +264,18 @@ impl Model {
         (residual, jacobian)
     }
 
-    /// Joints that may rest anywhere in the gaps of their drives while a cavity holds the tip, and the variance of where they
-    /// do [rad^2] (prismatic: [m^2]): noise that no reading shows.
+    /// Joints that may rest anywhere in the gaps of their drives, and the variance of where they do [rad^2]
+    /// (prismatic: [m^2]): noise that no reading shows.
     pub fn slack(&self, p: &[f64], o: &Observation) -> Vec<(usize, f64)> {
-        let effects = self.effects.as_ref().filter(|_| o.cavity().is_some());
-        effects.map_or_else(Vec::new, |effects| effects.slack(p, o.dwell))
+        let seated = o.cavity().is_some();
+        self.effects.as_ref().map_or_else(Vec::new, |effects| effects.slack(p, o.dwell, seated))
+    }
+
+    /// Effects that are a gap in the drive of a joint: which, the joint, and how wide it is at these parameters [rad]
+    /// (prismatic: [m]).
+    pub fn gaps(&self, p: &[f64]) -> Vec<(EffectSpec, usize, f64)> {
+        let all = self.effects.iter().flat_map(|effects| effects.gaps(p));
+        all.map(|(spec, joint, width)| (spec.clone(), joint, width)).collect()
     }
 
     /// Whether [`Model::slack`] depends on what is estimated.

@@ -156,6 +156,7 @@ fn check(o: &Observation, recording: usize) -> Result<(), String> {
         ("arrival", Some(o.arrival.len()), joints),
         ("path_memory_rad", o.path_memory_rad.as_ref().map(Vec::len), joints),
         ("pair_memory_rad", o.pair_memory_rad.as_ref().map(Vec::len), joints.saturating_sub(1)),
+        ("moved_rad", o.moved_rad.as_ref().map(Vec::len), joints),
         ("joint_velocity_radps", o.joint_velocity_radps.as_ref().map(Vec::len), joints),
         ("effort_nm", o.effort_nm.as_ref().map(Vec::len), joints),
     ];

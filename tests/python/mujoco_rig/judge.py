@@ -39,6 +39,7 @@ def session(program, folder, mechanism, seed):
         if any(e["set"] for e in said["diagnosis"]["effects"]):
             added = _armcal(program, "add", "suggested", f"{path}/pipeline.toml", "--out", f"{path}/out")
             said["after_mm"] = added.get("comparison", {}).get("held_out", {}).get("after_mm")
+            said["floor_after_mm"] = added.get("remaining", {}).get("floor_mm")
         with open(f"{path}-said.json", "w") as out:
             json.dump(said, out)
         shutil.rmtree(path)
@@ -95,11 +96,13 @@ def main():
         counts[truth["mechanism"]][word] += 1
         floor = found.get("floor_mm") or float("nan")
         before = found.get("holdout_mm", {}).get("before", float("nan"))
-        floors[truth["mechanism"]].append((before / floor, (said.get("after_mm") or before) / floor))
+        after = said.get("after_mm")
+        floor_after = said.get("floor_after_mm") or floor
+        floors[truth["mechanism"]].append((before / floor, after / floor_after if after else before / floor))
         names = "; ".join(" or ".join(e["set"][:4]) for e in found["effects"])
         hidden = f"{truth['mechanism']:12} {truth['seed']:5} {truth['size']:8.3f} {truth['unit']:6}"
-        after = "{:6.2f} -> {:5.2f} floors".format(*floors[truth["mechanism"]][-1])
-        print(f"{hidden} {word:16} {after}  {names or found['verdict']}")
+        fell = "{:6.2f} -> {:5.2f} floors".format(*floors[truth["mechanism"]][-1])
+        print(f"{hidden} {word:16} {fell}  {names or found['verdict']}")
     if ask.page:
         write(ask.page, counts, floors, ask, AT_FLOOR)
     median = {m: statistics.median(after for _, after in all) for m, all in floors.items()}

@@ -17,7 +17,8 @@ among names that the data do not tell apart; *unknown*: something unlisted is sa
 floor, said so without a name; *not shown*: within 1.1 of the floor without it, or said to be nothing below 1.5; *silent*: nothing
 missing above 1.5 floors; *wrong set*, *wrong name*: none of the names, or one told alone, is true; *setup*: stopped before any
 physics. Held-out mean error over the noise floor before and after `armcal add suggested`: medians; *at floor*: share
-within {at_floor} of it afterwards.
+within {at_floor} of it afterwards. The floor afterwards is that of the model with what was added: where a joint rests anywhere
+in a play that was found, it counts that.
 
 """
 

@@ -111,6 +111,12 @@ fn advice(kind: &EffectKind) -> &'static str {
         ("tool_shift", _) => {
             "The tool or its markers were remounted, bent or knocked: look at the last link."
         }
+        ("unsettled_reading", _) => {
+            "Read the joints later, when arm and readings have settled: look at waiting times, filters and whether set-points are recorded."
+        }
+        ("undeclared_load", _) => {
+            "Weigh what the tool carried in that recording, and declare it as `load_kg`."
+        }
         (_, Family::LostMotion) => "Look at that gear's preload and at the belt's tension.",
         (_, Family::Elasticity) => {
             "Something gives way under load: look at clamps, bearings and the declared load."

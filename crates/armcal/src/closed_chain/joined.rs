@@ -67,6 +67,7 @@ pub fn of_arm(dwell: &Dwell, first: usize, count: usize) -> Observation {
         arrival: dwell.arrival[own.clone()].to_vec(),
         path_memory_rad: Some(dwell.path_memory_rad[own.clone()].to_vec()),
         pair_memory_rad: Some(dwell.pair_memory_rad[pairs].to_vec()),
+        moved_rad: dwell.moved_rad.as_ref().map(|moved| moved[own.clone()].to_vec()),
         effort_nm: dwell.effort_nm.as_ref().map(|e| e[own].to_vec()),
         ..Observation::bare(dwell.id, joint_rad, Reference::position(Vector3::zeros()))
     }
@@ -161,6 +162,7 @@ mod tests {
             arrival: vec![armcal_core::Arrival::Unknown; 3],
             path_memory_rad: vec![Vec::new(); 3],
             pair_memory_rad: vec![[Vec::new(), Vec::new()]; 2],
+            moved_rad: None,
             tip: None,
             temperature_c: None,
         };

@@ -20,6 +20,10 @@ pub fn sensor(a: &str, b: &str) -> &'static str {
         () if has(&["base_compliance"]) => {
             "put a marker on the robot's base: it moves only if the base gives way"
         }
+        () if has(&["unsettled_reading"]) => {
+            "wait longer before the joints are read, or come to the same poses from near and from far"
+        }
+        () if has(&["undeclared_load"]) => "weigh what the tool carries, and declare it as `load_kg`",
         () if both(&lost_motion) => {
             "record the motor currents, or rest in the same poses with the motors off"
         }

@@ -250,6 +250,7 @@ fn later(known: &Known<'_>, like: &Observation, recording: usize, joint_rad: Vec
         joint_rad,
         temperature_c: newest.and_then(|o| o.temperature_c),
         joint_velocity_radps: None,
+        moved_rad: None,
         ..like.clone()
     }
 }
@@ -260,7 +261,8 @@ fn arriving(at: &Observation, arrival: Vec<Arrival>) -> Observation {
         _ => vec![q - side.sign() * AWAY_RAD, *q],
     };
     let path_memory_rad = Some(at.joint_rad.iter().zip(&arrival).map(memory).collect());
-    Observation { path_memory_rad, arrival, ..at.clone() }
+    let moved_rad = Some(arrival.iter().map(|side| side.sign() * AWAY_RAD).collect());
+    Observation { path_memory_rad, moved_rad, arrival, ..at.clone() }
 }
 
 fn side_of(turn_rad: f64) -> Arrival {

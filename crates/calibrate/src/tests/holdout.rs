@@ -79,6 +79,28 @@ fn held_out_error_is_near_the_noise_floor_and_far_below_nominal() {
     assert_eq!(all.holdout.fitted.n, 0);
 }
 
+/// Of few dwells a fit learns a part of their noise too, so that it predicts others worse than noise alone: by how much is
+/// known beforehand.
+#[test]
+fn what_few_dwells_do_not_tell_is_expected_of_the_held_out_ones() {
+    let model = rig::tracked_model();
+    for (dwells, at_least) in [(30, 1.05), (80, 1.015)] {
+        let (mut found, mut expected) = (0.0, 0.0);
+        for seed in 0..20 {
+            let mut rng = rig::rng(400 + seed);
+            let truth = rig::planted(&model, &mut rng, 0.9);
+            let observations = rig::tracked(&model, &truth, dwells, &mut rng);
+            let c = run(&model, &observations, "kind = \"cavity-folds\"\nk = 5").unwrap();
+            found += c.times_floor() / 20.0;
+            expected += c.prediction_factor / 20.0;
+        }
+        println!("{dwells} dwells: {found:.3} floors, {expected:.3} expected");
+        assert!(expected > at_least && (found / expected - 1.0).abs() < 0.04, "{found} {expected}");
+    }
+    let (model, observations) = tracked();
+    assert_eq!(run(&model, &observations, "kind = \"none\"").unwrap().prediction_factor, 1.0);
+}
+
 #[test]
 fn a_recording_held_out_gets_its_own_board_and_nothing_else() {
     let (model, observations) = boards();

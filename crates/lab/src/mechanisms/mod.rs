@@ -22,6 +22,7 @@
 //! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `shift_mm`, `turn_deg`, `recording`, `at_s`, `until_s` |
 //! | `thermal_growth` | links follow the thermometer | `links`, `per_kelvin_ppm` |
 //! | `warm_up` | links are heated by motors the thermometer does not see | `links`, `per_kelvin_ppm`, `rise_k`, `time_constant_s` |
+//! | `lag` | a joint that approaches its drive exponentially | `joint`, `time_constant_s` |
 //! | `zero_drift` | the zero of a potentiometer drifts | `joint`, `deg_per_hour` |
 //! | `frame_drift` | base, board or cameras creep | `body`, `mm_per_hour` |
 //! | `camera_scale` | the camera system is scaled wrongly | `percent`, `centre_m` |
@@ -58,6 +59,7 @@ mod friction_windup;
 mod gap;
 mod gear;
 mod heat;
+mod lag;
 mod link_bending;
 mod shapes;
 mod twist;
@@ -79,6 +81,7 @@ pub use eccentricity::{Eccentricity, MountedOn};
 pub use friction_windup::FrictionWindup;
 pub use gap::Gap;
 pub use heat::{RoomTemperature, ThermalGrowth, WarmUp};
+pub use lag::Lag;
 pub use link_bending::LinkBending;
 pub use shapes::{DamagedTeeth, GearRatio, Sawtooth, SecondHarmonic, SoftStop, ToothRunout};
 pub use twist::Twist;
@@ -150,6 +153,7 @@ mechanisms!(
     Twist,
     RoomTemperature,
     CrossedFriction,
+    Lag,
 );
 
 /// Checks the values of one `[[mechanisms]]` table and names the key at fault.

@@ -39,6 +39,11 @@ pub fn pair_memories(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> V
     (1..rest_rad.len()).map(|joint| [of(joint, 1.0), of(joint, -1.0)]).collect()
 }
 
+/// How far each joint has come from its last rest [rad].
+pub fn moved(from_rad: &[f64], rest_rad: &[f64]) -> Vec<f64> {
+    rest_rad.iter().zip(from_rad).map(|(rest, from)| rest - from).collect()
+}
+
 fn memory(before: &[Vec<f64>], of: impl Fn(&[f64]) -> f64, rest_rad: f64, still_rad: f64) -> Vec<f64> {
     let mut span = [rest_rad - still_rad, rest_rad + still_rad];
     // Newest first: the rest, then ever wider swings to alternating sides.

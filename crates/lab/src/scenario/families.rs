@@ -296,6 +296,13 @@ pub(super) const FAMILIES: &[Family] = &[
         build: frame_shift_within,
     },
     Family {
+        name: "unsettled_reading",
+        joints: &[1, 2, 3],
+        range: [0.01, 0.06],
+        unit: "of a move",
+        build: unsettled_reading,
+    },
+    Family {
         name: "zero_drift",
         joints: &[1, 2, 3],
         range: [0.1, 0.8],

@@ -17,6 +17,8 @@
 //! link there and it lags elsewhere. Where it is between -1 and 1, nothing holds the joint on a flank there: it rests
 //! anywhere in its gap, with variance `(b/2)^2 (1 - seated^2) / 3`: at 0 that of an even spread over the gap. Nothing
 //! predicts it; it is part of the noise of these dwells.
+//! Shape `rest` [1], 0 unless said: the part r of its gap in which the joint rests anywhere in every dwell, whoever holds
+//! the arm, with variance `(r b/2)^2 / 3`: a gap that neither load nor friction closes.
 //!
 //! # Signature in the data
 //! The residual flips sign with the direction of arrival, at the same pose; it does not depend on load.
@@ -35,7 +37,7 @@ use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
-use super::state::LED;
+use super::state::{LED, REST};
 use crate::rigid::Scalar;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -46,7 +48,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     target: Target::Joint,
     offered: Offered::Once,
-    shapes: &[LED],
+    shapes: &[LED, REST],
     never_negative: &[],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
     source: include_str!("backlash.rs"),

@@ -228,6 +228,16 @@ impl<'o> Drivers<'o> {
         self.pose.slots.get(BASE).map_or_else(Vector3::zeros, |base| base.translation_m)
     }
 
+    /// How far the joint's reading is from that of the rest before [rad] (prismatic: [m]); 0 where that is not known.
+    pub fn moved_rad(&self, joint: usize) -> f64 {
+        self.observation.moved_rad.as_ref().and_then(|all| all.get(joint)).copied().unwrap_or(0.0)
+    }
+
+    /// Generalised force on a joint of one kilogram at the tip [N m] (prismatic: [N]).
+    pub(crate) fn kilogram_nm(&self, joint: usize) -> f64 {
+        self.pose.tip_torque_nm(joint, &self.gravity_mps2)
+    }
+
     /// What the joint's encoder went through before it came to rest; empty where that is not known.
     pub fn path_memory_rad(&self, joint: usize) -> &'o [f64] {
         self.observation.path_memory_rad.as_ref().and_then(|all| all.get(joint)).map_or(&[], Vec::as_slice)

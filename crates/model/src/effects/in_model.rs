@@ -53,7 +53,7 @@ impl Model {
                 Offered::Once => {
                     specs.extend(at_targets.flat_map(|spec| self.parts(kind, spec, session, &zero)))
                 }
-                Offered::Events => {
+                Offered::Events | Offered::Recordings => {
                     for recording in session.telling_recordings() {
                         let since = Since::Recording(recording);
                         specs.extend(self.targets(kind, EffectSpec::new(kind.name).since(since)));

@@ -84,6 +84,8 @@ pub enum Family {
 pub enum Toggle {
     /// The direction of arrival.
     Direction,
+    /// The way to the pose: from which side, and how far the joints came.
+    Approach,
     /// The load at the tip.
     Load,
     /// Time.
@@ -101,6 +103,7 @@ impl Toggle {
     pub fn word(self) -> &'static str {
         match self {
             Toggle::Direction => "arrival direction",
+            Toggle::Approach => "approach",
             Toggle::Load => "load",
             Toggle::Time => "time",
             Toggle::Recording => "recording",
@@ -128,6 +131,8 @@ pub enum Offered {
     Once,
     /// For every target in every recording, and as a step at any dwell.
     Events,
+    /// For every target in every recording.
+    Recordings,
     /// Only with its shape scanned.
     Scanned,
     /// Not by itself: it belongs to the noise, or to the user.

@@ -58,6 +58,8 @@ mod state;
 mod table;
 mod thermal_growth;
 mod tool_shift;
+mod undeclared_load;
+mod unsettled_reading;
 mod volume_distortion;
 mod warm_up;
 mod zero_drift;
@@ -95,6 +97,7 @@ static CATALOGUE: &[&EffectKind] = &[
     &link_bending::KIND,
     &base_compliance::KIND,
     &bearing_compliance::KIND,
+    &undeclared_load::KIND,
     &eccentricity::KIND,
     &second_harmonic::KIND,
     &periodic::KIND,
@@ -106,6 +109,7 @@ static CATALOGUE: &[&EffectKind] = &[
     &tool_shift::KIND,
     &frame_shift::KIND,
     &board_shift::KIND,
+    &unsettled_reading::KIND,
     &zero_drift::KIND,
     &frame_drift::KIND,
     &thermal_growth::KIND,

@@ -96,9 +96,9 @@ pub(crate) trait AnyPhysics: Debug + Send + Sync {
     fn differentiate_seen(&self, theta: &[Dual64], point_m: &Vector3<Dual64>) -> Vector3<Dual64>;
     /// [`Physics::gap`].
     fn gap_of(&self, theta: &[f64]) -> Option<(usize, f64)>;
-    /// A joint that may rest anywhere in its gap while a cavity holds the tip, and the variance of where it does [rad^2]
-    /// (prismatic: [m^2]): what no prediction can know.
-    fn slack(&self, _theta: &[f64]) -> Option<(usize, f64)> {
+    /// A joint that may rest anywhere in its gap, while a cavity holds the tip (`seated`) or not, and the variance of where
+    /// it does [rad^2] (prismatic: [m^2]): what no prediction can know.
+    fn slack(&self, _theta: &[f64], _seated: bool) -> Option<(usize, f64)> {
         None
     }
     /// [`Physics::touched`].

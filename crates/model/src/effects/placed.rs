@@ -108,11 +108,7 @@ pub(crate) fn place(
         role: Role::Effect,
         meaning: shape.meaning.to_owned(),
     }));
-    let share = parameters.iter().position(|p| p.name == state::SEATED.name);
-    let physics = match share {
-        Some(share) => state::shared(physics, count, share),
-        None => physics,
-    };
+    let physics = state::in_state(physics, count, &parameters);
     for parameter in &mut parameters {
         model.declared.iter().try_for_each(|declared| declared.apply(spec, parameter)).map_err(bad)?;
     }
@@ -269,11 +265,18 @@ impl Effects {
         joints
     }
 
-    /// Joints that may rest anywhere in a gap while a cavity holds the tip of dwell `at`, and the variance of where they do
-    /// [rad^2].
-    pub fn slack(&self, p: &[f64], at: DwellId) -> Vec<(usize, f64)> {
+    /// Joints that may rest anywhere in a gap in the dwell `at`, and the variance of where they do [rad^2].
+    pub fn slack(&self, p: &[f64], at: DwellId, seated: bool) -> Vec<(usize, f64)> {
         let acting = self.placed.iter().filter(|effect| effect.acts_in(at));
-        acting.filter_map(|effect| effect.physics.slack(&p[effect.parameters.clone()])).collect()
+        acting.filter_map(|effect| effect.physics.slack(&p[effect.parameters.clone()], seated)).collect()
+    }
+
+    /// Effects with a gap in the drive of a joint: which, the joint, and how wide it is [rad] (prismatic: [m]).
+    pub fn gaps(&self, p: &[f64]) -> impl Iterator<Item = (&EffectSpec, usize, f64)> {
+        self.placed.iter().filter_map(|effect| {
+            let (joint, width) = effect.physics.gap_of(&p[effect.parameters.clone()])?;
+            Some((&effect.spec, joint, width))
+        })
     }
 
     /// Whether a gap of some width would leave a joint free somewhere; `nominal` are the parameters.
@@ -281,7 +284,7 @@ impl Effects {
         self.placed.iter().any(|effect| {
             let mut theta = nominal[effect.parameters.clone()].to_vec();
             theta[..effect.amplitudes].fill(1.0);
-            effect.physics.slack(&theta).is_some()
+            [true, false].into_iter().any(|seated| effect.physics.slack(&theta, seated).is_some())
         })
     }
 

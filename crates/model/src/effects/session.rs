@@ -37,6 +37,9 @@ pub struct Session {
     pub load: bool,
     /// Whether any observation was taken in motion.
     pub moving: bool,
+    /// Whether it is known of any observation where the joints rested before.
+    #[serde(default)]
+    pub moved: bool,
     /// Names of the cavities the tip was seated in, sorted.
     pub cavities: Vec<String>,
 }
@@ -79,6 +82,7 @@ impl Session {
             temperature: !temperatures.is_empty(),
             load: observations.iter().any(|o| o.load_kg != 0.0),
             moving: observations.iter().any(|o| o.joint_velocity_radps.is_some()),
+            moved: observations.iter().any(|o| o.moved_rad.is_some()),
             cavities,
         }
     }

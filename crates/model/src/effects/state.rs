@@ -4,12 +4,15 @@
 //! it leads pulls the encoder after it, from the other flank. Which of them acts in the cavities no recording says, so
 //! that the data do: every effect of which that decides is tried with the shares of it that may act there. Only where a
 //! session has dwells of both kinds.
+//!
+//! Nor does anything say where in its gap a joint rests that nothing presses onto a flank. Where the errors show that it
+//! rests there, how much of the gap it takes is part of the model, and of its noise.
 
 use super::drivers::Drivers;
 use super::kind::Shape;
 use super::physics::{AnyPhysics, Deformation};
 use super::placing::Placing;
-use armcal_core::{Observation, Unit};
+use armcal_core::{Observation, Parameter, Unit};
 use nalgebra::Vector3;
 use num_dual::Dual64;
 use std::ops::{MulAssign, Range};
@@ -34,6 +37,18 @@ pub(super) const LED: Shape = Shape {
     ..SEATED
 };
 
+/// How much of a gap a joint may rest in, whoever holds the arm.
+pub(super) const REST: Shape = Shape {
+    name: "rest",
+    unit: Unit::One,
+    default: Some(0.0),
+    lower: 0.0,
+    upper: 1.0,
+    meaning: "part of its gap in which a joint rests anywhere: 0 on its flank, 1 from flank to flank",
+    parameter: true,
+    values: None,
+};
+
 /// In a cavity a joint may rest within its play: less than all of it.
 fn led(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
     worth_trying(placing, &[-1.0, -0.75, -0.5, 0.0, 0.5])
@@ -47,51 +62,67 @@ fn worth_trying(placing: &Placing<'_>, shares: &[f64]) -> Vec<f64> {
     if placing.session.seated_and_tracked() { shares.to_vec() } else { Vec::new() }
 }
 
-/// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does.
+/// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does; where a
+/// joint rests, only where somebody says it.
 pub(super) fn matters(shape: &Shape, placing: &Placing<'_>) -> bool {
     let said = placing.spec.shape.iter().any(|(name, _)| name == shape.name);
-    shape.name != SEATED.name || said || placing.session.seated_and_tracked()
+    match shape.name {
+        name if name == SEATED.name => said || placing.session.seated_and_tracked(),
+        name if name == REST.name => said,
+        _ => true,
+    }
 }
 
-/// The placement with its amplitudes times the shape [`SEATED`], which stands at `share` of its parameters.
-pub(super) fn shared(physics: Arc<dyn AnyPhysics>, amplitudes: usize, share: usize) -> Arc<dyn AnyPhysics> {
-    Arc::new(Shared { physics, amplitudes, share })
+/// The physics with its shapes [`SEATED`] and [`REST`], where it has them among its `parameters`.
+pub(super) fn in_state(
+    physics: Arc<dyn AnyPhysics>,
+    amplitudes: usize,
+    parameters: &[Parameter],
+) -> Arc<dyn AnyPhysics> {
+    let at = |shape: &Shape| parameters.iter().position(|p| p.name == shape.name);
+    match (at(&SEATED), at(&REST)) {
+        (None, None) => physics,
+        (share, rest) => Arc::new(InState { physics, amplitudes, share, rest }),
+    }
 }
 
 fn seated(x: &Drivers<'_>) -> bool {
     x.observation.cavity().is_some()
 }
 
-/// Amplitudes that count in part while a cavity holds the tip.
+/// Amplitudes that count in part while a cavity holds the tip, and a gap in which a joint rests.
 #[derive(Debug)]
-struct Shared {
+struct InState {
     physics: Arc<dyn AnyPhysics>,
     amplitudes: usize,
-    share: usize,
+    /// Where [`SEATED`] and [`REST`] stand among the parameters.
+    share: Option<usize>,
+    rest: Option<usize>,
 }
 
-impl Shared {
-    /// The parameters with their amplitudes as they count there.
-    fn in_part<T: Copy + MulAssign>(&self, theta: &[T]) -> Vec<T> {
+impl InState {
+    /// The parameters with their amplitudes as they count in a cavity; `None` where they count as everywhere.
+    fn in_part<T: Copy + MulAssign>(&self, theta: &[T], x: &Drivers<'_>) -> Option<Vec<T>> {
+        let share = self.share.filter(|_| seated(x))?;
         let mut own = theta.to_vec();
-        own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[self.share]);
-        own
+        own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[share]);
+        Some(own)
     }
 }
 
-impl AnyPhysics for Shared {
+impl AnyPhysics for InState {
     fn predict(&self, theta: &[f64], x: &Drivers<'_>, change: &mut Deformation<f64>) {
-        if !seated(x) || theta[self.share] == 1.0 {
-            return self.physics.predict(theta, x, change);
+        match self.in_part(theta, x).filter(|_| self.share.is_some_and(|share| theta[share] != 1.0)) {
+            Some(own) => self.physics.predict(&own, x, change),
+            None => self.physics.predict(theta, x, change),
         }
-        self.physics.predict(&self.in_part(theta), x, change);
     }
 
     fn differentiate(&self, theta: &[Dual64], x: &Drivers<'_>, change: &mut Deformation<Dual64>) {
-        if !seated(x) {
-            return self.physics.differentiate(theta, x, change);
+        match self.in_part(theta, x) {
+            Some(own) => self.physics.differentiate(&own, x, change),
+            None => self.physics.differentiate(theta, x, change),
         }
-        self.physics.differentiate(&self.in_part(theta), x, change);
     }
 
     fn predict_seen(&self, theta: &[f64], point_m: &Vector3<f64>) -> Vector3<f64> {
@@ -106,10 +137,11 @@ impl AnyPhysics for Shared {
         self.physics.gap_of(theta)
     }
 
-    fn slack(&self, theta: &[f64]) -> Option<(usize, f64)> {
+    fn slack(&self, theta: &[f64], seated: bool) -> Option<(usize, f64)> {
         let (joint, width) = self.physics.gap_of(theta)?;
-        let free = 1.0 - theta[self.share].powi(2);
-        (free > 0.0).then(|| (joint, (0.5 * width).powi(2) * free / 3.0))
+        let held = self.share.filter(|_| seated).map_or(0.0, |share| (1.0 - theta[share].powi(2)).max(0.0));
+        let free = held + self.rest.map_or(0.0, |rest| theta[rest].powi(2));
+        (free > 0.0).then(|| (joint, (0.5 * width).powi(2) * free.min(1.0) / 3.0))
     }
 
     fn touched_entries(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {

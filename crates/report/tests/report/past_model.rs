@@ -84,13 +84,14 @@ fn the_session_is_written_in_the_words_of_the_format() {
         temperature: true,
         load: false,
         moving: false,
+        moved: false,
         cavities: vec!["c1".into()],
     };
     let text = "{\"start_ns\":1,\"end_ns\":2,\"recordings\":3,\"reference_temperature_c\":null,\
                 \"gravity_in_world_mps2\":[0.0,0.0,-9.80665],\"gravity_in_base_mps2\":[1.0,2.0,3.0],\
                 \"volume_centre_m\":null,\"volume_half_extent_m\":0.3,\"board_centres_m\":{\"1\":[0.1,0.2,0.3]},\
                 \"largest_effort_nm\":[4.0,5.0],\"temperature\":true,\"load\":false,\"moving\":false,\
-                \"cavities\":[\"c1\"]}";
+                \"moved\":false,\"cavities\":[\"c1\"]}";
     assert_eq!(serde_json::to_string(&session).unwrap(), text);
     assert_eq!(serde_json::from_str::<armcal_model::Session>(text).unwrap(), session);
 }

@@ -272,6 +272,7 @@ fn dwell(recording: usize, dwell: usize, joint_rad: &[f64]) -> Dwell {
         arrival: vec![Arrival::Positive, Arrival::Negative, Arrival::Unknown],
         path_memory_rad: joint_rad.iter().map(|q| vec![q - 0.1, *q]).collect(),
         pair_memory_rad: Vec::new(),
+        moved_rad: None,
         tip: (dwell == 5 && recording == 0).then(|| TipMeasurement {
             position_m: Vector3::new(0.4, 0.05, 0.3),
             covariance_m2: Matrix3::from_diagonal_element(4e-10),
@@ -320,6 +321,7 @@ fn calibration(model: &Model, observations: &[Observation], fitted: &[f64]) -> C
         train,
         holdout,
         noise_floor_m: 1.8e-4,
+        prediction_factor: 1.1,
         warnings: Vec::new(),
     }
 }

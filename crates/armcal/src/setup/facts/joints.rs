@@ -197,6 +197,7 @@ mod tests {
             arrival: vec![Arrival::Unknown; joint_rad.len()],
             path_memory_rad: Vec::new(),
             pair_memory_rad: Vec::new(),
+            moved_rad: None,
             tip: None,
             temperature_c: None,
         }

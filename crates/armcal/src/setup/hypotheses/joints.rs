@@ -113,6 +113,7 @@ pub fn scale(d: &mut Dwell, j: usize, factor: f64) {
     d.joint_sigma_rad[j] *= factor.abs();
     d.joint_spread_rad[j] *= factor.abs();
     d.path_memory_rad[j].iter_mut().for_each(|q| *q *= factor);
+    d.moved_rad.iter_mut().for_each(|moved| moved[j] *= factor);
     if factor < 0.0 {
         d.arrival[j] = match d.arrival[j] {
             Arrival::Positive => Arrival::Negative,
@@ -136,6 +137,7 @@ fn reorder(d: &mut Dwell, order: &[usize]) {
     by(&mut d.joint_sigma_rad, order);
     by(&mut d.joint_spread_rad, order);
     by(&mut d.path_memory_rad, order);
+    d.moved_rad.iter_mut().for_each(|moved| by(moved, order));
     by(&mut d.arrival, order);
 }
 

@@ -23,6 +23,28 @@ fn a_gap_follows_on_one_flank_or_the_other_and_never_leaves_them() {
 }
 
 #[test]
+fn what_lags_has_a_third_of_its_way_left_after_a_time_constant() {
+    let mut rest = Rest::at([0.0; 3]);
+    for (kind, expected) in
+        [(link as fn(&mut dyn Mechanism, &Rest, [f64; 3]) -> Vec<f64>, false), (motor, true)]
+    {
+        let mut lag = mechanism("kind = 'lag'\njoint = 2\ntime_constant_s = 0.4");
+        let mut at = |time_s: f64, q: f64, jogged: bool| {
+            (rest.session_s, rest.motors_lead) = (time_s, jogged);
+            kind(&mut *lag, &rest, [0.0, q, 0.0])[1]
+        };
+        assert_eq!(at(0.0, 0.1, false), 0.1);
+        // However many looks there are on the way.
+        at(1.1, 0.3, false);
+        let _ = (at(1.1, 0.5, false), at(1.3, 0.5, false));
+        let before = at(1.3, 0.5, false);
+        assert!((at(1.7, 0.5, false) - 0.5 - (before - 0.5) / std::f64::consts::E).abs() < 1e-12);
+        // Jogged there, it is there.
+        assert_eq!(at(1.7, 0.2, true) == 0.2, expected);
+    }
+}
+
+#[test]
 fn gravity_closes_a_gap_unless_friction_is_stronger() {
     let half = 0.3f64.to_radians();
     for (q2, side) in [(-0.8, -1.0), (0.8, 1.0)] {

@@ -66,6 +66,19 @@ fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -
     Ok(made(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
 }
 
+/// Read at the end of its rest, a joint has this share of its last move before it: only where motors drive the arm to
+/// free poses.
+pub fn unsettled_reading(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+    config.task.free.by_hand = false;
+    config.task.free.hold_s = [config.task.free.hold_s[1]; 2];
+    let time_constant_s = config.task.free.hold_s[1] / -draw.size.ln();
+    let lag = Lag { joint: draw.joint, time_constant_s, before: None };
+    let enters = [draw.joint_channel(), format!("s{}", draw.joint)];
+    let made = made(MechanismConfig::Lag(lag), draw.at_joint("unsettled_reading"), enters);
+    Ok(made
+        .alike_unless(draw.design.is_wide(), &[draw.at_joint("backlash"), draw.at_joint("friction_windup")]))
+}
+
 /// Length of the session [s].
 fn session_s(config: &LabConfig) -> Result<f64, LabError> {
     let rehearsal = observe(config)?;

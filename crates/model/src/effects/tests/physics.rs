@@ -273,6 +273,63 @@ fn a_hand_that_leads_the_link_leaves_it_on_the_other_flank() {
 }
 
 #[test]
+fn an_unsettled_joint_lacks_a_share_of_its_last_move() {
+    let model = paper();
+    let mut all = observations(&model, 6, true);
+    all[1].moved_rad = None;
+    let extended = model
+        .with_effects(&[model.effect("unsettled_reading:2").expect("a spec")], &Session::of(&all))
+        .expect("a model");
+    let mut p = extended.nominal();
+    p[extended.index("unsettled_reading:2.share").expect("a parameter")] = 0.1;
+    for o in &all {
+        let mut there = o.clone();
+        there.joint_rad[1] -= 0.1 * o.moved_rad.as_ref().map_or(0.0, |moved| moved[1]);
+        let apart = extended.predicted_tip_in_world(&p, o)
+            - extended.predicted_tip_in_world(&extended.nominal(), &there);
+        assert!(apart.norm() < 1e-12, "{apart}");
+    }
+    // A filter that lets 30 % of a move be missing in the reading: the joint is where a share of -3/7 says.
+    let (from, to) = (0.2_f64, 0.9);
+    let read = to - 0.3 * (to - from);
+    assert!((read + 0.3 / 0.7 * (read - from) - to).abs() < 1e-12);
+    all.iter_mut().for_each(|o| o.moved_rad = None);
+    let refused =
+        model.with_effects(&[model.effect("unsettled_reading:2").expect("a spec")], &Session::of(&all));
+    assert!(refused.expect_err("no moves").to_string().contains("rested before"));
+}
+
+#[test]
+fn an_undeclared_load_bends_the_joints_like_a_declared_one() {
+    let model = paper();
+    let mut all = observations(&model, 30, true);
+    all.iter_mut().for_each(|o| o.load_kg = 0.0);
+    let session = Session::of(&all);
+    let hidden =
+        model.with_effects(&[model.effect("undeclared_load@1").expect("a spec")], &session).expect("a model");
+    // A kilogram on springs of 500 and 200 N m/rad.
+    let springs = [500.0, 200.0];
+    let mut loaded = all.clone();
+    loaded.iter_mut().for_each(|o| o.load_kg = 1.0);
+    let known = ["compliance:2", "compliance:3"].map(|text| model.effect(text).expect("a spec"));
+    let known = model.with_effects(&known, &Session::of(&loaded)).expect("a model");
+    let (mut p, mut q) = (hidden.nominal(), known.nominal());
+    let reach_m = [model.zero_pose().link_m(1), model.zero_pose().link_m(2)].map(|(a, b)| (b - a).norm());
+    for (k, spring) in springs.iter().enumerate() {
+        let stretched_nm = G * reach_m[k..].iter().sum::<f64>();
+        p[hidden.index(&format!("undeclared_load@1.yield{}", k + 2)).expect("a parameter")] =
+            stretched_nm / spring;
+        q[known.index(&format!("compliance:{}.compliance_load", k + 2)).expect("a parameter")] = 1.0 / spring;
+    }
+    for (o, loaded) in all.iter().zip(&loaded) {
+        let expected = if o.dwell.recording == 1 { loaded } else { o };
+        let apart = hidden.predicted_tip_in_world(&p, o) - known.predicted_tip_in_world(&q, expected);
+        assert!(apart.norm() < 1e-9, "{}: {apart}", o.dwell);
+    }
+    assert!(model.effect("undeclared_load").and_then(|spec| model.with_effects(&[spec], &session)).is_err());
+}
+
+#[test]
 fn what_gravity_bends_may_rest_while_a_cavity_holds_the_tip() {
     let both = observations(&paper(), 20, false);
     for text in ["compliance:2", "link_bending:1", "base_compliance", "gravity_backlash:2"] {

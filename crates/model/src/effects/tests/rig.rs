@@ -110,6 +110,7 @@ pub fn observations(model: &Model, count: usize, tracked_only: bool) -> Vec<Obse
                 joints.iter().zip(&o.arrival).map(memory).collect()
             });
             o.effort_nm = Some((0..n).map(|_| random.within(-20.0, 20.0)).collect());
+            o.moved_rad = (i > 0).then(|| (0..n).map(|_| random.within(-0.8, 0.8)).collect());
             o.joint_velocity_radps = Some((0..n).map(|_| random.within(-0.5, 0.5)).collect());
             o.temperature_c = Some(20.0 + 6.0 * random.next());
             o.load_kg = if random.next() < 0.5 { 0.0 } else { 0.5 };
