@@ -127,6 +127,23 @@ fn iiwa14_without_a_camera() {
     assert_every_dwell(&summary, &real.join("mukca_iiwa14"));
 }
 
+/// Plastic gears whose backlash nobody can find in it, because the replay does not carry directions of arrival: an
+/// independent least squares leaves 3.1 mm on placements left out (datasets.md of the project's notes), and no static term a
+/// joint helps there. What armcal names must help there, or it names nothing.
+#[test]
+fn gen3lite_without_a_camera_gets_no_name_that_does_not_help() {
+    let Some((real, summary)) = run("mukca-gen3lite.toml") else { return };
+    assert_sound(&summary);
+    let [nominal, fitted] = held_out_mm(&summary);
+    assert!(fitted <= 3.5 && nominal > 1.5 * fitted, "{nominal} -> {fitted} mm");
+    let named = summary.pointer("/diagnosis/effects").and_then(Value::as_array).map_or(0, Vec::len);
+    let after = number(&summary, "/diagnosis/holdout_mm/after");
+    let word = &summary["diagnosis"]["verdict"];
+    println!("mukca-gen3lite.toml: {word}, {named} effects, {fitted:.3} -> {after:.3} mm");
+    assert!(if named == 0 { word == "unexplained" } else { after < 0.95 * fitted }, "{word} {after}");
+    assert_every_dwell(&summary, &real.join("mukca_gen3lite"));
+}
+
 /// Without the diagnosis of 1,495 poses, which takes minutes without optimisation.
 #[test]
 fn ur10_seen_by_a_laser_tracker() {

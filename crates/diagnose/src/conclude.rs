@@ -74,6 +74,7 @@ impl Diagnosis {
             self.tentative.clear();
         } else {
             self.warnings.extend(refitted.as_ref().filter(|_| shown == Some(ShownBy::Fitted)).map(by_fitted));
+            self.warnings.extend(refitted.iter().flat_map(|r| r.warnings.iter().cloned()));
             self.refitted = refitted.map(Box::new);
         }
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);

@@ -193,6 +193,8 @@ pub struct Refitted {
     pub model: Model,
     /// Its calibration, on the observations and the hold-out of the one without.
     pub calibration: Calibration,
+    /// What the user should know of it.
+    pub warnings: Vec<Warning>,
 }
 
 /// An error before and after [mm].

@@ -81,7 +81,7 @@ fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitt
     }
     let model = model.with_effects(&effects, session).ok()?;
     let calibration = calibrate(&model, observations, fit, holdout).ok()?;
-    Some(Refitted { effects, model, calibration })
+    Some(Refitted { effects, model, calibration, warnings: Vec::new() })
 }
 
 /// Refits the model with accepted effects, each set of effects once: all observations fit, some of them weigh.

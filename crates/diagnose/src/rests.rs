@@ -22,8 +22,8 @@ const NEGLIGIBLE: f64 = 0.1;
 const WHOLE: f64 = 1.25;
 
 impl Diagnosis {
-    /// The calibration with what was found, joints resting in gaps that were found where the scatter is theirs. Names and
-    /// warnings follow it.
+    /// The calibration with what was found, joints resting in gaps that were found where the scatter is theirs. Names
+    /// follow it.
     pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, refitted: Refitted) -> Refitted {
         let Some((spec, joint, part)) = self.rest(calibrated, &refitted) else { return refitted };
         let named = spec.clone().with(REST, part);
@@ -44,8 +44,8 @@ impl Diagnosis {
             calibration.noise_floor_m * 1e3,
             refitted.calibration.noise_floor_m * 1e3
         );
-        self.warnings.push(Warning::new(Severity::Notice, Stage::Diagnose, "rests-in-play", new, message));
-        Refitted { effects, model, calibration }
+        let warnings = vec![Warning::new(Severity::Notice, Stage::Diagnose, "rests-in-play", new, message)];
+        Refitted { effects, model, calibration, warnings }
     }
 
     /// The gap that was found, its joint, and the part of it in which the joint rests; none where the scatter is not certainly

@@ -273,7 +273,7 @@ pub const CAUSES: &[Cause] = &[
         "board-moved",
         &["board-moved", "board-turned", "table-bumped", "body-moved", "frame-moved", "frame-declared"],
         &["board moved", "board is moved", "board is shifted", "moved by", "beside"],
-        &["frame_shift"],
+        &["frame_shift", "board_shift"],
     ),
     row(
         "seat-height",
@@ -363,7 +363,7 @@ pub const CAUSES: &[Cause] = &[
         "table-bumped",
         &["table-bumped", "board-moved", "body-moved", "frame-moved"],
         &["moved", "bumped"],
-        &["frame_shift"],
+        &["frame_shift", "board_shift"],
     ),
     row(
         "camera-bumped",
