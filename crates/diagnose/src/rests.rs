@@ -18,20 +18,21 @@ use armcal_model::EffectSpec;
 const REST: &str = "rest";
 /// A part of the gap below which it makes no difference.
 const NEGLIGIBLE: f64 = 0.1;
-/// An estimate this far above the whole gap still is the whole gap: chance.
-const WHOLE: f64 = 1.25;
+/// No joint rests in more than its gap; how wide that is, the directions of arrival tell.
+const WHOLE: f64 = 1.0;
+
+/// Rounds in which the part of the gap and the fit that it weighs settle.
+const ROUNDS: usize = 4;
+/// A part that changes by less has settled.
+const SETTLED: f64 = 0.02;
 
 impl Diagnosis {
     /// The calibration with what was found, joints resting in gaps that were found where the scatter is theirs. Names
     /// follow it.
-    pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, refitted: Refitted) -> Refitted {
-        let Some((spec, joint, part)) = self.rest(calibrated, &refitted) else { return refitted };
-        let named = spec.clone().with(REST, part);
-        let with_rest = |e: &EffectSpec| if *e == spec { named.clone() } else { e.clone() };
-        let effects: Vec<EffectSpec> = refitted.effects.iter().map(with_rest).collect();
-        let Calibrated { model, observations, session, fit, holdout, .. } = *calibrated;
-        let Ok(model) = model.with_effects(&effects, session) else { return refitted };
-        let Ok(calibration) = calibrate(&model, observations, fit, holdout) else { return refitted };
+    pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, found: Refitted) -> Refitted {
+        let Some((spec, joint)) = self.loose(&found) else { return found };
+        let Some((named, refitted)) = settled(calibrated, &found, &spec, joint) else { return found };
+        let part = named.shape.iter().find(|(name, _)| name == REST).map_or(0.0, |(_, part)| *part);
         let (old, new) = (spec.to_string(), named.to_string());
         let names = self.effects.iter_mut().flat_map(|e| std::iter::once(&mut e.name).chain(&mut e.set));
         names.chain(&mut self.names).filter(|name| **name == old).for_each(|name| name.clone_from(&new));
@@ -41,33 +42,63 @@ impl Diagnosis {
              takes it away",
             joint + 1,
             100.0 * part,
-            calibration.noise_floor_m * 1e3,
-            refitted.calibration.noise_floor_m * 1e3
+            refitted.calibration.noise_floor_m * 1e3,
+            found.calibration.noise_floor_m * 1e3
         );
         let warnings = vec![Warning::new(Severity::Notice, Stage::Diagnose, "rests-in-play", new, message)];
-        Refitted { effects, model, calibration, warnings }
+        Refitted { warnings, ..refitted }
     }
 
-    /// The gap that was found, its joint, and the part of it in which the joint rests; none where the scatter is not certainly
-    /// that of the joint, or larger than the gap.
-    fn rest(&self, calibrated: &Calibrated<'_>, refitted: &Refitted) -> Option<(EffectSpec, usize, f64)> {
+    /// A gap that was found, and its joint, where the scatter that is left is certainly of that joint.
+    fn loose(&self, found: &Refitted) -> Option<(EffectSpec, usize)> {
         let (kind, _) = self.noise.correlated()?;
-        let values = refitted.calibration.fit.values();
-        let gaps = refitted.model.gaps(&values).into_iter();
-        let (spec, joint, width) = gaps
-            .filter(|(spec, joint, _)| {
-                *Noise::Slack(*joint).word() == *kind && refitted.effects.contains(spec)
-            })
-            .find(|(spec, ..)| spec.shape.iter().all(|(name, _)| name != REST))?;
-        let variance = own_variance(calibrated, refitted, &values, joint)?;
-        let part = (12.0 * variance).sqrt() / width.abs();
-        let told = (NEGLIGIBLE..=WHOLE).contains(&part);
-        told.then(|| (spec, joint, (100.0 * part.min(1.0)).round() / 100.0))
+        let gaps = found.model.gaps(&found.calibration.fit.values()).into_iter();
+        // A link that leads in the hand of a servo is no link in a gap.
+        gaps.filter(|(spec, _, width)| *width > 0.0 || spec.shape.is_empty())
+            .filter(|(spec, joint, _)| *Noise::Slack(*joint).word() == *kind && found.effects.contains(spec))
+            .find(|(spec, ..)| spec.shape.iter().all(|(name, _)| name != REST))
+            .map(|(spec, joint, _)| (spec, joint))
     }
 }
 
-/// Variance of a joint's own angle from dwell to dwell beyond what the noise of each explains [rad^2] (prismatic: [m^2]):
-/// the weighted mean of the squared implied errors less their variances.
+/// The gap with the part of it in which its joint rests, and the fit that weighs its dwells by that; none where that is
+/// nothing, or more than the gap.
+fn settled(
+    calibrated: &Calibrated<'_>,
+    found: &Refitted,
+    spec: &EffectSpec,
+    joint: usize,
+) -> Option<(EffectSpec, Refitted)> {
+    let Calibrated { model, observations, session, fit, holdout, .. } = *calibrated;
+    let (mut part, mut now) = (0.0, found.clone());
+    for _ in 0..ROUNDS {
+        let next = part_of_gap(calibrated, &now, joint, part)?;
+        if (next - part).abs() < SETTLED {
+            break;
+        }
+        part = next;
+        let named = spec.clone().with(REST, part);
+        let with_rest = |e: &EffectSpec| if e == spec { named.clone() } else { e.clone() };
+        let effects: Vec<EffectSpec> = found.effects.iter().map(with_rest).collect();
+        let model = model.with_effects(&effects, session).ok()?;
+        let calibration = calibrate(&model, observations, fit, holdout).ok()?;
+        now = Refitted { effects, model, calibration, warnings: Vec::new() };
+    }
+    let named = now.effects.iter().find(|e| e.kind == spec.kind && e.target == spec.target)?.clone();
+    Some((named, now))
+}
+
+/// The part of its gap in which a joint rests, from a fit that assumed `assumed` of it.
+fn part_of_gap(calibrated: &Calibrated<'_>, now: &Refitted, joint: usize, assumed: f64) -> Option<f64> {
+    let values = now.calibration.fit.values();
+    let (_, _, width) = now.model.gaps(&values).into_iter().find(|(_, of, _)| *of == joint)?;
+    let variance = (assumed * width).powi(2) / 12.0 + own_variance(calibrated, now, &values, joint)?;
+    let part = (12.0 * variance.max(0.0)).sqrt() / width.abs();
+    (NEGLIGIBLE..=WHOLE).contains(&part).then(|| (100.0 * part).round() / 100.0)
+}
+
+/// Variance of a joint's own angle from dwell to dwell beyond what the noise of each explains [rad^2] (prismatic: [m^2]),
+/// negative where that is less: the weighted mean of the squared implied errors less their variances.
 fn own_variance(
     calibrated: &Calibrated<'_>,
     refitted: &Refitted,
@@ -87,5 +118,5 @@ fn own_variance(
         sum += weight * (e.error.powi(2) - e.sigma.powi(2));
         weights += weight;
     }
-    (weights > 0.0 && sum > 0.0).then(|| sum / weights)
+    (weights > 0.0).then(|| sum / weights)
 }

@@ -120,8 +120,7 @@ impl View<'_> {
             let axis = &linear.axes[*column];
             let parameter = &model.parameters()[axis.index];
             let name = parameter.name.strip_prefix(&prefix).unwrap_or(&parameter.name).to_owned();
-            let never_negative =
-                effect.kind.never_negative.contains(&name.trim_end_matches(|c: char| c.is_ascii_digit()));
+            let never_negative = effect.never_negative(&name);
             Amplitude { name, unit: parameter.unit, typical: axis.scale, never_negative }
         };
         Candidate {

@@ -199,11 +199,6 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
         // The fitted width takes the mean: from 1/2 to 1/10 of the gap are 0.6 of it, and the spread is 2/3 of that.
         let rest: f64 = name.rsplit_once('=').unwrap().1.parse().unwrap();
         let refitted = &d.refitted.as_ref().unwrap().calibration;
-        println!(
-            "seed {seed}: {name}, {:.2} floors, {:.2} before",
-            refitted.times_floor(),
-            before.times_floor()
-        );
         assert!((0.5..0.85).contains(&rest) && (0.85..1.2).contains(&refitted.times_floor()), "{name}");
         assert!(d.unexplained.is_none() && d.warnings.iter().any(|w| w.code == "rests-in-play"));
         // It stays so when it is added.

@@ -96,7 +96,7 @@ fn slack_ends_at_the_flanks() {
         [("rest=0.5", 0.25, Some(0.25)), ("seated=0,rest=0.6", 1.0, Some(0.36)), ("rest=0", 0.0, None)]
     {
         let spec = geometry.effect(&format!("backlash:1,{text}")).unwrap();
-        let model = geometry.with_effects(&[spec.clone()], &Session::of(&observations)).unwrap();
+        let model = geometry.with_effects(std::slice::from_ref(&spec), &Session::of(&observations)).unwrap();
         let mut p = model.nominal();
         p[geometry.parameters().len()] = WIDTH_RAD;
         let part = |o: &Observation| model.slack(&p, o).first().map(|(_, v)| 12.0 * v / WIDTH_RAD.powi(2));

@@ -12,7 +12,8 @@
 //! of the encoder's last move, however small, because a link that leads pushes the encoder from the flank it touches.
 //!
 //! # Parameters and units
-//! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand.
+//! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand; never where
+//! `seated` says that a hand led it into the cavities only.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip, negative where a hand led the
 //! link there and it lags elsewhere. Where it is between -1 and 1, nothing holds the joint on a flank there: it rests
 //! anywhere in its gap, with variance `(b/2)^2 (1 - seated^2) / 3`: at 0 that of an even spread over the gap. Nothing

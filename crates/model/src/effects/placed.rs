@@ -1,7 +1,7 @@
 //! The effects of a model: placing them and evaluating them together.
 
 use super::drivers::{Drivers, NominalPose};
-use super::kind::{EffectKind, Placement};
+use super::kind::{EffectKind, Family, Placement};
 use super::physics::{AnyPhysics, Deformation, Slot};
 use super::placing::Placing;
 use super::session::Session;
@@ -49,6 +49,17 @@ impl PlacedEffect {
 
     fn acts_in(&self, dwell: DwellId) -> bool {
         self.spec.since.is_none_or(|since| since.holds(dwell))
+    }
+
+    /// Whether physics does not let one of its amplitudes be negative, by its name without the spec.
+    ///
+    /// A link that leads its motor belongs to an arm that is led by hand. Where a spec says that a lost motion acts in
+    /// another way in cavities, a servo holds the arm elsewhere, and there a link only lags.
+    pub fn never_negative(&self, amplitude: &str) -> bool {
+        let quantity = amplitude.trim_end_matches(|c: char| c.is_ascii_digit());
+        let lags = self.kind.family == Family::LostMotion
+            && self.spec.shape.iter().any(|(name, share)| name == state::SEATED.name && *share != 1.0);
+        self.kind.never_negative.contains(&quantity) || (lags && matches!(quantity, "width" | "windup"))
     }
 }
 

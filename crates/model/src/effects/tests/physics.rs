@@ -273,6 +273,24 @@ fn a_hand_that_leads_the_link_leaves_it_on_the_other_flank() {
 }
 
 #[test]
+fn a_link_leads_only_where_a_hand_may_have_led_it() {
+    let (model, all) = (paper(), observations(&paper(), 20, false));
+    let of = |text: &str, amplitude: &str| {
+        let placed =
+            model.with_effects(&[model.effect(text).expect("a spec")], &Session::of(&all)).expect("a model");
+        placed.effects()[0].never_negative(amplitude)
+    };
+    assert!(
+        !of("backlash:1", "width") && !of("backlash:1,seated=1", "width") && !of("zero_slip:1@1", "slip")
+    );
+    assert!(of("backlash:1,seated=-1", "width") && of("friction_windup:2,seated=0", "windup"));
+    assert!(
+        !of("friction_windup:2,seated=0", "windup_outer") && !of("compliance:2,seated=0", "compliance_outer")
+    );
+    assert!(of("compliance:2", "compliance") && of("arm_compliance", "compliance2"));
+}
+
+#[test]
 fn an_unsettled_joint_lacks_a_share_of_its_last_move() {
     let model = paper();
     let mut all = observations(&model, 6, true);
