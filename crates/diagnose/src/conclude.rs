@@ -140,9 +140,8 @@ fn at_floor(calibration: &Calibration, config: &DiagnosisConfig) -> bool {
 /// noise does not learn, may give by chance: whatever looks like structure in them is too small to be worth a claim without
 /// a name.
 fn noise_alone(calibration: &Calibration, share: f64) -> bool {
-    let judged = calibration.residuals.iter().filter(|r| r.held_out == calibration.held_out());
     let (mut excess_m, mut variance_m2) = (0.0, 0.0);
-    for r in judged {
+    for r in calibration.judged_residuals() {
         let expected_m = share * calibration.prediction_factor * r.expected_norm_m;
         excess_m += r.fitted_m.norm() - expected_m;
         variance_m2 += (SPREAD_OF_NORM * expected_m).powi(2);

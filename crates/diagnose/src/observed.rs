@@ -12,7 +12,7 @@ use armcal_calibrate::{
     Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem, inner, linearise,
 };
 use armcal_core::Observation;
-use armcal_model::{Model, Session};
+use armcal_model::{EffectSpec, Model, Session};
 use std::collections::BTreeMap;
 
 /// A calibrated model, and what it was calibrated with.
@@ -30,6 +30,15 @@ pub struct Calibrated<'a> {
     pub fit: &'a FitConfig,
     /// What was held out.
     pub holdout: &'a HoldoutConfig,
+}
+
+impl Calibrated<'_> {
+    /// The model with more effects, on the same observations and hold-out; none where this leaves no way to fit it.
+    pub(crate) fn with(&self, effects: Vec<EffectSpec>) -> Option<Refitted> {
+        let model = self.model.with_effects(&effects, self.session).ok()?;
+        let calibration = calibrate(&model, self.observations, self.fit, self.holdout).ok()?;
+        Some(Refitted { effects, model, calibration, warnings: Vec::new() })
+    }
 }
 
 /// Diagnoses a calibrated model: which effect do its observations ask for?
@@ -74,14 +83,8 @@ fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
 /// The model with everything that was found, on the same observations and hold-out. None where nothing was found, or
 /// where this hold-out leaves no way to fit it.
 fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {
-    let Calibrated { model, observations, session, fit, holdout, .. } = *calibrated;
-    let effects = diagnosis.suggested(model.chain().joint_names()).ok()?;
-    if effects.is_empty() {
-        return None;
-    }
-    let model = model.with_effects(&effects, session).ok()?;
-    let calibration = calibrate(&model, observations, fit, holdout).ok()?;
-    Some(Refitted { effects, model, calibration, warnings: Vec::new() })
+    let effects = diagnosis.suggested(calibrated.model.chain().joint_names()).ok()?;
+    if effects.is_empty() { None } else { calibrated.with(effects) }
 }
 
 /// Refits the model with accepted effects, each set of effects once: all observations fit, some of them weigh.

@@ -9,7 +9,6 @@ use crate::diagnosis::{Diagnosis, Refitted};
 use crate::implied::{BLURRED, ImpliedError, implied_joint_errors};
 use crate::noise::Noise;
 use crate::observed::Calibrated;
-use armcal_calibrate::calibrate;
 use armcal_core::robust::median;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_model::EffectSpec;
@@ -31,9 +30,8 @@ impl Diagnosis {
     /// follow it.
     pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, found: Refitted) -> Refitted {
         let Some((spec, joint)) = self.loose(&found) else { return found };
-        let Some((named, refitted)) = settled(calibrated, &found, &spec, joint) else { return found };
-        let part = named.shape.iter().find(|(name, _)| name == REST).map_or(0.0, |(_, part)| *part);
-        let (old, new) = (spec.to_string(), named.to_string());
+        let Some((part, refitted)) = settled(calibrated, &found, &spec, joint) else { return found };
+        let (old, new) = (spec.to_string(), spec.with(REST, part).to_string());
         let names = self.effects.iter_mut().flat_map(|e| std::iter::once(&mut e.name).chain(&mut e.set));
         names.chain(&mut self.names).filter(|name| **name == old).for_each(|name| name.clone_from(&new));
         let message = format!(
@@ -61,15 +59,14 @@ impl Diagnosis {
     }
 }
 
-/// The gap with the part of it in which its joint rests, and the fit that weighs its dwells by that; none where that is
+/// The part of the gap in which its joint rests, and the fit that weighs its dwells by that; none where that is
 /// nothing, or more than the gap.
 fn settled(
     calibrated: &Calibrated<'_>,
     found: &Refitted,
     spec: &EffectSpec,
     joint: usize,
-) -> Option<(EffectSpec, Refitted)> {
-    let Calibrated { model, observations, session, fit, holdout, .. } = *calibrated;
+) -> Option<(f64, Refitted)> {
     let (mut part, mut now) = (0.0, found.clone());
     for _ in 0..ROUNDS {
         let next = part_of_gap(calibrated, &now, joint, part)?;
@@ -80,12 +77,9 @@ fn settled(
         let named = spec.clone().with(REST, part);
         let with_rest = |e: &EffectSpec| if e == spec { named.clone() } else { e.clone() };
         let effects: Vec<EffectSpec> = found.effects.iter().map(with_rest).collect();
-        let model = model.with_effects(&effects, session).ok()?;
-        let calibration = calibrate(&model, observations, fit, holdout).ok()?;
-        now = Refitted { effects, model, calibration, warnings: Vec::new() };
+        now = calibrated.with(effects)?;
     }
-    let named = now.effects.iter().find(|e| e.kind == spec.kind && e.target == spec.target)?.clone();
-    Some((named, now))
+    Some((part, now))
 }
 
 /// The part of its gap in which a joint rests, from a fit that assumed `assumed` of it.

@@ -46,9 +46,7 @@ pub fn detect_dwells(
     let mut dwells: Vec<Dwell> = Vec::with_capacity(found.rows.len());
     for (dwell, rows) in found.rows.iter().enumerate() {
         let creeps = found.crept_rad.contains_key(&dwell);
-        let own = summary.dwell(DwellId { recording, dwell }, rows, &history, creeps);
-        let moved_rad = dwells.last().map(|before| moved_rad(before, &own));
-        dwells.push(Dwell { moved_rad, ..own });
+        dwells.push(summary.dwell(DwellId { recording, dwell }, rows, &history, creeps, dwells.last()));
     }
     let warnings = summary.warnings(&found, &dwells);
     Ok((dwells, warnings))
@@ -63,7 +61,14 @@ struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    fn dwell(&self, id: DwellId, rows: &Range<usize>, history: &History<'_>, creeps: bool) -> Dwell {
+    fn dwell(
+        &self,
+        id: DwellId,
+        rows: &Range<usize>,
+        history: &History<'_>,
+        creeps: bool,
+        before: Option<&Dwell>,
+    ) -> Dwell {
         let joints = &self.samples.joints;
         let (start_ns, end_ns) = (joints.time_ns[rows.start], joints.time_ns[rows.end - 1]);
         let means = joint_means(joints, rows, &self.encoders.step_rad, creeps);
@@ -81,7 +86,7 @@ impl Summary<'_> {
             arrival: history.arrival(rows.start, &joint_rad),
             path_memory_rad: history.path_memory(rows.start, &joint_rad),
             pair_memory_rad: history.pair_memory(rows.start, &joint_rad),
-            moved_rad: None,
+            moved_rad: before.map(|before| moved_rad(&before.joint_rad, &joint_rad)),
             joint_rad,
             tip: self.tip_of(start_ns, end_ns, creeps),
             temperature_c: stream
@@ -230,8 +235,8 @@ impl Summary<'_> {
 }
 
 /// How far each joint went from one dwell to the next [rad].
-fn moved_rad(from: &Dwell, to: &Dwell) -> Vec<f64> {
-    to.joint_rad.iter().zip(&from.joint_rad).map(|(to, from)| to - from).collect()
+fn moved_rad(from_rad: &[f64], to_rad: &[f64]) -> Vec<f64> {
+    to_rad.iter().zip(from_rad).map(|(to, from)| to - from).collect()
 }
 
 /// The first few of a list of dwells, in words.

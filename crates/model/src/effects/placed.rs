@@ -57,8 +57,7 @@ impl PlacedEffect {
     /// another way in cavities, a servo holds the arm elsewhere, and there a link only lags.
     pub fn never_negative(&self, amplitude: &str) -> bool {
         let quantity = amplitude.trim_end_matches(|c: char| c.is_ascii_digit());
-        let lags = self.kind.family == Family::LostMotion
-            && self.spec.shape.iter().any(|(name, share)| name == state::SEATED.name && *share != 1.0);
+        let lags = self.kind.family == Family::LostMotion && state::servo_elsewhere(&self.spec);
         self.kind.never_negative.contains(&quantity) || (lags && matches!(quantity, "width" | "windup"))
     }
 }

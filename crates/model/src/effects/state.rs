@@ -12,6 +12,7 @@ use super::drivers::Drivers;
 use super::kind::Shape;
 use super::physics::{AnyPhysics, Deformation};
 use super::placing::Placing;
+use super::spec::EffectSpec;
 use armcal_core::{Observation, Parameter, Unit};
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -86,6 +87,11 @@ pub(super) fn in_state(
     }
 }
 
+/// Whether a spec says that what acts in cavities is another share of what acts elsewhere: then a servo holds the arm there.
+pub(super) fn servo_elsewhere(spec: &EffectSpec) -> bool {
+    spec.shape.iter().any(|(name, share)| name == SEATED.name && *share != 1.0)
+}
+
 fn seated(x: &Drivers<'_>) -> bool {
     x.observation.cavity().is_some()
 }
@@ -101,26 +107,30 @@ struct InState {
 }
 
 impl InState {
-    /// The parameters with their amplitudes as they count in a cavity; `None` where they count as everywhere.
-    fn in_part<T: Copy + MulAssign>(&self, theta: &[T], x: &Drivers<'_>) -> Option<Vec<T>> {
-        let share = self.share.filter(|_| seated(x))?;
+    /// The parameters with their amplitudes times the one that stands at `share`.
+    fn in_part<T: Copy + MulAssign>(&self, theta: &[T], share: usize) -> Vec<T> {
         let mut own = theta.to_vec();
         own[..self.amplitudes].iter_mut().for_each(|a| *a *= theta[share]);
-        Some(own)
+        own
+    }
+
+    /// Where the share of the amplitudes stands that acts in an observation, if not all of them do.
+    fn share_in(&self, x: &Drivers<'_>) -> Option<usize> {
+        self.share.filter(|_| seated(x))
     }
 }
 
 impl AnyPhysics for InState {
     fn predict(&self, theta: &[f64], x: &Drivers<'_>, change: &mut Deformation<f64>) {
-        match self.in_part(theta, x).filter(|_| self.share.is_some_and(|share| theta[share] != 1.0)) {
-            Some(own) => self.physics.predict(&own, x, change),
+        match self.share_in(x).filter(|share| theta[*share] != 1.0) {
+            Some(share) => self.physics.predict(&self.in_part(theta, share), x, change),
             None => self.physics.predict(theta, x, change),
         }
     }
 
     fn differentiate(&self, theta: &[Dual64], x: &Drivers<'_>, change: &mut Deformation<Dual64>) {
-        match self.in_part(theta, x) {
-            Some(own) => self.physics.differentiate(&own, x, change),
+        match self.share_in(x) {
+            Some(share) => self.physics.differentiate(&self.in_part(theta, share), x, change),
             None => self.physics.differentiate(theta, x, change),
         }
     }

@@ -70,9 +70,9 @@ fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -
 /// free poses.
 pub fn unsettled_reading(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
     config.task.free.by_hand = false;
-    config.task.free.hold_s = [config.task.free.hold_s[1]; 2];
-    let time_constant_s = config.task.free.hold_s[1] / -draw.size.ln();
-    let lag = Lag { joint: draw.joint, time_constant_s, before: None };
+    let [_, longest_s] = config.task.free.hold_s;
+    config.task.free.hold_s = [longest_s; 2];
+    let lag = Lag { joint: draw.joint, time_constant_s: longest_s / -draw.size.ln(), before: None };
     let enters = [draw.joint_channel(), format!("s{}", draw.joint)];
     let made = made(MechanismConfig::Lag(lag), draw.at_joint("unsettled_reading"), enters);
     Ok(made
