@@ -27,7 +27,7 @@ const CHANCE: f64 = 2.58;
 
 /// Where more than this many times the floor remains, a name stays only if it explains at least this share of what lay above
 /// the floor: what leaves the most unexplained has only leaned on another cause.
-const LARGE_REST: f64 = 2.0;
+pub(crate) const LARGE_REST: f64 = 2.0;
 const LEAST_EXPLAINED: f64 = 0.5;
 
 /// What the verdict is settled with.
@@ -47,39 +47,44 @@ impl Diagnosis {
     pub(crate) fn conclude(&mut self, evidence: Evidence<'_>, config: &DiagnosisConfig) {
         let Evidence { before, observations, refitted, joint_names } = evidence;
         let after = refitted.as_ref().map(|r| &r.calibration);
-        let mm = |c: &Calibration| c.judged().fitted.mean_m * 1e3;
         self.judged = if before.held_out() { JudgedOn::HeldOut } else { JudgedOn::Fitted };
-        self.holdout_mm = BeforeAfter { before: mm(before), after: mm(after.unwrap_or(before)) };
+        self.holdout_mm = BeforeAfter { before: error_mm(before), after: error_mm(after.unwrap_or(before)) };
         self.floor_mm = before.noise_floor_m * 1e3;
 
-        let mut refuted = Vec::new();
-        let left = left_over(after.unwrap_or(before));
         let least = after.map_or(f64::INFINITY, Calibration::times_floor).min(self.noise.sigma_ratio);
         let noise_alone = noise_alone(before, least.min(1.0));
         let shown = after.map(|after| shown_by(before, after, observations, config));
         let withheld = (self.verdict == Verdict::Unknown && noise_alone)
-            || after.is_some_and(|after| {
-                shown == Some(ShownBy::Nothing)
-                    || left > config.unexplained_factor
-                    || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
-            });
+            || after.is_some_and(|after| shown == Some(ShownBy::Nothing) || leans(before, after, config));
+        let mut refuted = Vec::new();
         if withheld {
-            let names =
-                refitted.iter().map(|r| r.effects.iter().map(ToString::to_string).collect::<Vec<_>>());
-            refuted.extend(names.map(|names| (names.join(" + "), self.holdout_mm)));
-            self.holdout_mm.after = self.holdout_mm.before;
-            self.effects.clear();
-            self.unlisted.clear();
-            self.unknown = None;
-            self.tentative.clear();
+            refuted.extend(refitted.map(|r| (together(&r), self.holdout_mm)));
+            self.take_back();
         } else {
             self.warnings.extend(refitted.as_ref().filter(|_| shown == Some(ShownBy::Fitted)).map(by_fitted));
             self.warnings.extend(refitted.iter().flat_map(|r| r.warnings.iter().cloned()));
             self.refitted = refitted.map(Box::new);
         }
-        let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
         let improbable = self.p_nothing < config.max_probability_nothing;
         let agrees = at_floor(before, config) && (noise_alone || !improbable);
+        self.settle(withheld, agrees, improbable);
+        self.tell_unexplained(before, observations, joint_names, refuted, config);
+        lead(self, observations, joint_names);
+        self.explanations = explanations(self, config);
+    }
+
+    /// Takes back everything that was found: the refit does not confirm it.
+    fn take_back(&mut self) {
+        self.holdout_mm.after = self.holdout_mm.before;
+        self.effects.clear();
+        self.unlisted.clear();
+        self.unknown = None;
+        self.tentative.clear();
+    }
+
+    /// The verdict, of what was found in the linearised model, whether that is `withheld`, whether the data agree with
+    /// nothing missing, and whether that is improbable.
+    fn settle(&mut self, withheld: bool, agrees: bool, improbable: bool) {
         self.verdict = match self.verdict {
             Verdict::NothingMissing if agrees => Verdict::NothingMissing,
             Verdict::NothingMissing | Verdict::Unexplained => Verdict::Unexplained,
@@ -96,39 +101,60 @@ impl Diagnosis {
             Verdict::Unexplained => None,
             _ => self.probability,
         };
-        let times_floor = left_over(settled);
-        let unexplained = self.verdict == Verdict::Unexplained
-            || (self.verdict != Verdict::NothingMissing && times_floor > config.floor_factor);
-        if unexplained {
-            let errors: Vec<DwellError<'_>> = settled
-                .residuals
-                .iter()
-                .zip(observations)
-                .filter(|(r, _)| r.held_out == settled.held_out())
-                .map(|(r, observation)| DwellError {
-                    observation,
-                    error_m: r.fitted_m.norm(),
-                    expected_m: r.expected_norm_m,
-                })
-                .collect();
-            let unexplained = Unexplained {
-                error_mm: mm(settled),
-                floor_mm: settled.noise_floor_m * 1e3,
-                times_floor: settled.times_floor(),
-                places: error_places(&errors, joint_names),
-                scatter: self.noise.correlated().map(|(kind, _)| kind.to_owned()),
-                tried: Tried {
-                    listed: self.candidates.len(),
-                    unlisted: self.tried_unlisted,
-                    refitted: refuted,
-                },
-            };
-            self.warnings.extend(warning(self.verdict, &unexplained, times_floor, config));
-            self.unexplained = Some(unexplained);
-        }
-        lead(self, observations, joint_names);
-        self.explanations = explanations(self, config);
     }
+
+    /// What is neither explained nor at the floor: how much, where, and what was tried, `refuted` names among it.
+    fn tell_unexplained(
+        &mut self,
+        before: &Calibration,
+        observations: &[Observation],
+        joint_names: &[String],
+        refuted: Vec<(String, BeforeAfter)>,
+        config: &DiagnosisConfig,
+    ) {
+        let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
+        let times_floor = left_over(settled);
+        let beside_names = self.verdict != Verdict::NothingMissing && times_floor > config.floor_factor;
+        if self.verdict != Verdict::Unexplained && !beside_names {
+            return;
+        }
+        let judged =
+            settled.residuals.iter().zip(observations).filter(|(r, _)| r.held_out == settled.held_out());
+        let errors: Vec<DwellError<'_>> = judged
+            .map(|(r, observation)| DwellError {
+                observation,
+                error_m: r.fitted_m.norm(),
+                expected_m: r.expected_norm_m,
+            })
+            .collect();
+        let unexplained = Unexplained {
+            error_mm: error_mm(settled),
+            floor_mm: settled.noise_floor_m * 1e3,
+            times_floor: settled.times_floor(),
+            places: error_places(&errors, joint_names),
+            scatter: self.noise.correlated().map(|(kind, _)| kind.to_owned()),
+            tried: Tried { listed: self.candidates.len(), unlisted: self.tried_unlisted, refitted: refuted },
+        };
+        self.warnings.extend(unexplained.warning(self.verdict, times_floor, config));
+        self.unexplained = Some(unexplained);
+    }
+}
+
+/// Mean error by which a calibration is judged [mm].
+fn error_mm(calibration: &Calibration) -> f64 {
+    calibration.judged().fitted.mean_m * 1e3
+}
+
+/// Names of what was refitted together.
+fn together(refitted: &Refitted) -> String {
+    let names: Vec<String> = refitted.effects.iter().map(ToString::to_string).collect();
+    names.join(" + ")
+}
+
+/// Whether what a refit with more effects leaves is so much that they have only leaned on another cause.
+fn leans(before: &Calibration, after: &Calibration, config: &DiagnosisConfig) -> bool {
+    let left = left_over(after);
+    left > config.unexplained_factor || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
 }
 
 /// Whether the calibrated errors are at the floor and scatter about as declared.
@@ -210,63 +236,6 @@ fn left_over(calibration: &Calibration) -> f64 {
     }
 }
 
-/// Errors far above the floor that nothing explains make a result inadequate, whatever was named beside them.
-fn warning(
-    verdict: Verdict,
-    unexplained: &Unexplained,
-    times_floor: f64,
-    config: &DiagnosisConfig,
-) -> Option<Warning> {
-    let alone = verdict == Verdict::Unexplained;
-    let inadequate = match alone {
-        true => unexplained.times_floor > config.floor_factor,
-        false => times_floor > LARGE_REST,
-    };
-    if !alone && !inadequate {
-        return None;
-    }
-    let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
-    let beside = if alone { "" } else { "beside what is named, " };
-    let message = format!("{beside}{}", unexplained.sentence());
-    Some(Warning::new(severity, Stage::Diagnose, "unexplained", "diagnosis", message))
-}
-
-impl Unexplained {
-    /// How much, where, and what was tried, in one sentence without its capital.
-    pub fn sentence(&self) -> String {
-        let much = match self.times_floor.is_finite() {
-            true => format!(
-                "the mean error of {:.3} mm is {:.1} times the noise floor of {:.3} mm",
-                self.error_mm, self.times_floor, self.floor_mm
-            ),
-            false => format!("the mean error is {:.3} mm, and no noise is declared", self.error_mm),
-        };
-        let places: Vec<String> = self
-            .places
-            .iter()
-            .map(|p| {
-                format!(
-                    "{} ({} dwells, {:.3} mm; elsewhere {:.3})",
-                    p.place, p.dwells, p.error_mm, p.elsewhere_mm
-                )
-            })
-            .collect();
-        let places = match places.is_empty() {
-            true => "about alike in all recordings, joint ranges and directions".to_owned(),
-            false => format!("largest against their noise in {}", places.join(" and in ")),
-        };
-        let refitted: Vec<String> = self
-            .tried
-            .refitted
-            .iter()
-            .map(|(names, e)| format!("; {names} would leave {:.3} mm", e.after))
-            .collect();
-        let scatter = self.scatter.as_ref().map_or(String::new(), |kind| format!("; the scatter is {kind}"));
-        format!(
-            "{much}, {places}{scatter}; {} listed effects and {} unlisted shapes were tried and do not explain it{}",
-            self.tried.listed,
-            self.tried.unlisted,
-            refitted.concat()
-        )
-    }
-}
+#[cfg(test)]
+#[path = "tests/conclude.rs"]
+mod tests;

@@ -48,3 +48,34 @@ impl HeldOut {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_an_interval_clear_of_zero_says_anything() {
+        let of = |low: f64, high: f64| HeldOut {
+            before: 1.0,
+            after: 0.9,
+            change_ci95: [low, high],
+            gain: 0.1,
+            p: 0.5,
+            groups: 12,
+        };
+        for (low, high, helps, harms, words) in [
+            (-0.3, -0.1, true, false, "it helps there"),
+            (-0.3, 0.0, false, false, "no more than chance"),
+            (-0.3, 0.1, false, false, "no more than chance"),
+            (0.0, 0.2, false, false, "no more than chance"),
+            (0.1, 0.2, false, true, "it does harm there"),
+        ] {
+            let held_out = of(low, high);
+            assert_eq!((held_out.helps(), held_out.harms(), held_out.verdict()), (helps, harms, words));
+        }
+        assert_eq!(
+            of(-0.3, 0.1).change_text(),
+            "changes the mean error there from 1.000 to 0.900 mm (95 % -0.300 to +0.100)"
+        );
+    }
+}

@@ -60,32 +60,9 @@ pub fn implied_joint_errors(
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
 mod tests {
     use super::*;
+    use crate::tests::planar_arm;
     use armcal_core::{DwellId, Reference};
-    use armcal_model::{Chain, Frames};
     use nalgebra::Matrix3;
-
-    /// A planar arm of two links and a wrist that turns about its own axis, through the tip.
-    const ARM: &str = r#"
-        name = "planar"
-        [[rows]]
-        name = "joint1"
-        theta_deg = 0.0
-        d_mm = 0.0
-        a_mm = 400.0
-        alpha_deg = 0.0
-        [[rows]]
-        name = "joint2"
-        theta_deg = 0.0
-        d_mm = 0.0
-        a_mm = 300.0
-        alpha_deg = 0.0
-        [[rows]]
-        name = "wrist"
-        theta_deg = 0.0
-        d_mm = 0.0
-        a_mm = 0.0
-        alpha_deg = 0.0
-    "#;
 
     fn seen(joint_rad: &[f64], position_m: Vector3<f64>) -> Observation {
         let id = DwellId { recording: 0, dwell: 0 };
@@ -103,8 +80,7 @@ mod tests {
 
     #[test]
     fn an_offset_is_seen_in_its_joint_and_projected_into_the_others() {
-        let chain = Chain::from_dh_toml(ARM, std::path::Path::new("arm.toml")).unwrap();
-        let model = Model::new(chain, Frames::of_bare_arm()).unwrap();
+        let model = planar_arm();
         let p = model.nominal();
         for q in [[0.3, 0.9], [-1.2, 2.0], [2.5, -0.4]] {
             let offset_rad = 2e-4;
@@ -125,8 +101,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_implies_nothing() {
-        let chain = Chain::from_dh_toml(ARM, std::path::Path::new("arm.toml")).unwrap();
-        let model = Model::new(chain, Frames::of_bare_arm()).unwrap();
+        let model = planar_arm();
         let o = seen(&[0.1, 0.2, 0.3], Vector3::repeat(f64::NAN));
         let residual_m = model.residual(&model.nominal(), &o).position_m;
         assert_eq!(implied_joint_errors(&model, &model.nominal(), &o, &residual_m), [None; 3]);

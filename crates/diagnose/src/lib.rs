@@ -71,6 +71,7 @@ mod special;
 mod stretches;
 mod structure;
 mod suggestion;
+mod unexplained;
 mod unknown;
 mod view;
 mod weigh;

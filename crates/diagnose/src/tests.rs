@@ -11,6 +11,7 @@ use crate::weigh::{Outside, Weighed, weigh};
 use crate::whitener::Whitener;
 use crate::{DiagnosisConfig, LinearRefit, Problem};
 use arm::{design, problem, rng};
+use armcal_model::{Chain, Frames, Model};
 use nalgebra::{DMatrix, DVector};
 
 fn small(seed: u64) -> Problem {
@@ -18,6 +19,34 @@ fn small(seed: u64) -> Problem {
     let poses: Vec<_> =
         design(0, &mut r).into_iter().filter(|p| p.dwell % 6 == 0 || p.dwell % 6 == 5).collect();
     problem(&poses, &[], arm::Noise::White, &mut r, false)
+}
+
+/// A planar arm of two links and a wrist that turns about its own axis, through the tip.
+const PLANAR_ARM: &str = r#"
+    name = "planar"
+    [[rows]]
+    name = "joint1"
+    theta_deg = 0.0
+    d_mm = 0.0
+    a_mm = 400.0
+    alpha_deg = 0.0
+    [[rows]]
+    name = "joint2"
+    theta_deg = 0.0
+    d_mm = 0.0
+    a_mm = 300.0
+    alpha_deg = 0.0
+    [[rows]]
+    name = "wrist"
+    theta_deg = 0.0
+    d_mm = 0.0
+    a_mm = 0.0
+    alpha_deg = 0.0
+"#;
+
+pub(crate) fn planar_arm() -> Model {
+    let chain = Chain::from_dh_toml(PLANAR_ARM, std::path::Path::new("arm.toml")).unwrap();
+    Model::new(chain, Frames::of_bare_arm()).unwrap()
 }
 
 /// Few resamplings: what the tests ask is far from chance.
