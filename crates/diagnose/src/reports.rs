@@ -83,7 +83,9 @@ pub(crate) fn candidate_reports(
             compare(problem, &before, &after, groups, config)
         });
         let mut same: Vec<String> = c.aliases.clone();
-        if rank < SHOWN {
+        let smallest_seen = smallest_seen(&gram, variance, order.len());
+        // What these motions do not show at any size looks like everything and like nothing.
+        if rank < SHOWN && smallest_seen.is_finite() {
             let others = order.iter().filter(|l| **l != k).filter(|l| {
                 let other = weighed.dense(&weighed.entries[**l].candidate.columns, problem);
                 likeness(projection, &columns, &fitted.estimate, &other, own_variance).cosine
@@ -106,7 +108,7 @@ pub(crate) fn candidate_reports(
                 .and_then(|t| t.recordings)
                 .map(|h| BeforeAfter { before: h.before, after: h.after }),
             absorbed: fitted.absorbed,
-            smallest_seen: smallest_seen(&gram, variance, order.len()),
+            smallest_seen,
             same_to_the_data: same,
         });
     }

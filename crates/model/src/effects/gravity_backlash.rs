@@ -13,7 +13,10 @@
 //! `width` b [rad]; shapes `friction` F [1], `smoothing` e [1], `outer` r [1]: nobody knows the masses, and where the
 //! torque changes sign depends on their ratio.
 //! Shape `seated` [1], 1 unless said: the share that acts while a cavity holds the tip; 0 where the hand carries the
-//! arm there.
+//! arm there. Where it is between -1 and 1, nothing holds the joint on a flank there: it rests anywhere in its gap, with
+//! variance `(b/2)^2 (1 - seated^2) / 3`, noise of these dwells.
+//! Shape `rest` [1], 0 unless said: the part r of its gap in which the joint rests anywhere in every dwell, with variance
+//! `(r b/2)^2 / 3`.
 //!
 //! # Signature in the data
 //! A jump where the gravity torque of the joint changes sign, a constant elsewhere: with one sign of torque it is
@@ -29,7 +32,7 @@ use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
 use super::physics::{Deformation, Physics};
 use super::placing::{Placing, amplitude};
-use super::state::SEATED;
+use super::state::{REST, SEATED};
 use crate::rigid::Scalar;
 use armcal_core::{Observation, Unit};
 
@@ -73,6 +76,7 @@ pub(super) static KIND: EffectKind = EffectKind {
             values: Some(weights),
         },
         SEATED,
+        REST,
     ],
     never_negative: &["width"],
     confused_with: &["backlash", "compliance", "arm_compliance"],
@@ -114,5 +118,9 @@ impl Physics for GravityBacklash {
         let load = (outer * torque.outer_nm + (torque.total_nm() - torque.outer_nm)) * self.per_torque;
         let contact = (friction * x.arrival[self.joint] - load) / smoothing;
         change.joint(self.joint, width * contact.tanh() * -0.5);
+    }
+
+    fn gap(&self, theta: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint, theta[0]))
     }
 }
