@@ -26,8 +26,11 @@ pub enum Command {
         /// Folder for the results; created if missing.
         #[arg(long, default_value = "out")]
         out: PathBuf,
-        /// Print summary.json instead of the table.
-        #[arg(long)]
+        /// Print every parameter and every notice, not only what decides.
+        #[arg(long, short)]
+        verbose: bool,
+        /// Print summary.json instead.
+        #[arg(long, conflicts_with = "verbose")]
         json: bool,
     },
     /// Channels, rates, gaps, clocks and occlusion of recordings, before a long run.

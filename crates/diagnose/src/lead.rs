@@ -63,18 +63,22 @@ mod tests {
     use crate::{Candidate, Columns};
     use std::sync::Arc;
 
-    /// A session with a spring at joint 2, and a measured effort of it that tells the same but for this share.
-    fn first(share: f64) -> Vec<String> {
+    /// A session with a spring at joint 2, which follows `toggle`, and a measured effort of it that tells the same but for a
+    /// share, times `sign`.
+    fn first(share: f64, toggle: Toggle, sign: f64) -> Vec<String> {
         let mut p = planted(&[("compliance:2", 2.0)], 0, 3);
-        p.candidates.iter_mut().filter(|c| c.family == "compliance").for_each(|c| c.toggle = Toggle::Load);
+        p.candidates.iter_mut().filter(|c| c.family == "compliance").for_each(|c| c.toggle = toggle);
         let (spring, other) = (own(&p, "compliance:2"), own(&p, "backlash:1"));
         let columns = spring.columns.dense(&p.dwells, 1.0);
         let effort = &columns * (1.0 - share)
             + other.columns.dense(&p.dwells, 1.0).columns(0, columns.ncols()) * share;
+        let mut amplitudes = spring.amplitudes.clone();
+        amplitudes.iter_mut().for_each(|a| a.never_negative = true);
         p.candidates.push(Candidate {
             spec: "effort_compliance:2".into(),
             family: MEASURED.into(),
-            columns: Columns::Dense(Arc::new(effort)),
+            columns: Columns::Dense(Arc::new(effort * sign)),
+            amplitudes,
             ..spring
         });
         let r = room(&p, &quick());
@@ -84,10 +88,15 @@ mod tests {
 
     #[test]
     fn effort_that_was_measured_is_told_before_a_torque_that_was_not() {
-        let alike = first(0.0);
+        let alike = first(0.0, Toggle::Load, 1.0);
         assert_eq!(alike[0], "effort_compliance:2");
         assert!(alike.contains(&"compliance:2".to_owned()), "{alike:?}");
         // Where the data contradict it, measured or not, it is no answer.
-        assert_eq!(first(0.7)[0], "compliance:2");
+        assert_eq!(first(0.7, Toggle::Load, 1.0)[0], "compliance:2");
+        // Nor where it came out as no spring can, nor before what reckons with no torque.
+        let yields_upwards = first(0.0, Toggle::Load, -1.0);
+        assert_eq!(yields_upwards[0], "compliance:2");
+        assert!(yields_upwards.contains(&"effort_compliance:2".to_owned()), "{yields_upwards:?}");
+        assert_eq!(first(0.0, Toggle::None, 1.0)[0], "compliance:2");
     }
 }

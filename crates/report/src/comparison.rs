@@ -2,7 +2,7 @@
 
 use crate::pairing::{Paired, Unpaired, paired};
 use crate::past_run::{PastParameter, PastResidual, PastRun};
-use crate::terminal::{Pen, TerminalStyle, number};
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
 use comfy_table::Cell;

@@ -1,8 +1,8 @@
 //! What is missing, for a person in the terminal.
 
 use crate::past_run::PastRun;
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::Run;
-use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{in_display_unit, printable};
 use armcal_core::SetupReport;
 use armcal_diagnose::{
@@ -76,13 +76,31 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
     sections.join("\n")
 }
 
-/// The part of a run's summary that says what is missing.
+/// What is missing: the answer, what was found, what to do next.
 pub(crate) fn brief(pen: &Pen, d: &Diagnosis) -> String {
-    let mut text = pen.list(d.effects.iter().map(|e| ("-", found(e))));
-    text.push_str(&pen.list(d.unlisted.iter().map(|u| ("-", unlisted(u)))));
-    text.push_str(&pen.list(d.nested.iter().map(|n| ("-", printable(&n.sentence())))));
-    text.push_str(&pen.list(d.record_next.iter().map(|r| ("next:", printable(r)))));
-    pen.section(&headline(d), text)
+    let (found, next) = found_and_next(pen, d);
+    pen.section(&headline(d), found + &next)
+}
+
+/// What was found, one line each, and what to do next.
+pub(crate) fn found_and_next(pen: &Pen, d: &Diagnosis) -> (String, String) {
+    let named = d.effects.iter().map(|e| ("-", found(e)));
+    let unlisted = d.unlisted.iter().map(|u| ("-", unlisted(u)));
+    let nested = d.nested.iter().map(|n| ("-", printable(&n.sentence())));
+    let next = added(d).into_iter().chain(d.record_next.iter().map(|r| printable(r)));
+    let next = next.map(|step| ("next:", step));
+    (pen.list(named) + &pen.list(unlisted) + &pen.list(nested), pen.list(next))
+}
+
+/// What adding it to the model does, where something was found and a calibration with it confirms it.
+fn added(d: &Diagnosis) -> Option<String> {
+    d.refitted.as_ref()?;
+    Some(format!(
+        "`armcal add suggested PIPELINE` adds it to the model: the mean {} error goes from {:.3} to {:.3} mm",
+        d.judged.words(),
+        d.holdout_mm.before,
+        d.holdout_mm.after
+    ))
 }
 
 /// The answer in one sentence.

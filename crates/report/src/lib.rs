@@ -31,6 +31,7 @@ mod parameters;
 mod past_model;
 mod past_observations;
 mod past_run;
+mod pen;
 mod points;
 mod pooled;
 mod proto;
@@ -62,13 +63,14 @@ pub use past_observations::{
     observations_json, sha256,
 };
 pub use past_run::{PastDwell, PastParameter, PastRecording, PastResidual, PastRun, PastRunError};
+pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pooled::{
     POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_files, pooled_json, pooled_terminal, write_pooled,
 };
 pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
 pub use summary::{SCHEMA, summary_json};
-pub use terminal::{RULED, TerminalStyle, number, plain_table, table_text, terminal};
+pub use terminal::{Detail, terminal};
 pub use text::{conclusion, millimetres, printable};
 pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,

@@ -1,29 +1,27 @@
-//! The summary a person reads in the terminal, at most 100 columns wide.
+//! The summary a person reads in the terminal: the story in one screen, or everything.
 
-use crate::diagnosis_text::brief;
+use crate::diagnosis_text::found_and_next;
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::text::{conclusion, in_display_unit, millimetres, printable};
 use armcal_calibrate::{Calibration, Estimate};
-use armcal_core::{ErrorStats, Warning};
-use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, LineStyle, Table, TableStyle};
+use armcal_core::{ErrorStats, Severity, Warning};
+use comfy_table::Cell;
 
-/// Widest line.
-const COLUMNS: u16 = 100;
-
-/// A thin rule below the header and nothing else: the numbers are the table.
-pub const RULED: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
-
-/// Whether colour codes may be written.
+/// How much of a run is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TerminalStyle {
-    /// Text only.
-    Plain,
-    /// ANSI colours and bold.
-    Colour,
+pub enum Detail {
+    /// What was done, how well, what is missing, what to do next: one screen.
+    Story,
+    /// Every parameter and every notice too.
+    Everything,
 }
 
-/// The summary of a run, ending in a newline.
-pub fn terminal(run: &Run, style: TerminalStyle) -> String {
+/// Names of parameters that stand for all that are not determined.
+const NAMED: usize = 4;
+
+/// The summary of a run, ending in a newline. It ends with the verdict, the status and the next step.
+pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
     let pen = Pen { style };
     let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&run.pipeline_name))];
     let answer = run.answer();
@@ -31,14 +29,61 @@ pub fn terminal(run: &Run, style: TerminalStyle) -> String {
     sections.extend(leads.then(|| pen.verdict(&answer.sentence, false)));
     sections.push(pen.section("Recordings", recordings(&pen, run)));
     sections.push(pen.section("Position errors [mm]", errors(&pen, &run.calibration)));
-    sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
-    sections.extend(undetermined(&pen, &run.calibration));
-    sections.extend(run.diagnosis.iter().map(|d| brief(&pen, d)));
-    sections.extend(warnings(&pen, run));
-    let conclusion = conclusion(&run.calibration);
-    let last = if leads { format!("{conclusion} {}", answer.sentence) } else { conclusion };
-    sections.push(pen.verdict(&last, run.status() == Status::Ok));
+    let all = warnings(run);
+    match detail {
+        Detail::Everything => {
+            sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
+            sections.extend(undetermined(&pen, &run.calibration));
+            sections.extend(listed(&pen, all.iter().collect()));
+        }
+        Detail::Story => {
+            let (notices, grave): (Vec<_>, Vec<_>) =
+                all.iter().partition(|(severity, _)| *severity == Severity::Notice);
+            // What the answer says already is not said once more.
+            let grave = grave.into_iter().filter(|(_, text)| !answer.sentence.contains(said(text))).collect();
+            let left_out = [summarised(&run.calibration), counted(notices.len())];
+            let left_out: Vec<String> = left_out.into_iter().flatten().collect();
+            let left_out = format!("{} (`armcal run -v` lists them)", left_out.join("; "));
+            sections.push(pen.list(std::iter::once(("-", left_out))));
+            sections.extend(listed(&pen, grave));
+        }
+    }
+    let status = run.status();
+    sections.push(pen.verdict(&conclusion(&run.calibration), status == Status::Ok));
+    let (found, next) = run.diagnosis.as_ref().map_or_else(Default::default, |d| found_and_next(&pen, d));
+    sections.push(pen.verdict(&answer.sentence, status == Status::Ok) + &found);
+    sections.push(pen.verdict(&format!("Status: {}", status_sentence(status)), status == Status::Ok) + &next);
     sections.join("\n")
+}
+
+/// Whether the result stands, and what the command exits with.
+fn status_sentence(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "ok.",
+        Status::Inadequate => {
+            "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
+        }
+        Status::DataLost => {
+            "data lost (exit code 3): a part of the input was not used; the warnings say which."
+        }
+    }
+}
+
+/// The parameters in one sentence; none where none is free.
+fn summarised(calibration: &Calibration) -> Option<String> {
+    let free = || calibration.fit.estimates.iter().filter(|e| e.parameter.free);
+    let open: Vec<String> = free().filter(|e| !e.determined).map(|e| printable(&e.parameter.name)).collect();
+    let named = open.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let more = if open.len() > NAMED { ", .." } else { "" };
+    let undetermined = match open.len() {
+        0 => "all determined by these data".to_owned(),
+        n => format!("{n} of them not determined by these data and kept near nominal ({named}{more})"),
+    };
+    (free().count() > 0).then(|| format!("{} parameters fitted, {undetermined}", free().count()))
+}
+
+fn counted(n: usize) -> Option<String> {
+    (n > 0).then(|| if n == 1 { "1 notice".to_owned() } else { format!("{n} notices") })
 }
 
 fn recordings(pen: &Pen, run: &Run) -> String {
@@ -144,95 +189,24 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
         .then(|| pen.section("What these data cannot determine (kept near nominal)", pen.list(texts)))
 }
 
-fn warnings(pen: &Pen, run: &Run) -> Option<String> {
+/// Every warning, those of the recordings first.
+fn warnings(run: &Run) -> Vec<(Severity, String)> {
     let of_recordings = run.recordings.iter().flat_map(|r| {
-        r.all_warnings()
-            .into_iter()
-            .map(|w| (w.severity.word(), format!("{}: {}", printable(&r.name), text(w))))
+        r.all_warnings().into_iter().map(|w| (w.severity, format!("{}: {}", printable(&r.name), text(w))))
     });
-    let overall = run.overall_warnings().into_iter().map(|w| (w.severity.word(), text(&w)));
-    let all: Vec<_> = of_recordings.chain(overall).collect();
-    (!all.is_empty()).then(|| pen.section("Warnings", pen.list(all.into_iter())))
+    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (w.severity, text(&w)))).collect()
+}
+
+/// A warning without its subject.
+fn said(text: &str) -> &str {
+    text.split_once(": ").map_or(text, |(_, message)| message)
+}
+
+fn listed(pen: &Pen, warnings: Vec<&(Severity, String)>) -> Option<String> {
+    let entries = warnings.iter().map(|(severity, text)| (severity.word(), text.clone()));
+    (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries)))
 }
 
 fn text(warning: &Warning) -> String {
     printable(&warning.to_string())
-}
-
-/// A table of text without colours: a thin rule below the header and nothing else.
-pub fn plain_table() -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).force_no_tty();
-    table
-}
-
-/// A table line by line, without the blanks that fill it up.
-pub fn table_text(table: &Table) -> String {
-    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
-/// A cell set flush right.
-pub fn number(value: impl ToString) -> Cell {
-    Cell::new(value).set_alignment(CellAlignment::Right)
-}
-
-/// Draws tables in one style.
-pub(crate) struct Pen {
-    pub style: TerminalStyle,
-}
-
-impl Pen {
-    pub fn table(&self, header: &[&str]) -> Table {
-        let mut table = self.bare_table();
-        table.load_style(RULED);
-        table.set_header(header.iter().map(|h| Cell::new(h).add_attribute(Attribute::Dim)));
-        table
-    }
-
-    fn bare_table(&self) -> Table {
-        let mut table = Table::new();
-        table.load_style(TableStyle::new());
-        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS);
-        match self.style {
-            TerminalStyle::Plain => table.force_no_tty(),
-            TerminalStyle::Colour => table.enforce_styling(),
-        };
-        table
-    }
-
-    /// Sentences behind a short label, wrapped.
-    pub fn list(&self, entries: impl Iterator<Item = (&'static str, String)>) -> String {
-        let mut table = self.bare_table();
-        for (label, text) in entries {
-            table.add_row(vec![self.mark(Cell::new(label)), Cell::new(text)]);
-        }
-        self.render(&table)
-    }
-
-    fn mark(&self, cell: Cell) -> Cell {
-        cell.fg(Color::Yellow)
-    }
-
-    pub fn render(&self, table: &Table) -> String {
-        table_text(table)
-    }
-
-    pub fn section(&self, title: &str, body: String) -> String {
-        format!("{}\n{body}", self.bold(title))
-    }
-
-    /// The result in one sentence, in the colour of whether it can be relied upon.
-    pub fn verdict(&self, conclusion: &str, reliable: bool) -> String {
-        let mut table = self.bare_table();
-        let colour = if reliable { Color::Green } else { Color::Yellow };
-        table.add_row(vec![Cell::new(conclusion).fg(colour).add_attribute(Attribute::Bold)]);
-        self.render(&table)
-    }
-
-    pub fn bold(&self, text: &str) -> String {
-        match self.style {
-            TerminalStyle::Plain => text.to_owned(),
-            TerminalStyle::Colour => format!("\u{1b}[1m{text}\u{1b}[0m"),
-        }
-    }
 }

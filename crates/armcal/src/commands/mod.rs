@@ -26,7 +26,7 @@ use crate::cli::{Cli, Command};
 use crate::error::Error;
 use crate::stdout::print;
 use crate::transfer::Asked;
-use armcal_report::TerminalStyle;
+use armcal_report::{Detail, TerminalStyle};
 use std::borrow::Cow;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,10 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
         }
         Command::Pool { pipeline, results, out, json } => pool::run(pipeline, results, out, *json),
-        Command::Run { pipeline, out, json } => run::run(pipeline, out, *json),
+        Command::Run { pipeline, out, verbose, json } => {
+            let detail = if *verbose { Detail::Everything } else { Detail::Story };
+            run::run(pipeline, out, detail, *json)
+        }
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))

@@ -7,13 +7,13 @@ use crate::pipeline::{Job, Pipeline};
 use crate::progress::Progress;
 use crate::{story, view};
 use armcal_report::{
-    Status, closed_files, closed_summary_json, closed_terminal, run_files, summary_json, terminal, write_all,
-    write_closed,
+    Detail, Status, closed_files, closed_summary_json, closed_terminal, run_files, summary_json, terminal,
+    write_all, write_closed,
 };
 use std::path::{Path, PathBuf};
 
-/// Runs a pipeline, writes all results to `out`, prints the table (or the summary as JSON).
-pub fn run(path: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
+/// Runs a pipeline, writes all results to `out`, prints the story, or everything (or the summary as JSON).
+pub fn run(path: &Path, out: &Path, detail: Detail, json: bool) -> Result<Outcome, Error> {
     let pipeline = match Job::load(path)? {
         Job::OneArm(pipeline) => pipeline,
         Job::TwoArms(pipeline) => return two_arms(&pipeline, out, json),
@@ -29,7 +29,7 @@ pub fn run(path: &Path, out: &Path, json: bool) -> Result<Outcome, Error> {
     if json {
         print(&summary_json(&run))?;
     } else {
-        print(&terminal(&run, style()))?;
+        print(&terminal(&run, style(), detail))?;
         print_written(out, &written)?;
     }
     Ok(outcome(run.status()))

@@ -3,8 +3,8 @@
 use super::Campaign;
 use super::date::minute;
 use super::words::{meaning, repeated, sentence};
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{Status, VERSION};
-use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
 use armcal_campaign::{ErrorFigures, Row};
 use comfy_table::Cell;

@@ -1,8 +1,9 @@
 //! The summary of two arms that a person reads in the terminal.
 
 use super::ClosedRun;
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{Status, VERSION};
-use crate::terminal::{Pen, TerminalStyle, errors, number, parameters, undetermined};
+use crate::terminal::{errors, parameters, undetermined};
 use crate::text::{conclusion_about, millimetres, printable};
 use armcal_core::Warning;
 use comfy_table::Cell;

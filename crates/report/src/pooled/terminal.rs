@@ -1,8 +1,9 @@
 //! The summary of a pool that a person reads in the terminal.
 
 use super::PooledRun;
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{Status, VERSION};
-use crate::terminal::{Pen, TerminalStyle, errors, number, parameters_of, undetermined};
+use crate::terminal::{errors, parameters_of, undetermined};
 use crate::text::{conclusion, millimetres, printable};
 use armcal_calibrate::Estimate;
 use comfy_table::Cell;

@@ -1,7 +1,7 @@
 //! Criteria of ISO 9283 in the terminal: the worst place of each, and what the recordings cannot show.
 
 use super::IsoReport;
-use crate::terminal::{Pen, number};
+use crate::pen::{Pen, number};
 use crate::text::printable;
 use armcal_iso9283::{Criterion, NotMeasured};
 use comfy_table::Cell;

@@ -2,8 +2,8 @@
 
 use super::row::{Row, or_dash};
 use super::{On, Published, Told, Verification, VerifiedRecording};
+use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
-use crate::terminal::{Pen, TerminalStyle, number};
 use crate::text::{millimetres, printable};
 use armcal_verify::{Against, By, Compared, PathRow, Plane, PointsRow};
 use comfy_table::Cell;

@@ -1,17 +1,44 @@
 use crate::synthetic::{HOSTILE, synthetic};
-use armcal_report::{TerminalStyle, conclusion, terminal};
+use armcal_core::Severity;
+use armcal_report::{Detail, TerminalStyle, conclusion, terminal};
 
 #[test]
 fn what_a_person_reads() {
     let s = synthetic();
-    insta::assert_snapshot!(terminal(&s.run, TerminalStyle::Plain));
+    insta::assert_snapshot!(terminal(&s.run, TerminalStyle::Plain, Detail::Everything));
+}
+
+#[test]
+fn what_decides_fits_on_a_screen_and_ends_with_verdict_status_and_next_step() {
+    let s = synthetic();
+    let story = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    let everything = terminal(&s.run, TerminalStyle::Plain, Detail::Everything);
+    assert!(story.lines().count() <= 40, "{story}");
+    let at = |text: &str, what: &str| text.find(what).unwrap_or_else(|| panic!("no {what:?} in {text}"));
+    for text in [&story, &everything] {
+        let answer = s.run.answer().sentence;
+        let verdict = at(text, answer.split(' ').take(3).collect::<Vec<_>>().join(" ").as_str());
+        assert!(at(text, "mean error falls") < verdict && verdict < at(text, "Status: "));
+    }
+    let overall = s.run.overall_warnings();
+    let of_recordings = s.run.recordings.iter().flat_map(|r| r.all_warnings());
+    let mut notices = 0;
+    for w in overall.iter().chain(of_recordings) {
+        notices += usize::from(w.severity == Severity::Notice);
+        // Wrapped, so by its first words.
+        let first = w.message.split(' ').take(2).collect::<Vec<_>>().join(" ");
+        assert!(w.severity == Severity::Notice || story.contains(&first), "{first} in {story}");
+    }
+    assert!(story.contains(&format!("{notices} notice")), "{notices} in {story}");
+    assert!(story.contains("parameters fitted, ") && !story.contains("notice  "));
 }
 
 #[test]
 fn it_fits_100_columns_and_obeys_no_control_characters_of_names() {
     let s = synthetic();
-    let plain = terminal(&s.run, TerminalStyle::Plain);
-    for line in plain.lines() {
+    let [plain, story] =
+        [Detail::Everything, Detail::Story].map(|detail| terminal(&s.run, TerminalStyle::Plain, detail));
+    for line in plain.lines().chain(story.lines()) {
         assert!(line.chars().count() <= 100, "{line}");
     }
     assert!(!plain.chars().any(|c| c.is_control() && c != '\n'));
@@ -21,7 +48,10 @@ fn it_fits_100_columns_and_obeys_no_control_characters_of_names() {
 #[test]
 fn colour_adds_nothing_but_colour() {
     let s = synthetic();
-    let (plain, colour) = (terminal(&s.run, TerminalStyle::Plain), terminal(&s.run, TerminalStyle::Colour));
+    let (plain, colour) = (
+        terminal(&s.run, TerminalStyle::Plain, Detail::Everything),
+        terminal(&s.run, TerminalStyle::Colour, Detail::Everything),
+    );
     let mut rest = colour.as_str();
     let mut without = String::new();
     while let Some((before, after)) = rest.split_once("\u{1b}[") {
