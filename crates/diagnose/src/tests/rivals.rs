@@ -143,3 +143,22 @@ fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simpl
     assert_eq!(after(&repeats(drift), &[(play, 600.0), (drift, 607.0)]), (2, alone.clone()));
     assert_eq!(after(&repeats("tool_shift@1"), &[(play, 600.0), ("tool_shift@1", 100.0)]), (0, alone));
 }
+
+#[test]
+fn what_a_refit_puts_far_behind_leaves_the_answer_and_what_it_puts_ahead_takes_the_name() {
+    let config = quick();
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut found = search.accepted[0].clone();
+    let own = found.judged.entry;
+    let other = entry(&found.room.weighed, "zero_drift:1");
+    std::rc::Rc::make_mut(&mut found.room).weighed.entries[own].ln_evidence = 60.0;
+    found.judged.set = vec![own, other];
+    // Twice three nats.
+    let after = |ln: f64| decided(&found, &[(own, 100.0), (other, 100.0 + ln)], &config);
+    assert!(after(-5.9).is_none(), "it stays beside");
+    assert_eq!(after(-6.1).map(|a| a.judged.set), Some(vec![own]));
+    assert!(after(2.9).is_none());
+    let ahead = after(3.1).unwrap();
+    assert!(ahead.judged.entry == other || ahead.grade == Grade::OrUnlisted);
+}
