@@ -1,7 +1,7 @@
 //! What a calibration returns.
 
 use crate::covariance::Covariance;
-use armcal_core::{DwellId, ErrorStats, Parameter, Warning};
+use armcal_core::{DwellId, ErrorStats, Observation, Parameter, Warning};
 use nalgebra::Vector3;
 
 /// One parameter after the fit.
@@ -157,5 +157,14 @@ impl Calibration {
     pub fn judged_residuals(&self) -> impl Iterator<Item = &Residual> {
         let held_out = self.held_out();
         self.residuals.iter().filter(move |r| r.held_out == held_out)
+    }
+
+    /// The same, each with what was observed; `observations` are those of the calibration, in the order of its residuals.
+    pub fn judged_pairs<'a>(
+        &'a self,
+        observations: &'a [Observation],
+    ) -> impl Iterator<Item = (&'a Residual, &'a Observation)> {
+        let held_out = self.held_out();
+        self.residuals.iter().zip(observations).filter(move |(r, _)| r.held_out == held_out)
     }
 }

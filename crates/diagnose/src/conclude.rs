@@ -118,9 +118,8 @@ impl Diagnosis {
         if self.verdict != Verdict::Unexplained && !beside_names {
             return;
         }
-        let judged =
-            settled.residuals.iter().zip(observations).filter(|(r, _)| r.held_out == settled.held_out());
-        let errors: Vec<DwellError<'_>> = judged
+        let errors: Vec<DwellError<'_>> = settled
+            .judged_pairs(observations)
             .map(|(r, observation)| DwellError {
                 observation,
                 error_m: r.fitted_m.norm(),
@@ -214,7 +213,7 @@ fn by_fitted(refitted: &Refitted) -> Warning {
          fitted points decided, and another hold-out (`[holdout]`) may show more",
         listed(&names)
     );
-    Warning::new(Severity::Notice, Stage::Diagnose, "judged-by-fit", names.join(" + "), message)
+    Warning::new(Severity::Notice, Stage::Diagnose, "judged-by-fit", together(refitted), message)
 }
 
 /// Share of the squared error above the floor that a refit with more effects explains, on the side of the hold-out that shows

@@ -100,9 +100,8 @@ fn own_variance(
     joint: usize,
 ) -> Option<f64> {
     let calibration = &refitted.calibration;
-    let judged = calibration.residuals.iter().zip(calibrated.observations);
-    let judged = judged.filter(|(r, _)| r.held_out == calibration.held_out());
-    let errors: Vec<ImpliedError> = judged
+    let errors: Vec<ImpliedError> = calibration
+        .judged_pairs(calibrated.observations)
         .filter_map(|(r, o)| implied_joint_errors(&refitted.model, values, o, &r.fitted_m).swap_remove(joint))
         .collect();
     let usual = median(&errors.iter().map(|e| e.sigma).collect::<Vec<_>>());

@@ -38,9 +38,10 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
         }
         Detail::Story => {
             let (notices, grave): (Vec<_>, Vec<_>) =
-                all.iter().partition(|(severity, _)| *severity == Severity::Notice);
+                all.iter().partition(|(_, w)| w.severity == Severity::Notice);
             // What the answer says already is not said once more.
-            let grave = grave.into_iter().filter(|(_, text)| !answer.sentence.contains(said(text))).collect();
+            let told = |w: &Warning| answer.sentence.contains(&printable(&w.message));
+            let grave = grave.into_iter().filter(|(_, w)| !told(w)).collect();
             let left_out = [summarised(&run.calibration), counted(notices.len())];
             let left_out: Vec<String> = left_out.into_iter().flatten().collect();
             let left_out = format!("{} (`armcal run -v` lists them)", left_out.join("; "));
@@ -49,10 +50,11 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
         }
     }
     let status = run.status();
-    sections.push(pen.verdict(&conclusion(&run.calibration), status == Status::Ok));
+    let verdict = |text: &str| pen.verdict(text, status == Status::Ok);
+    sections.push(verdict(&conclusion(&run.calibration)));
     let (found, next) = run.diagnosis.as_ref().map_or_else(Default::default, |d| found_and_next(&pen, d));
-    sections.push(pen.verdict(&answer.sentence, status == Status::Ok) + &found);
-    sections.push(pen.verdict(&format!("Status: {}", status_sentence(status)), status == Status::Ok) + &next);
+    sections.push(verdict(&answer.sentence) + &found);
+    sections.push(verdict(&format!("Status: {}", status_sentence(status))) + &next);
     sections.join("\n")
 }
 
@@ -189,21 +191,17 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
         .then(|| pen.section("What these data cannot determine (kept near nominal)", pen.list(texts)))
 }
 
-/// Every warning, those of the recordings first.
-fn warnings(run: &Run) -> Vec<(Severity, String)> {
+/// Every warning and how it is told, those of the recordings first.
+fn warnings(run: &Run) -> Vec<(String, Warning)> {
     let of_recordings = run.recordings.iter().flat_map(|r| {
-        r.all_warnings().into_iter().map(|w| (w.severity, format!("{}: {}", printable(&r.name), text(w))))
+        let told = |w: &Warning| (format!("{}: {}", printable(&r.name), text(w)), w.clone());
+        r.all_warnings().into_iter().map(told)
     });
-    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (w.severity, text(&w)))).collect()
+    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (text(&w), w))).collect()
 }
 
-/// A warning without its subject.
-fn said(text: &str) -> &str {
-    text.split_once(": ").map_or(text, |(_, message)| message)
-}
-
-fn listed(pen: &Pen, warnings: Vec<&(Severity, String)>) -> Option<String> {
-    let entries = warnings.iter().map(|(severity, text)| (severity.word(), text.clone()));
+fn listed(pen: &Pen, warnings: Vec<&(String, Warning)>) -> Option<String> {
+    let entries = warnings.iter().map(|(text, w)| (w.severity.word(), text.clone()));
     (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries)))
 }
 

@@ -88,12 +88,17 @@ fn a_rival_counts_as_its_refit_does() {
     assert_eq!(answer(&[("zero_drift:1", 100.0)]).0, name("backlash:1"));
 }
 
-#[test]
-fn rivals_are_as_far_behind_as_a_linearised_fit_may_put_them() {
+/// A planted play as it is found.
+fn found() -> Accepted {
     let config = quick();
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
-    let mut found = search.accepted[0].clone();
+    search.accepted[0].clone()
+}
+
+#[test]
+fn rivals_are_as_far_behind_as_a_linearised_fit_may_put_them() {
+    let mut found = found();
     let within = |found: &mut Accepted, own: f64, behind: f64| {
         let room = std::rc::Rc::make_mut(&mut found.room);
         let at = entry(&room.weighed, "zero_drift:1");
@@ -146,16 +151,13 @@ fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simpl
 
 #[test]
 fn what_a_refit_puts_far_behind_leaves_the_answer_and_what_it_puts_ahead_takes_the_name() {
-    let config = quick();
-    let p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
-    let mut found = search.accepted[0].clone();
+    let mut found = found();
     let own = found.judged.entry;
     let other = entry(&found.room.weighed, "zero_drift:1");
     std::rc::Rc::make_mut(&mut found.room).weighed.entries[own].ln_evidence = 60.0;
     found.judged.set = vec![own, other];
     // Twice three nats.
-    let after = |ln: f64| decided(&found, &[(own, 100.0), (other, 100.0 + ln)], &config);
+    let after = |ln: f64| decided(&found, &[(own, 100.0), (other, 100.0 + ln)], &quick());
     assert!(after(-5.9).is_none(), "it stays beside");
     assert_eq!(after(-6.1).map(|a| a.judged.set), Some(vec![own]));
     assert!(after(2.9).is_none());

@@ -52,21 +52,7 @@ fn driver_unit(driver: &str, chain: &Chain) -> (Unit, &'static str) {
 mod tests {
     use super::*;
 
-    const ARM: &str = r#"
-        name = "two"
-        [[rows]]
-        name = "joint1"
-        theta_deg = 0.0
-        d_mm = 0.0
-        a_mm = 400.0
-        alpha_deg = 0.0
-        [[rows]]
-        name = "joint2"
-        theta_deg = 0.0
-        d_mm = 0.0
-        a_mm = 300.0
-        alpha_deg = 0.0
-    "#;
+    const ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
 
     #[test]
     fn angles_are_shown_in_degrees_and_directions_as_they_are() {
