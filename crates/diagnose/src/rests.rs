@@ -69,7 +69,7 @@ fn settled(
 ) -> Option<(f64, Refitted)> {
     let (mut part, mut now) = (0.0, found.clone());
     for _ in 0..ROUNDS {
-        let next = part_of_gap(calibrated, &now, joint, part)?;
+        let next = part_of_gap(calibrated, &now, (&spec.kind, joint), part)?;
         if (next - part).abs() < SETTLED {
             break;
         }
@@ -82,10 +82,16 @@ fn settled(
     Some((part, now))
 }
 
-/// The part of its gap in which a joint rests, from a fit that assumed `assumed` of it.
-fn part_of_gap(calibrated: &Calibrated<'_>, now: &Refitted, joint: usize, assumed: f64) -> Option<f64> {
+/// The part of the gap of one kind in which a joint rests, from a fit that assumed `assumed` of it.
+fn part_of_gap(
+    calibrated: &Calibrated<'_>,
+    now: &Refitted,
+    (kind, joint): (&str, usize),
+    assumed: f64,
+) -> Option<f64> {
     let values = now.calibration.fit.values();
-    let (_, _, width) = now.model.gaps(&values).into_iter().find(|(_, of, _)| *of == joint)?;
+    let (_, _, width) =
+        now.model.gaps(&values).into_iter().find(|(of, at, _)| of.kind == kind && *at == joint)?;
     let variance = (assumed * width).powi(2) / 12.0 + own_variance(calibrated, now, &values, joint)?;
     let part = (12.0 * variance.max(0.0)).sqrt() / width.abs();
     (NEGLIGIBLE..=WHOLE).contains(&part).then(|| (100.0 * part).round() / 100.0)

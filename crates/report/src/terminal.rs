@@ -44,8 +44,9 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
             let grave = grave.into_iter().filter(|(_, w)| !told(w)).collect();
             let left_out = [summarised(&run.calibration), counted(notices.len())];
             let left_out: Vec<String> = left_out.into_iter().flatten().collect();
-            let left_out = format!("{} (`armcal run -v` lists them)", left_out.join("; "));
-            sections.push(pen.list(std::iter::once(("-", left_out))));
+            let brief = (!left_out.is_empty())
+                .then(|| format!("{} (`armcal run -v` lists them)", left_out.join("; ")));
+            sections.extend(brief.map(|brief| pen.list(std::iter::once(("-", brief)))));
             sections.extend(listed(&pen, grave));
         }
     }

@@ -34,6 +34,21 @@ fn what_decides_fits_on_a_screen_and_ends_with_verdict_status_and_next_step() {
 }
 
 #[test]
+fn where_nothing_is_left_out_nothing_is_said_to_be() {
+    let mut s = synthetic();
+    s.run.calibration.fit.estimates.iter_mut().for_each(|e| e.parameter.free = false);
+    let said = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    assert!(!said.contains("parameters fitted") && said.contains(" notice"), "{said}");
+    s.run.warnings.clear();
+    s.run.calibration.warnings.clear();
+    s.run.calibration.fit.warnings.clear();
+    s.run.recordings.clear();
+    assert_eq!(s.run.overall_warnings(), []);
+    let said = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    assert!(!said.contains("lists them"), "{said}");
+}
+
+#[test]
 fn it_fits_100_columns_and_obeys_no_control_characters_of_names() {
     let s = synthetic();
     let [plain, story] =
