@@ -68,7 +68,7 @@ fn every_path_of_the_layouts_resolves() {
     run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
     let titles = layouts_resolve(&python, out.path());
     assert!(titles.iter().any(|t| t == "Errors on the boards, from above"));
-    assert!(!titles.iter().any(|t| t.contains("what the effects do")), "nothing was found: {titles:?}");
+    assert!(!titles.iter().any(|t| t.contains(", effects by")), "nothing was found: {titles:?}");
 }
 
 #[test]
@@ -84,7 +84,19 @@ fn the_layout_of_a_hidden_effect_shows_what_it_does() {
     let summary = run_pipeline(&rig.join("pipeline.toml"), &out, &[0, 3]);
     assert_eq!(summary["diagnosis"]["names"][0], "backlash:1", "{}", summary["diagnosis"]["names"]);
     let titles = layouts_resolve(&python, &out);
-    for title in ["joint1, what the effects do, over its angle", "joint1, what is left, over its angle"] {
-        assert!(titles.iter().any(|t| t == title), "no {title} in {titles:?}");
+    for title in ["joint1, effects by angle", "joint1, rest by angle"] {
+        assert!(titles.iter().any(|t| t.starts_with(title)), "no {title} in {titles:?}");
     }
+}
+
+#[test]
+fn rerun_draws_robots_board_and_errors_without_any_configuration() {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    let summary = run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
+    let drawn = script(&python, "check_rerun.py", &out.path().join("run.mcap"));
+    println!("{drawn}");
+    assert_eq!(number(&drawn, "/points"), number(&summary, "/fit/train/n"));
+    // The plate and the 33 cavities that the board file lists.
+    assert_eq!(number(&drawn, "/drawn/board/shapes"), 34.0);
 }

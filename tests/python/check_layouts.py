@@ -10,10 +10,12 @@ import re
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
+from xml.etree import ElementTree
 
 from google.protobuf.descriptor import FieldDescriptor
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from mcap_ros2.decoder import DecoderFactory as Ros2DecoderFactory
 
 TOPIC = r'(/[A-Za-z0-9_\-]+(?:/[A-Za-z0-9_\-]+)*|"(?:[^"\\]|\\["\\])*")'
 FIELD = r'\.([A-Za-z0-9_]+)(?:\[(-?\d+|-?\d*:-?\d*)\])?'
@@ -29,28 +31,35 @@ KEYS = {
     "Table": {"topicPath"},
     "RawMessages": {"topicPath", "diffEnabled", "expansion"},
     "Indicator": {"path", "style", "rules", "fallbackColor", "fallbackLabel"},
-    "Log": {"topicToRender", "minLogLevel", "searchTerms"},
     "StateTransitions": {"paths", "isSynced"},
 }
-LEGACY_NAME = {"3D": "ThreeDee", "RosOut": "Log"}
+LEGACY_NAME = {"3D": "ThreeDee"}
 NUMBERS = {FieldDescriptor.CPPTYPE_INT32, FieldDescriptor.CPPTYPE_INT64, FieldDescriptor.CPPTYPE_UINT32,
            FieldDescriptor.CPPTYPE_UINT64, FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT}
 
 
+DRAWN = {"foxglove.SceneUpdate", "foxglove.PosesInFrame", "foxglove.PoseInFrame", "foxglove.PointCloud"}
+
+
 def read(path):
-    messages = defaultdict(list)
+    """Messages, schema names, attachments, texts of robots, and the time of the first message, by topic."""
+    messages, texts, times = defaultdict(list), {}, {}
     with open(path, "rb") as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        reader = make_reader(stream, decoder_factories=[DecoderFactory(), Ros2DecoderFactory()], validate_crcs=True)
         schemas = {c.topic: reader.get_summary().schemas.get(c.schema_id) for c in reader.get_summary().channels.values()}
-        for _, channel, _, decoded in reader.iter_decoded_messages(topics=[t for t in schemas if t.startswith("/armcal/")]):
-            messages[channel.topic].append(decoded)
+        for _, channel, message, decoded in reader.iter_decoded_messages(topics=[t for t in schemas if t.startswith("/armcal/")]):
+            times.setdefault(channel.topic, message.log_time)
+            if channel.topic.endswith("/robot_description"):
+                texts[channel.topic] = decoded.data
+            else:
+                messages[channel.topic].append(decoded)
         attached = {a.name: a.data for a in reader.iter_attachments()}
-    return messages, {t: s.name for t, s in schemas.items() if s}, attached
+    return messages, {t: s.name for t, s in schemas.items() if s}, attached, texts, times
 
 
 class Resolver:
-    def __init__(self, messages):
-        self.messages = messages
+    def __init__(self, messages, texts, times):
+        self.messages, self.texts, self.times = messages, texts, times
         self.used = Counter()
 
     def resolve(self, path):
@@ -98,9 +107,11 @@ class Resolver:
 
     def plot(self, config):
         assert set(config) <= PLOT, set(config) - PLOT
-        arrays = config["xAxisVal"] == "currentCustom"
-        assert arrays or config["xAxisVal"] == "timestamp"
-        x = self.numbers(config["xAxisPath"]["value"], True) if arrays else None
+        # Against time a plot of real recordings shows the days between them.
+        assert config["xAxisVal"] == "currentCustom"
+        # A floating legend lies over the data and one at a side takes their place: the title says which colour is what.
+        assert config["legendDisplay"] == "none" and config["showLegend"] is False
+        x = self.numbers(config["xAxisPath"]["value"], True)
         for series in config["paths"]:
             assert set(series) == SERIES, series
             try:
@@ -108,10 +119,9 @@ class Resolver:
                 continue
             except ValueError:
                 pass
-            y = self.numbers(series["value"], arrays)
-            if arrays:
-                assert [len(v) for v in y] == [len(v) for v in x], f"{series['value']}: not as many as x"
-                assert series["value"].split(".")[0] == config["xAxisPath"]["value"].split(".")[0], "two messages"
+            y = self.numbers(series["value"], True)
+            assert [len(v) for v in y] == [len(v) for v in x], f"{series['value']}: not as many as x"
+            assert series["value"].split(".")[0] == config["xAxisPath"]["value"].split(".")[0], "two messages"
         assert config["paths"], "an empty plot"
 
     def panel(self, kind, config, schemas, frames):
@@ -119,18 +129,22 @@ class Resolver:
         if kind == "Plot":
             self.plot(config)
         elif kind == "Table":
-            _, field, many, _ = self.resolve(config["topicPath"])
-            assert field.message_type is not None and many, f"{config['topicPath']} is no table"
+            # A path that ends in [:] shows the first row only; an empty array says that it waits for a message.
+            values, field, many, whole = self.resolve(config["topicPath"])
+            assert field.message_type is not None and whole and not many, f"{config['topicPath']} is no table"
+            assert len(values[0][0]) > 0, f"{config['topicPath']} is empty"
         elif kind == "RawMessages":
-            self.resolve(config["topicPath"])
+            values, _, _, whole = self.resolve(config["topicPath"])
+            assert not whole or len(values[0][0]) > 0, f"{config['topicPath']} is empty"
         elif kind == "Indicator":
             values, field, many, whole = self.resolve(config["path"])
             assert field.cpp_type == FieldDescriptor.CPPTYPE_STRING and not many and not whole
             assert all(set(r) == {"rawValue", "operator", "color", "label"} for r in config["rules"])
-            assert values[0][0] in {r["rawValue"] for r in config["rules"]}, values
-        elif kind == "Log":
-            assert schemas[config["topicToRender"]] == "foxglove.Log"
-            self.resolve(config["topicToRender"])
+            colour = {r["rawValue"]: r["color"] for r in config["rules"]}
+            assert values[0][0] in colour, values
+            # What must not be relied upon is red, and nothing else is.
+            bad = {"inadequate", "data_lost", "unexplained", "setup"}
+            assert {v for v, c in colour.items() if c == colour["inadequate"]} == bad, colour
         elif kind == "StateTransitions":
             for path in config["paths"]:
                 _, field, many, whole = self.resolve(path["value"])
@@ -139,9 +153,25 @@ class Resolver:
             assert set(config["cameraState"]) == CAMERA
             assert config["followTf"] in frames, f"no frame {config['followTf']}"
             assert any(t["visible"] for t in config["topics"].values())
-            for topic in config["topics"]:
+            # `transforms.visible` is no key of the viewers: these are, and without them every frame has a name and axes.
+            transforms = config["scene"]["transforms"]
+            assert transforms == {"showLabel": False, "axisScale": 0, "lineWidth": 0, "enablePreloading": True}
+            for topic, settings in config["topics"].items():
                 assert self.messages.get(topic), f"nothing on {topic}"
-                assert schemas[topic] in {"foxglove.SceneUpdate", "foxglove.PosesInFrame", "foxglove.PoseInFrame"}, topic
+                assert schemas[topic] in DRAWN, topic
+                if schemas[topic] == "foxglove.PoseInFrame":
+                    assert settings["axisScale"] <= 0.05, "axes of a metre"
+                if schemas[topic] == "foxglove.PointCloud":
+                    fields = {f.name for m in self.messages[topic] for f in m.fields}
+                    assert {"x", "y", "z", settings["colorField"]} <= fields, fields
+                # The measured tip is not there before it was seen.
+                if settings["visible"] and schemas[topic] != "foxglove.PoseInFrame":
+                    first = min(self.times[t] for t in self.times)
+                    assert self.times[topic] == first, f"{topic}: nothing at the first instant"
+            for layer in config["layers"].values():
+                assert layer["layerId"] == "foxglove.Urdf" and layer["sourceType"] == "topic", layer
+                links = {link.get("name") for link in ElementTree.fromstring(self.texts[layer["topic"]]).findall("link")}
+                assert links and {layer["framePrefix"] + link for link in links} <= frames, links - frames
 
 
 def current(layout):
@@ -181,7 +211,9 @@ def legacy(layout):
                     assert set(tab) == {"title", "layout"}
                     yield from walk(tab["layout"])
                 return
+            # Foxglove Studio reads the one, Lichtblick the other.
             title = config.pop("foxglovePanelTitle")
+            assert config.pop("lichtblickPanelTitle") == title
             assert (config.pop("sidebarDimension", None) is not None) == (kind == "Plot")
             yield LEGACY_NAME.get(kind, kind), title, config
         else:
@@ -195,9 +227,9 @@ def legacy(layout):
 
 
 def main(out):
-    messages, schemas, attached = read(out / "run.mcap")
+    messages, schemas, attached, texts, times = read(out / "run.mcap")
     frames = {n for m in messages["/armcal/tf"] for t in m.transforms for n in (t.parent_frame_id, t.child_frame_id)}
-    resolver, panels = Resolver(messages), {}
+    resolver, panels = Resolver(messages, texts, times), {}
     for name, walk in [("foxglove-layout.json", current), ("foxglove-layout-legacy.json", legacy)]:
         text = (out / name).read_bytes()
         assert attached[f"armcal/{name}"] == text, f"{name} is not what is attached"

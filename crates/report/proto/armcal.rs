@@ -283,6 +283,36 @@ pub struct Parameters {
     #[prost(string, repeated, tag = "3")]
     pub undetermined: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
+/// A free parameter as people read it: in display units, with the digits that count.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct ParameterRow {
+    #[prost(string, tag = "1")]
+    pub parameter: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub nominal: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub calibrated: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub change: ::prost::alloc::string::String,
+    /// Half the width of the 95 % interval.
+    #[prost(string, tag = "5")]
+    pub interval95: ::prost::alloc::string::String,
+    #[prost(string, tag = "6")]
+    pub unit: ::prost::alloc::string::String,
+    /// Undetermined by these data, or on its bound.
+    #[prost(string, tag = "7")]
+    pub remark: ::prost::alloc::string::String,
+    #[prost(string, tag = "8")]
+    pub meaning: ::prost::alloc::string::String,
+}
+/// The parameters that the fit could change (topic /armcal/parameter_table), one message a run.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ParameterTable {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub rows: ::prost::alloc::vec::Vec<ParameterRow>,
+}
 /// Statistics of the norms of position errors.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct Errors {
@@ -526,6 +556,22 @@ pub struct Course {
     /// What the effects found do to it (and what is left); empty when nothing was found.
     #[prost(double, repeated, tag = "9")]
     pub effect_outward_mm: ::prost::alloc::vec::Vec<f64>,
+}
+/// What a run ends with (topic /armcal/story), one message a run: what the terminal prints last.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Story {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    /// What a lamp shows. The status where the result does not stand (inadequate, data_lost), or why it does not (unexplained,
+    /// setup); otherwise the verdict (nothing_missing, identified, ambiguous, unknown, not_diagnosed).
+    #[prost(string, tag = "2")]
+    pub lamp: ::prost::alloc::string::String,
+    /// What the calibration reached, what is missing, the status, what to do next; one sentence each.
+    #[prost(string, repeated, tag = "3")]
+    pub lines: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Every warning with its severity and what it is about, the gravest first.
+    #[prost(string, repeated, tag = "4")]
+    pub warnings: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// One step on the way from the nominal model to the one with everything found.
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -77,19 +77,20 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
 }
 
 /// What is missing: the answer, what was found, what to do next.
-pub(crate) fn brief(pen: &Pen, d: &Diagnosis) -> String {
-    let (found, next) = found_and_next(pen, d);
-    pen.section(&headline(d), found + &next)
+fn brief(pen: &Pen, d: &Diagnosis) -> String {
+    let list = |label, entries: Vec<String>| pen.list(entries.into_iter().map(|entry| (label, entry)));
+    pen.section(&headline(d), list("-", all_found(d)) + &list("next:", next(d)))
 }
 
-/// What was found, one line each, and what to do next.
-pub(crate) fn found_and_next(pen: &Pen, d: &Diagnosis) -> (String, String) {
-    let named = d.effects.iter().map(|e| ("-", found(e)));
-    let unlisted = d.unlisted.iter().map(|u| ("-", unlisted(u)));
-    let nested = d.nested.iter().map(|n| ("-", printable(&n.sentence())));
-    let next = added(d).into_iter().chain(d.record_next.iter().map(|r| printable(r)));
-    let next = next.map(|step| ("next:", step));
-    (pen.list(named) + &pen.list(unlisted) + &pen.list(nested), pen.list(next))
+/// What was found: with names, without one, and what the choice among them is worth; one entry each.
+pub(crate) fn all_found(d: &Diagnosis) -> Vec<String> {
+    let nested = d.nested.iter().map(|n| printable(&n.sentence()));
+    d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(nested).collect()
+}
+
+/// What to do next, one step an entry.
+pub(crate) fn next(d: &Diagnosis) -> Vec<String> {
+    added(d).into_iter().chain(d.record_next.iter().map(|r| printable(r))).collect()
 }
 
 /// What adding it to the model does, where something was found and a calibration with it confirms it.

@@ -37,6 +37,7 @@ mod pooled;
 mod proto;
 mod run;
 mod same_dwells;
+mod story;
 mod summary;
 mod tables;
 mod terminal;

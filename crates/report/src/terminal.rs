@@ -1,9 +1,9 @@
 //! The summary a person reads in the terminal: the story in one screen, or everything.
 
-use crate::diagnosis_text::found_and_next;
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
-use crate::text::{conclusion, in_display_unit, millimetres, printable};
+use crate::story::Story;
+use crate::text::{in_display_unit, millimetres, printable, remark};
 use armcal_calibrate::{Calibration, Estimate};
 use armcal_core::{ErrorStats, Severity, Warning};
 use comfy_table::Cell;
@@ -24,12 +24,12 @@ const NAMED: usize = 4;
 pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
     let pen = Pen { style };
     let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&run.pipeline_name))];
-    let answer = run.answer();
-    let leads = matches!(answer.word, "setup" | "unexplained");
-    sections.extend(leads.then(|| pen.verdict(&answer.sentence, false)));
+    let story = Story::of(run);
+    let leads = matches!(story.lamp, "setup" | "unexplained");
+    sections.extend(leads.then(|| pen.verdict(&story.missing, false)));
     sections.push(pen.section("Recordings", recordings(&pen, run)));
     sections.push(pen.section("Position errors [mm]", errors(&pen, &run.calibration)));
-    let all = warnings(run);
+    let all = &story.warnings;
     match detail {
         Detail::Everything => {
             sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
@@ -40,7 +40,7 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
             let (notices, grave): (Vec<_>, Vec<_>) =
                 all.iter().partition(|(_, w)| w.severity == Severity::Notice);
             // What the answer says already is not said once more.
-            let told = |w: &Warning| answer.sentence.contains(&printable(&w.message));
+            let told = |w: &Warning| story.missing.contains(&printable(&w.message));
             let grave = grave.into_iter().filter(|(_, w)| !told(w)).collect();
             let left_out = [summarised(&run.calibration), counted(notices.len())];
             let left_out: Vec<String> = left_out.into_iter().flatten().collect();
@@ -50,26 +50,19 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
             sections.extend(listed(&pen, grave));
         }
     }
-    let status = run.status();
-    let verdict = |text: &str| pen.verdict(text, status == Status::Ok);
-    sections.push(verdict(&conclusion(&run.calibration)));
-    let (found, next) = run.diagnosis.as_ref().map_or_else(Default::default, |d| found_and_next(&pen, d));
-    sections.push(verdict(&answer.sentence) + &found);
-    sections.push(verdict(&format!("Status: {}", status_sentence(status))) + &next);
+    sections.extend(ending(&pen, &story));
     sections.join("\n")
 }
 
-/// Whether the result stands, and what the command exits with.
-fn status_sentence(status: Status) -> &'static str {
-    match status {
-        Status::Ok => "ok.",
-        Status::Inadequate => {
-            "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
-        }
-        Status::DataLost => {
-            "data lost (exit code 3): a part of the input was not used; the warnings say which."
-        }
-    }
+/// What it came to, what is missing, the status and the next step.
+fn ending(pen: &Pen, story: &Story) -> [String; 3] {
+    let verdict = |text: &str| pen.verdict(text, story.status == Status::Ok);
+    let list = |label, entries: &[String]| pen.list(entries.iter().map(|e| (label, e.clone())));
+    [
+        verdict(&story.calibration),
+        verdict(&story.missing) + &list("-", &story.found),
+        verdict(&format!("Status: {}", story.status_sentence())) + &list("next:", &story.next),
+    ]
 }
 
 /// The parameters in one sentence; none where none is free.
@@ -163,7 +156,7 @@ pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
             number(in_display_unit(unit, e.value)),
             number(in_display_unit(unit, e.value - e.parameter.nominal)),
             number(in_display_unit(unit, half)),
-            pen.mark(Cell::new(marks(e))),
+            pen.mark(Cell::new(remark(e))),
         ]);
     }
     let mut text = pen.render(&table);
@@ -175,15 +168,6 @@ pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
     text
 }
 
-fn marks(e: &Estimate) -> &'static str {
-    match (e.determined, e.at_bound) {
-        (true, false) => "",
-        (true, true) => "at bound",
-        (false, false) => "undetermined",
-        (false, true) => "undetermined, at bound",
-    }
-}
-
 /// What the data leave open, if anything.
 pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<String> {
     let directions = &calibration.fit.undetermined;
@@ -192,20 +176,7 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
         .then(|| pen.section("What these data cannot determine (kept near nominal)", pen.list(texts)))
 }
 
-/// Every warning and how it is told, those of the recordings first.
-fn warnings(run: &Run) -> Vec<(String, Warning)> {
-    let of_recordings = run.recordings.iter().flat_map(|r| {
-        let told = |w: &Warning| (format!("{}: {}", printable(&r.name), text(w)), w.clone());
-        r.all_warnings().into_iter().map(told)
-    });
-    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (text(&w), w))).collect()
-}
-
 fn listed(pen: &Pen, warnings: Vec<&(String, Warning)>) -> Option<String> {
     let entries = warnings.iter().map(|(text, w)| (w.severity.word(), text.clone()));
     (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries)))
-}
-
-fn text(warning: &Warning) -> String {
-    printable(&warning.to_string())
 }

@@ -1,6 +1,6 @@
 //! How numbers and names are written for people.
 
-use armcal_calibrate::{Calibration, SideErrors};
+use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::Unit;
 
 /// The result in one sentence, about held-out points where there are any.
@@ -75,6 +75,16 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
         a if a != 0.0 && a < 5e-5 => format!("{shown:.1e}"),
         a if a >= 1e5 => format!("{shown:.3e}"),
         _ => format!("{shown:.4}"),
+    }
+}
+
+/// What is to be known of an estimate beside its numbers.
+pub(crate) fn remark(e: &Estimate) -> &'static str {
+    match (e.determined, e.at_bound) {
+        (true, false) => "",
+        (true, true) => "at bound",
+        (false, false) => "undetermined",
+        (false, true) => "undetermined, at bound",
     }
 }
 

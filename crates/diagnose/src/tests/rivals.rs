@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
+use crate::judge::Judged;
 use crate::refit::LinearRefit;
 use crate::tests::{entry, in_rooms, planted, quick};
 use crate::weigh::weigh;
@@ -26,7 +27,7 @@ fn the_evidence_of_a_refit_is_that_of_a_gaussian() {
 struct Told {
     linear: LinearRefit,
     square: BTreeMap<&'static str, f64>,
-    asked: usize,
+    asked: Vec<Vec<String>>,
 }
 
 impl Refit for Told {
@@ -39,7 +40,7 @@ impl Refit for Told {
         accepted: &[Candidate],
         keep: &[bool],
     ) -> Result<Option<AfterRefit>, DiagnoseError> {
-        self.asked += 1;
+        self.asked.push(accepted.iter().map(|c| c.spec.clone()).collect());
         let last = accepted.last().map_or("", |c| c.spec.as_str());
         let rows = 3 * keep.iter().filter(|k| **k).count();
         let after = |square: &f64| AfterRefit { square: *square, rows, normal: DMatrix::zeros(0, 0) };
@@ -52,8 +53,11 @@ fn answer(square: &[(&'static str, f64)]) -> (Vec<String>, Grade) {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
     let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
-    let mut refit =
-        Told { linear: LinearRefit::new(p.clone()), square: square.iter().copied().collect(), asked: 0 };
+    let mut refit = Told {
+        linear: LinearRefit::new(p.clone()),
+        square: square.iter().copied().collect(),
+        asked: Vec::new(),
+    };
     let first = (p.clone(), weigh(&p, &config));
     let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
     // All entries are within reach of the name.
@@ -117,7 +121,7 @@ fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simpl
     let config = quick();
     let after = |change: &dyn Fn(&mut Accepted), square: &[(&'static str, f64)]| {
         let square = square.iter().copied().collect();
-        let mut refit = Told { linear: LinearRefit::new(p.clone()), square, asked: 0 };
+        let mut refit = Told { linear: LinearRefit::new(p.clone()), square, asked: Vec::new() };
         let first = (p.clone(), weigh(&p, &config));
         let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
         change(&mut search.accepted[0]);
@@ -125,7 +129,7 @@ fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simpl
         settle(&mut search, &mut rooms, &config).unwrap();
         let a = &search.accepted[0];
         let names = a.judged.set.iter().map(|k| a.room.weighed.entries[*k].candidate.spec.clone());
-        (refit.asked, names.collect::<Vec<_>>())
+        (refit.asked.len(), names.collect::<Vec<_>>())
     };
     assert!(after(&|_| (), &[]).0 >= 1);
     assert_eq!(after(&|a| a.candidate.known = Some("seen".into()), &[]).0, 0);
@@ -163,4 +167,35 @@ fn what_a_refit_puts_far_behind_leaves_the_answer_and_what_it_puts_ahead_takes_t
     assert!(after(2.9).is_none());
     let ahead = after(3.1).unwrap();
     assert!(ahead.judged.entry == other || ahead.grade == Grade::OrUnlisted);
+}
+
+#[test]
+fn what_was_found_is_settled_with_everything_else_that_was_found() {
+    let p = planted(&[("backlash:1", 1.0), ("zero_drift:3", 1.0)], 0, 3);
+    let config = quick();
+    let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut found: Vec<String> = search.accepted.iter().map(|a| a.candidate.spec.clone()).collect();
+    found.sort();
+    assert_eq!(found, ["backlash:1", "zero_drift:3"]);
+    let mut refit = Told { linear: LinearRefit::new(p.clone()), square: BTreeMap::new(), asked: Vec::new() };
+    let first = (p.clone(), weigh(&p, &config));
+    let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
+    settle(&mut search, &mut rooms, &config).unwrap();
+    assert!(refit.asked.iter().all(|a| a.len() == 2 && a[0] != a[1]), "{:?}", refit.asked);
+    for one in &found {
+        assert!(refit.asked.iter().any(|a| &a[0] == one), "beside {one}: {:?}", refit.asked);
+    }
+}
+
+#[test]
+fn a_name_that_a_refit_puts_behind_the_truth_is_taken_back() {
+    // The drift was told where the play was planted.
+    let mut found = found();
+    let config = quick();
+    let (truth, told) = (found.judged.entry, entry(&found.room.weighed, "zero_drift:1"));
+    found.judged = Judged { entry: told, set: vec![told], ..found.judged.clone() };
+    found.candidate = found.room.weighed.entries[told].candidate.clone();
+    let after = decided(&found, &[(told, 100.0), (truth, 120.0)], &config).unwrap();
+    assert_eq!((after.candidate.spec.as_str(), after.judged.entry), ("backlash:1", truth));
+    assert_eq!((after.judged.set, after.grade), (vec![truth], Grade::Named));
 }

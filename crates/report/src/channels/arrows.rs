@@ -8,12 +8,15 @@ use crate::run::Run;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 
-const WHITE: Rgba = [0.95, 0.95, 0.95, 1.0];
+const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
 
 /// Longest arrow worth drawing beside an arm [m]; the 95th percentile of a set is kept below.
 const LONG_ARROW_M: f64 = 0.05;
-const THICKNESS_M: f64 = 0.0015;
-const TEXT_HEIGHT_M: f64 = 0.012;
+const THICKNESS_M: f64 = 0.0025;
+/// Extent of the points that text is sized for at least [m].
+const SMALLEST_M: f64 = 0.2;
+/// Height of the text as a share of the extent of the points: to be read from where all of them are seen.
+const TEXT_HEIGHT: f64 = 0.018;
 
 /// Where an arrow begins and the error it shows: place of the tip, measured minus predicted [m].
 type Error = fn(&Point) -> (Vector3<f64>, Vector3<f64>);
@@ -93,6 +96,8 @@ impl Drawing {
         let seen: Vec<&Vector3<f64>> =
             own.iter().map(|p| &p.measured_m).filter(|m| m.iter().all(|x| x.is_finite())).collect();
         let mut place_m = seen.iter().copied().sum::<Vector3<f64>>() / seen.len() as f64;
+        let low_m = seen.iter().fold(place_m, |low, m| low.inf(m));
+        let high_m = seen.iter().fold(place_m, |high, m| high.sup(m));
         place_m.z = seen.iter().map(|m| m.z).reduce(f64::max)? + 0.1;
         let words = format!(
             "arrows: from the measured tip towards the predicted one\n\
@@ -105,7 +110,7 @@ impl Drawing {
             crate::text::millimetres(self.large_m)
         );
         let mut legend = entity("scale", time_ns);
-        legend.texts.push(text(&place_m, TEXT_HEIGHT_M, WHITE, words));
+        legend.texts.push(text(&place_m, TEXT_HEIGHT * (high_m - low_m).norm().max(SMALLEST_M), INK, words));
         Some(legend)
     }
 }

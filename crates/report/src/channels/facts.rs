@@ -4,7 +4,7 @@ use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use crate::points::Point;
 use crate::proto;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
-use crate::text::conclusion;
+use crate::text::{conclusion, in_display_unit, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     out.put("/armcal/parameters", begin_ns, &parameters(&run.calibration.fit, begin_ns));
+    out.put("/armcal/parameter_table", begin_ns, &parameter_table(&run.calibration.fit, begin_ns));
     out.put(
         "/armcal/report",
         begin_ns,
@@ -178,6 +179,25 @@ fn parameter(e: &Estimate) -> proto::Parameter {
         role: role_word(p.role).into(),
         meaning: p.meaning.clone(),
     }
+}
+
+/// The free parameters of a fit as the terminal shows them.
+fn parameter_table(fit: &Fit, time_ns: i64) -> proto::ParameterTable {
+    let row = |e: &Estimate| {
+        let shown = |si| in_display_unit(e.parameter.unit, si);
+        proto::ParameterRow {
+            parameter: e.parameter.name.clone(),
+            nominal: shown(e.parameter.nominal),
+            calibrated: shown(e.value),
+            change: shown(e.value - e.parameter.nominal),
+            interval95: format!("± {}", shown((e.ci95[1] - e.ci95[0]) / 2.0)),
+            unit: e.parameter.unit.display_symbol().into(),
+            remark: remark(e).into(),
+            meaning: e.parameter.meaning.clone(),
+        }
+    };
+    let free = fit.estimates.iter().filter(|e| e.parameter.free);
+    proto::ParameterTable { timestamp: time(time_ns), rows: free.map(row).collect() }
 }
 
 /// The calibration of the pipeline of this name, and what it comes to in a sentence.

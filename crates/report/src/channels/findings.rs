@@ -4,10 +4,12 @@ use super::facts::time;
 use super::{Messages, run_start_ns, start_ns};
 use crate::findings::Findings;
 use crate::run::Run;
+use crate::story::Story;
 
 pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     let stamp = || time(begin_ns);
+    out.put("/armcal/story", begin_ns, &story(&Story::of(run), begin_ns));
     for joint in &f.joints {
         let topic = implied_topic(joint.number);
         out.put(topic, begin_ns, &crate::proto::JointErrors { timestamp: stamp(), ..joint.clone() });
@@ -30,6 +32,18 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
         out.put(curve_topic(number), begin_ns, &message);
     }
     out.put("/armcal/quality", begin_ns, &crate::proto::Quality { timestamp: stamp(), ..f.quality.clone() });
+}
+
+fn story(s: &Story, time_ns: i64) -> crate::proto::Story {
+    let mut warnings: Vec<_> = s.warnings.iter().collect();
+    warnings.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
+    let told = warnings.into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code));
+    crate::proto::Story {
+        timestamp: time(time_ns),
+        lamp: s.lamp.into(),
+        lines: s.lines(),
+        warnings: told.collect(),
+    }
 }
 
 /// Topic of what is implied about a joint, by its number from 1.

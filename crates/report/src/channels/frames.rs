@@ -4,10 +4,14 @@ use super::shapes::{quaternion, vector};
 use super::{Messages, WORLD, run_start_ns, timestamp};
 use crate::run::Run;
 use armcal_core::{Dwell, Pose};
+use armcal_model::Model;
 use foxglove::messages as fox;
 use std::collections::BTreeSet;
 
-/// What stands still, before the first dwell: the frame of the map of boards.
+/// The board of the recording that is shown.
+pub(super) const BOARD: &str = "board";
+
+/// What stands still whether or not the arm ever dwells: the frame of the map of boards.
 pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: vec![board_map(begin_ns)] });
@@ -18,32 +22,44 @@ fn board_map(time_ns: i64) -> fox::FrameTransform {
     transform(time_ns, WORLD, super::board_map::FRAME, &Pose::identity())
 }
 
-/// The tree at one dwell, complete.
-pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, out: &mut Messages) {
-    if dwell.joint_rad.len() != run.model.joint_count() {
-        return;
-    }
+/// A frame of the arm in the frame before it, the first one in the world.
+pub(super) struct Link {
+    pub name: String,
+    pub in_parent: Pose,
+}
+
+/// The frames of the arm under a prefix, in the order of the chain.
+pub(super) fn links(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64]) -> Vec<Link> {
+    let mut names = BTreeSet::new();
+    let mut base_from_parent = model.base_in_world(p).inverse();
+    let link = |(name, base_from_child): (String, Pose)| {
+        let mut name = format!("{prefix}/{name}");
+        // A link may be called like the frames around the arm; a frame must not be its own parent.
+        while !names.insert(name.clone()) {
+            name.push('\'');
+        }
+        let in_parent = base_from_parent.inverse() * base_from_child;
+        base_from_parent = base_from_child;
+        Link { name, in_parent }
+    };
+    model.link_frames_in_base(p, joint_rad).into_iter().map(link).collect()
+}
+
+/// The tree in the pose of a dwell, complete.
+pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
-    let time_ns = dwell.mid_ns();
     let mut transforms = vec![board_map(time_ns)];
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
-        let mut parent_name = WORLD.to_owned();
-        let mut names = BTreeSet::new();
-        let mut base_from_parent = run.model.base_in_world(p).inverse();
-        for (name, base_from_child) in run.model.link_frames_in_base(p, &dwell.joint_rad) {
-            let mut child_name = format!("{prefix}/{name}");
-            // A link may be called like the frames around the arm; a frame must not be its own parent.
-            while !names.insert(child_name.clone()) {
-                child_name.push('\'');
-            }
-            let parent_from_child = base_from_parent.inverse() * base_from_child;
-            transforms.push(transform(time_ns, &parent_name, &child_name, &parent_from_child));
-            (parent_name, base_from_parent) = (child_name, base_from_child);
+        let mut parent = WORLD.to_owned();
+        for link in links(&run.model, prefix, p, &dwell.joint_rad) {
+            transforms.push(transform(time_ns, &parent, &link.name, &link.in_parent));
+            parent = link.name;
         }
     }
     if let Some(board) = run.model.board_in_world(&fitted, recording) {
         let name = format!("board/{}", run.recordings[recording].name);
         transforms.push(transform(time_ns, WORLD, &name, &board));
+        transforms.push(transform(time_ns, WORLD, BOARD, &board));
     }
     out.put("/armcal/tf", time_ns, &fox::FrameTransforms { transforms });
 }

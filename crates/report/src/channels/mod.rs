@@ -6,7 +6,11 @@
 //! | `/armcal/arrows_nominal`, `_calibrated`, `_after` | `foxglove.SceneUpdate` | one a recording: error arrows; `after` \
 //!   with everything found |
 //! | `/armcal/board_map` | `foxglove.SceneUpdate` | one a run: all boards from above, side by side, with error arrows |
+//! | `/armcal/nominal/robot_description`, `/armcal/calibrated/..`, `/armcal/board/..` | `std_msgs/msg/String` | one a run: \
+//!   URDF whose links are frames of `/armcal/tf` |
+//! | `/armcal/errors` | `foxglove.PointCloud` | one a recording: measured tips with their errors as fields |
 //! | `/armcal/arms` | `foxglove.SceneUpdate` | one a dwell: nominal and calibrated arm, measured tip |
+//! | `/armcal/story` | `armcal.Story` | one a run: what came out, what is missing, what to do next |
 //! | `/armcal/tf` | `foxglove.FrameTransforms` | one a dwell: both arms link by link, the board; the frame of the map |
 //! | `/armcal/path_measured`, `_nominal`, `_calibrated` | `foxglove.PosesInFrame` | one a recording |
 //! | `/armcal/tip_measured` | `foxglove.PoseInFrame` | one an observation |
@@ -14,6 +18,7 @@
 //! | `/armcal/assignments` | `armcal.Assignment` | one a dwell |
 //! | `/armcal/residuals` | `armcal.Residual` | one an observation |
 //! | `/armcal/parameters` | `armcal.Parameters` | one a run |
+//! | `/armcal/parameter_table` | `armcal.ParameterTable` | one a run: the free ones as people read them |
 //! | `/armcal/report` | `armcal.Calibration` | one a run |
 //! | `/armcal/clock` | `armcal.ClockAlignment` | one a recording with a sensor clock |
 //! | `/armcal/implied/joint1`, ... | `armcal.JointErrors` | one a run: error against angle, by direction of arrival |
@@ -35,11 +40,13 @@
 mod arrows;
 pub(crate) mod board_map;
 mod closed_chain;
+pub(crate) mod cloud;
 mod facts;
 mod findings;
 mod frames;
 mod log;
 mod paths;
+pub(crate) mod robots;
 mod scene;
 mod shapes;
 
@@ -75,17 +82,22 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
     facts::put(run, points, &mut out);
     findings::put(run, findings, &mut out);
     frames::put_standing(run, &mut out);
+    robots::put(run, &mut out);
     board_map::put(run, findings, &mut out);
     let drawing = arrows::Drawing::of(run, points);
     for (index, recording) in run.recordings.iter().enumerate() {
         let of_recording: Vec<&Point> =
             points.iter().filter(|p| p.observation.dwell.recording == index).collect();
         paths::put(recording, &of_recording, &mut out);
+        cloud::put(recording, &of_recording, &mut out);
         scene::standing(run, index, &of_recording, &drawing, &mut out);
         arrows::put(run, index, &of_recording, &drawing, &mut out);
-        for dwell in &recording.dwells {
-            frames::put(run, index, dwell, &mut out);
-            scene::arms(run, dwell, &of_recording, &mut out);
+        let shown = || recording.dwells.iter().filter(|d| d.joint_rad.len() == run.model.joint_count());
+        // A viewer draws nothing before the first message: until the first dwell the arm stands as in it.
+        let first = shown().take(1).map(|dwell| (dwell, start_ns(recording)));
+        for (dwell, time_ns) in first.chain(shown().map(|dwell| (dwell, dwell.mid_ns()))) {
+            frames::put(run, index, dwell, time_ns, &mut out);
+            scene::arms(run, dwell, &of_recording, time_ns, &mut out);
         }
     }
     out.messages.sort_by_key(|m| m.log_ns);
@@ -136,6 +148,22 @@ impl Messages {
             message_encoding: T::get_message_encoding(),
             log_ns: unsigned(log_ns),
             publish_ns: unsigned(publish_ns),
+            data,
+        });
+    }
+}
+
+impl Messages {
+    /// Text as ROS 2 has it: a string in little-endian CDR (OMG DDS-XTypes 1.3, 7.4) behind its four bytes of header.
+    fn put_text(&mut self, topic: &str, time_ns: i64, text: &str) {
+        let length = count(text.len() + 1).to_le_bytes();
+        let data = [&[0, 1, 0, 0], &length[..], text.as_bytes(), &[0]].concat();
+        self.messages.push(ResultMessage {
+            topic: topic.into(),
+            schema: Schema::new("std_msgs/msg/String", "ros2msg", b"string data\n".as_slice()),
+            message_encoding: "cdr".into(),
+            log_ns: unsigned(time_ns),
+            publish_ns: unsigned(time_ns),
             data,
         });
     }

@@ -17,10 +17,10 @@ pub(super) const GREY: Rgba = [0.62, 0.62, 0.62, 0.6];
 pub(super) const GREEN: Rgba = [0.15, 0.65, 0.35, 0.9];
 const WHITE: Rgba = [0.95, 0.95, 0.95, 1.0];
 const HELD_OUT: Rgba = [0.25, 0.50, 0.95, 1.0];
-const PLATE: Rgba = [0.45, 0.45, 0.50, 0.5];
-const BOARD: Rgba = [0.80, 0.78, 0.70, 1.0];
+pub(super) const PLATE: Rgba = [0.45, 0.45, 0.50, 0.5];
+pub(super) const CAVITY: Rgba = [0.80, 0.78, 0.70, 1.0];
 
-const CAVITY_DIAMETER_M: f64 = 0.008;
+pub(super) const CAVITY_DIAMETER_M: f64 = 0.008;
 /// The plate under the cavities: thickness, and how far it reaches beyond them.
 const PLATE_M: f64 = 0.004;
 const PLATE_MARGIN_M: f64 = 0.02;
@@ -35,23 +35,12 @@ pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Dr
     out.put("/armcal/scene", time_ns, &fox::SceneUpdate { deletions: vec![all(time_ns)], entities });
 }
 
-/// Both arms during one dwell, and the tip as it was measured.
-pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], out: &mut Messages) {
-    if dwell.joint_rad.len() != run.model.joint_count() {
-        return;
-    }
-    let time_ns = dwell.mid_ns();
+/// Both arms in the pose of a dwell, and the tip as it was measured.
+pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
     let mut entities = vec![
-        arm(
-            "arm/nominal",
-            &run.model,
-            &run.calibration.nominal_values,
-            GREY,
-            dwell.mid_ns(),
-            &dwell.joint_rad,
-        ),
-        arm("arm/calibrated", &run.model, &fitted, GREEN, dwell.mid_ns(), &dwell.joint_rad),
+        arm("arm/nominal", &run.model, &run.calibration.nominal_values, GREY, time_ns, &dwell.joint_rad),
+        arm("arm/calibrated", &run.model, &fitted, GREEN, time_ns, &dwell.joint_rad),
     ];
     let observed = own.iter().find(|p| p.observation.dwell == dwell.id).map(|p| p.measured_m);
     let mut measured = entity("tip/measured", time_ns);
@@ -94,21 +83,26 @@ fn board(run: &Run, recording: usize, time_ns: i64) -> Option<fox::SceneEntity> 
     entity.cubes.extend(base_plate(&board.cavities, &world_from_board));
     for cavity in &board.cavities {
         let place = world_from_board * Pose::from(Translation3::from(cavity.in_board_m));
-        entity.cylinders.push(disc(&place, CAVITY_DIAMETER_M, 0.001, BOARD));
+        entity.cylinders.push(disc(&place, CAVITY_DIAMETER_M, 0.001, CAVITY));
         let above_m = place * nalgebra::Point3::new(0.0, 0.0, 0.01);
-        entity.texts.push(text(&above_m.coords, 0.004, BOARD, cavity.name.clone()));
+        entity.texts.push(text(&above_m.coords, 0.004, CAVITY, cavity.name.clone()));
     }
     Some(entity)
 }
 
-/// A plate under the cavities, below the lowest.
 fn base_plate(cavities: &[Cavity], world_from_board: &Pose) -> Option<fox::CubePrimitive> {
+    let (in_board, size_m) = plate_of(cavities)?;
+    Some(plate(&(world_from_board * in_board), &size_m, PLATE))
+}
+
+/// A plate under the cavities, below the lowest: its centre in the frame of the board, and its sides [m].
+pub(super) fn plate_of(cavities: &[Cavity]) -> Option<(Pose, Vector3<f64>)> {
     let places = || cavities.iter().map(|c| c.in_board_m);
     let (low, high) = (places().reduce(|a, b| a.inf(&b))?, places().reduce(|a, b| a.sup(&b))?);
     let mut centre = (low + high) / 2.0;
     centre.z = low.z - PLATE_M;
     let size_m = (high - low + Vector3::repeat(2.0 * PLATE_MARGIN_M)).xy().push(PLATE_M);
-    Some(plate(&(world_from_board * Pose::from(Translation3::from(centre))), &size_m, PLATE))
+    Some((Pose::from(Translation3::from(centre)), size_m))
 }
 
 /// Where the tip was measured; held-out points in blue.

@@ -8,8 +8,9 @@ use armcal_core::robust::percentile;
 use armcal_core::{Pose, Reference};
 use nalgebra::Vector3;
 
-/// The share of the distance between neighbouring cavities that a large error vector may cover.
-const REACH: f64 = 0.6;
+/// Distances between neighbouring cavities that a large error vector may cover: shorter ones cannot be seen in a panel that
+/// shows all boards.
+const REACH: f64 = 1.5;
 
 pub(super) fn board_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<BoardErrors> {
     let magnification = magnification(run, points);

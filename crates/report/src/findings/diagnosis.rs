@@ -1,6 +1,6 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
-use super::{finite, or_zero};
+use super::{finite, or_zero, short};
 use crate::diagnosis_text::{headline, sizes, sizes_of};
 use crate::proto;
 use crate::run::Answer;
@@ -47,12 +47,12 @@ fn candidate(c: &CandidateReport) -> proto::Candidate {
         effect: c.spec.clone(),
         target: c.target.clone(),
         size: sizes(c),
-        probability: or_zero(c.probability),
-        log_evidence: finite(c.log_evidence),
-        p_adjusted: finite(c.p_adjusted),
-        before_mm: c.holdout_mm.and_then(|h| finite(h.before)),
-        after_mm: c.holdout_mm.and_then(|h| finite(h.after)),
-        absorbed_percent: finite(100.0 * c.absorbed),
+        probability: short(or_zero(c.probability)),
+        log_evidence: finite(c.log_evidence).map(short),
+        p_adjusted: finite(c.p_adjusted).map(short),
+        before_mm: c.holdout_mm.and_then(|h| finite(h.before).map(short)),
+        after_mm: c.holdout_mm.and_then(|h| finite(h.after).map(short)),
+        absorbed_percent: finite(100.0 * c.absorbed).map(short),
         same_to_the_data: c.same_to_the_data.join(", "),
     }
 }
@@ -62,11 +62,11 @@ fn found(e: &FoundEffect) -> proto::FoundEffect {
         effect: e.name.clone(),
         one_of: if e.set.len() > 1 { e.set.join(", ") } else { String::new() },
         size: sizes_of(e),
-        probability: or_zero(e.probability),
-        p_adjusted: finite(e.p_adjusted),
-        before_mm: finite(e.places.before),
-        after_mm: finite(e.places.after),
+        probability: short(or_zero(e.probability)),
+        p_adjusted: finite(e.p_adjusted).map(short),
+        before_mm: finite(e.places.before).map(short),
+        after_mm: finite(e.places.after).map(short),
         rival: e.rival.as_ref().map(|r| r.name.clone()).unwrap_or_default(),
-        rival_behind_nats: e.rival.as_ref().and_then(|r| finite(r.behind_nats)),
+        rival_behind_nats: e.rival.as_ref().and_then(|r| finite(r.behind_nats).map(short)),
     }
 }

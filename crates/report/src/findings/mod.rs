@@ -69,7 +69,31 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Four significant digits: tables of viewers show every digit a number has.
+fn short(value: f64) -> f64 {
+    let exponent = value.abs().log10().floor();
+    if exponent.is_finite() { rounded(value, 3 - exponent as i32) } else { value }
+}
+
+/// The decimal number of so many places nearest to a value; whole numbers at least.
+fn rounded(value: f64, places: i32) -> f64 {
+    let places = usize::try_from(places).unwrap_or(0);
+    format!("{value:.places$}").parse().unwrap_or(value)
+}
+
 /// Zero for what is not a number, in fields that cannot be absent.
 fn or_zero(value: f64) -> f64 {
     finite(value).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_tables_have_four_digits() {
+        let shown = [24.342_778_184, 0.131_249_9, -20.892_246, 123_456.7, 1e-7 / 3.0, 0.0].map(short);
+        assert_eq!(shown, [24.34, 0.1312, -20.89, 123_457.0, 3.333e-8, 0.0]);
+        assert!(short(f64::NAN).is_nan() && short(f64::INFINITY).is_infinite());
+    }
 }

@@ -1,6 +1,6 @@
 //! What the data are like: clocks, occlusion, damage, and dwells that do not take part.
 
-use super::finite;
+use super::{finite, short};
 use crate::channels::count;
 use crate::proto::{Quality, RecordingQuality, RejectedDwell};
 use crate::run::{RecordingRun, Run};
@@ -27,17 +27,17 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingQuality {
         dwells: count(r.dwells.len()),
         used: count(run.used(r)),
         rejected: count(r.rejections.len()),
-        duration_min,
+        duration_min: short(duration_min),
         occluded: r.report.streams.iter().map(|s| s.occluded.total()).sum(),
         damaged: count(r.report.files.iter().map(|f| f.damaged.len()).sum()),
         warnings: count(r.all_warnings().len()),
-        clock_offset_ms: r.clock.as_ref().and_then(|c| finite(c.offset_s * 1e3)),
+        clock_offset_ms: r.clock.as_ref().and_then(|c| finite(c.offset_s * 1e3).map(short)),
         clock_offset_sigma_ms: r
             .clock
             .as_ref()
             .filter(|c| !c.declared)
-            .and_then(|c| finite(c.offset_sigma_s * 1e3)),
-        clock_drift_ppm: r.clock.as_ref().and_then(|c| finite(c.drift * 1e6)),
-        clock_correlation: r.clock.as_ref().and_then(|c| finite(c.correlation)),
+            .and_then(|c| finite(c.offset_sigma_s * 1e3).map(short)),
+        clock_drift_ppm: r.clock.as_ref().and_then(|c| finite(c.drift * 1e6).map(short)),
+        clock_correlation: r.clock.as_ref().and_then(|c| finite(c.correlation).map(short)),
     }
 }

@@ -28,14 +28,14 @@ pub(super) fn steps(run: &Run) -> Steps {
     Steps {
         timestamp: None,
         steps,
-        noise_floor_mm: super::or_zero(calibration.noise_floor_m * 1e3),
+        noise_floor_mm: super::short(super::or_zero(calibration.noise_floor_m * 1e3)),
         held_out,
     }
 }
 
 fn step(number: usize, adds: &str, e: &ErrorStats, before_m: Option<f64>) -> Step {
     let falls = before_m.filter(|b| *b > 0.0).map_or(0.0, |b| 100.0 * (b - e.mean_m) / b);
-    let mm = |m: f64| super::or_zero(m * 1e3);
+    let mm = |m: f64| super::short(super::or_zero(m * 1e3));
     Step {
         number: count(number),
         adds: adds.to_owned(),
@@ -43,6 +43,6 @@ fn step(number: usize, adds: &str, e: &ErrorStats, before_m: Option<f64>) -> Ste
         rms_mm: mm(e.rms_m),
         p95_mm: mm(e.p95_m),
         max_mm: mm(e.max_m),
-        falls_by_percent: super::or_zero(falls),
+        falls_by_percent: super::short(super::or_zero(falls)),
     }
 }

@@ -1,6 +1,7 @@
 //! Settings of panels, which both formats share.
 
-use super::spec::{Kind, Plot, Series, View, X};
+use super::spec::{Colour, Kind, Plot, Series, View};
+use crate::channels::cloud;
 use serde_json::{Map, Value, json};
 
 /// The settings of a panel.
@@ -11,12 +12,11 @@ pub(super) fn config(kind: &Kind) -> Map<String, Value> {
         Kind::Table(path) => json!({ "topicPath": path }),
         Kind::Raw(path) => json!({ "topicPath": path, "diffEnabled": false, "expansion": "all" }),
         Kind::Indicator(path, rules) => {
-            let rule = |[value, colour, label]: &[&str; 3]| json!({ "rawValue": value, "operator": "=", "color": colour, "label": label });
+            let rule = |(value, colour, label): &(&str, Colour, &str)| json!({ "rawValue": value, "operator": "=", "color": colour.hex, "label": label });
             let rules: Vec<Value> = rules.iter().map(rule).collect();
             json!({ "path": path, "style": "background", "rules": rules,
-                    "fallbackColor": "#777777", "fallbackLabel": "not diagnosed" })
+                    "fallbackColor": "#777777", "fallbackLabel": "waiting for the first message" })
         }
-        Kind::Log(topic) => json!({ "topicToRender": topic, "minLogLevel": 1, "searchTerms": [] }),
         Kind::States(paths) => {
             let path = |[value, label]: &[&str; 2]| json!({ "value": value, "label": label, "timestampMethod": "receiveTime" });
             let paths: Vec<Value> = paths.iter().map(path).collect();
@@ -32,11 +32,13 @@ pub(super) fn config(kind: &Kind) -> Map<String, Value> {
 fn plot_config(plot: &Plot) -> Value {
     let mut config = json!({
         "paths": plot.series.iter().map(series).collect::<Vec<Value>>(),
-        "xAxisVal": "timestamp",
+        "xAxisVal": "currentCustom",
+        "xAxisPath": { "value": plot.x_path, "enabled": true },
+        "xAxisLabel": plot.x_label,
         "yAxisLabel": plot.y_label,
-        "isSynced": true,
-        "showLegend": true,
-        "legendDisplay": "floating",
+        "isSynced": false,
+        "showLegend": false,
+        "legendDisplay": "none",
         "showPlotValuesInLegend": false,
         "showXAxisLabels": true,
         "showYAxisLabels": true,
@@ -44,12 +46,6 @@ fn plot_config(plot: &Plot) -> Value {
     if let Some([least, most]) = plot.y_range {
         config["minYValue"] = json!(least);
         config["maxYValue"] = json!(most);
-    }
-    if let X::Array(path, label) = &plot.x {
-        config["xAxisVal"] = json!("currentCustom");
-        config["xAxisPath"] = json!({ "value": path, "enabled": true });
-        config["xAxisLabel"] = json!(label);
-        config["isSynced"] = json!(false);
     }
     config
 }
@@ -59,7 +55,7 @@ fn series(s: &Series) -> Value {
         "value": s.path,
         "enabled": true,
         "label": s.label,
-        "color": s.colour,
+        "color": s.colour.hex,
         "timestampMethod": "receiveTime",
         "showLine": s.line,
         "lineSize": if s.line { 1.5 } else { 3.0 },
@@ -68,9 +64,15 @@ fn series(s: &Series) -> Value {
 
 fn view_config(view: &View) -> Value {
     let topic = |(topic, visible): &(&str, bool)| {
-        let settings = match topic.contains("/path_") {
-            true => json!({ "visible": visible, "type": "line", "lineWidth": 0.001 }),
-            false => json!({ "visible": visible }),
+        let settings = match *topic {
+            t if t.contains("/path_") => json!({ "visible": visible, "type": "line", "lineWidth": 0.001 }),
+            cloud::TOPIC => json!({
+                "visible": visible, "pointSize": 8, "pointShape": "circle",
+                "colorMode": "colormap", "colorMap": "turbo", "colorField": cloud::SHOWN,
+            }),
+            // Axes of a metre otherwise.
+            "/armcal/tip_measured" => json!({ "visible": visible, "axisScale": 0.03 }),
+            _ => json!({ "visible": visible }),
         };
         ((*topic).to_owned(), settings)
     };
@@ -91,9 +93,31 @@ fn view_config(view: &View) -> Value {
         },
         "followTf": view.frame,
         "followMode": "follow-none",
-        "scene": { "transforms": { "visible": false } },
+        // Without these every link and board has a name and axes of its own in the picture, and a frame that comes with a
+        // later message is a problem until then.
+        "scene": {
+            "transforms": { "showLabel": false, "axisScale": 0, "lineWidth": 0, "enablePreloading": true },
+        },
         "transforms": {},
         "topics": topics,
-        "layers": {},
+        "layers": robots(&view.robots),
     })
+}
+
+/// Layers that draw URDF from topics; the links are called like the frames, so they have no prefix.
+fn robots(topics: &[&str]) -> Map<String, Value> {
+    let layer = |(order, topic): (usize, &&str)| {
+        let settings = json!({
+            "instanceId": topic,
+            "layerId": "foxglove.Urdf",
+            "label": topic,
+            "sourceType": "topic",
+            "topic": topic,
+            "framePrefix": "",
+            "visible": false,
+            "order": order + 1,
+        });
+        ((*topic).to_owned(), settings)
+    };
+    topics.iter().enumerate().map(layer).collect()
 }

@@ -41,7 +41,6 @@ fn panel_type(kind: &Kind) -> &'static str {
         Kind::Table(_) => "Table",
         Kind::Raw(_) => "RawMessages",
         Kind::Indicator(..) => "Indicator",
-        Kind::Log(_) => "Log",
         Kind::States(_) => "StateTransitions",
     }
 }

@@ -1,12 +1,12 @@
 //! What the dwells say about each joint, by direction of arrival.
 
 use super::panels::{BLUE, GREY, VERMILION, dots};
-use super::spec::{Content, Direction, Kind, Plot, X};
+use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
 use crate::findings::Findings;
 use crate::proto::JointErrors;
 use crate::text::printable;
-use armcal_core::robust::percentile;
+use armcal_core::robust::{median, percentile};
 
 /// A joint that gravity loads by less than this share of the most loaded one is not drawn over its torque.
 const UNLOADED: f64 = 0.05;
@@ -14,6 +14,11 @@ const UNLOADED: f64 = 0.05;
 const MOVED: f64 = 0.3;
 /// Nor is one on which they act by less than this many times what is left.
 const ABOVE_REST: f64 = 1.5;
+
+/// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
+const BLUNT: f64 = 5.0;
+/// Rows of joints that fit below each other on a laptop beside other panels.
+const SHOWN: usize = 2;
 
 /// What is drawn of a joint, split by direction of arrival.
 #[derive(Clone, Copy)]
@@ -36,6 +41,14 @@ impl What {
         }
     }
 
+    fn words(self) -> &'static str {
+        match self {
+            What::Error => "",
+            What::After => ", rest",
+            What::Effect => ", effects",
+        }
+    }
+
     fn suffix(self) -> &'static str {
         match self {
             What::Error => "",
@@ -50,76 +63,78 @@ pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
     f.joints.iter().filter(|m| !m.reading.is_empty())
 }
 
-/// Over its angle and, where gravity loads it, over its torque.
-pub(super) fn joint_row(f: &Findings, m: &JointErrors, what: What) -> Vec<Content> {
-    let name = printable(&m.joint);
-    let title = match what {
-        What::Error => name,
-        What::After => format!("{name}, what is left"),
-        What::Effect => format!("{name}, what the effects do"),
-    };
-    let range = common_range(f, m, what);
-    let angle =
-        joint_plot(m, format!("{title}, over its angle"), ("reading", "reading", &m.unit), what, range);
-    let mut row = vec![angle];
+/// Over its angle, where play and eccentricity show.
+pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
+    let title = format!("{}{} by angle", printable(&m.joint), what.words());
+    joint_plot(m, &title, ("reading", "reading", &m.unit), what, common_range(f, m, what))
+}
+
+/// Over its torque, where compliance shows; none where gravity hardly loads it.
+pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<Content> {
     let span = |m: &JointErrors| m.torque_nm.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
     let largest = f.joints.iter().map(span).fold(0.0, f64::max);
-    if span(m) > UNLOADED * largest {
-        let torque = ("torque_nm", "gravity torque", "N m");
-        row.push(joint_plot(m, format!("{title}, over its torque"), torque, what, range));
-    }
-    row
+    let title = format!("{}{} by torque", printable(&m.joint), what.words());
+    let torque = ("torque_nm", "gravity torque", "N m");
+    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, common_range(f, m, what)))
 }
 
 /// Implied error by direction of arrival against one of the arrays: field, name and unit.
 fn joint_plot(
     m: &JointErrors,
-    title: String,
+    title: &str,
     (x, x_name, x_unit): (&str, &str, &str),
     what: What,
     y_range: Option<[f64; 2]>,
 ) -> Content {
     let path = |field: &str| format!("{}.{field}[:]", implied_topic(m.number));
-    let arrivals = [
-        ("positive", 1, "arrived in +q", BLUE),
-        ("negative", -1, "arrived in -q", VERMILION),
-        ("unknown", 0, "arrival unknown", GREY),
-    ];
+    let arrivals =
+        [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
-    let dots_of = |(field, _, label, colour): (&str, i32, &str, &'static str)| {
+    let dots_of = |(field, _, label, colour): (&str, i32, &str, Colour)| {
         dots(path(&format!("{field}{}", what.suffix())), label, colour)
     };
     let plot = Plot {
-        x: X::Array(path(x), format!("{x_name} [{x_unit}]")),
+        x_path: path(x),
+        x_label: format!("{x_name} [{x_unit}]; colours: arrived in"),
         y_label: format!("implied error [{}]", m.unit),
         y_range,
         series: seen.map(dots_of).collect(),
     };
-    Content::panel(title, Kind::Plot(plot))
+    Content::plot(title, plot)
 }
 
-/// The same for all joints of a unit; what is left keeps the scale of what the effects do.
+/// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
+/// wrist that only turns the tool, would flatten the others. What is left keeps the scale of what the effects do.
 fn common_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
     let scale = if matches!(what, What::After) { What::Effect } else { what };
-    let same = f.joints.iter().filter(|other| other.unit == m.unit);
-    let errors: Vec<f64> = same.flat_map(|m| scale.whole(m)).map(|e| e.abs()).collect();
+    let usual = |m: &JointErrors| median(&m.sigma);
+    let unit = || f.joints.iter().filter(|other| other.unit == m.unit && !other.sigma.is_empty());
+    let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
+    let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
+    let beside = unit().filter(|other| if sharp(m) { sharp(other) } else { other.number == m.number });
+    let errors: Vec<f64> = beside.flat_map(|m| scale.whole(m)).map(|e| e.abs()).collect();
     let large = 1.3 * percentile(&errors, 0.98);
     (large > 0.0).then_some([-large, large])
 }
 
-/// The joints the effects found act on most, each with what they do and what is left.
+/// The joints the effects found act on most, each with what they do and what is left. Sizes are counted in the standard
+/// deviations of the dwells, so that joints which hardly move the tip do not lead.
 pub(super) fn what_effects_do(f: &Findings) -> Vec<Content> {
     let size = |m: &JointErrors, what: What| {
-        percentile(&what.whole(m).iter().map(|e| e.abs()).collect::<Vec<f64>>(), 0.9)
+        let sigmas: Vec<f64> = what.whole(m).iter().zip(&m.sigma).map(|(e, s)| (e / s).abs()).collect();
+        percentile(&sigmas, 0.9)
     };
     let effect = |m: &JointErrors| size(m, What::Effect);
-    let largest = |unit: &str| f.joints.iter().filter(|m| m.unit == unit).map(effect).fold(0.0, f64::max);
-    let moved = drawn(f)
-        .filter(|m| effect(m) >= MOVED * largest(&m.unit) && effect(m) > ABOVE_REST * size(m, What::After));
+    let largest = drawn(f).map(effect).fold(0.0, f64::max);
+    let mut moved: Vec<&JointErrors> = drawn(f)
+        .filter(|m| effect(m) >= MOVED * largest && effect(m) > ABOVE_REST * size(m, What::After))
+        .collect();
+    moved.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
     let row = |m: &JointErrors| {
-        let mut row = joint_row(f, m, What::Effect);
-        row.push(joint_row(f, m, What::After).swap_remove(0));
+        let mut row = vec![over_angle(f, m, What::Effect)];
+        row.extend(over_torque(f, m, What::Effect));
+        row.push(over_angle(f, m, What::After));
         Content::even(Direction::Row, row)
     };
-    moved.map(row).collect()
+    moved.into_iter().take(SHOWN).map(row).collect()
 }

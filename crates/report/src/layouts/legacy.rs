@@ -4,6 +4,9 @@ use super::config::config;
 use super::spec::{Content, Direction, Kind};
 use serde_json::{Map, Value, json};
 
+/// Foxglove Studio's, and Lichtblick's.
+const TITLE_KEYS: [&str; 2] = ["foxglovePanelTitle", "lichtblickPanelTitle"];
+
 pub(super) fn layout(content: &Content) -> Value {
     let mut panels = Map::new();
     let tree = node(content, &mut panels);
@@ -21,7 +24,9 @@ fn node(content: &Content, panels: &mut Map<String, Value>) -> Value {
     match content {
         Content::Panel(panel) => {
             let mut settings = config(&panel.kind);
-            settings.insert("foxglovePanelTitle".into(), json!(panel.title));
+            for key in TITLE_KEYS {
+                settings.insert(key.into(), json!(panel.title));
+            }
             if matches!(panel.kind, Kind::Plot(_)) {
                 settings.insert("sidebarDimension".into(), json!(240));
             }
@@ -69,7 +74,6 @@ fn panel_type(kind: &Kind) -> &'static str {
         Kind::Table(_) => "Table",
         Kind::Raw(_) => "RawMessages",
         Kind::Indicator(..) => "Indicator",
-        Kind::Log(_) => "RosOut",
         Kind::States(_) => "StateTransitions",
     }
 }

@@ -37,34 +37,34 @@ pub(super) enum Kind {
     /// A message or a field of one, by its path.
     Raw(String),
     /// A lamp: path, and value, colour and label of each rule.
-    Indicator(String, Vec<[&'static str; 3]>),
-    /// The topic of a log.
-    Log(&'static str),
+    Indicator(String, Vec<(&'static str, Colour, &'static str)>),
     /// Values over time, each with its path and label.
     States(Vec<[&'static str; 2]>),
 }
 
-/// Numbers against time, or arrays of one message against an array of the same message.
+/// Arrays of one message against an array of the same message: a plot against time would show the days between recordings.
 pub(super) struct Plot {
-    pub x: X,
+    pub x_path: String,
+    pub x_label: String,
     pub y_label: String,
     /// Where panels are compared: their common range. Otherwise that of the data.
     pub y_range: Option<[f64; 2]>,
     pub series: Vec<Series>,
 }
 
-pub(super) enum X {
-    Time,
-    /// Path of the array, and the label of the axis.
-    Array(String, String),
-}
-
 pub(super) struct Series {
     /// A path, or a number for a level line.
     pub path: String,
     pub label: String,
-    pub colour: &'static str,
+    pub colour: Colour,
     pub line: bool,
+}
+
+/// A colour, and how people call it.
+#[derive(Clone, Copy)]
+pub(super) struct Colour {
+    pub hex: &'static str,
+    pub name: &'static str,
 }
 
 /// A 3D panel.
@@ -77,11 +77,22 @@ pub(super) struct View {
     pub from_above: bool,
     /// Topics, and whether they are shown at first.
     pub topics: Vec<(&'static str, bool)>,
+    /// Topics with the text of a robot, to be switched on.
+    pub robots: Vec<&'static str>,
 }
 
 impl Content {
     pub fn panel(title: impl Into<String>, kind: Kind) -> Content {
         Content::Panel(Panel { title: title.into(), kind })
+    }
+
+    /// A plot; its title says which colour is what, because a legend lies over the data or takes their place.
+    pub fn plot(title: &str, plot: Plot) -> Content {
+        let mut named: Vec<String> =
+            plot.series.iter().map(|s| format!("{} {}", s.label, s.colour.name)).collect();
+        named.dedup();
+        let title = if named.len() > 1 { format!("{title}: {}", named.join(", ")) } else { title.to_owned() };
+        Content::panel(title, Kind::Plot(plot))
     }
 
     /// Equal shares.

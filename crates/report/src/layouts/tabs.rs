@@ -1,9 +1,7 @@
 //! What is shown where: what came out, where it fails, what is missing, whether the data can be trusted.
 
-use super::joints::{What, drawn, joint_row, what_effects_do};
-use super::panels::{
-    curve_plot, errors_in_time, falling_error, outward, over_recorded_time, raw, table, verdict,
-};
+use super::joints::{What, drawn, over_angle, over_torque, what_effects_do};
+use super::panels::{curve_plot, falling_error, lamp, outward, over_recorded_time, raw, table};
 use super::spec::{Content, Direction, Kind};
 use super::views::{map, world};
 use crate::findings::Findings;
@@ -11,87 +9,134 @@ use crate::points::Point;
 use crate::run::Run;
 use Direction::{Column, Row};
 
+/// Joints of which angle and torque fit side by side in one tab; with more, each has a tab of its own.
+const FEW: usize = 3;
+
 pub(super) fn content(run: &Run, points: &[Point], f: &Findings) -> Content {
     let mut tabs = vec![("Overview", overview(run, points, f)), ("Where it fails", where_it_fails(f))];
-    if f.diagnosis.is_some() {
-        tabs.push(("What is missing", what_is_missing(run, f)));
+    tabs.extend(over_torques(f).map(|panels| ("Over torque", panels)));
+    if f.diagnosis.as_ref().is_some_and(|(d, c)| !d.effects.is_empty() || !c.candidates.is_empty()) {
+        tabs.push(("What is missing", what_is_missing(f)));
     }
-    tabs.push(("Parameters", parameters()));
-    tabs.push(("Data quality", data_quality()));
+    let curves = (1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve));
+    tabs.extend(grid(curves.collect()).map(|panels| ("Unlisted errors", panels)));
+    tabs.extend(numbers(f).map(|panels| ("Numbers", panels)));
+    tabs.push(("Parameters", parameters(run)));
+    tabs.push(("Data quality", data_quality(run, f)));
     Content::Tabs(tabs)
 }
 
+/// What came out and what to do, beside the arm.
 fn overview(run: &Run, points: &[Point], f: &Findings) -> Content {
-    let mut right = Vec::new();
-    if f.diagnosis.is_some() {
-        right.push((1.0, verdict()));
-        right.push((1.5, raw("What is missing", "/armcal/diagnosis.sentence")));
-    }
-    right.push((1.5, raw("What the calibration reached", "/armcal/report.conclusion")));
-    right.push((4.0, errors_in_time("Error at each dwell, before and after", run, true)));
-    right.push((3.0, falling_error(f)));
-    let scene = Content::panel("Nominal arm grey, calibrated arm green", Kind::View(world(run, points, f)));
-    Content::Split(Row, vec![(3.0, scene), (2.0, Content::Split(Column, right))])
+    let mut right = vec![
+        (1.3, lamp()),
+        (4.0, raw("What came out", "/armcal/story.lines")),
+        (3.0, over_recorded_time(f, true)),
+    ];
+    right.extend(falling_error(f).map(|panel| (2.5, panel)));
+    let title = "Nominal arm grey, calibrated arm green, arrows: its errors, enlarged";
+    let scene = Content::panel(title, Kind::View(world(run, points, f)));
+    Content::Split(Row, vec![(1.0, scene), (1.0, Content::Split(Column, right))])
 }
 
-/// One row a joint: over its angle, where play and eccentricity show, and over its torque, where compliance does. All on
-/// one scale, so that the joint that errs stands out.
+/// One plot a joint, all on one scale, so that the joint that errs stands out.
 fn where_it_fails(f: &Findings) -> Content {
     let mut left = Vec::new();
     if !f.boards.is_empty() {
         left.push((3.0, Content::panel("Errors on the boards, from above", Kind::View(map(f)))));
     }
-    left.push((2.0, over_recorded_time(f)));
-    left.push((2.0, outward("Error away from the base over recorded time", "outward_mm", "calibrated")));
-    let joints: Vec<Content> = drawn(f).map(|m| Content::even(Row, joint_row(f, m, What::Error))).collect();
+    left.push((2.0, over_recorded_time(f, false)));
+    left.push((2.0, outward(f)));
     let left = Content::Split(Column, left);
-    if joints.is_empty() {
-        return left;
+    let joints = match drawn(f).count() {
+        n if n > FEW => grid(drawn(f).map(|m| over_angle(f, m, What::Error)).collect()),
+        _ => {
+            let row = |m| {
+                let torque = over_torque(f, m, What::Error);
+                Content::even(Row, std::iter::once(over_angle(f, m, What::Error)).chain(torque).collect())
+            };
+            let rows: Vec<Content> = drawn(f).map(row).collect();
+            (!rows.is_empty()).then(|| Content::even(Column, rows))
+        }
+    };
+    match joints {
+        Some(joints) => Content::Split(Row, vec![(2.0, left), (3.0, joints)]),
+        None => left,
     }
-    Content::Split(Row, vec![(2.0, left), (3.0, Content::even(Column, joints))])
 }
 
-fn what_is_missing(run: &Run, f: &Findings) -> Content {
-    let answer = Content::Split(
-        Column,
-        vec![
-            (1.0, verdict()),
-            (2.0, raw("The answer", "/armcal/diagnosis.sentence")),
-            (3.0, table("What was found", "/armcal/diagnosis.effects[:]")),
-            (4.0, table("Candidates, each on its own, best first", "/armcal/candidates.candidates[:]")),
-            (3.0, table("The numbers, one by one", "/armcal/diagnosis.explanations[:]")),
-            (2.0, raw("What to record next", "/armcal/diagnosis.record_next")),
-            (2.0, table("What these data could not have shown", "/armcal/diagnosis.not_testable[:]")),
-        ],
-    );
-    let mut pictures = vec![
-        Content::even(Row, vec![falling_error(f), table("Steps", "/armcal/steps.steps[:]")]),
-        errors_in_time("Error at each dwell, step by step", run, false),
-    ];
-    pictures.extend((1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve)));
-    if !run.steps.is_empty() {
-        pictures.extend(what_effects_do(f));
-        let title = "What the effects do away from the base, over recorded time";
-        pictures.push(outward(title, "effect_outward_mm", "effects found, and what is left"));
+/// Where [`where_it_fails`] has no room for it.
+fn over_torques(f: &Findings) -> Option<Content> {
+    let many = drawn(f).count() > FEW;
+    grid(drawn(f).filter(|_| many).filter_map(|m| over_torque(f, m, What::Error)).collect())
+}
+
+/// Two columns, one where there are few; none without panels.
+fn grid(panels: Vec<Content>) -> Option<Content> {
+    let across = if panels.len() > 2 { 2 } else { 1 };
+    let mut panels = panels.into_iter().peekable();
+    let mut rows = Vec::new();
+    while panels.peek().is_some() {
+        rows.push(Content::even(Row, panels.by_ref().take(across).collect()));
     }
+    (!rows.is_empty()).then(|| Content::even(Column, rows))
+}
+
+fn what_is_missing(f: &Findings) -> Content {
+    let some = |n: usize, share: f64, panel: Content| (n > 0).then_some((share, panel));
+    let (found, next, candidates) = f
+        .diagnosis
+        .as_ref()
+        .map_or((0, 0, 0), |(d, c)| (d.effects.len(), d.record_next.len(), c.candidates.len()));
+    let answer = [
+        Some((2.0, raw("The answer", "/armcal/diagnosis.sentence"))),
+        some(found, 3.0, table("What was found", "/armcal/diagnosis.effects")),
+        some(
+            candidates,
+            4.0,
+            table("Candidates, each on its own, best first", "/armcal/candidates.candidates"),
+        ),
+        some(next, 2.0, raw("What to record next", "/armcal/diagnosis.record_next")),
+    ];
+    let mut pictures: Vec<Content> = falling_error(f).into_iter().collect();
+    pictures.push(over_recorded_time(f, false));
+    if !f.course.after_mm.is_empty() {
+        pictures.extend(what_effects_do(f));
+    }
+    let answer = Content::Split(Column, answer.into_iter().flatten().collect());
     Content::Split(Row, vec![(1.0, answer), (1.0, Content::even(Column, pictures))])
 }
 
-fn parameters() -> Content {
-    let all = table("Parameters, old and new", "/armcal/parameters.parameters[:]");
-    let undetermined = raw("What the data do not determine", "/armcal/parameters.undetermined");
-    Content::Split(Column, vec![(4.0, all), (1.0, undetermined)])
+/// The numbers behind the answer; none where nothing was diagnosed.
+fn numbers(f: &Findings) -> Option<Content> {
+    let (d, _) = f.diagnosis.as_ref()?;
+    let mut panels = vec![(2.0, table("Step by step", "/armcal/steps.steps"))];
+    if !d.explanations.is_empty() {
+        panels.push((3.0, table("The numbers, one by one", "/armcal/diagnosis.explanations")));
+    }
+    if !d.not_testable.is_empty() {
+        panels.push((2.0, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
+    }
+    Some(Content::Split(Column, panels))
 }
 
-fn data_quality() -> Content {
+fn parameters(run: &Run) -> Content {
+    let mut panels = vec![(4.0, table("Parameters, old and new", "/armcal/parameter_table.rows"))];
+    if !run.calibration.fit.undetermined.is_empty() {
+        panels.push((1.0, raw("What the data do not determine", "/armcal/parameters.undetermined")));
+    }
+    Content::Split(Column, panels)
+}
+
+fn data_quality(run: &Run, f: &Findings) -> Content {
     let states = vec![["/armcal/assignments.recording", "recording"], ["/armcal/assignments.used", "used"]];
-    Content::Split(
-        Column,
-        vec![
-            (2.0, table("Recordings and their clocks", "/armcal/quality.recordings[:]")),
-            (2.0, table("Dwells that were not used", "/armcal/quality.rejected[:]")),
-            (1.0, Content::panel("Dwells used, over time", Kind::States(states))),
-            (3.0, Content::panel("What happened", Kind::Log("/armcal/log"))),
-        ],
-    )
+    let mut panels = vec![(2.0, table("Recordings and their clocks", "/armcal/quality.recordings"))];
+    if !f.quality.rejected.is_empty() {
+        panels.push((2.0, table("Dwells that were not used", "/armcal/quality.rejected")));
+    }
+    panels.push((1.5, Content::panel("Dwells used, over time", Kind::States(states))));
+    if f.quality.recordings.iter().any(|r| r.warnings > 0) || !run.overall_warnings().is_empty() {
+        panels.push((3.0, raw("Warnings, the gravest first", "/armcal/story.warnings")));
+    }
+    Content::Split(Column, panels)
 }

@@ -138,7 +138,7 @@ fn the_map_of_boards_draws_them_at_the_stated_scale() {
     for recording in 0..3 {
         let board = &own(&messages, &format!("/armcal/board/{recording}"))[0];
         let factor = number(board, "magnification");
-        assert!(factor >= 1.0 && legend.contains(&format!("x {factor};")), "{legend}");
+        assert!(factor >= 1.0 && legend.contains(&format!("x {factor}\n")), "{legend}");
         let entity = entities.iter().find(|e| string(e, "id") == format!("calibrated/{recording}")).unwrap();
         assert_eq!(string(entity, "frame_id"), "board_map");
         let (x_mm, y_mm) = (numbers(board, "fitted_x_mm"), numbers(board, "fitted_y_mm"));
@@ -164,7 +164,10 @@ fn the_error_falls_step_by_step() {
     assert!((number(&steps[2], "falls_by_percent") - 75.0).abs() < 1e-9);
     let holdout = &s.run.calibration.holdout;
     let means: Vec<f64> = steps.iter().map(|step| number(step, "mean_mm")).collect();
-    assert_eq!(means[..2], [holdout.nominal.mean_m * 1e3, holdout.fitted.mean_m * 1e3]);
+    // With the four digits that a table shows.
+    for (shown, mean_m) in means.iter().zip([holdout.nominal.mean_m, holdout.fitted.mean_m]) {
+        assert!((shown - mean_m * 1e3).abs() <= 5e-4 * shown && shown.to_string().len() <= 6, "{shown}");
+    }
     for residual in own(&messages, "/armcal/residuals") {
         assert_eq!(numbers(&residual, "step_norm_mm"), [0.0]);
     }

@@ -14,6 +14,9 @@ mod findings;
 /// `run.mcap`: input untouched, every message decodable, pictures in the right place.
 mod recording;
 
+/// The robots and the board as URDF.
+mod robots;
+
 /// `summary.json` keeps its contract and its numbers.
 mod summary;
 

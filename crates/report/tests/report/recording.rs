@@ -9,13 +9,13 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Full {
     pub topic: String,
-    schema: Option<(String, String, Vec<u8>)>,
-    encoding: String,
-    metadata: BTreeMap<String, String>,
-    sequence: u32,
-    log_time: u64,
-    publish_time: u64,
-    data: Vec<u8>,
+    pub schema: Option<(String, String, Vec<u8>)>,
+    pub encoding: String,
+    pub metadata: BTreeMap<String, String>,
+    pub sequence: u32,
+    pub log_time: u64,
+    pub publish_time: u64,
+    pub data: Vec<u8>,
 }
 
 pub fn read(path: &Path) -> Vec<Full> {
@@ -90,26 +90,33 @@ fn every_result_message_decodes_with_the_schema_it_carries() {
     let messages = read(&write(&s, InputMessages::Reference, "out").join("run.mcap"));
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for m in &messages {
-        decode(m);
+        if !m.topic.ends_with("/robot_description") {
+            decode(m);
+        }
         *counts.entry(m.topic.as_str()).or_default() += 1;
     }
     let expected = [
-        ("/armcal/arms", 18),
+        ("/armcal/arms", 21),
         ("/armcal/arrows_calibrated", 3),
         ("/armcal/arrows_nominal", 3),
         ("/armcal/assignments", 18),
         ("/armcal/board/0", 1),
         ("/armcal/board/1", 1),
         ("/armcal/board/2", 1),
+        ("/armcal/board/robot_description", 1),
         ("/armcal/board_map", 1),
+        ("/armcal/calibrated/robot_description", 1),
         ("/armcal/clock", 1),
         ("/armcal/course", 1),
         ("/armcal/dwells", 18),
+        ("/armcal/errors", 3),
         ("/armcal/implied/joint1", 1),
         ("/armcal/implied/joint2", 1),
         ("/armcal/implied/joint3", 1),
         // 1 opening, 3 recordings, 5 rejections, 3 warnings (association, gap, earlier results), 1 conclusion.
         ("/armcal/log", 13),
+        ("/armcal/nominal/robot_description", 1),
+        ("/armcal/parameter_table", 1),
         ("/armcal/parameters", 1),
         ("/armcal/path_calibrated", 3),
         ("/armcal/path_measured", 3),
@@ -120,7 +127,8 @@ fn every_result_message_decodes_with_the_schema_it_carries() {
         ("/armcal/scene", 3),
         ("/armcal/steps", 1),
         // One a dwell, and one before them all.
-        ("/armcal/tf", 19),
+        ("/armcal/story", 1),
+        ("/armcal/tf", 22),
         ("/armcal/tip_measured", 13),
     ];
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);

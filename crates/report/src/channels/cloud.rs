@@ -1,0 +1,50 @@
+//! Errors as a point cloud, one a recording: every measured tip with its errors as fields, for viewers that colour by one.
+
+use super::shapes::at;
+use super::{Messages, WORLD, start_ns, timestamp};
+use crate::points::Point;
+use crate::run::RecordingRun;
+use foxglove::messages as fox;
+use foxglove::messages::packed_element_field::NumericType;
+use nalgebra::Vector3;
+
+/// Topic of the clouds.
+pub(crate) const TOPIC: &str = "/armcal/errors";
+/// Field that a layout colours by.
+pub(crate) const SHOWN: &str = "calibrated_mm";
+/// Fields, each a 32-bit number: where the tip was [m], and its errors.
+const FIELDS: [&str; 7] = ["x", "y", "z", SHOWN, "nominal_mm", "after_mm", "expected_mm"];
+const BYTES: u32 = 4;
+
+pub(super) fn put(recording: &RecordingRun, own: &[&Point], out: &mut Messages) {
+    let start_ns = start_ns(recording);
+    let seen = own.iter().filter(|p| p.measured_m.iter().all(|x| x.is_finite()));
+    let data: Vec<u8> = seen.flat_map(|p| row(p)).flat_map(f32::to_le_bytes).collect();
+    if data.is_empty() {
+        return;
+    }
+    let field = |(k, name): (u32, &&str)| fox::PackedElementField {
+        name: (*name).to_owned(),
+        offset: k * BYTES,
+        r#type: NumericType::Float32 as i32,
+    };
+    let cloud = fox::PointCloud {
+        timestamp: Some(timestamp(start_ns)),
+        frame_id: WORLD.into(),
+        pose: Some(at(&Vector3::zeros())),
+        point_stride: BYTES * super::count(FIELDS.len()),
+        fields: (0..).zip(&FIELDS).map(field).collect(),
+        data: data.into(),
+    };
+    out.put(TOPIC, start_ns, &cloud);
+}
+
+/// In the order of [`FIELDS`]; without anything found, the error after it is that of the calibration.
+fn row(p: &Point) -> [f32; 7] {
+    let mm = |error: &Vector3<f64>| error.norm() * 1e3;
+    let after = p.steps_m.last().unwrap_or(&p.residual.fitted_m);
+    let m = &p.measured_m;
+    let errors =
+        [mm(&p.residual.fitted_m), mm(&p.residual.nominal_m), mm(after), p.residual.expected_norm_m * 1e3];
+    [m.x, m.y, m.z, errors[0], errors[1], errors[2], errors[3]].map(|v| v as f32)
+}

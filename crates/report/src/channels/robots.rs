@@ -1,0 +1,144 @@
+//! The nominal and the calibrated robot, and the board, as URDF text on `std_msgs/String` topics, so that viewers that know
+//! nothing of armcal draw them: links are called like the frames of `/armcal/tf`, which move them. The topics end in
+//! `robot_description`, by which Rerun knows them.
+
+use super::frames::{BOARD as BOARD_FRAME, Link, links};
+use super::shapes::Rgba;
+use super::{Messages, run_start_ns, scene};
+use crate::run::Run;
+use armcal_core::Pose;
+use armcal_table::Board;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use std::fmt::Write as _;
+
+/// A cylinder between the origins of two frames is as thick [m].
+const RADIUS_M: f64 = 0.012;
+/// How far the joints are turned to see which of two frames a part of the arm belongs to [rad or m].
+const TURNED: f64 = 0.3;
+/// Height of the disc that stands for a cavity [m].
+const DISC_M: f64 = 0.001;
+const HEAD: &str = "<?xml version=\"1.0\"?>\n";
+/// Lengths below are none [m].
+const NOTHING_M: f64 = 1e-6;
+
+/// Topics of the robots.
+pub(crate) const NOMINAL: &str = "/armcal/nominal/robot_description";
+pub(crate) const CALIBRATED: &str = "/armcal/calibrated/robot_description";
+/// Topic of the board.
+const BOARD: &str = "/armcal/board/robot_description";
+
+pub(super) fn put(run: &Run, out: &mut Messages) {
+    let mut say = |topic, text: String| out.put_text(topic, run_start_ns(run), &text);
+    if let Some(board) = &run.board {
+        say(BOARD, board_urdf(board));
+    }
+    let dwells = run.recordings.iter().flat_map(|r| &r.dwells);
+    let Some(dwell) = dwells.into_iter().find(|d| d.joint_rad.len() == run.model.joint_count()) else {
+        return;
+    };
+    let turned: Vec<f64> = dwell.joint_rad.iter().map(|q| q + TURNED).collect();
+    let fitted = run.calibration.fit.values();
+    let mut robot = |topic, prefix, p: &[f64], rgba| {
+        let [stands, turned] =
+            [&dwell.joint_rad, &turned].map(|joint_rad| links(&run.model, prefix, p, joint_rad));
+        say(topic, urdf(prefix, &stands, &turned, rgba));
+    };
+    robot(NOMINAL, "nominal", &run.calibration.nominal_values, scene::GREY);
+    robot(CALIBRATED, "calibrated", &fitted, scene::GREEN);
+}
+
+/// Plate and cavities in the frame of the board.
+fn board_urdf(board: &Board) -> String {
+    let mut visual = String::new();
+    if let Some((centre, size_m)) = scene::plate_of(&board.cavities) {
+        let [x, y, z]: [f64; 3] = size_m.into();
+        let _ = write!(
+            visual,
+            "<visual>{}<geometry><box size=\"{x} {y} {z}\"/></geometry>{}</visual>",
+            origin(&centre),
+            material("plate")
+        );
+    }
+    for cavity in &board.cavities {
+        let (place, radius_m) =
+            (Pose::from(Translation3::from(cavity.in_board_m)), scene::CAVITY_DIAMETER_M / 2.0);
+        let _ = write!(
+            visual,
+            "<visual>{}<geometry><cylinder radius=\"{radius_m}\" length=\"{DISC_M}\"/></geometry>{}</visual>",
+            origin(&place),
+            material("cavity")
+        );
+    }
+    let materials =
+        [("plate", scene::PLATE), ("cavity", scene::CAVITY)].map(|(name, rgba)| defined(name, rgba)).concat();
+    format!(
+        "{HEAD}<robot name=\"board\">\n{materials}  <link name=\"{BOARD_FRAME}\">{visual}</link>\n</robot>\n"
+    )
+}
+
+fn material(name: &str) -> String {
+    format!("<material name=\"{name}\"/>")
+}
+
+fn defined(name: &str, [r, g, b, a]: Rgba) -> String {
+    format!("  <material name=\"{name}\"><color rgba=\"{r} {g} {b} {a}\"/></material>\n")
+}
+
+/// Links in the pose `stands`; `turned` are the same with all joints turned. What is between two frames is drawn with the one
+/// in which it does not move: the first for a URDF, the second for Denavit-Hartenberg rows.
+fn urdf(prefix: &str, stands: &[Link], turned: &[Link], rgba: Rgba) -> String {
+    let mut visuals = vec![String::new(); stands.len()];
+    for k in 1..stands.len() {
+        let (here, there) = (stands[k].in_parent, turned[k].in_parent);
+        let (along, moved) = (here.translation.vector, there.translation.vector);
+        if (along - moved).norm() < NOTHING_M {
+            visuals[k - 1] += &cylinder(&along, prefix);
+        } else {
+            visuals[k] += &cylinder(&here.inverse().translation.vector, prefix);
+        }
+    }
+    let mut text = format!("{HEAD}<robot name=\"{prefix}\">\n{}", defined(prefix, rgba));
+    for (link, visual) in stands.iter().zip(&visuals) {
+        let _ = writeln!(text, "  <link name=\"{}\">{visual}</link>", escaped(&link.name));
+    }
+    for (k, link) in stands.iter().enumerate().skip(1) {
+        let (name, parent) = (escaped(&link.name), escaped(&stands[k - 1].name));
+        let _ = writeln!(
+            text,
+            "  <joint name=\"{name}/joint\" type=\"floating\"><parent link=\"{parent}\"/><child link=\"{name}\"/>{}</joint>",
+            origin(&link.in_parent)
+        );
+    }
+    text + "</robot>\n"
+}
+
+/// From the origin of a frame to a place in it; nothing where that is the origin.
+fn cylinder(to_m: &Vector3<f64>, of: &str) -> String {
+    let length_m = to_m.norm();
+    if !(length_m.is_finite() && length_m > NOTHING_M) {
+        return String::new();
+    }
+    // Opposite to z there is no unique rotation; half a turn about x is one.
+    let rotation = UnitQuaternion::rotation_between(&Vector3::z(), to_m)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let middle = Pose::from_parts((to_m / 2.0).into(), rotation);
+    let shape = format!("<cylinder radius=\"{RADIUS_M}\" length=\"{length_m}\"/>");
+    format!("<visual>{}<geometry>{shape}</geometry>{}</visual>", origin(&middle), material(of))
+}
+
+fn origin(pose: &Pose) -> String {
+    let ([x, y, z], (roll, pitch, yaw)) = (pose.translation.vector.into(), pose.rotation.euler_angles());
+    format!("<origin xyz=\"{x} {y} {z}\" rpy=\"{roll} {pitch} {yaw}\"/>")
+}
+
+fn escaped(name: &str) -> String {
+    let safe = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        c if c.is_control() => "_".to_owned(),
+        c => c.to_string(),
+    };
+    name.chars().map(safe).collect()
+}

@@ -1,0 +1,95 @@
+//! How a run ends, in sentences: what the calibration reached, what is missing, whether the result stands, what to do next.
+//! Terminal and viewer say the same because both say this.
+
+use crate::diagnosis_text::{all_found, next};
+use crate::run::{Run, Status};
+use crate::text::{conclusion, printable};
+use armcal_core::Warning;
+
+/// The end of a run.
+pub(crate) struct Story {
+    /// One word for a lamp: the status where the result does not stand, or the verdict that says why; else the verdict.
+    pub lamp: &'static str,
+    pub calibration: String,
+    pub missing: String,
+    /// One entry for everything that was found.
+    pub found: Vec<String>,
+    pub status: Status,
+    /// What to do, one step an entry.
+    pub next: Vec<String>,
+    /// Every warning and how it is told, those of the recordings first.
+    pub warnings: Vec<(String, Warning)>,
+}
+
+impl Story {
+    pub fn of(run: &Run) -> Story {
+        let answer = run.answer();
+        let status = run.status();
+        let diagnosis = run.diagnosis.as_ref();
+        Story {
+            lamp: lamp(answer.word, status),
+            calibration: conclusion(&run.calibration),
+            missing: answer.sentence,
+            found: diagnosis.map_or_else(Vec::new, all_found),
+            status,
+            next: diagnosis.map_or_else(Vec::new, next),
+            warnings: warnings(run),
+        }
+    }
+
+    /// All of it, a sentence an entry, what a reader needs first first.
+    pub fn lines(&self) -> Vec<String> {
+        let found = self.found.iter().map(|f| format!("found: {f}"));
+        let next = self.next.iter().map(|n| format!("next: {n}"));
+        let status = format!("Status: {}", self.status_sentence());
+        let head = [self.missing.clone(), self.calibration.clone()];
+        head.into_iter().chain([status]).chain(next).chain(found).collect()
+    }
+
+    /// Whether the result stands, and what the command exits with.
+    pub fn status_sentence(&self) -> &'static str {
+        match self.status {
+            Status::Ok => "ok.",
+            Status::Inadequate => {
+                "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
+            }
+            Status::DataLost => {
+                "data lost (exit code 3): a part of the input was not used; the warnings say which."
+            }
+        }
+    }
+}
+
+fn warnings(run: &Run) -> Vec<(String, Warning)> {
+    let text = |w: &Warning| printable(&w.to_string());
+    let of_recordings = run.recordings.iter().flat_map(|r| {
+        let told = |w: &Warning| (format!("{}: {}", printable(&r.name), text(w)), w.clone());
+        r.all_warnings().into_iter().map(told)
+    });
+    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (text(&w), w))).collect()
+}
+
+/// Never a verdict of success where the result does not stand.
+fn lamp(verdict: &'static str, status: Status) -> &'static str {
+    match status {
+        Status::Ok => verdict,
+        _ if matches!(verdict, "unexplained" | "setup") => verdict,
+        Status::Inadequate => "inadequate",
+        Status::DataLost => "data_lost",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lamp_is_a_verdict_of_success_only_where_the_result_stands() {
+        assert_eq!(lamp("nothing_missing", Status::Ok), "nothing_missing");
+        assert_eq!(lamp("nothing_missing", Status::Inadequate), "inadequate");
+        assert_eq!(lamp("nothing_missing", Status::DataLost), "data_lost");
+        assert_eq!(lamp("identified", Status::Inadequate), "inadequate");
+        assert_eq!(lamp("unexplained", Status::Inadequate), "unexplained");
+        assert_eq!(lamp("setup", Status::DataLost), "setup");
+    }
+}
