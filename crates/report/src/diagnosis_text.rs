@@ -6,7 +6,8 @@ use crate::run::Run;
 use crate::text::{in_display_unit, printable};
 use armcal_core::SetupReport;
 use armcal_diagnose::{
-    CandidateReport, Combination, Diagnosis, FoundEffect, ParameterReport, Term, UnknownReport, Verdict,
+    CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
+    Verdict,
 };
 use armcal_model::effects_toml;
 use comfy_table::Cell;
@@ -86,6 +87,17 @@ fn brief(pen: &Pen, d: &Diagnosis) -> String {
 pub(crate) fn all_found(d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&n.sentence()));
     d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(nested).collect()
+}
+
+/// The same in a line or two each: names, sizes, and what they take of the error.
+pub(crate) fn briefly_found(d: &Diagnosis) -> Vec<String> {
+    let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
+    let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
+    let unlisted = d
+        .unlisted
+        .iter()
+        .map(|u| format!("unlisted, at {} over {}: {}", u.channel, u.driver, falls(&u.places)));
+    named.chain(unlisted).map(|said| printable(&said)).collect()
 }
 
 /// What to do next, one step an entry.

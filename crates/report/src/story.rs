@@ -1,10 +1,14 @@
 //! How a run ends, in sentences: what the calibration reached, what is missing, whether the result stands, what to do next.
 //! Terminal and viewer say the same because both say this.
 
-use crate::diagnosis_text::{all_found, next};
+use crate::diagnosis_text::{all_found, briefly_found, next};
 use crate::run::{Run, Status};
 use crate::text::{conclusion, printable};
 use armcal_core::Warning;
+
+/// What to do where the setup contradicts the data.
+const MEND: &str =
+    "mend what is said above and run again; what is missing physically is looked for after that";
 
 /// The end of a run.
 pub(crate) struct Story {
@@ -14,6 +18,8 @@ pub(crate) struct Story {
     pub missing: String,
     /// One entry for everything that was found.
     pub found: Vec<String>,
+    /// The same in a line or two each.
+    pub found_briefly: Vec<String>,
     pub status: Status,
     /// What to do, one step an entry.
     pub next: Vec<String>,
@@ -29,11 +35,16 @@ impl Story {
         Story {
             lamp: lamp(answer.word, status),
             calibration: conclusion(&run.calibration),
-            missing: answer.sentence,
             found: diagnosis.map_or_else(Vec::new, all_found),
+            found_briefly: diagnosis.map_or_else(Vec::new, briefly_found),
             status,
-            next: diagnosis.map_or_else(Vec::new, next),
+            next: match diagnosis {
+                Some(d) => next(d),
+                None if answer.word == "setup" => vec![MEND.to_owned()],
+                None => Vec::new(),
+            },
             warnings: warnings(run),
+            missing: answer.sentence,
         }
     }
 

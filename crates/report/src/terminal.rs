@@ -4,7 +4,7 @@ use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::story::Story;
 use crate::text::{in_display_unit, millimetres, printable, remark};
-use armcal_calibrate::{Calibration, Estimate};
+use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{ErrorStats, Severity, Warning};
 use comfy_table::Cell;
 
@@ -17,6 +17,8 @@ pub enum Detail {
     Everything,
 }
 
+/// Entries of a list in the story: of what was found, of what to do next.
+const SHOWN: usize = 2;
 /// Names of parameters that stand for all that are not determined.
 const NAMED: usize = 4;
 
@@ -28,41 +30,60 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
     let leads = matches!(story.lamp, "setup" | "unexplained");
     sections.extend(leads.then(|| pen.verdict(&story.missing, false)));
     sections.push(pen.section("Recordings", recordings(&pen, run)));
-    sections.push(pen.section("Position errors [mm]", errors(&pen, &run.calibration)));
-    let all = &story.warnings;
+    let shown = match detail {
+        Detail::Story => errors_that_count(&pen, &run.calibration),
+        Detail::Everything => errors(&pen, &run.calibration),
+    };
+    sections.push(pen.section("Position errors [mm]", shown));
     match detail {
         Detail::Everything => {
             sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
             sections.extend(undetermined(&pen, &run.calibration));
-            sections.extend(listed(&pen, all.iter().collect()));
+            sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
         }
-        Detail::Story => {
-            let (notices, grave): (Vec<_>, Vec<_>) =
-                all.iter().partition(|(_, w)| w.severity == Severity::Notice);
-            // What the answer says already is not said once more.
-            let told = |w: &Warning| story.missing.contains(&printable(&w.message));
-            let grave = grave.into_iter().filter(|(_, w)| !told(w)).collect();
-            let left_out = [summarised(&run.calibration), counted(notices.len())];
-            let left_out: Vec<String> = left_out.into_iter().flatten().collect();
-            let brief = (!left_out.is_empty())
-                .then(|| format!("{} (`armcal run -v` lists them)", left_out.join("; ")));
-            sections.extend(brief.map(|brief| pen.list(std::iter::once(("-", brief)))));
-            sections.extend(listed(&pen, grave));
-        }
+        Detail::Story => sections.extend(briefly(&pen, run, &story)),
     }
-    sections.extend(ending(&pen, &story));
+    sections.extend(ending(&pen, &story, detail));
     sections.join("\n")
 }
 
+/// Parameters and notices by their number, the gravest warnings by their words.
+fn briefly(pen: &Pen, run: &Run, story: &Story) -> Vec<String> {
+    let (notices, grave): (Vec<_>, Vec<_>) =
+        story.warnings.iter().partition(|(_, w)| w.severity == Severity::Notice);
+    // What the answer says already is not said once more.
+    let told = |w: &Warning| story.missing.contains(&printable(&w.message));
+    let mut grave: Vec<_> = grave.into_iter().filter(|(_, w)| !told(w)).collect();
+    grave.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
+    let left_out = [summarised(&run.calibration), counted(notices.len())];
+    let left_out: Vec<String> = left_out.into_iter().flatten().collect();
+    let brief =
+        (!left_out.is_empty()).then(|| format!("{} (`armcal run -v` lists them)", left_out.join("; ")));
+    let counted = brief.map(|brief| pen.list(std::iter::once(("-", brief))));
+    let more = grave.len().saturating_sub(SHOWN);
+    grave.truncate(SHOWN);
+    counted.into_iter().chain(listed(pen, grave, more)).collect()
+}
+
 /// What it came to, what is missing, the status and the next step.
-fn ending(pen: &Pen, story: &Story) -> [String; 3] {
+fn ending(pen: &Pen, story: &Story, detail: Detail) -> [String; 2] {
     let verdict = |text: &str| pen.verdict(text, story.status == Status::Ok);
-    let list = |label, entries: &[String]| pen.list(entries.iter().map(|e| (label, e.clone())));
+    let list = |label, entries: &[String]| match detail {
+        Detail::Everything => pen.list(entries.iter().map(|e| (label, e.clone()))),
+        Detail::Story => pen.list(first_ones(entries).into_iter().map(|e| (label, e))),
+    };
+    let found = if detail == Detail::Story { &story.found_briefly } else { &story.found };
     [
-        verdict(&story.calibration),
-        verdict(&story.missing) + &list("-", &story.found),
+        verdict(&story.calibration) + &verdict(&story.missing) + &list("-", found),
         verdict(&format!("Status: {}", story.status_sentence())) + &list("next:", &story.next),
     ]
+}
+
+/// As many as fit on a screen, and how many more there are.
+fn first_ones(entries: &[String]) -> Vec<String> {
+    let more = entries.len().saturating_sub(SHOWN);
+    let rest = (more > 0).then(|| format!("and {more} more (`armcal run -v` lists them)"));
+    entries.iter().take(SHOWN).cloned().chain(rest).collect()
 }
 
 /// The parameters in one sentence; none where none is free.
@@ -116,8 +137,20 @@ fn clock_drift(recording: &RecordingRun) -> String {
 
 /// Nominal and calibrated errors on both sides of the hold-out.
 pub(crate) fn errors(pen: &Pen, calibration: &Calibration) -> String {
+    errors_on(pen, calibration, &[("fitted", &calibration.train), ("held out", &calibration.holdout)])
+}
+
+/// The same on the held-out side alone, where there is one.
+fn errors_that_count(pen: &Pen, calibration: &Calibration) -> String {
+    match calibration.held_out() {
+        true => errors_on(pen, calibration, &[("held out", &calibration.holdout)]),
+        false => errors(pen, calibration),
+    }
+}
+
+fn errors_on(pen: &Pen, calibration: &Calibration, sides: &[(&str, &SideErrors)]) -> String {
     let mut table = pen.table(&["points", "n", "parameters", "mean", "rms", "p95", "max"]);
-    for (label, side) in [("fitted", &calibration.train), ("held out", &calibration.holdout)] {
+    for (label, side) in sides {
         if side.fitted.n == 0 {
             continue;
         }
@@ -176,7 +209,9 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
         .then(|| pen.section("What these data cannot determine (kept near nominal)", pen.list(texts)))
 }
 
-fn listed(pen: &Pen, warnings: Vec<&(String, Warning)>) -> Option<String> {
+/// Warnings, and that there are more of them.
+fn listed(pen: &Pen, warnings: Vec<&(String, Warning)>, more: usize) -> Option<String> {
     let entries = warnings.iter().map(|(text, w)| (w.severity.word(), text.clone()));
-    (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries)))
+    let rest = (more > 0).then(|| ("", format!("and {more} more (`armcal run -v` lists them)")));
+    (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries.chain(rest))))
 }

@@ -1,4 +1,4 @@
-//! The transform tree: `world` -> `nominal/...` and `calibrated/...`, link by link, and `board/<recording>`.
+//! The transform tree: `tf#/` -> `world` -> `nominal/...` and `calibrated/...`, link by link, and `board/<recording>`.
 
 use super::shapes::{quaternion, vector};
 use super::{Messages, WORLD, run_start_ns, timestamp};
@@ -14,7 +14,15 @@ pub(super) const BOARD: &str = "board";
 /// What stands still whether or not the arm ever dwells: the frame of the map of boards.
 pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
-    out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: vec![board_map(begin_ns)] });
+    out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: standing(begin_ns) });
+}
+
+/// Rerun's name for the frame that its views look at when nobody tells them: what hangs on it is seen without a blueprint.
+const RERUN_ROOT: &str = "tf#/";
+
+/// The world, and the map of boards beside it.
+fn standing(time_ns: i64) -> Vec<fox::FrameTransform> {
+    vec![transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity()), board_map(time_ns)]
 }
 
 /// The map of boards is a drawing, so where it lies does not matter.
@@ -48,7 +56,7 @@ pub(super) fn links(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64]) -
 /// The tree in the pose of a dwell, complete.
 pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
-    let mut transforms = vec![board_map(time_ns)];
+    let mut transforms = standing(time_ns);
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
         let mut parent = WORLD.to_owned();
         for link in links(&run.model, prefix, p, &dwell.joint_rad) {

@@ -41,7 +41,7 @@ fn child<'a, 'i>(of: Node<'a, 'i>, name: &str) -> Node<'a, 'i> {
 /// Where every frame of each message of transforms is in the world, in the order of the chain.
 fn frames(messages: &[Full], prefix: &str) -> Vec<Vec<(String, Isometry3<f64>)>> {
     let tree = |t: &prost_reflect::DynamicMessage| {
-        let mut in_world = BTreeMap::from([("world".to_owned(), Isometry3::identity())]);
+        let mut in_world = BTreeMap::from([("tf#/".to_owned(), Isometry3::identity())]);
         let mut chain = Vec::new();
         for t in list(t, "transforms") {
             let step = Isometry3::from_parts(vector(&t, "translation").into(), rotation(&t, "rotation"));
