@@ -38,6 +38,8 @@ def main(path):
         return [v for n in names for v in found[entity][n]]
 
     frames = flat(has("/armcal/tf", "Transform3D:child_frame"))
+    # Its views look at this frame unless a blueprint says otherwise: what does not hang on it is not seen.
+    assert "tf#/" in flat(has("/armcal/tf", "Transform3D:parent_frame")), "nothing hangs on the root"
     points = has("/armcal/errors", "Points3D:positions")
     for topic in ("path_measured", "path_nominal", "path_calibrated"):
         has(f"/armcal/{topic}", "InstancePoses3D:translations")

@@ -102,7 +102,7 @@ impl Drawing {
         let words = format!(
             "arrows: from the measured tip towards the predicted one\n\
              nominal errors x {}, calibrated errors{} x {}\n\
-             green {} mm, red {} mm and more; blue points are held out",
+             green {} mm, red {} mm and more; blue spheres are held out",
             self.nominal_factor,
             if self.found { " and those with what was found" } else { "" },
             self.fitted_factor,

@@ -8,17 +8,16 @@ use armcal_model::Model;
 use foxglove::messages as fox;
 use std::collections::BTreeSet;
 
+/// Rerun's name for the frame that its views look at when nobody tells them: what hangs on it is seen without a blueprint.
+const RERUN_ROOT: &str = "tf#/";
 /// The board of the recording that is shown.
 pub(super) const BOARD: &str = "board";
 
-/// What stands still whether or not the arm ever dwells: the frame of the map of boards.
+/// What stands still whether or not the arm ever dwells.
 pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: standing(begin_ns) });
 }
-
-/// Rerun's name for the frame that its views look at when nobody tells them: what hangs on it is seen without a blueprint.
-const RERUN_ROOT: &str = "tf#/";
 
 /// The world, and the map of boards beside it.
 fn standing(time_ns: i64) -> Vec<fox::FrameTransform> {

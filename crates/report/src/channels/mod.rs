@@ -151,9 +151,7 @@ impl Messages {
             data,
         });
     }
-}
 
-impl Messages {
     /// Text as ROS 2 has it: a string in little-endian CDR (OMG DDS-XTypes 1.3, 7.4) behind its four bytes of header.
     fn put_text(&mut self, topic: &str, time_ns: i64, text: &str) {
         let length = count(text.len() + 1).to_le_bytes();

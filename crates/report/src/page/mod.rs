@@ -23,10 +23,11 @@ mod signature;
 pub use basis::Basis;
 pub use compared::comparison_html;
 
+use crate::ReportError;
 use crate::diagnosis_text::{pasted, sizes_of, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
+use crate::story::Story;
 use crate::text::millimetres;
-use crate::{ReportError, conclusion};
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
 use armcal_diagnose::{FoundEffect, Nested};
@@ -65,6 +66,7 @@ pub enum PageKind {
 /// A template or document that cannot be written.
 pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, ReportError> {
     let script = own_script();
+    let story = Story::of(run);
     let connect = if kind == PageKind::Live { "'self'" } else { "'none'" };
     let page = ReportPage {
         policy: embed::policy(&[embed::PLOTLY, &script], connect),
@@ -75,12 +77,12 @@ pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, R
         live: kind == PageKind::Live,
         title: &run.pipeline_name,
         version: VERSION,
-        status: match run.status() {
+        status: match story.status {
             Status::Ok => "ok",
             Status::Inadequate => "inadequate",
             Status::DataLost => "data lost",
         },
-        conclusion: conclusion(&run.calibration),
+        story,
         verdict: verdict(run),
         run,
         recordings: quality::recordings(run),
@@ -114,7 +116,7 @@ struct ReportPage<'a> {
     title: &'a str,
     version: &'a str,
     status: &'a str,
-    conclusion: String,
+    story: Story,
     verdict: Verdict,
     run: &'a Run,
     recordings: Vec<quality::RecordingRow>,
@@ -124,11 +126,9 @@ struct ReportPage<'a> {
 
 /// What the diagnosis says, in sentences.
 struct Verdict {
-    sentence: String,
     found: Vec<String>,
     /// Tables to paste into the pipeline for what is unlisted.
     paste: Vec<String>,
-    next: Vec<String>,
     same: Vec<[String; 2]>,
     unseen: Vec<armcal_diagnose::NotTestable>,
     explanations: Vec<armcal_diagnose::Explanation>,
@@ -137,23 +137,19 @@ struct Verdict {
 fn verdict(run: &Run) -> Verdict {
     let Some(d) = &run.diagnosis else {
         return Verdict {
-            sentence: run.answer().sentence,
             found: Vec::new(),
             paste: Vec::new(),
-            next: Vec::new(),
             same: Vec::new(),
             unseen: Vec::new(),
             explanations: Vec::new(),
         };
     };
     Verdict {
-        sentence: run.answer().sentence,
         found: (d.effects.iter().map(|e| found(run, e)))
             .chain(d.unlisted.iter().map(unlisted))
             .chain(d.nested.iter().map(Nested::sentence))
             .collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
-        next: d.record_next.clone(),
         same: d.cannot_tell_apart.clone(),
         unseen: d.not_testable.clone(),
         explanations: d.explanations.clone(),

@@ -6,6 +6,11 @@ use crate::text::printable;
 use armcal_iso9283::{Criterion, NotMeasured};
 use comfy_table::Cell;
 
+/// Columns of [`rows`].
+pub(super) const HEADER: [&str; 9] =
+    ["clause", "criterion", "", "unit", "nominal", "calibrated", "worst at", "n", "asked"];
+const STAND_IN: &str = "Set-points are not recorded: encoder readings stand for commands.";
+
 /// The section; one sentence where no criterion could be computed.
 pub(super) fn section(pen: &Pen, report: &IsoReport) -> String {
     let title = "ISO 9283, the worst place of each criterion (verification.json has all)";
@@ -13,31 +18,49 @@ pub(super) fn section(pen: &Pen, report: &IsoReport) -> String {
         let why = " No pose and no path is commanded twice in these recordings, and the criteria are about repeats.\n";
         return pen.section(title, why.to_owned());
     }
-    let mut table =
-        pen.table(&["clause", "criterion", "", "unit", "nominal", "calibrated", "worst at", "n", "asked"]);
-    let nominal = report.nominal.worst();
-    for calibrated in report.calibrated.worst() {
-        let before = nominal.iter().find(|c| c.clause == calibrated.clause && c.name == calibrated.name);
-        table.add_row(vec![
-            Cell::new(calibrated.clause),
-            Cell::new(&calibrated.name),
-            Cell::new(&calibrated.symbol),
-            Cell::new(calibrated.quantity.display_symbol()),
-            number(before.map_or("-".into(), |c| shown(c))),
-            number(shown(calibrated)),
-            Cell::new(printable(&calibrated.at)),
-            number(calibrated.n),
-            number(calibrated.asked),
-        ]);
+    let mut table = pen.table(&HEADER);
+    for row in rows(report) {
+        let [clause, criterion, symbol, unit, nominal, calibrated, at, n, asked] = row;
+        let mut cells: Vec<Cell> = [clause, criterion, symbol, unit].into_iter().map(Cell::new).collect();
+        cells.extend([number(nominal), number(calibrated), Cell::new(at), number(n), number(asked)]);
+        table.add_row(cells);
     }
     let mut text = pen.render(&table);
     if !report.commands_recorded {
-        text.push_str(" Set-points are not recorded: encoder readings stand for commands.\n");
+        text.push_str(&format!(" {STAND_IN}\n"));
     }
     let notes = report.calibrated.notes.iter().map(|note| ("note", printable(note)));
     text.push_str(&pen.list(notes));
     text.push_str(&pen.list(missing(&report.calibrated.not_measured).into_iter().map(|m| ("no", m))));
     pen.section(title, text)
+}
+
+/// The worst place of each criterion, in the order of [`HEADER`].
+pub(super) fn rows(report: &IsoReport) -> Vec<[String; 9]> {
+    let nominal = report.nominal.worst();
+    let row = |c: &Criterion| {
+        let before = nominal.iter().find(|n| n.clause == c.clause && n.name == c.name);
+        [
+            c.clause.to_string(),
+            c.name.clone(),
+            c.symbol.clone(),
+            c.quantity.display_symbol().to_string(),
+            before.map_or("-".into(), |n| shown(n)),
+            shown(c),
+            printable(&c.at),
+            c.n.to_string(),
+            c.asked.to_string(),
+        ]
+    };
+    report.calibrated.worst().into_iter().map(row).collect()
+}
+
+/// What the criteria need to be read rightly, and which cannot be computed.
+pub(super) fn remarks(report: &IsoReport) -> Vec<String> {
+    let stand_in = (!report.commands_recorded).then(|| STAND_IN.to_owned());
+    let notes = report.calibrated.notes.iter().map(|note| printable(note));
+    let missing = missing(&report.calibrated.not_measured).into_iter().map(|m| format!("not measured: {m}"));
+    stand_in.into_iter().chain(notes).chain(missing).collect()
 }
 
 /// What cannot be computed, criteria with one reason together.

@@ -1,5 +1,6 @@
 //! The page of `armcal verify`: the tables, and the source paper's figures 6, 7 and 10 for the longest motions.
 
+use super::iso;
 use super::row::Row;
 use super::terminal::conclusion;
 use super::{PathSample, Verification};
@@ -35,7 +36,10 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
             ("Error at points", v.points.iter().map(point_row).collect()),
             ("Error along paths", v.paths.iter().map(path_row).collect()),
         ],
-        warnings: v.warnings.iter().map(ToString::to_string).collect(),
+        iso_header: iso::HEADER,
+        iso_rows: iso::rows(&v.iso9283),
+        iso_remarks: iso::remarks(&v.iso9283),
+        warnings: v.warnings.iter().map(|w| (w.severity.word(), w.to_string())).collect(),
     };
     Ok(page.render()?)
 }
@@ -53,7 +57,11 @@ struct VerificationPage<'a> {
     effects: String,
     sentence: String,
     tables: Vec<(&'static str, Vec<Shown>)>,
-    warnings: Vec<String>,
+    iso_header: [&'static str; 9],
+    iso_rows: Vec<[String; 9]>,
+    iso_remarks: Vec<String>,
+    /// Severity and text.
+    warnings: Vec<(&'static str, String)>,
 }
 
 /// A row as the page shows it: a mean and its interval in one cell.

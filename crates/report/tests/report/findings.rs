@@ -24,7 +24,7 @@ fn with_joint_off(joint: usize, offset_rad: f64) -> Synthetic {
 }
 
 /// The run with play in joint 1 of this width found, and nothing left.
-fn with_play_found(s: &mut Synthetic, width_rad: f64) {
+pub fn with_play_found(s: &mut Synthetic, width_rad: f64) {
     let run = &mut s.run;
     let joints = run.model.chain().joint_names();
     let spec = EffectSpec::parse("backlash:1", joints).unwrap();

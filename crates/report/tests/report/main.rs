@@ -17,6 +17,9 @@ mod recording;
 /// The robots and the board as URDF.
 mod robots;
 
+/// Terminal, page and viewer end with the same sentences.
+mod story;
+
 /// `summary.json` keeps its contract and its numbers.
 mod summary;
 

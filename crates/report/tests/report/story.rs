@@ -1,0 +1,72 @@
+//! The first screen of the page, the first panel of the layout and the last lines of the terminal say the same.
+
+use crate::findings::with_play_found;
+use crate::recording::{get, own, read, string, write};
+use crate::synthetic::{Synthetic, synthetic};
+use armcal_core::{Severity, Stage, Warning};
+use armcal_report::{Detail, InputMessages, Status, TerminalStyle, terminal};
+
+/// Text without line breaks, indents and markup of characters.
+fn flat(text: &str) -> String {
+    let plain = text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+    let plain = plain.replace("&#60;", "<").replace("&#62;", ">").replace("&#38;", "&").replace("&#39;", "'");
+    plain.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What the three say of a run: lamp, and the lines of the story, found in page and terminal too.
+fn said(s: &Synthetic, folder: &str) -> (String, Vec<String>) {
+    let out = write(s, InputMessages::Reference, folder);
+    let story = own(&read(&out.join("run.mcap")), "/armcal/story").remove(0);
+    let lines: Vec<String> = get(&story, "lines")
+        .as_list()
+        .unwrap()
+        .iter()
+        .map(|line| line.as_str().unwrap().to_owned())
+        .collect();
+    let page = flat(&std::fs::read_to_string(out.join("report.html")).unwrap());
+    let header = page.split("</header>").next().unwrap().to_owned();
+    let everything = flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything));
+    let brief = flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Story));
+    for line in &lines {
+        // The terminal sets the label in a column of its own, as the list of what was found its dash.
+        let words = flat(line.trim_start_matches("found: ").trim_start_matches("next: "));
+        assert!(everything.contains(&words), "{words:?} in {everything}");
+    }
+    for line in &lines[..3] {
+        assert!(header.contains(&flat(line)), "{line:?} in {header}");
+        assert!(brief.contains(&flat(line)), "{line:?} in {brief}");
+    }
+    if let Some(next) = lines.iter().find_map(|l| l.strip_prefix("next: ")) {
+        assert!(header.contains(&flat(next)) && brief.contains(&flat(next)), "{next:?}");
+    }
+    (string(&story, "lamp"), lines)
+}
+
+#[test]
+fn page_layout_and_terminal_say_the_same() {
+    let plain = synthetic();
+    let (lamp, lines) = said(&plain, "plain");
+    assert_eq!(lines[0], plain.run.answer().sentence);
+    assert!(lines[2].starts_with("Status: "));
+    if plain.run.status() != Status::Ok {
+        assert!(["inadequate", "data_lost", "unexplained", "setup"].contains(&lamp.as_str()), "{lamp}");
+    }
+    let mut found = synthetic();
+    with_play_found(&mut found, 1e-3);
+    said(&found, "found");
+}
+
+#[test]
+fn a_lamp_is_green_only_where_the_result_stands() {
+    let mut s = synthetic();
+    s.run.warnings.push(Warning::new(
+        Severity::DataLost,
+        Stage::Recording,
+        "lost",
+        "normal",
+        "a chunk is gone",
+    ));
+    let (lamp, lines) = said(&s, "lost");
+    assert_eq!(s.run.status(), Status::DataLost);
+    assert!(lamp != "nothing_missing" && lines[2].contains("data lost"), "{lamp} {lines:?}");
+}
