@@ -23,6 +23,11 @@ pub(crate) struct Point<'a> {
     pub effect_m: Option<Vector3<f64>>,
 }
 
+/// Lowest and highest corner of the box about places; none where there are none.
+pub(crate) fn extent(places: impl Iterator<Item = Vector3<f64>>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    places.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.inf(&p), high.sup(&p)))
+}
+
 /// The points of a run, in the order of its observations.
 pub(crate) fn points(run: &Run) -> Result<Vec<Point<'_>>, ReportError> {
     check(run)?;

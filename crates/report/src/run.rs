@@ -184,6 +184,17 @@ impl Run {
         self.used(recording)
     }
 
+    /// Dwells of a recording in which every joint of the model was read: what the arm can be drawn in.
+    pub(crate) fn posed<'a>(&self, recording: &'a RecordingRun) -> impl Iterator<Item = &'a Dwell> + use<'a> {
+        let joints = self.model.joint_count();
+        recording.dwells.iter().filter(move |d| d.joint_rad.len() == joints)
+    }
+
+    /// The first of them all: what the arm is drawn in before anything moves.
+    pub(crate) fn first_posed(&self) -> Option<&Dwell> {
+        self.recordings.iter().find_map(|r| self.posed(r).next())
+    }
+
     /// Dwells of a recording that the fit could use.
     pub(crate) fn used(&self, recording: &RecordingRun) -> usize {
         recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()

@@ -57,6 +57,13 @@ impl Story {
         head.into_iter().chain([status]).chain(next).chain(found).collect()
     }
 
+    /// The warnings by their severity.
+    pub fn gravest_first(&self) -> Vec<&(String, Warning)> {
+        let mut all: Vec<_> = self.warnings.iter().collect();
+        all.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
+        all
+    }
+
     /// Whether the result stands, and what the command exits with.
     pub fn status_sentence(&self) -> &'static str {
         match self.status {

@@ -3,7 +3,7 @@
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::story::Story;
-use crate::text::{in_display_unit, millimetres, printable, remark};
+use crate::text::{estimate_shown, millimetres, printable, remark};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{ErrorStats, Severity, Warning};
 use comfy_table::Cell;
@@ -49,12 +49,11 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
 
 /// Parameters and notices by their number, the gravest warnings by their words.
 fn briefly(pen: &Pen, run: &Run, story: &Story) -> Vec<String> {
-    let (notices, grave): (Vec<_>, Vec<_>) =
-        story.warnings.iter().partition(|(_, w)| w.severity == Severity::Notice);
+    let (notices, mut grave): (Vec<_>, Vec<_>) =
+        story.gravest_first().into_iter().partition(|(_, w)| w.severity == Severity::Notice);
     // What the answer says already is not said once more.
     let told = |w: &Warning| story.missing.contains(&printable(&w.message));
-    let mut grave: Vec<_> = grave.into_iter().filter(|(_, w)| !told(w)).collect();
-    grave.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
+    grave.retain(|(_, w)| !told(w));
     let left_out = [summarised(&run.calibration), counted(notices.len())];
     let left_out: Vec<String> = left_out.into_iter().flatten().collect();
     let brief =
@@ -180,17 +179,11 @@ pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
     let (free, fixed): (Vec<&Estimate>, Vec<&Estimate>) =
         estimates.iter().copied().partition(|e| e.parameter.free);
     for e in free {
-        let unit = e.parameter.unit;
-        let half = (e.ci95[1] - e.ci95[0]) / 2.0;
-        table.add_row(vec![
-            Cell::new(printable(&e.parameter.name)),
-            Cell::new(unit.display_symbol()),
-            number(in_display_unit(unit, e.parameter.nominal)),
-            number(in_display_unit(unit, e.value)),
-            number(in_display_unit(unit, e.value - e.parameter.nominal)),
-            number(in_display_unit(unit, half)),
-            pen.mark(Cell::new(remark(e))),
-        ]);
+        let mut row =
+            vec![Cell::new(printable(&e.parameter.name)), Cell::new(e.parameter.unit.display_symbol())];
+        row.extend(estimate_shown(e).map(number));
+        row.push(pen.mark(Cell::new(remark(e))));
+        table.add_row(row);
     }
     let mut text = pen.render(&table);
     match fixed.len() {

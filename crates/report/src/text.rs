@@ -78,6 +78,13 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
     }
 }
 
+/// An estimate in the unit shown to people: nominal value, value, change, half the width of the 95 % interval.
+pub(crate) fn estimate_shown(e: &Estimate) -> [String; 4] {
+    let half = (e.ci95[1] - e.ci95[0]) / 2.0;
+    [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half]
+        .map(|si| in_display_unit(e.parameter.unit, si))
+}
+
 /// What is to be known of an estimate beside its numbers.
 pub(crate) fn remark(e: &Estimate) -> &'static str {
     match (e.determined, e.at_bound) {

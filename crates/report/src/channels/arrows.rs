@@ -3,7 +3,7 @@
 use super::shapes::{Rgba, arrow, entity, note, text};
 use super::{Messages, start_ns, timestamp};
 use crate::findings::round_factor;
-use crate::points::Point;
+use crate::points::{Point, extent};
 use crate::run::Run;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
@@ -96,9 +96,8 @@ impl Drawing {
         let seen: Vec<&Vector3<f64>> =
             own.iter().map(|p| &p.measured_m).filter(|m| m.iter().all(|x| x.is_finite())).collect();
         let mut place_m = seen.iter().copied().sum::<Vector3<f64>>() / seen.len() as f64;
-        let low_m = seen.iter().fold(place_m, |low, m| low.inf(m));
-        let high_m = seen.iter().fold(place_m, |high, m| high.sup(m));
-        place_m.z = seen.iter().map(|m| m.z).reduce(f64::max)? + 0.1;
+        let (low_m, high_m) = extent(seen.iter().copied().copied())?;
+        place_m.z = high_m.z + 0.1;
         let words = format!(
             "arrows: from the measured tip towards the predicted one\n\
              nominal errors x {}, calibrated errors{} x {}\n\

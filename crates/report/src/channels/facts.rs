@@ -4,7 +4,7 @@ use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use crate::points::Point;
 use crate::proto;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
-use crate::text::{conclusion, in_display_unit, remark};
+use crate::text::{conclusion, estimate_shown, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
@@ -184,13 +184,13 @@ fn parameter(e: &Estimate) -> proto::Parameter {
 /// The free parameters of a fit as the terminal shows them.
 fn parameter_table(fit: &Fit, time_ns: i64) -> proto::ParameterTable {
     let row = |e: &Estimate| {
-        let shown = |si| in_display_unit(e.parameter.unit, si);
+        let [nominal, calibrated, change, half] = estimate_shown(e);
         proto::ParameterRow {
             parameter: e.parameter.name.clone(),
-            nominal: shown(e.parameter.nominal),
-            calibrated: shown(e.value),
-            change: shown(e.value - e.parameter.nominal),
-            interval95: format!("± {}", shown((e.ci95[1] - e.ci95[0]) / 2.0)),
+            nominal,
+            calibrated,
+            change,
+            interval95: format!("± {half}"),
             unit: e.parameter.unit.display_symbol().into(),
             remark: remark(e).into(),
             meaning: e.parameter.meaning.clone(),

@@ -35,9 +35,8 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
 }
 
 fn story(s: &Story, time_ns: i64) -> crate::proto::Story {
-    let mut warnings: Vec<_> = s.warnings.iter().collect();
-    warnings.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
-    let told = warnings.into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code));
+    let told =
+        s.gravest_first().into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code));
     crate::proto::Story {
         timestamp: time(time_ns),
         lamp: s.lamp.into(),

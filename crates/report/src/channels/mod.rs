@@ -92,7 +92,7 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
         cloud::put(recording, &of_recording, &mut out);
         scene::standing(run, index, &of_recording, &drawing, &mut out);
         arrows::put(run, index, &of_recording, &drawing, &mut out);
-        let shown = || recording.dwells.iter().filter(|d| d.joint_rad.len() == run.model.joint_count());
+        let shown = || run.posed(recording);
         // A viewer draws nothing before the first message: until the first dwell the arm stands as in it.
         let first = shown().take(1).map(|dwell| (dwell, start_ns(recording)));
         for (dwell, time_ns) in first.chain(shown().map(|dwell| (dwell, dwell.mid_ns()))) {

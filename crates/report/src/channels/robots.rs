@@ -32,10 +32,7 @@ pub(super) fn put(run: &Run, out: &mut Messages) {
     if let Some(board) = &run.board {
         say(BOARD, board_urdf(board));
     }
-    let dwells = run.recordings.iter().flat_map(|r| &r.dwells);
-    let Some(dwell) = dwells.into_iter().find(|d| d.joint_rad.len() == run.model.joint_count()) else {
-        return;
-    };
+    let Some(dwell) = run.first_posed() else { return };
     let turned: Vec<f64> = dwell.joint_rad.iter().map(|q| q + TURNED).collect();
     let fitted = run.calibration.fit.values();
     let mut robot = |topic, prefix, p: &[f64], rgba| {
@@ -132,13 +129,5 @@ fn origin(pose: &Pose) -> String {
 }
 
 fn escaped(name: &str) -> String {
-    let safe = |c: char| match c {
-        '&' => "&amp;".to_owned(),
-        '<' => "&lt;".to_owned(),
-        '>' => "&gt;".to_owned(),
-        '"' => "&quot;".to_owned(),
-        c if c.is_control() => "_".to_owned(),
-        c => c.to_string(),
-    };
-    name.chars().map(safe).collect()
+    quick_xml::escape::escape(name.replace(char::is_control, "_")).into_owned()
 }

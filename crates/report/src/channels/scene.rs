@@ -3,7 +3,7 @@
 use super::arrows::{Drawing, all};
 use super::shapes::{Rgba, disc, entity, line_strip, note, plate, sphere, text};
 use super::{Messages, start_ns};
-use crate::points::Point;
+use crate::points::{Point, extent};
 use crate::run::Run;
 use armcal_core::{Dwell, Pose};
 use armcal_model::Model;
@@ -97,8 +97,7 @@ fn base_plate(cavities: &[Cavity], world_from_board: &Pose) -> Option<fox::CubeP
 
 /// A plate under the cavities, below the lowest: its centre in the frame of the board, and its sides [m].
 pub(super) fn plate_of(cavities: &[Cavity]) -> Option<(Pose, Vector3<f64>)> {
-    let places = || cavities.iter().map(|c| c.in_board_m);
-    let (low, high) = (places().reduce(|a, b| a.inf(&b))?, places().reduce(|a, b| a.sup(&b))?);
+    let (low, high) = extent(cavities.iter().map(|c| c.in_board_m))?;
     let mut centre = (low + high) / 2.0;
     centre.z = low.z - PLATE_M;
     let size_m = (high - low + Vector3::repeat(2.0 * PLATE_MARGIN_M)).xy().push(PLATE_M);

@@ -69,15 +69,14 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// Four significant digits: tables of viewers show every digit a number has.
+/// Four significant digits, whole numbers at least: tables of viewers show every digit a number has. By its decimal digits,
+/// because powers of ten above 22 are no floating-point numbers.
 fn short(value: f64) -> f64 {
     let exponent = value.abs().log10().floor();
-    if exponent.is_finite() { rounded(value, 3 - exponent as i32) } else { value }
-}
-
-/// The decimal number of so many places nearest to a value; whole numbers at least.
-fn rounded(value: f64, places: i32) -> f64 {
-    let places = usize::try_from(places).unwrap_or(0);
+    if !exponent.is_finite() {
+        return value;
+    }
+    let places = usize::try_from(3 - exponent as i32).unwrap_or(0);
     format!("{value:.places$}").parse().unwrap_or(value)
 }
 

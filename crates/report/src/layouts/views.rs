@@ -3,9 +3,8 @@
 use super::spec::View;
 use crate::channels::{board_map, cloud, robots};
 use crate::findings::Findings;
-use crate::points::Point;
+use crate::points::{Point, extent};
 use crate::run::Run;
-use nalgebra::Vector3;
 
 /// From how many diagonals of what is there the camera looks at it: with its opening of 45 degrees all of it is seen.
 const AWAY: f64 = 1.1;
@@ -18,19 +17,16 @@ const PANEL: f64 = 2.2;
 pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
     let fitted = run.calibration.fit.values();
     let base = run.model.base_in_world(&fitted);
-    let stands =
-        run.recordings.iter().flat_map(|r| &r.dwells).find(|d| d.joint_rad.len() == run.model.joint_count());
-    let arm = stands.map_or_else(Vec::new, |d| run.model.link_frames_in_base(&fitted, &d.joint_rad));
+    let arm =
+        run.first_posed().map_or_else(Vec::new, |d| run.model.link_frames_in_base(&fitted, &d.joint_rad));
     let links = arm.iter().map(|(_, frame)| (base * frame).translation.vector);
-    let places: Vec<Vector3<f64>> = points
+    let places = points
         .iter()
         .map(|p| p.measured_m)
         .chain(links)
         .chain([base.translation.vector])
-        .filter(|m| m.iter().all(|x| x.is_finite()))
-        .collect();
-    let low = places.iter().copied().reduce(|a, b| a.inf(&b)).unwrap_or_default();
-    let high = places.iter().copied().reduce(|a, b| a.sup(&b)).unwrap_or_default();
+        .filter(|m| m.iter().all(|x| x.is_finite()));
+    let (low, high) = extent(places).unwrap_or_default();
     let (target_m, distance_m) = ((low + high) / 2.0, (AWAY * (high - low).norm()).clamp(0.5, 20.0));
     let mut topics = vec![
         ("/armcal/scene", true),

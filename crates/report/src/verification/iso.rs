@@ -9,14 +9,16 @@ use comfy_table::Cell;
 /// Columns of [`rows`].
 pub(super) const HEADER: [&str; 9] =
     ["clause", "criterion", "", "unit", "nominal", "calibrated", "worst at", "n", "asked"];
+/// Where there is none.
+pub(super) const NO_REPEATS: &str =
+    "No pose and no path is commanded twice in these recordings, and the criteria are about repeats.";
 const STAND_IN: &str = "Set-points are not recorded: encoder readings stand for commands.";
 
 /// The section; one sentence where no criterion could be computed.
 pub(super) fn section(pen: &Pen, report: &IsoReport) -> String {
     let title = "ISO 9283, the worst place of each criterion (verification.json has all)";
     if report.calibrated.criteria.is_empty() {
-        let why = " No pose and no path is commanded twice in these recordings, and the criteria are about repeats.\n";
-        return pen.section(title, why.to_owned());
+        return pen.section(title, format!(" {NO_REPEATS}\n"));
     }
     let mut table = pen.table(&HEADER);
     for row in rows(report) {
