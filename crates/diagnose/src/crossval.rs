@@ -71,8 +71,15 @@ pub(crate) fn by_stretch(problem: &Problem) -> Vec<Group> {
     groups.into_iter().map(around).collect()
 }
 
-/// Whitened residual rows of every dwell, each predicted without its group; `effect` columns are fitted too.
-pub(crate) fn left_out(problem: &Problem, effect: Option<&DMatrix<f64>>, groups: &[Group]) -> DVector<f64> {
+/// Whitened residual rows of every dwell, each predicted without its group; `effect` columns are fitted too. Noise of
+/// `scale` times the declared one makes priors weigh its square as much against data in declared units; the columns of an
+/// effect come with that in them.
+pub(crate) fn left_out(
+    problem: &Problem,
+    effect: Option<&DMatrix<f64>>,
+    groups: &[Group],
+    scale: f64,
+) -> DVector<f64> {
     let geometry = problem.geometry.ncols();
     let extra = effect.map_or(0, |e| e.ncols());
     let mut x = DMatrix::zeros(problem.rows(), geometry + extra);
@@ -80,7 +87,10 @@ pub(crate) fn left_out(problem: &Problem, effect: Option<&DMatrix<f64>>, groups:
     if let Some(effect) = effect {
         x.columns_mut(geometry, extra).copy_from(effect);
     }
-    let precision = |k: usize| if k < geometry { problem.geometry_precision[k] } else { EFFECT_PRECISION };
+    let precision = |k: usize| match k < geometry {
+        true => problem.geometry_precision[k] * scale.powi(2),
+        false => EFFECT_PRECISION,
+    };
     let mut normal = inner(&x, &x);
     let mut right = x.tr_mul(&problem.residual);
     for k in 0..x.ncols() {
@@ -155,17 +165,18 @@ pub(crate) fn gain(
     problem: &Problem,
     effect: &DMatrix<f64>,
     groups: &[Group],
-    memory: Option<&Whitener>,
+    (memory, scale): (Option<&Whitener>, f64),
     config: &DiagnosisConfig,
 ) -> HeldOut {
-    let (before, after) = (left_out(problem, None, groups), left_out(problem, Some(effect), groups));
+    let both =
+        |p: &Problem, effect| (left_out(p, None, groups, scale), left_out(p, Some(effect), groups, scale));
+    let (before, after) = both(problem, effect);
     let plain = compare(problem, &before, &after, groups, config);
     let Some(memory) = memory else { return plain };
     let forgetful = problem.whitened(memory);
     let mut effect = effect.clone();
     memory.apply(&mut effect);
-    let before = left_out(&forgetful, None, groups);
-    let after = left_out(&forgetful, Some(&effect), groups);
+    let (before, after) = both(&forgetful, &effect);
     let HeldOut { gain, p, .. } = compare(&forgetful, &before, &after, groups, config);
     HeldOut { gain, p, ..plain }
 }

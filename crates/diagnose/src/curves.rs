@@ -1,14 +1,14 @@
 //! Several unlisted error curves: each joint may err over its own angle, all at once.
 //!
-//! One curve after the other joins the base while the best unlisted cell is a joint's own angle and predicts places the
-//! fit did not see. Each is then described among the others, so that none carries another's shape.
+//! One curve after the other joins the base while the best unlisted cell is a joint's own angle, and then while
+//! another joint's predicts places the fit did not see. Each is then described among the others, so that none carries another's shape.
 
 use crate::DiagnoseError;
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::UnknownReport;
-use crate::forward::something;
 use crate::problem::Candidate;
+use crate::ripple::Peak;
 use crate::rooms::{Room, Rooms, as_candidate};
 use crate::unknown::described;
 use crate::weigh::Outside;
@@ -32,13 +32,11 @@ pub(crate) fn error_curves(
     loop {
         let base: Vec<Candidate> = names.iter().chain(&shapes).cloned().collect();
         let room = rooms.with(&base)?;
-        if shapes.len() >= room.problem.joints() || (!shapes.is_empty() && !something(&room, config)) {
+        let explained = || room.weighed.p_nothing >= config.max_probability_nothing;
+        if shapes.len() >= room.problem.joints() || (!shapes.is_empty() && explained()) {
             break;
         }
         let Some(best) = leading(&room, &shapes, config) else { break };
-        if !room.predicts_with(&best.what.columns, config) {
-            break;
-        }
         shapes.push(as_candidate(&best.what, &room, config));
     }
     let mut curves = Vec::new();
@@ -52,11 +50,21 @@ pub(crate) fn error_curves(
             curves.push(Curve { candidate: shape.clone(), report });
         }
     }
+    share_ripples(&mut curves);
     curves.sort_by(|a, b| b.report.log_evidence.total_cmp(&a.report.log_evidence));
     Ok(curves)
 }
 
-/// The best joint over its own angle; the first must be as good as the best cell of all.
+/// Gears of one make: what stands out in one joint less clearly than a ripple is one where another joint has it clearly.
+fn share_ripples(curves: &mut [Curve]) {
+    let clear: Vec<Peak> = curves.iter().filter_map(|c| c.report.peak.filter(Peak::is_alone)).collect();
+    for report in curves.iter_mut().map(|c| &mut c.report) {
+        let shared = report.peak.filter(|p| clear.iter().any(|c| p.is_of_a_make_with(c)));
+        report.ripple = report.ripple.or(shared.map(|p| p.ripple));
+    }
+}
+
+/// The best joint over its own angle that predicts; the first must be as good as the best cell of all.
 fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) -> Option<&'r Outside> {
     let weighed = &room.weighed;
     // Joints of one make err alike: after a first curve the next need not lead all cells, only predict.
@@ -69,7 +77,9 @@ fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) ->
             && own_angle(&u.what)
             && taken.iter().all(|t| t.spec != u.what.name)
     });
-    own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    let mut own: Vec<&Outside> = own.collect();
+    own.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
+    own.into_iter().find(|u| room.predicts_with(&u.what.columns, config))
 }
 
 /// Whether a joint errs over its own angle.

@@ -6,7 +6,7 @@ use crate::error_places::ErrorPlace;
 use crate::held_out::HeldOut;
 use crate::nested::Nested;
 use crate::noise::Noise;
-use crate::ripple::Ripple;
+use crate::ripple::{Peak, Ripple};
 use crate::structure::Structure;
 use armcal_calibrate::Calibration;
 use armcal_core::{DwellId, Unit, Warning};
@@ -324,6 +324,9 @@ pub struct UnknownReport {
     pub shape: Vec<ShapePoint>,
     /// What repeats in it, of a joint's error over its own angle.
     pub ripple: Option<Ripple>,
+    /// Its strongest period, whether or not that is a ripple.
+    #[serde(skip)]
+    pub(crate) peak: Option<Peak>,
     /// Harmonics of the turn that the poses resolve, of a joint's error over its own angle.
     #[serde(skip)]
     pub harmonics: Option<u32>,

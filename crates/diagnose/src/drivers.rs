@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 
 /// Functions kept for a smooth driver, and for a joint's own angle in detail.
 const FUNCTIONS: usize = 8;
-const FINE_FUNCTIONS: usize = 30;
+const FINE_FUNCTIONS: [usize; 2] = [30, 60];
+/// Dwells to each function of a joint's own angle, between those.
+const DWELLS_A_FUNCTION: usize = 5;
 /// Bins over which the kernel is decomposed.
 const BINS: usize = 41;
 const FINE_BINS: usize = 121;
@@ -156,7 +158,10 @@ fn smooth(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
     let (lengths, bins, functions) = match kind {
         DriverKind::Time => (TIME_LENGTHS, FINE_BINS, TIME_FUNCTIONS),
         DriverKind::DirectionAlong(_) => (ALONG_LENGTHS, FINE_BINS, ALONG_FUNCTIONS),
-        DriverKind::Own(_) => (FINE_LENGTHS, FINE_BINS, FINE_FUNCTIONS),
+        DriverKind::Own(_) => {
+            let [fewest, most] = FINE_FUNCTIONS;
+            (FINE_LENGTHS, FINE_BINS, (value.len() / DWELLS_A_FUNCTION).clamp(fewest, most))
+        }
         _ => (LENGTHS, BINS, FUNCTIONS),
     };
     let kernel = Kernel::new(&value, lengths, bins, functions);

@@ -132,7 +132,7 @@ mod tests {
             p.residual += own.expect("a point of the grid").columns.dense(&p.dwells, 1.0)
                 * DVector::from_vec(vec![0.8, -0.6]);
         }
-        let fitted = crate::crossval::left_out(&p, None, &[]);
+        let fitted = crate::crossval::left_out(&p, None, &[], 1.0);
         let all = one_frequency(&p.scans, &p.dwells, &fitted).expect("three joints");
         assert_eq!(
             all.points[0].spec,

@@ -80,8 +80,8 @@ fn assemble(
         true => top.map_or(1.0, |t| t.own().p_adjusted),
         false => effects.iter().map(|e| e.p_adjusted).fold(0.0, f64::max),
     };
-    let mean = |p: &Problem| {
-        let norms = norms_m(p, &left_out(p, None, &by_place(p)));
+    let mean = |p: &Problem, w: &Weighed| {
+        let norms = norms_m(p, &left_out(p, None, &by_place(p), w.scale));
         norms.iter().sum::<f64>() / norms.len().max(1) as f64 * 1e3
     };
     let noise = noise(&search.with_curves.weighed);
@@ -103,7 +103,10 @@ fn assemble(
         judged: JudgedOn::Linearised,
         unexplained: None,
         refitted: None,
-        holdout_mm: BeforeAfter { before: mean(problem), after: mean(&search.with_curves.problem) },
+        holdout_mm: BeforeAfter {
+            before: mean(problem, weighed),
+            after: mean(&search.with_curves.problem, &search.with_curves.weighed),
+        },
         warnings: warnings(&noise, &set_aside, whole.dwells.len(), search, config),
         noise,
         set_aside,

@@ -115,12 +115,13 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let within_nats = if impossible.is_empty() { of_shape } else { f64::INFINITY };
     let set = answer(problem, weighed, metric, (entry, within_nats), config);
 
-    let effect = weighed.entries[entry].candidate.columns.dense(&problem.dwells, 1.0);
+    let columns = &weighed.entries[entry].candidate.columns;
+    let effect = columns.dense(&problem.dwells, 1.0);
     let groups = independent_groups(problem, weighed);
-    let memory = weighed.memory_of(&weighed.entries[entry].candidate.columns, problem, config);
-    let places = gain(problem, &effect, &groups, memory, config);
+    let places = weighed.gain(problem, (columns, &effect), &groups, config);
     let groups = by_recording(problem);
-    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, None, config));
+    let noise = (None, weighed.scale);
+    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, noise, config));
 
     let theta = &fitted.estimate;
     let theta_sigma = relative_sigma(&fitted, residual_variance);

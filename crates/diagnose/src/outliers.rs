@@ -58,8 +58,8 @@ fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
     let best = weighed.best().filter(|b| b.1 > 0.0);
     let effect = best.map(|b| weighed.tamed(b.0, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
-    let left = left_out(problem, effect.as_ref(), &alone);
-    let fitted = left_out(problem, effect.as_ref(), &[]);
+    let left = left_out(problem, effect.as_ref(), &alone, weighed.scale);
+    let fitted = left_out(problem, effect.as_ref(), &[], weighed.scale);
     let square = studentised(problem, &left, &fitted);
     let reduced: Vec<f64> =
         problem.dwells.iter().zip(&square).map(|(d, square)| square / median_square(d.rows as f64)).collect();

@@ -4,7 +4,7 @@ use crate::bootstrap::Significance;
 use crate::combination::{Combination, combination};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, likeness, one_step, smallest_seen};
-use crate::crossval::{Group, compare, gain, left_out};
+use crate::crossval::{Group, compare, left_out};
 use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport, Rival};
 use crate::forward::Accepted;
 use crate::judge::Judged;
@@ -67,7 +67,7 @@ pub(crate) fn candidate_reports(
     let projection = &weighed.metrics[0].projection;
     let variance = projection.rss / projection.dof();
     let order = weighed.ranking();
-    let before = left_out(problem, None, groups);
+    let before = left_out(problem, None, groups, weighed.scale);
     let none = Significance { score: 0.0, surprise: 0.0, p_raw: 1.0, p_adjusted: 1.0 };
     let mut reports = Vec::new();
     for (rank, k) in order.iter().copied().enumerate() {
@@ -79,7 +79,8 @@ pub(crate) fn candidate_reports(
         let significance = top.map_or(none, |t| t.significance[k]);
         let own_variance = projection.variance_without(significance.score);
         let held = (rank < SHOWN).then(|| {
-            let after = left_out(problem, Some(&c.columns.dense(&problem.dwells, 1.0)), groups);
+            let effect = c.columns.dense(&problem.dwells, 1.0);
+            let after = left_out(problem, Some(&effect), groups, weighed.scale);
             compare(problem, &before, &after, groups, config)
         });
         let mut same: Vec<String> = c.aliases.clone();
@@ -128,11 +129,10 @@ pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival>
     let k = weighed.ranking().into_iter().find(another)?;
     let columns = &weighed.entries[k].candidate.columns;
     let groups = independent_groups(problem, weighed);
-    let memory = weighed.memory_of(columns, problem, config);
     Some(Rival {
         name: weighed.entries[k].candidate.spec.clone(),
         behind_nats: own.ln_evidence - weighed.entries[k].ln_evidence,
-        places: gain(problem, &columns.dense(&problem.dwells, 1.0), &groups, memory, config),
+        places: weighed.gain(problem, (columns, &columns.dense(&problem.dwells, 1.0)), &groups, config),
     })
 }
 

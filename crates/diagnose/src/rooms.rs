@@ -3,7 +3,6 @@
 use crate::DiagnoseError;
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::crossval::gain;
 use crate::judge::{Judged, independent_groups, judge};
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
@@ -43,8 +42,8 @@ impl Room {
     pub fn predicts_with(&self, columns: &Columns, config: &DiagnosisConfig) -> bool {
         let groups = independent_groups(&self.problem, &self.weighed);
         let effect = self.weighed.tamed(columns, &self.problem, config);
-        let memory = self.weighed.memory_of(columns, &self.problem, config);
-        gain(&self.problem, &effect, &groups, memory, config).p <= config.max_p_adjusted
+        let gain = self.weighed.gain(&self.problem, (columns, &effect), &groups, config);
+        gain.p <= config.max_p_adjusted
     }
 }
 
@@ -117,7 +116,7 @@ impl<'a> Rooms<'a> {
 
 /// An unlisted shape as something that can join the base, with the freedom these data give it.
 pub(crate) fn as_candidate(cell: &Unlisted, room: &Room, config: &DiagnosisConfig) -> Candidate {
-    let tamed = room.weighed.tamed(&cell.columns, &room.problem, config);
+    let sized = room.weighed.sized(&cell.columns, &room.problem, config);
     Candidate {
         spec: cell.name.clone(),
         family: UNLISTED.to_string(),
@@ -126,6 +125,6 @@ pub(crate) fn as_candidate(cell: &Unlisted, room: &Room, config: &DiagnosisConfi
         known: None,
         amplitudes: Vec::new(),
         toggle: Toggle::None,
-        columns: Columns::Dense(Arc::new(tamed)),
+        columns: Columns::Dense(Arc::new(sized)),
     }
 }

@@ -245,7 +245,7 @@ fn leave_group_out_is_a_refit_without_the_group() {
         "what is near in time is not seen either"
     );
     let places = crate::crossval::by_place(&p);
-    let found = [&places, &stretches].map(|groups| crate::crossval::left_out(&p, Some(&effect), groups));
+    let found = [&places, &stretches].map(|groups| crate::crossval::left_out(&p, Some(&effect), groups, 1.0));
     let cases = places.iter().map(|g| (g, &found[0])).step_by(4);
     for (group, found) in cases.chain(stretches.iter().map(|g| (g, &found[1])).step_by(5)) {
         let keep: Vec<bool> = (0..p.dwells.len()).map(|i| !group.unseen.contains(&i)).collect();

@@ -2,14 +2,13 @@
 
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::crossval::gain;
 use crate::diagnosis::{ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::expression;
 use crate::judge::independent_groups;
 use crate::problem::{Channel, Problem};
-use crate::ripple::ripple;
+use crate::ripple::{Peak, peak};
 use crate::weigh::{Outside, Weighed};
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
@@ -48,18 +47,17 @@ pub(crate) fn described(
     let variance = metric.projection.variance_without(drop);
     let effect = weighed.tamed(&best.columns, problem, config);
     let groups = independent_groups(problem, weighed);
-    let memory = weighed.memory_of(&best.columns, problem, config);
-    let places = gain(problem, &effect, &groups, memory, config);
+    let places = weighed.gain(problem, (&best.columns, &effect), &groups, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
-    let (mut shape, mut repeats, mut harmonics) = (Vec::new(), None, None);
+    let (mut shape, mut strongest, mut harmonics) = (Vec::new(), None, None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
         shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
         if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
             let per = driver.basis.ncols();
             let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
-            repeats = ripple(&driver.value, curve.as_slice(), per);
+            strongest = peak(&driver.value, curve.as_slice(), per);
             harmonics = Some(resolved(&driver.value));
         }
     }
@@ -95,7 +93,8 @@ pub(crate) fn described(
         log_evidence: ln,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
-        ripple: repeats,
+        ripple: strongest.filter(Peak::is_alone).map(|p| p.ripple),
+        peak: strongest,
         harmonics,
         expression: formula,
         places,

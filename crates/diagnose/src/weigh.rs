@@ -2,9 +2,10 @@
 
 use crate::cells::{Unlisted, cells, discrepancies};
 use crate::config::DiagnosisConfig;
-use crate::crossval::EFFECT_PRECISION;
+use crate::crossval::{EFFECT_PRECISION, Group, gain};
 use crate::drivers::{Driver, drivers};
 use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
+use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem, Scan};
 use crate::projection::Gram;
@@ -170,12 +171,7 @@ impl Weighed {
     }
 
     /// Whitening by the noise in which a term is explained best, where noise remembers.
-    pub fn memory_of(
-        &self,
-        columns: &Columns,
-        problem: &Problem,
-        config: &DiagnosisConfig,
-    ) -> Option<&Whitener> {
+    fn memory_of(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> Option<&Whitener> {
         self.remembers().then(|| &self.metric_of(columns, problem, config).whitener)
     }
 
@@ -251,13 +247,30 @@ impl Weighed {
         columns.dense(&problem.dwells, 1.0 / self.scale)
     }
 
-    /// Columns scaled so that the weak prior of left-out fits is the amplitude these data prefer: a flexible shape must
-    /// not be fitted freely where nothing was seen.
-    pub fn tamed(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> DMatrix<f64> {
+    /// Columns scaled so that the weak prior of an effect's amplitude is the amplitude these data prefer: a flexible shape
+    /// must not be fitted freely where nothing was seen. As they join the base of a problem, whose noise is weighed there.
+    pub fn sized(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> DMatrix<f64> {
         let metric = self.metric_of(columns, problem, config);
         let gram = metric.gram(&self.dense(columns, problem));
         let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
-        columns.dense(&problem.dwells, a * EFFECT_PRECISION.sqrt() / self.scale)
+        columns.dense(&problem.dwells, a * EFFECT_PRECISION.sqrt())
+    }
+
+    /// The same for left-out fits, which are made in units of the declared noise.
+    pub fn tamed(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> DMatrix<f64> {
+        self.sized(columns, problem, config) / self.scale
+    }
+
+    /// What `effect`, a scaling of `columns`, does to errors on groups the fit did not see, under the noise in which the
+    /// columns are explained best.
+    pub fn gain(
+        &self,
+        problem: &Problem,
+        (columns, effect): (&Columns, &DMatrix<f64>),
+        groups: &[Group],
+        config: &DiagnosisConfig,
+    ) -> HeldOut {
+        gain(problem, effect, groups, (self.memory_of(columns, problem, config), self.scale), config)
     }
 
     /// Products under white noise.

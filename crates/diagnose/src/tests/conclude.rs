@@ -91,6 +91,7 @@ fn shape() -> UnknownReport {
         unit: Unit::Radian,
         shape: Vec::new(),
         ripple: None,
+        peak: None,
         harmonics: None,
         expression: None,
         places,

@@ -63,7 +63,7 @@ fn what_was_found_is_told_with_its_numbers() {
     assert!(d.unknown.is_none() && d.unlisted.is_empty() && d.set_aside.is_empty());
     // The mean over dwells of the left-out errors, before and with the effect in the model.
     let mean = |p: &Problem| {
-        let e = left_out(p, None, &by_place(p));
+        let e = left_out(p, None, &by_place(p), 1.0);
         let norm = |i: usize| e.rows(3 * i, 3).norm() * SIGMA_M;
         (0..p.dwells.len()).map(norm).sum::<f64>() / p.dwells.len() as f64 * 1e3
     };

@@ -37,8 +37,8 @@ fn the_square_is_that_of_the_left_out_error_in_its_own_covariance() {
     let mut p = sound(1);
     p.residual[0] += 3.0;
     let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
-    let left = left_out(&p, None, &alone);
-    let square = studentised(&p, &left, &left_out(&p, None, &[]));
+    let left = left_out(&p, None, &alone, 1.0);
+    let square = studentised(&p, &left, &left_out(&p, None, &[], 1.0));
     let precision = DMatrix::from_diagonal(&p.geometry_precision);
     for i in [0, 17, 100, 197] {
         let x = p.geometry.rows(3 * i, 3);
@@ -72,8 +72,8 @@ fn an_error_is_suspect_from_the_declared_rarity_on_whatever_the_noise() {
             let weighed = weigh(&p, &config());
             let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| weighed.tamed(b.0, &p, &config()));
             let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
-            let left = left_out(&p, best.as_ref(), &alone);
-            let square = studentised(&p, &left, &left_out(&p, best.as_ref(), &[]));
+            let left = left_out(&p, best.as_ref(), &alone, weighed.scale);
+            let square = studentised(&p, &left, &left_out(&p, best.as_ref(), &[], weighed.scale));
             let ratio = square[at] * 2.38 / median(&square);
             if (ratio / RARE - 1.0).abs() < 0.03 {
                 continue;
