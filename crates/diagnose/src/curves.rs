@@ -1,7 +1,7 @@
 //! Several unlisted error curves: each joint may err over its own angle, all at once.
 //!
-//! One curve after the other joins the base while the best unlisted cell is a joint's own angle, and then while
-//! another joint's predicts places the fit did not see. Each is then described among the others, so that none carries another's shape.
+//! The first curve joins the base where the best unlisted cell is a joint's own angle, others while that of another joint
+//! predicts places the fit did not see. Each is then described among the others, so that none carries another's shape.
 
 use crate::DiagnoseError;
 use crate::cells::Unlisted;

@@ -176,7 +176,7 @@ fn confirm(
 
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
 /// all, the best that has a place and a driver, or the best listed one.
-pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
+fn something(room: &Room, config: &DiagnosisConfig) -> bool {
     let weighed = &room.weighed;
     if weighed.p_nothing >= config.max_probability_nothing {
         return false;

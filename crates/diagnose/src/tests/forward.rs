@@ -431,3 +431,25 @@ fn a_name_falls_to_a_curve_that_says_the_same_and_to_no_other() {
     assert_eq!(beside("scale:3"), both);
     assert_eq!(beside("zero_drift:2"), [("backlash:1".to_string(), 21)]);
 }
+
+/// A shape joins the base with the size that the data give it, however far the noise is from the declared one.
+#[test]
+fn a_curve_that_joined_leaves_little_of_its_own_evidence_whatever_the_noise() {
+    let config = quick();
+    let mut r = arm::rng(8);
+    let poses = arm::design(60, &mut r);
+    let curve = arm::on_joint(2, |p, _, _| 5e-3 * (25.0 * p.q[2]).sin().powi(3));
+    let sound = arm::problem(&poses, &[(curve, vec![])], arm::Noise::White, &mut r, false);
+    for declared in [1.0, 15.0] {
+        let p = arm::overconfident(sound.clone(), declared);
+        in_rooms(&p, &config, |rooms| {
+            let bare = rooms.with(&[]).unwrap();
+            let cell = bare.weighed.best_cell().unwrap();
+            assert_eq!(cell.what.name, "joint3 <- q3");
+            let with = rooms.with(&[as_candidate(&cell.what, &bare, &config)]).unwrap();
+            let own = with.weighed.unlisted.iter().filter(|u| u.what.name == cell.what.name);
+            let left = own.map(|u| u.ln_evidence).fold(0.0, f64::max);
+            assert!(left < 0.2 * cell.ln_evidence, "{declared}: {left} of {}", cell.ln_evidence);
+        });
+    }
+}
