@@ -71,5 +71,5 @@ pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
 pub use pooled::{PooledModel, PooledRecording, calibrate_pooled};
-pub use products::inner;
+pub use products::{gram, inner};
 pub use scene::Scene;

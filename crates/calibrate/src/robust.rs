@@ -5,7 +5,7 @@
 
 use crate::loss::{Loss, chi_median};
 use crate::problem::Linearised;
-use crate::products::inner;
+use crate::products::gram;
 use crate::solver::{Arrow, Cost, Curvature, Quadratic, triangle};
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
@@ -132,8 +132,8 @@ impl RobustCost<'_, '_> {
             along.copy_from(&(direction.transpose() * jacobian.rows(*at, direction.len())));
         }
         if self.white.structure.is_dense() {
-            let squares = inner(&jacobian, &jacobian);
-            let curvature = &squares - inner(&along, &along);
+            let squares = gram(&jacobian);
+            let curvature = &squares - gram(&along);
             return Part { gradient, squares: squares.diagonal(), curvature };
         }
         let squares = DVector::from_iterator(

@@ -7,7 +7,7 @@
 //! nothing determines where they started.
 
 use crate::problem::{Linearised, Problem};
-use crate::products::inner;
+use crate::products::gram;
 use crate::solver::{Arrow, Curvature, triangle};
 use crate::structure::Structure;
 use crate::{CalibrateError, FitConfig};
@@ -199,7 +199,7 @@ impl<'a> Whitened<'a> {
     pub fn squares(&self, at: &Point) -> Curvature {
         if self.structure.is_dense() {
             let jacobian = &at.groups[0].1;
-            return Curvature::Dense(inner(jacobian, jacobian));
+            return Curvature::Dense(gram(jacobian));
         }
         let triangles = self.each_group(|group| triangle(at.groups[group].1.clone()));
         let nothing = DVector::zeros(self.axes.len());

@@ -11,7 +11,7 @@
 use crate::config::DiagnosisConfig;
 use crate::projection::{Projection, eigen};
 use crate::special::ln_f_tail;
-use armcal_calibrate::inner;
+use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -138,7 +138,7 @@ fn inflated(projection: &Projection, residual: &DVector<f64>, rows: &[usize]) ->
     let e = DVector::from_iterator(rows.len(), rows.iter().map(|r| residual[*r]));
     let q = projection.q.select_rows(rows);
     // H_gg = V diag(h) V' has rank at most min(rows, p).
-    let small = if q.nrows() <= q.ncols() { &q * q.transpose() } else { inner(&q, &q) };
+    let small = if q.nrows() <= q.ncols() { &q * q.transpose() } else { gram(&q) };
     let decomposed = small.symmetric_eigen();
     let vectors = if q.nrows() <= q.ncols() {
         decomposed.eigenvectors

@@ -10,8 +10,8 @@ use crate::places::units;
 use crate::problem::Problem;
 use crate::projection::cholesky_upper;
 use crate::whitener::Whitener;
+use armcal_calibrate::gram;
 use armcal_calibrate::grouped_ci95;
-use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -91,7 +91,7 @@ pub(crate) fn left_out(
         true => problem.geometry_precision[k] * scale.powi(2),
         false => EFFECT_PRECISION,
     };
-    let mut normal = inner(&x, &x);
+    let mut normal = gram(&x);
     let mut right = x.tr_mul(&problem.residual);
     for k in 0..x.ncols() {
         normal[(k, k)] += precision(k);

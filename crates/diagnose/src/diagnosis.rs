@@ -327,15 +327,24 @@ pub struct UnknownReport {
     /// Its strongest period, whether or not that is a ripple.
     #[serde(skip)]
     pub(crate) peak: Option<Peak>,
-    /// Harmonics of the turn that the poses resolve, of a joint's error over its own angle.
+    /// The Fourier series that follows it, of a joint's error over its own angle.
     #[serde(skip)]
-    pub harmonics: Option<u32>,
+    pub series: Option<Series>,
     /// The expression effect to paste.
     pub expression: Option<Expression>,
     /// Errors on places the fit did not see, with this shape in the model.
     pub places: HeldOut,
     /// Other places and drivers that explain it within 3 nats.
     pub rivals: Vec<String>,
+}
+
+/// A Fourier series over a joint's turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Series {
+    /// Harmonics of the turn that the poses resolve.
+    pub harmonics: u32,
+    /// Standard deviation of the curve beside its slow part [rad], two digits.
+    pub typical_rad: f64,
 }
 
 /// A point of a shape, SI.

@@ -279,7 +279,7 @@ fn against_unlisted(
 
 /// Penalised linear fit of the geometry alone.
 pub(crate) fn base_fit(problem: &Problem) -> DVector<f64> {
-    let mut normal = armcal_calibrate::inner(&problem.geometry, &problem.geometry);
+    let mut normal = armcal_calibrate::gram(&problem.geometry);
     let mut right = problem.geometry.tr_mul(&problem.residual);
     for k in 0..right.len() {
         normal[(k, k)] += problem.geometry_precision[k];

@@ -9,7 +9,7 @@ use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{
-    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem, inner, linearise,
+    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem, gram, linearise,
 };
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
@@ -164,7 +164,7 @@ impl Refit for ModelRefit<'_> {
             column /= axis.precision.sqrt();
             square += axis.precision * axis.offset.powi(2);
         }
-        Ok(Some(AfterRefit { square, rows: rows.len(), normal: inner(&jacobian, &jacobian) }))
+        Ok(Some(AfterRefit { square, rows: rows.len(), normal: gram(&jacobian) }))
     }
 
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {

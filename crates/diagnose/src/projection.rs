@@ -10,7 +10,7 @@
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
 //! 2015), which is as orthogonal as Householder's and a matrix product fast.
 
-use armcal_calibrate::inner;
+use armcal_calibrate::{gram, inner};
 use nalgebra::{DMatrix, DVector};
 
 /// Geometry projected out of one set of whitened rows.
@@ -55,7 +55,7 @@ impl Projection {
         let mut prior = DMatrix::from_diagonal(&root);
         let mut ln_det = -2.0 * root.iter().map(|v| v.ln()).sum::<f64>();
         for _ in 0..2 {
-            let normal = inner(&data, &data) + inner(&prior, &prior);
+            let normal = gram(&data) + gram(&prior);
             let factor = cholesky_upper(normal);
             ln_det += 2.0 * factor.diagonal().iter().map(|v| v.ln()).sum::<f64>();
             let inverse = factor
@@ -94,10 +94,10 @@ impl Projection {
     /// Products of columns in the projected space.
     pub fn gram(&self, columns: &DMatrix<f64>) -> Gram {
         let c = inner(&self.q, columns);
-        let full = inner(columns, columns);
+        let full = gram(columns);
         Gram {
             raw: full.diagonal(),
-            a: full - inner(&c, &c),
+            a: full - gram(&c),
             g: columns.tr_mul(&self.residual) - c.tr_mul(&self.z),
         }
     }

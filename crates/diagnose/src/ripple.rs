@@ -61,6 +61,12 @@ impl Peak {
     }
 }
 
+/// Standard deviation of a curve, given at the angles [rad] where the joint was, beside its slow part: that has names of its
+/// own (`gear_ratio`, `eccentricity`, `second_harmonic`), and the geometry has a share in it.
+pub(crate) fn beside_slow(angles_rad: &[f64], curve: &[f64]) -> f64 {
+    Waves::slow(angles_rad).without(&DVector::from_column_slice(curve)).norm() / (curve.len() as f64).sqrt()
+}
+
 /// The strongest period of a curve, given at the angles [rad] where the joint was, beside its slow part: a straight line and
 /// the first two harmonics of the turn.
 ///

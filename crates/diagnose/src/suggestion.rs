@@ -51,10 +51,12 @@ impl UnknownReport {
     /// formula follows it. `None` where neither reaches the shape.
     pub fn effect(&self) -> Option<EffectSpec> {
         let formula = self.expression.as_ref();
-        if let (Some(joint), Some(harmonics)) = (self.own_angle(), self.harmonics)
+        if let (Some(joint), Some(series)) = (self.own_angle(), self.series)
             && formula.is_none_or(|e| e.share_of_shape < FORMULA_SHARE)
         {
-            return Some(EffectSpec::new("error_curve").at(joint).with("harmonics", f64::from(harmonics)));
+            let curve = EffectSpec::new("error_curve").at(joint);
+            let curve = curve.with("harmonics", f64::from(series.harmonics));
+            return Some(curve.with("typical", series.typical_rad));
         }
         let formula = formula?;
         let mut spec = EffectSpec::new("expression");

@@ -2,13 +2,13 @@
 
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::diagnosis::{ShapePoint, UnknownReport};
+use crate::diagnosis::{Series, ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::expression;
 use crate::judge::independent_groups;
 use crate::problem::{Channel, Problem};
-use crate::ripple::{Peak, peak};
+use crate::ripple::{Peak, beside_slow, peak};
 use crate::weigh::{Outside, Weighed};
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
@@ -50,7 +50,7 @@ pub(crate) fn described(
     let places = weighed.gain(problem, (&best.columns, &effect), &groups, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.drivers.get(d));
-    let (mut shape, mut strongest, mut harmonics) = (Vec::new(), None, None);
+    let (mut shape, mut strongest, mut series) = (Vec::new(), None, None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
         shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
@@ -58,7 +58,8 @@ pub(crate) fn described(
             let per = driver.basis.ncols();
             let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
             strongest = peak(&driver.value, curve.as_slice(), per);
-            harmonics = Some(resolved(&driver.value));
+            let typical_rad = two_digits(beside_slow(&driver.value, curve.as_slice()));
+            series = Some(Series { harmonics: resolved(&driver.value), typical_rad });
         }
     }
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.
@@ -95,7 +96,7 @@ pub(crate) fn described(
         shape,
         ripple: strongest.filter(Peak::is_alone).map(|p| p.ripple),
         peak: strongest,
-        harmonics,
+        series,
         expression: formula,
         places,
         rivals: rivals.into_iter().map(|u| u.what.name.clone()).collect(),
@@ -111,6 +112,10 @@ fn resolved(angles_rad: &[f64]) -> u32 {
     gaps.sort_by(f64::total_cmp);
     let usual_rad = gaps.get(gaps.len() / 2).copied().unwrap_or(PI);
     (PI / (A_HALF_WAVE * usual_rad)).round().clamp(FEWEST_HARMONICS, MOST_HARMONICS) as u32
+}
+
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// The axis whose fitted part moves the residual most.

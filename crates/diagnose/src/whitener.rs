@@ -10,7 +10,7 @@
 
 use crate::noise::Noise;
 use crate::problem::{DwellRow, Problem};
-use armcal_calibrate::inner;
+use armcal_calibrate::{gram, inner};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -145,7 +145,7 @@ fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
 
 /// P with `(I - P P')^2 = (I + b^2 Z Z')^-1`, and ln of the determinant of `I + b^2 Z Z'`.
 fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
-    let eigen = inner(z, z).symmetric_eigen();
+    let eigen = gram(z).symmetric_eigen();
     let mut p = z * &eigen.eigenvectors;
     let mut ln_det = 0.0;
     for (k, w) in eigen.eigenvalues.iter().enumerate() {

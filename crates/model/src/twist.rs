@@ -18,6 +18,11 @@ impl Twist {
         Twist { translation_m: Vector3::zeros(), rotation_rad: Vector3::zeros() }
     }
 
+    /// `factor` of it.
+    pub fn times(&self, factor: f64) -> Twist {
+        Twist { translation_m: self.translation_m * factor, rotation_rad: self.rotation_rad * factor }
+    }
+
     /// Adds `factor` of another motion.
     pub fn add(&mut self, other: &Twist, factor: f64) {
         self.translation_m += other.translation_m * factor;

@@ -92,7 +92,7 @@ fn shape() -> UnknownReport {
         shape: Vec::new(),
         ripple: None,
         peak: None,
-        harmonics: None,
+        series: None,
         expression: None,
         places,
         rivals: Vec::new(),

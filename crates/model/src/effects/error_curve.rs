@@ -9,8 +9,9 @@
 //! to fall with n as those of a smooth random curve do (Matern 5/2 with a length of 5 deg).
 //!
 //! # Parameters and units
-//! `sin<n>`, `cos<n>` [rad]; shape `harmonics` N (default 16; features down to about 180/N deg are followed). Prior of
-//! the whole curve: 0.1 deg.
+//! `sin<n>`, `cos<n>` [rad]; shape `harmonics` N (default 16; features down to about 180/N deg are followed), shape
+//! `typical` [rad] the standard deviation expected of the whole curve (default 0.1 deg): where poses are few the curve
+//! stays within it. The diagnosis proposes the size that it found.
 //!
 //! # Signature in the data
 //! Errors that look like noise against everything but this joint's angle, and repeat exactly. The curve holds where the
@@ -39,24 +40,36 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::None,
     target: Target::Joint,
     offered: Offered::Never,
-    shapes: &[Shape {
-        name: "harmonics",
-        unit: Unit::One,
-        default: Some(16.0),
-        lower: 1.0,
-        upper: 180.0,
-        meaning: "number of harmonics of the turn",
-        parameter: false,
-        values: None,
-    }],
+    shapes: &[
+        Shape {
+            name: "harmonics",
+            unit: Unit::One,
+            default: Some(16.0),
+            lower: 1.0,
+            upper: 180.0,
+            meaning: "number of harmonics of the turn",
+            parameter: false,
+            values: None,
+        },
+        Shape {
+            name: "typical",
+            unit: Unit::Radian,
+            default: Some(TYPICAL_RAD),
+            lower: 1e-7,
+            upper: 0.1,
+            meaning: "standard deviation expected of the whole curve",
+            parameter: false,
+            values: None,
+        },
+    ],
     never_negative: &[],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
     source: include_str!("error_curve.rs"),
     place,
 };
 
-/// Standard deviation of the whole curve [deg].
-const TYPICAL_DEG: f64 = 0.1;
+/// Standard deviation of the whole curve [rad] where nothing is said: 0.1 deg.
+const TYPICAL_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 /// Length over which it stays alike [rad].
 const LENGTH_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
@@ -75,7 +88,8 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     // Spectral density of the Matern 5/2 kernel at n turns, up to a factor.
     let density = |n: f64| (5.0 + (n * LENGTH_RAD).powi(2)).powi(-3);
     let all: f64 = (1..=180).map(|n| density(f64::from(n))).sum();
-    let sigma = |n: usize| TYPICAL_DEG.to_radians() * (density(n as f64) / all).sqrt();
+    let typical_rad = placing.shape("typical").unwrap_or(TYPICAL_RAD);
+    let sigma = |n: usize| typical_rad * (density(n as f64) / all).sqrt();
     let amplitudes = (1..=harmonics)
         .flat_map(|n| ["sin", "cos"].map(|name| (n, name)))
         .map(|(n, name)| {
@@ -88,15 +102,23 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for ErrorCurve {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        // sin nq and cos nq by turning from one harmonic to the next: a pass for each of many amplitudes comes here.
-        let (first_sine, first_cosine) = x.joint_rad(self.joint).sin_cos();
-        let (mut sine, mut cosine) = (first_sine, first_cosine);
         let mut sum = D::from(0.0);
-        for pair in theta.chunks_exact(2) {
-            sum += pair[0] * sine + pair[1] * cosine;
-            (sine, cosine) =
-                (sine * first_cosine + cosine * first_sine, cosine * first_cosine - sine * first_sine);
+        for (amplitude, wave) in theta.iter().zip(waves(x.joint_rad(self.joint), theta.len())) {
+            sum += *amplitude * wave;
         }
         change.joint(self.joint, sum);
     }
+
+    fn per_amplitude(&self, x: &Drivers<'_>, count: usize) -> Option<(usize, Vec<f64>)> {
+        Some((self.joint, waves(x.joint_rad(self.joint), count).collect()))
+    }
+}
+
+/// `sin q, cos q, sin 2q, cos 2q ..`, the first `count`: each harmonic turned on from the one before.
+fn waves(angle_rad: f64, count: usize) -> impl Iterator<Item = f64> {
+    let first = angle_rad.sin_cos();
+    let next = move |(sine, cosine): &(f64, f64)| {
+        Some((sine * first.1 + cosine * first.0, cosine * first.1 - sine * first.0))
+    };
+    std::iter::successors(Some(first), next).flat_map(|(sine, cosine)| [sine, cosine]).take(count)
 }

@@ -78,6 +78,12 @@ pub(crate) trait Physics: Debug + Send + Sync + 'static {
         None
     }
 
+    /// Of an effect that turns one joint in proportion to its many amplitudes: the joint, and by how much [rad] (prismatic:
+    /// [m]) for a unit of each of the `count`. [`Physics::deform`] is the sum of these, and one pass gives all derivatives.
+    fn per_amplitude(&self, _x: &Drivers<'_>, _count: usize) -> Option<(usize, Vec<f64>)> {
+        None
+    }
+
     /// The entries of `theta` that can matter to this observation.
     fn touched(&self, _x: &Drivers<'_>, count: usize) -> Range<usize> {
         0..count
@@ -99,6 +105,10 @@ pub(crate) trait AnyPhysics: Debug + Send + Sync {
     /// A joint that may rest anywhere in its gap, while a cavity holds the tip (`seated`) or not, and the variance of where
     /// it does [rad^2] (prismatic: [m^2]): what no prediction can know.
     fn slack(&self, _theta: &[f64], _seated: bool) -> Option<(usize, f64)> {
+        None
+    }
+    /// [`Physics::per_amplitude`].
+    fn in_proportion(&self, _x: &Drivers<'_>, _count: usize) -> Option<(usize, Vec<f64>)> {
         None
     }
     /// [`Physics::touched`].
@@ -124,6 +134,10 @@ impl<P: Physics> AnyPhysics for P {
 
     fn gap_of(&self, theta: &[f64]) -> Option<(usize, f64)> {
         self.gap(theta)
+    }
+
+    fn in_proportion(&self, x: &Drivers<'_>, count: usize) -> Option<(usize, Vec<f64>)> {
+        self.per_amplitude(x, count)
     }
 
     fn touched_entries(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {

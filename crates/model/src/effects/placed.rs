@@ -237,6 +237,12 @@ impl Effects {
         let mut change = Deformation::none();
         let mut lanes = Vec::new();
         for effect in self.placed.iter().filter(|effect| effect.acts_on(x)) {
+            let first = effect.parameters.start;
+            if let Some((joint, shares)) = effect.physics.in_proportion(x, effect.parameters.len()) {
+                let of = |(k, share): (usize, &f64)| (first + k, joint_motions[joint].times(*share));
+                parameters.extend(shares.iter().enumerate().map(of));
+                continue;
+            }
             lanes.clear();
             lanes.extend(p[effect.parameters.clone()].iter().map(|&value| Dual64::from(value)));
             for k in effect.physics.touched_entries(x, lanes.len()) {
@@ -256,9 +262,9 @@ impl Effects {
                         motion.add(motion_k, value.eps);
                     }
                 }
-                parameters.push((effect.parameters.start + k, motion));
+                parameters.push((first + k, motion));
                 if change.seat_m.iter().any(|s| s.eps != 0.0) {
-                    seats.push((effect.parameters.start + k, change.seat_m.map(|s| s.eps)));
+                    seats.push((first + k, change.seat_m.map(|s| s.eps)));
                 }
             }
         }
