@@ -1,6 +1,6 @@
 //! From a diagnosis to the effects that it proposes to add.
 
-use crate::diagnosis::{Diagnosis, ExpressionParameter, UnknownReport, Verdict};
+use crate::diagnosis::{Diagnosis, ExpressionParameter, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectSpec, Expression, ModelError, Override};
 
 /// A formula must remove this share of what the free shape removes; otherwise a whole curve is offered.
@@ -9,7 +9,8 @@ const FORMULA_SHARE: f64 = 0.9;
 const OF_THE_SESSION: [&str; 2] = ["t", "recording"];
 
 impl Diagnosis {
-    /// The effects found, the most probable name of each; where none has a name, all unlisted shapes.
+    /// The effects found, the most probable name of each; where none has a name, all unlisted shapes, and beside error
+    /// curves of joints the effects that show once these are in the model.
     ///
     /// # Errors
     /// A name that the catalogue does not know on an arm with these joints.
@@ -18,8 +19,16 @@ impl Diagnosis {
         let mut effects = named.collect::<Result<Vec<_>, ModelError>>()?;
         if self.verdict == Verdict::Unknown {
             effects.extend(self.unlisted.iter().filter_map(UnknownReport::effect));
+            let beside = self.beside_curves().iter().map(|e| EffectSpec::parse(&e.name, joint_names));
+            effects.extend(beside.collect::<Result<Vec<_>, ModelError>>()?);
         }
         Ok(effects)
+    }
+
+    /// Effects that show once the error curves of joints are in the model; none where what is missing is anything else.
+    pub fn beside_curves(&self) -> &[FoundEffect] {
+        let curves = !self.unlisted.is_empty() && self.unlisted.iter().all(|u| u.own_angle().is_some());
+        if self.verdict == Verdict::Unknown && curves { &self.tentative } else { &[] }
     }
 
     /// Of the suggested effects those to keep, and those that are no part of an arm: a formula of absolute time, or of the

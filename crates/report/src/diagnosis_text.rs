@@ -86,7 +86,8 @@ fn brief(pen: &Pen, d: &Diagnosis) -> String {
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
 pub(crate) fn all_found(d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&n.sentence()));
-    d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(nested).collect()
+    let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
+    d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(beside).chain(nested).collect()
 }
 
 /// The same in a line or two each: names, sizes, and what they take of the error.
@@ -97,8 +98,15 @@ pub(crate) fn briefly_found(d: &Diagnosis) -> Vec<String> {
         .unlisted
         .iter()
         .map(|u| format!("unlisted, at {} over {}: {}", u.channel, u.driver, falls(&u.places)));
-    named.chain(unlisted).map(|said| printable(&said)).collect()
+    let beside = d
+        .beside_curves()
+        .iter()
+        .map(|e| format!("{WITH_CURVES}{}: {}", e.set.join(" or "), falls(&e.places)));
+    named.chain(unlisted).chain(beside).map(|said| printable(&said)).collect()
 }
+
+/// What is said before an effect that shows only beside error curves of joints.
+const WITH_CURVES: &str = "with these curves in the model also ";
 
 /// What to do next, one step an entry.
 pub(crate) fn next(d: &Diagnosis) -> Vec<String> {

@@ -334,3 +334,25 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
          listed effects and 77 unlisted shapes were tried and do not explain it"
     );
 }
+
+#[test]
+fn what_shows_beside_error_curves_is_added_with_them() {
+    let mut d = found(Unknown);
+    d.tentative = found(Identified).effects;
+    d.unlisted = vec![UnknownReport {
+        series: Some(crate::diagnosis::Series { harmonics: 30, typical_rad: 0.00021 }),
+        ..shape()
+    }];
+    let names = ["joint1", "joint2", "wrist"].map(str::to_owned);
+    let suggested = |d: &Diagnosis| -> Vec<String> {
+        d.suggested(&names).unwrap().iter().map(EffectSpec::to_string).collect()
+    };
+    assert_eq!(suggested(&d), ["error_curve:1,harmonics=30,typical=0.00021", "backlash:1"]);
+    assert_eq!(d.beside_curves().len(), 1);
+    // Beside anything else a name is only a hint.
+    d.unlisted[0].channel = "joint2".to_owned();
+    assert!(suggested(&d).is_empty() && d.beside_curves().is_empty());
+    d.verdict = Unexplained;
+    d.unlisted.clear();
+    assert!(suggested(&d).is_empty() && d.beside_curves().is_empty());
+}
