@@ -44,6 +44,16 @@ try {
     assert.ok(await page.locator(`tr.selected[data-spec="${spec}"]`).count() === 1);
     console.log(`${spec}: ${await page.textContent("#n-after")} on screen, ${side(refit).fitted_mm.mean} in summary.json`);
   }
+  // The answer itself can be shown too.
+  const answer = await page.evaluate(() => found() === base() ? null : found().added);
+  assert.equal(await page.isVisible("#show-found"), answer !== null);
+  if (answer) {
+    await page.click("#show-found");
+    const refit = summary.refits.find((r) => r.effects.join("+") === answer.join("+"));
+    assert.equal(await number(page, "#n-after"), side(refit).fitted_mm.mean, "with what was found");
+    assert.equal(await page.isVisible("#show-found"), false);
+  }
+  assert.equal((await page.textContent("#do-next")).includes("`"), false, "commands are set as code");
   await buttons.first().click();
   await drawn(page);
   await page.screenshot({ path: join(folder, "candidate.png"), fullPage: true });

@@ -73,10 +73,16 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
         let names: Vec<String> = d.tentative.iter().map(|t| t.set.join(" or ")).collect();
         say(
             "tentative",
-            format!(
-                "with that unlisted shape in the model too, the data also ask for {}",
-                names.join("; and ")
-            ),
+            match d.beside_curves().is_empty() {
+                true => format!(
+                    "with that unlisted shape in the model too, the data also ask for {}",
+                    names.join("; and ")
+                ),
+                false => format!(
+                    "with these curves in the model the data also ask for {}; `armcal add suggested` adds that with them",
+                    names.join("; and ")
+                ),
+            },
         );
     }
     say(

@@ -9,7 +9,7 @@ use armcal_diagnose::{
     CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
     Verdict,
 };
-use armcal_model::effects_toml;
+use armcal_model::{effects_toml, place_and_moment};
 use comfy_table::Cell;
 use serde_json::Value;
 
@@ -27,7 +27,7 @@ pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
     let pen = Pen { style };
     match &run.diagnosis {
         None => run.answer().sentence + "\n",
-        Some(d) => full(&pen, d),
+        Some(d) => full(&pen, run, d),
     }
 }
 
@@ -78,9 +78,9 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
 }
 
 /// What is missing: the answer, what was found, what to do next.
-fn brief(pen: &Pen, d: &Diagnosis) -> String {
+fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     let list = |label, entries: Vec<String>| pen.list(entries.into_iter().map(|entry| (label, entry)));
-    pen.section(&headline(d), list("-", all_found(d)) + &list("next:", next(d)))
+    pen.section(&headline(run, d), list("-", all_found(d)) + &list("next:", next(d)))
 }
 
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
@@ -106,7 +106,7 @@ pub(crate) fn briefly_found(d: &Diagnosis) -> Vec<String> {
 }
 
 /// What is said before an effect that shows only beside error curves of joints.
-const WITH_CURVES: &str = "with these curves in the model also ";
+pub(crate) const WITH_CURVES: &str = "with these curves in the model also ";
 
 /// What to do next, one step an entry.
 pub(crate) fn next(d: &Diagnosis) -> Vec<String> {
@@ -125,8 +125,7 @@ fn added(d: &Diagnosis) -> Option<String> {
 }
 
 /// The answer in one sentence.
-pub fn headline(d: &Diagnosis) -> String {
-    let names = printable(&d.names.join(", "));
+pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
     let unseen = d.not_testable.len();
     match d.verdict {
         Verdict::NothingMissing => {
@@ -141,11 +140,25 @@ pub fn headline(d: &Diagnosis) -> String {
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
+            let names: Vec<String> = d.names.iter().map(|name| told(run, name)).collect();
+            let names = printable(&names.join(", "));
             format!("Missing: {names} ({probability}p = {:.3}){}.", d.p_adjusted, beside(d))
         }
         Verdict::Ambiguous => {
-            let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
+            let sets: Vec<String> = d.effects.iter().map(|e| one_of(run, &e.set)).collect();
             format!("Missing: {}{}.", printable(&sets.join("; and ")), beside(d))
+        }
+        Verdict::Unknown if d.unlisted.len() > 1 && curved_joints(d).len() == d.unlisted.len() => {
+            let also: Vec<String> = d.beside_curves().iter().map(|e| e.set.join(" or ")).collect();
+            let also = if also.is_empty() {
+                String::new()
+            } else {
+                format!("; with that, also {}", also.join("; and "))
+            };
+            let joints = curved_joints(d).join(", ");
+            printable(&format!(
+                "Something unlisted is missing: joints {joints} each err over their own angle{also}."
+            ))
         }
         Verdict::Unknown => match &d.unknown {
             Some(u) => format!(
@@ -170,10 +183,23 @@ pub(crate) fn setup_sentence(setup: &SetupReport) -> Option<String> {
     (!messages.is_empty()).then(|| printable(&format!("Setup first: {}.", messages.join("; also, "))))
 }
 
+/// Numbers of the joints that err over their own angle, the strongest first.
+fn curved_joints(d: &Diagnosis) -> Vec<String> {
+    d.unlisted.iter().filter_map(UnknownReport::own_angle).map(|joint| (joint + 1).to_string()).collect()
+}
+
+/// A name; of an event with its moment in words before it: `frame_shift from dwell 43 of `roll` on (frame_shift@2.43)`.
+fn told(run: &Run, name: &str) -> String {
+    match place_and_moment(name) {
+        Some((place, Some(since))) => format!("{place}{} ({name})", run.moment(since)),
+        _ => name.to_owned(),
+    }
+}
+
 /// One effect by its name, or by all names that these data leave.
-fn one_of(set: &[String]) -> String {
+fn one_of(run: &Run, set: &[String]) -> String {
     match set {
-        [name] => name.clone(),
+        [name] => told(run, name),
         names => format!("one of {} (these data cannot tell which)", names.join(", ")),
     }
 }
@@ -185,8 +211,8 @@ fn beside(d: &Diagnosis) -> String {
     })
 }
 
-fn full(pen: &Pen, d: &Diagnosis) -> String {
-    let mut sections = vec![brief(pen, d)];
+fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
+    let mut sections = vec![brief(pen, run, d)];
     sections.push(pen.section("Candidates, best first", ranking(pen, d)));
     if !d.cannot_tell_apart.is_empty() {
         let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", printable(&format!("{a} and {b}"))));

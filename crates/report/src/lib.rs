@@ -54,7 +54,7 @@ pub use closed_chain::{
     write_closed,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use diagnosis_text::{diagnosis_text, headline, past_diagnosis, size as amplitude_text};
+pub use diagnosis_text::{diagnosis_text, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use pairing::{Side, Unpaired};

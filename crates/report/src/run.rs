@@ -5,7 +5,7 @@ use armcal_calibrate::Calibration;
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
-use armcal_model::{Model, Session};
+use armcal_model::{Model, Session, Since};
 use armcal_recording::{FileReport, RecordingReport};
 use armcal_table::{Assignment, Association, Board, Place};
 use serde::Serialize;
@@ -155,7 +155,7 @@ impl Run {
             return Answer { word: "setup", sentence };
         }
         if let Some(diagnosis) = &self.diagnosis {
-            return Answer { word: diagnosis.verdict.word(), sentence: headline(diagnosis) };
+            return Answer { word: diagnosis.verdict.word(), sentence: headline(self, diagnosis) };
         }
         let why = match self.undiagnosed {
             Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.",
@@ -206,6 +206,19 @@ impl Run {
         let added =
             |(step, before): (&Refit, usize)| step.effects[before.min(step.effects.len())..].join(" + ");
         self.steps.iter().zip(before).map(added).collect()
+    }
+
+    /// When an effect acts, in words that stand after its name: ` from dwell 17 of `roll` on`, ` in dwells 17 to 25 of `roll``,
+    /// ` in `roll``.
+    pub fn moment(&self, since: Since) -> String {
+        let name = |index: usize| self.recordings.get(index).map_or("?", |r| r.name.as_str());
+        match since {
+            Since::Recording(index) => format!(" in `{}`", name(index)),
+            Since::Dwell(dwell) => format!(" from dwell {} of `{}` on", dwell.dwell, name(dwell.recording)),
+            Since::Dwells { first, last } => {
+                format!(" in dwells {} to {last} of `{}`", first.dwell, name(first.recording))
+            }
+        }
     }
 
     /// Name of the recording a dwell belongs to.

@@ -83,17 +83,9 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
 
 /// `, from dwell 17 of `roll` on`; `, in dwells 17 to 25 of `roll`; `, in `roll` as against the others`.
 fn when(run: &Run, since: Option<Since>) -> String {
-    let name = |index: usize| run.recordings.get(index).map_or("?", |r| r.name.as_str());
-    match since {
-        None => String::new(),
-        Some(Since::Recording(index)) => format!(", in `{}` as against the other recordings", name(index)),
-        Some(Since::Dwell(dwell)) => {
-            format!(", from dwell {} of `{}` on", dwell.dwell, name(dwell.recording))
-        }
-        Some(Since::Dwells { first, last }) => {
-            format!(", in dwells {} to {last} of `{}`", first.dwell, name(first.recording))
-        }
-    }
+    let beside =
+        if matches!(since, Some(Since::Recording(_))) { " as against the other recordings" } else { "" };
+    since.map_or(String::new(), |since| format!(",{}{beside}", run.moment(since)))
 }
 
 /// What to look at where an effect is named.

@@ -3,10 +3,10 @@
 use super::{finite, or_zero, short};
 use crate::diagnosis_text::{headline, sizes, sizes_of};
 use crate::proto;
-use crate::run::Answer;
+use crate::run::{Answer, Run};
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect};
 
-pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
+pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
     let not_testable = d.not_testable.iter().map(|n| proto::NotTestable {
         effect: n.effect.clone(),
         smallest_seen: n.smallest_seen.clone(),
@@ -20,7 +20,7 @@ pub(super) fn diagnosis(d: &Diagnosis) -> proto::Diagnosis {
     proto::Diagnosis {
         timestamp: None,
         verdict: d.verdict.word().into(),
-        sentence: headline(d),
+        sentence: headline(run, d),
         names: d.names.clone(),
         probability: d.probability.and_then(finite),
         p_adjusted: finite(d.p_adjusted),

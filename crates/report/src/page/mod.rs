@@ -24,7 +24,7 @@ pub use basis::Basis;
 pub use compared::comparison_html;
 
 use crate::ReportError;
-use crate::diagnosis_text::{pasted, sizes_of, unlisted};
+use crate::diagnosis_text::{WITH_CURVES, pasted, sizes_of, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
 use crate::story::Story;
 use crate::text::millimetres;
@@ -145,8 +145,9 @@ fn verdict(run: &Run) -> Verdict {
         };
     };
     Verdict {
-        found: (d.effects.iter().map(|e| found(run, e)))
+        found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
             .chain(d.unlisted.iter().map(unlisted))
+            .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
             .chain(d.nested.iter().map(Nested::sentence))
             .collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
@@ -156,18 +157,11 @@ fn verdict(run: &Run) -> Verdict {
     }
 }
 
-/// A found effect in sentences; its errors are those of the refits that the page shows, not those of the weighing.
-fn found(run: &Run, e: &FoundEffect) -> String {
+/// A found effect in sentences, `fall` what it takes of the error.
+fn found(e: &FoundEffect, fall: &str) -> String {
     let kind = e.name.split([':', '@', ',']).next().and_then(find);
     let summary = kind.map_or(String::new(), |kind| format!(": {}", kind.summary));
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
-    let step = run.steps.iter().position(|step| step.effects.last() == Some(&e.name));
-    let fall = step.map_or(String::new(), |k| {
-        let before = k.checked_sub(1).map_or(&run.calibration, |k| &run.steps[k].calibration);
-        let after = &run.steps[k].calibration;
-        let mean = |c: &Calibration| millimetres(judged(c).mean_m);
-        format!(" With it the mean error goes from {} to {} mm.", mean(before), mean(after))
-    });
     let rival =
         e.rival.as_ref().map_or(String::new(), |r| format!(" The next best explanation is {}.", r.name));
     let pairs = match &e.contrast {
@@ -177,6 +171,17 @@ fn found(run: &Run, e: &FoundEffect) -> String {
         _ => String::new(),
     };
     format!("{}{set}{summary}. Its size: {}.{fall}{rival}{pairs}", e.name, sizes_of(e))
+}
+
+/// How the error falls with an effect: that of the refits that the page shows, not that of the weighing.
+fn fall(run: &Run, e: &FoundEffect) -> String {
+    let step = run.steps.iter().position(|step| step.effects.last() == Some(&e.name));
+    step.map_or(String::new(), |k| {
+        let before = k.checked_sub(1).map_or(&run.calibration, |k| &run.steps[k].calibration);
+        let after = &run.steps[k].calibration;
+        let mean = |c: &Calibration| millimetres(judged(c).mean_m);
+        format!(" With it the mean error goes from {} to {} mm.", mean(before), mean(after))
+    })
 }
 
 /// Errors on points that the fit never saw, or on all where nothing was held out.

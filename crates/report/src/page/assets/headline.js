@@ -15,6 +15,7 @@ part(() => {
   $("n-after-name").textContent = view.name;
   $("with").hidden = isBase();
   $("reset").hidden = isBase();
+  $("show-found").hidden = doc.path.length < 2 || view.shown === found();
   const points = now.n + (view.shown.holdout.fitted_mm ? " held-out points" : " points, none held out");
   const change = view.shown.change;
   const interval = change && change.ci95_mm && !isBase()

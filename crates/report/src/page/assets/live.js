@@ -112,10 +112,12 @@ function start() {
   part(redraw);
   if ($("live")) live();
   $("reset").addEventListener("click", () => show(base(), "as calibrated"));
+  $("show-found").addEventListener("click", () => show(found(), "with what was found"));
   $("rescale").addEventListener("change", redraw);
   dark.addEventListener("change", redraw);
   window.addEventListener("beforeprint", drawAll);
   printing.addEventListener("change", () => drawAll());
+  for (const said of document.querySelectorAll("#verdict, #do-next, #next li, #missing > ul li")) markCommands(said);
   show(base(), "as calibrated");
   document.documentElement.dataset.ready = "yes";
 }

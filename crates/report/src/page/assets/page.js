@@ -15,6 +15,8 @@ function show(shown, name) {
 
 const base = () => doc.refits[0];
 const isBase = () => view.shown === base();
+// The model with everything that was found.
+const found = () => doc.refits[doc.path[doc.path.length - 1]];
 const label = (shown) => shown.added.length ? "+ " + shown.added.join(" + ") : "as calibrated";
 
 // The side of the hold-out that counts: points the fit never saw, where there are any.

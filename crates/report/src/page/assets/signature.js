@@ -39,7 +39,7 @@ function signatureBox(signature) {
 part(() => {
   const box = $("signatures");
   for (const old of box.querySelectorAll(".plot")) { charts.delete(old); sight.unobserve(old); Plotly.purge(old); }
-  const last = doc.refits[doc.path[doc.path.length - 1]];
+  const last = found();
   const shown = isBase() ? last : view.shown;
   box.replaceChildren(...shown.signatures.map(signatureBox));
   box.className = shown.signatures.length > 1 ? "grid" : "";

@@ -38,3 +38,11 @@ function signed(value) {
   const text = Math.abs(value).toFixed(3);
   return (Number(text) === 0 ? "" : value > 0 ? "+" : "−") + text;
 }
+
+// What a sentence has between backticks, as code.
+function markCommands(box) {
+  for (const node of [...box.childNodes].filter((n) => n.nodeType === Node.TEXT_NODE && n.data.includes("`"))) {
+    const parts = node.data.split("`");
+    node.replaceWith(...parts.map((text, k) => k % 2 === 1 && k < parts.length - 1 ? element("code", text) : document.createTextNode(text)));
+  }
+}
