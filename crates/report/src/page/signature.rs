@@ -11,7 +11,7 @@ use super::bands::{Band, bands_over};
 use super::basis::Basis;
 use super::numbers::Column;
 use crate::run::{Refit, Run};
-use armcal_model::PlacedEffect;
+use armcal_model::{Family, PlacedEffect};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -65,7 +65,7 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     }
     let (channel, share) = channel(basis, &difference_m, effect.spec.target)?;
     let effect_is = basis.levers.implied(channel, &difference_m);
-    let driver = driver(basis, channel, &effect_is)?;
+    let driver = driver(basis, channel, effect.kind.family, &effect_is)?;
     let residuals = refit.calibration.residuals.iter().zip(&difference_m);
     let partial_m: Vec<Vector3<f64>> = residuals.map(|(r, d)| r.fitted_m + d).collect();
     let measured = basis.levers.implied(channel, &partial_m);
@@ -91,11 +91,13 @@ fn channel(basis: &Basis, difference_m: &[Vector3<f64>], target: Option<usize>) 
     Some((chosen, shares[chosen]))
 }
 
-/// The driver over which the effect scatters least within a bin and a direction of arrival.
-fn driver(basis: &Basis, channel: usize, effect: &[Option<f64>]) -> Option<usize> {
+/// The driver over which the effect scatters least within a bin and a direction of arrival; what gives way is looked at over
+/// torque first.
+fn driver(basis: &Basis, channel: usize, family: Family, effect: &[Option<f64>]) -> Option<usize> {
     let joint = basis.levers.channels[channel].joint;
     let own = |key: &str| joint.and_then(|j| basis.driver(&format!("{key}{}", j + 1)));
-    let first = [own("q"), own("tau"), basis.driver("temperature"), basis.driver("time")];
+    let [one, other] = if family == Family::Elasticity { ["tau", "q"] } else { ["q", "tau"] };
+    let first = [own(one), own(other), basis.driver("temperature"), basis.driver("time")];
     let mut order: Vec<usize> = first.into_iter().flatten().collect();
     order.extend((0..basis.drivers.len()).filter(|d| !order.contains(d)).collect::<Vec<_>>());
     let left: Vec<f64> = order.iter().map(|d| scatter(basis, joint, *d, effect)).collect();

@@ -1,7 +1,15 @@
 // Geometry, then what was found, one effect after the other: bars that fall towards the noise floor.
 
-// A long name on several lines.
-const wrapped = (text, width) => (text.match(new RegExp(".{1," + width + "}", "g")) || [""]).slice(0, 3).map(plain).join("<br>");
+// A long name on up to three lines, broken after a space, a comma or an underscore.
+function wrapped(text, width) {
+  const lines = [""];
+  for (const word of text.match(/[^ _,]+[ _,]*/g) || []) {
+    const last = lines[lines.length - 1];
+    if (last && (last + word).trimEnd().length > width) lines.push(word);
+    else lines[lines.length - 1] += word;
+  }
+  return lines.slice(0, 3).map(plain).join("<br>");
+}
 
 // What a step adds, without the shapes of it; many of them by their number.
 const together = (added) => added.length > 3 ? added.length + " effects" : added.map((spec) => spec.split(",")[0]).join(", ");

@@ -1,5 +1,14 @@
 // The effect by itself: what the measurements say without it, and what the model says it does.
 
+// Sorted points of a line, broken where there are none for long: more than a tenth of the range and thrice the usual distance.
+function withoutGaps(points) {
+  const steps = points.slice(1).map((p, k) => p[0] - points[k][0]);
+  const usual = [...steps].sort((a, b) => a - b)[Math.floor(steps.length / 2)];
+  const range = steps.reduce((sum, step) => sum + step, 0);
+  const long = Math.max(range / 10, 3 * usual);
+  return points.flatMap((p, k) => k > 0 && steps[k - 1] > long ? [[(p[0] + points[k - 1][0]) / 2, null], p] : [p]);
+}
+
 function signatureFigure(signature) {
   const c = colours();
   const channel = doc.channels[signature.channel], x = driver(signature.driver);
@@ -9,7 +18,8 @@ function signatureFigure(signature) {
   }));
   for (const line of byDirection(channel.joint, (own, look) => {
     const order = own.filter((i) => x.values[i] !== null && signature.effect_is[i] !== null).sort((a, b) => x.values[a] - x.values[b]);
-    return { type: "scatter", mode: "lines", name: "fitted effect", x: order.map((i) => x.values[i]), y: order.map((i) => signature.effect_is[i]),
+    const line = withoutGaps(order.map((i) => [x.values[i], signature.effect_is[i]]));
+    return { type: "scatter", mode: "lines", name: "fitted effect", x: line.map((p) => p[0]), y: line.map((p) => p[1]), connectgaps: false,
       line: { color: c[look.colour], width: 2 }, hoverinfo: "skip", showlegend: false };
   })) data.push(line);
   for (const band of signature.bands) {
