@@ -88,4 +88,23 @@ function span(columns, floor = 0) {
   const pad = Math.max(0.06 * (high - low), floor, 1e-9);
   return [low - pad, high + pad];
 }
+
+// The same without what is far off: twice the width of the middle nine tenths beyond them.
+function bulk(columns) {
+  const known = columns.flat().filter((v) => v !== null).sort((a, b) => a - b);
+  const at = (part) => known[Math.round(part * (known.length - 1))];
+  const far = 2 * (at(0.95) - at(0.05));
+  return span([far > 0 ? known.filter((v) => v >= at(0.05) - far && v <= at(0.95) + far) : known]);
+}
+
+// Marks at the edge of a range for the points beyond it, so that none is lost from sight.
+function beyond(x, y, range, unit, more) {
+  const out = indices.filter((i) => x[i] !== null && y[i] !== null && (y[i] < range[0] || y[i] > range[1]));
+  if (!out.length) return [];
+  const inset = 0.02 * (range[1] - range[0]), above = (i) => y[i] > range[1];
+  return [{ type: "scatter", mode: "markers", name: out.length + " beyond the axis", x: out.map((i) => x[i]),
+    y: out.map((i) => above(i) ? range[1] - inset : range[0] + inset),
+    marker: { symbol: out.map((i) => above(i) ? "triangle-up" : "triangle-down"), size: 10, color: colours().minus },
+    text: out.map((i) => plain(dwellName(i)) + ": " + mm(y[i]) + " " + plain(unit)), hovertemplate: "%{text}<extra></extra>", ...more }];
+}
 const marker = (look, size, opacity) => ({ color: colours()[look.colour], symbol: look.symbol, size, opacity, line: { width: 1, color: colours()[look.colour] } });

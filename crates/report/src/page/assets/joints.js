@@ -6,6 +6,7 @@ function channelFigure(k) {
   const data = [];
   const more = {};
   const y = view.shown.implied[k];
+  const range = rescaled() ? bulk([y]) : bulk([base().implied[k], y]);
   keys.forEach((key, panel) => {
     const suffix = panel === 0 ? "" : String(panel + 1), x = driver(key);
     const axes = { xaxis: "x" + suffix, yaxis: "y" };
@@ -16,6 +17,7 @@ function channelFigure(k) {
       x: own.map((i) => x.values[i]), y: own.map((i) => y[i]), marker: marker(look, pointSize, 0.55),
       text: own.map((i) => plain(dwellName(i))), hovertemplate: "%{text}<br>%{x}, %{y}<extra></extra>", ...axes,
     })));
+    data.push(...beyond(x.values, y, range, channel.unit, { showlegend: panel === 0, ...axes }));
     for (const band of view.shown.bands.filter((b) => b.channel === k && b.driver === key)) {
       const look = band.direction === null ? { colour: "plus" } : direction[band.direction];
       data.push({ type: "scatter", mode: "lines", x: band.x, y: band.mean, line: { color: c[look.colour], width: 2.5 }, showlegend: false,
@@ -24,7 +26,6 @@ function channelFigure(k) {
     const width = 1 / keys.length, gap = 0.025;
     more["xaxis" + suffix] = axis(plain(x.label), { domain: [panel * width + (panel ? gap : 0), (panel + 1) * width - gap / 2], anchor: "y" });
   });
-  const range = rescaled() ? span([y]) : span([base().implied[k], y]);
   more.yaxis = axis(plain(channel.label) + " [" + channel.unit + "]", { range, zeroline: true, zerolinewidth: 1.5 });
   return { data, layout: layout({ height: 300, showlegend: true, ...more }) };
 }

@@ -19,8 +19,9 @@ function timeFigure() {
         marker: { color: c.plus, symbol, size: pointSize, opacity: 0.8 }, text: own.map((i) => plain(dwellName(i))),
         hovertemplate: "%{text}<br>%{y} mm<extra></extra>", showlegend: k === 0, yaxis });
     }
-    const range = rescaled() ? span([now[column]]) : span([first[column], now[column]]);
+    const range = rescaled() ? bulk([now[column]]) : bulk([first[column], now[column]]);
     if (column === "error_mm") range[0] = 0;
+    data.push(...beyond(x.values, now[column], range, "mm", { yaxis, showlegend: k === 0 }));
     more["yaxis" + (k ? k + 1 : "")] = axis(title, { range, domain: place(k), zeroline: column !== "error_mm" });
   });
   if (extra) {
