@@ -53,6 +53,13 @@ try {
     assert.equal(await number(page, "#n-after"), side(refit).fitted_mm.mean, "with what was found");
     assert.equal(await page.isVisible("#show-found"), false);
   }
+  // One far point does not flatten a plot, and is not lost from sight.
+  const far = await page.evaluate(() => {
+    const y = indices.map((i) => i === 3 ? 1000 : Math.sin(i)), range = bulk([y]);
+    return { range, marks: beyond(indices, y, range, "mm", {}), none: beyond(indices, y.map(Math.sin), range, "mm", {}) };
+  });
+  assert.ok(far.range[0] < -0.9 && far.range[1] > 0.9 && far.range[1] < 6, `${far.range}`);
+  assert.deepEqual([far.marks.map((m) => m.x), far.marks[0].marker.symbol, far.marks[0].name, far.none], [[[3]], ["triangle-up"], "1 beyond the axis", []]);
   assert.equal((await page.textContent("#do-next")).includes("`"), false, "commands are set as code");
   await buttons.first().click();
   await drawn(page);
