@@ -73,8 +73,8 @@ pub(crate) fn expression(
             ExpressionParameter {
                 name: name.clone(),
                 found,
-                prior: readable(found.abs().max(1e-3 * u)),
-                bound: readable(30.0 * found.abs().max(*u)),
+                prior: to_digits(found.abs().max(1e-3 * u), 4),
+                bound: to_digits(30.0 * found.abs().max(*u), 4),
             }
         })
         .collect();
@@ -244,7 +244,7 @@ fn number(value: f64) -> String {
     if text.is_empty() || text == "-0" { "0".to_string() } else { text.to_string() }
 }
 
-/// Four digits: a size that a person reads and changes.
-fn readable(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
+/// To so many digits: a size that a person reads and changes.
+pub(crate) fn to_digits(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }

@@ -5,7 +5,7 @@ use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Series, ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
-use crate::expression::expression;
+use crate::expression::{expression, to_digits};
 use crate::judge::independent_groups;
 use crate::problem::{Channel, Problem};
 use crate::ripple::{Peak, beside_slow, peak};
@@ -58,7 +58,7 @@ pub(crate) fn described(
             let per = driver.basis.ncols();
             let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
             strongest = peak(&driver.value, curve.as_slice(), per);
-            let typical_rad = two_digits(beside_slow(&driver.value, curve.as_slice()));
+            let typical_rad = to_digits(beside_slow(&driver.value, curve.as_slice()), 2);
             series = Some(Series { harmonics: resolved(&driver.value), typical_rad });
         }
     }
@@ -112,10 +112,6 @@ fn resolved(angles_rad: &[f64]) -> u32 {
     gaps.sort_by(f64::total_cmp);
     let usual_rad = gaps.get(gaps.len() / 2).copied().unwrap_or(PI);
     (PI / (A_HALF_WAVE * usual_rad)).round().clamp(FEWEST_HARMONICS, MOST_HARMONICS) as u32
-}
-
-fn two_digits(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// The axis whose fitted part moves the residual most.
