@@ -89,12 +89,15 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let density = |n: f64| (5.0 + (n * LENGTH_RAD).powi(2)).powi(-3);
     let all: f64 = (1..=180).map(|n| density(f64::from(n))).sum();
     let typical_rad = placing.shape("typical").unwrap_or(TYPICAL_RAD);
-    let sigma = |n: usize| typical_rad * (density(n as f64) / all).sqrt();
+    let share = |n: usize| (density(n as f64) / all).sqrt();
+    // What is expected to be small may still turn out large: bounds are no tighter than those of an ordinary curve.
+    let widest_rad = typical_rad.max(TYPICAL_RAD);
     let amplitudes = (1..=harmonics)
         .flat_map(|n| ["sin", "cos"].map(|name| (n, name)))
         .map(|(n, name)| {
             let meaning = format!("amplitude of {name} {n}q");
-            amplitude(&format!("{name}{n}"), Unit::Radian, sigma(n), 50.0 * sigma(n), meaning)
+            let (sigma, bound) = (typical_rad * share(n), 50.0 * widest_rad * share(n));
+            amplitude(&format!("{name}{n}"), Unit::Radian, sigma, bound, meaning)
         })
         .collect();
     Ok(Placement::new(amplitudes, ErrorCurve { joint }))
