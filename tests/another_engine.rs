@@ -29,6 +29,6 @@ fn what_acts_depends_on_who_holds_the_arm() {
     let Some(found) = judged("compliance2,backlash1", 1) else { return };
     assert_eq!(number(&found, "/counts/compliance2/first"), 1.0);
     assert_eq!(number(&found, "/counts/backlash1/first"), 1.0);
-    assert_eq!(number(&found, "/counts/nothing/not shown"), 1.0);
+    assert_eq!(number(&found, "/counts/nothing/at the floor"), 1.0);
     assert!(number(&found, "/after_floors/compliance2") < 1.1);
 }

@@ -179,15 +179,15 @@ fn noise_alone(calibration: &Calibration, share: f64) -> bool {
 enum ShownBy {
     /// By those that are judged: held out, or all where nothing is.
     Judged,
-    /// By those that were fitted, the held-out ones being no worse.
+    /// By those that were fitted, the held-out ones being no worse by more than chance.
     Fitted,
     /// By none.
     Nothing,
 }
 
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
-/// or, where these cannot show what an effect does (it acts only in what was held out) and are not worse for it, clearly
-/// less on those that were fitted.
+/// or, where these cannot show what an effect does (it acts only in what was held out) and are not worse for it by more than
+/// chance, clearly less on those that were fitted.
 fn shown_by(
     before: &Calibration,
     after: &Calibration,
@@ -199,7 +199,7 @@ fn shown_by(
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
     match compare_heldout(before, after, observations, config) {
         Some(held) if worth && held.helps() => ShownBy::Judged,
-        Some(_) if fitted && gain_m >= 0.0 => ShownBy::Fitted,
+        Some(held) if fitted && !held.harms() => ShownBy::Fitted,
         None if worth => ShownBy::Judged,
         _ => ShownBy::Nothing,
     }

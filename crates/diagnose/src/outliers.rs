@@ -3,7 +3,7 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{Group, left_out};
 use crate::drivers::standardised_joints;
-use crate::problem::{DwellRow, Problem};
+use crate::problem::{Columns, DwellRow, Problem};
 use crate::special::chi2_tail;
 use crate::weigh::{Weighed, weigh};
 use armcal_core::robust::median;
@@ -20,6 +20,8 @@ const MAX_AGREEMENT: f64 = 0.4;
 const MIN_AGREEING: usize = 4;
 /// Dwells in a row that err are an event, which has a name of its own.
 const RUN: usize = 3;
+/// Names whose predictions are asked.
+const NAMED: usize = 6;
 /// What sets dwells apart, a joint's angle say, keeps at least this share of its variance.
 const KEPT_VARIANCE: f64 = 0.5;
 
@@ -52,11 +54,36 @@ pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
     Cleaned { keep, problem, weighed }
 }
 
-/// Dwells whose residual, predicted without them by the most flexible explanation at hand, is as rare as
-/// `outlier_sigma`, what that prediction does not know allowed for.
+/// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a
+/// prediction does not know allowed for: the best of all, which may be a flexible shape, and the best that have a name.
+/// What one of these predicts has a cause, even where another one weighs more as long as these dwells are in it.
 fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
-    let best = weighed.best().filter(|b| b.1 > 0.0);
-    let effect = best.map(|b| weighed.tamed(b.0, problem, config));
+    let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| b.0);
+    let named = weighed.ranking().into_iter().map(|k| &weighed.entries[k]).take(NAMED);
+    let named = named.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
+    let explanations: Vec<&Columns> = best.into_iter().chain(named).collect();
+    let Some((first, others)) = explanations.split_first() else {
+        return unpredicted(problem, weighed, None, config);
+    };
+    let mut found = unpredicted(problem, weighed, Some(first), config);
+    for other in others {
+        if found.is_empty() {
+            break;
+        }
+        let also = unpredicted(problem, weighed, Some(other), config);
+        found.retain(|i| also.contains(i));
+    }
+    found
+}
+
+/// Dwells that one explanation, or none, does not predict without them.
+fn unpredicted(
+    problem: &Problem,
+    weighed: &Weighed,
+    explanation: Option<&Columns>,
+    config: &DiagnosisConfig,
+) -> Vec<usize> {
+    let effect = explanation.map(|columns| weighed.tamed(columns, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let left = left_out(problem, effect.as_ref(), &alone, weighed.scale);
     let fitted = left_out(problem, effect.as_ref(), &[], weighed.scale);

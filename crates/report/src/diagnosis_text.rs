@@ -116,12 +116,15 @@ pub(crate) fn next(d: &Diagnosis) -> Vec<String> {
 /// What adding it to the model does, where something was found and a calibration with it confirms it.
 fn added(d: &Diagnosis) -> Option<String> {
     d.refitted.as_ref()?;
-    Some(format!(
-        "`armcal add suggested PIPELINE` adds it to the model: the mean {} error goes from {:.3} to {:.3} mm",
-        d.judged.words(),
-        d.holdout_mm.before,
-        d.holdout_mm.after
-    ))
+    let (before, after) = (d.holdout_mm.before, d.holdout_mm.after);
+    let error = d.judged.words();
+    let does = match d.warnings.iter().any(|w| w.code == "judged-by-fit") {
+        true => format!(
+            "the fitted points err less; the mean {error} error, {before:.3} and {after:.3} mm, does not change clear of chance"
+        ),
+        false => format!("the mean {error} error goes from {before:.3} to {after:.3} mm"),
+    };
+    Some(format!("`armcal add suggested PIPELINE` adds it to the model: {does}"))
 }
 
 /// The answer in one sentence.

@@ -59,10 +59,10 @@ def judged(truth, found):
     floors = found["holdout_mm"]["before"] / found["floor_mm"]
     sets = [e["set"] for e in found["effects"]]
     true = [any(is_true(name, truth["accept"]) for name in names) for names in sets]
+    if found["verdict"] in ("nothing_missing", "unexplained") and floors <= AT_FLOOR:
+        return "at the floor"
     if found["verdict"] == "nothing_missing":
         return "silent" if floors > ABOVE_FLOOR else "not shown"
-    if found["verdict"] == "unexplained" and floors <= AT_FLOOR:
-        return "not shown"
     if any(len(names) == 1 and not right for names, right in zip(sets, true)):
         return "first, and more" if true[0] and is_true(sets[0][0], truth["accept"]) else "wrong name"
     if sets and is_true(sets[0][0], truth["accept"]):

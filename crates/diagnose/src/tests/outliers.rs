@@ -1,8 +1,10 @@
 //! What may be set aside, against planted accidents and against the covariance written out.
 
 use super::*;
+use crate::problem::Candidate;
 use crate::tests::arm::{Noise, SIGMA_M, design, overconfident, problem, rng};
 use nalgebra::{DMatrix, Vector3};
+use std::sync::Arc;
 
 fn config() -> DiagnosisConfig {
     DiagnosisConfig { resamplings: 99, ..Default::default() }
@@ -92,6 +94,26 @@ fn accidents_are_seen_beside_a_large_effect() {
     let planted = [5, 77, 151];
     planted.iter().enumerate().for_each(|(k, i)| push(&mut p, *i, 3.5e-3 * apart(k).normalize()));
     assert_eq!(aside(&p), planted);
+}
+
+#[test]
+fn what_a_name_predicts_is_no_accident_though_another_explanation_weighs_more() {
+    let few = [5, 40, 77, 120, 151, 190];
+    let mut p = sound(2);
+    let mut acts = DMatrix::zeros(p.rows(), 1);
+    few.iter().enumerate().for_each(|(k, i)| {
+        push(&mut p, *i, 6e-3 * apart(k).normalize());
+        acts.view_mut((3 * i, 0), (3, 1)).copy_from(&apart(k).normalize());
+    });
+    let flank = Candidate { columns: Columns::Dense(Arc::new(acts)), ..p.candidates[0].clone() };
+    p.candidates.push(Candidate { spec: "flank".to_owned(), ..flank });
+    let mut weighed = weigh(&p, &config());
+    assert!(suspects(&p, &weighed, &config()).is_empty(), "the best explanation predicts them");
+    let mut louder = weighed.unlisted[0].clone();
+    louder.ln_evidence = 1e6;
+    weighed.unlisted.push(louder);
+    assert_eq!(unpredicted(&p, &weighed, weighed.best().map(|b| b.0), &config()), few);
+    assert!(suspects(&p, &weighed, &config()).is_empty(), "and so does the best that has a name");
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub(super) static KIND: EffectKind = EffectKind {
             upper: 10.0,
             meaning: "width of the change of flank as a fraction of the largest gravity torque",
             parameter: true,
-            values: None,
+            values: Some(sharp),
         },
         Shape {
             name: "outer",
@@ -101,6 +101,11 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 fn drags(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
     vec![0.05, 0.1, 0.2, 0.3, 0.5]
+}
+
+/// A rigid gap changes flanks at once; the default allows for masses that nobody knows.
+fn sharp(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+    vec![0.01]
 }
 
 /// The last joint has no outer links.

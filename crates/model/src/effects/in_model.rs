@@ -87,15 +87,8 @@ impl Model {
                     let telling = steps.iter().filter(|(_, side)| *side >= least);
                     members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
-                for shape in kind.shapes.iter().filter(|shape| shape.parameter) {
-                    let Some(values) = shape.values else { continue };
-                    let placing = Placing { model: self, session, spec: &spec, kind, zero: &zero };
-                    members.extend(
-                        values(&placing, observations)
-                            .iter()
-                            .map(|v| spec.clone().with(shape.name, readable(*v))),
-                    );
-                }
+                let placing = Placing { model: self, session, spec: &spec, kind, zero: &zero };
+                members.extend(shaped(&placing, observations));
                 members.retain(|spec| self.offers(spec, session, &zero));
                 if !members.is_empty() {
                     families.push((spec, members));
@@ -203,4 +196,22 @@ fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
         (*dwell, if before == 0 { usize::MAX } else { before.min(after) })
     };
     inner.iter().map(side).collect()
+}
+
+/// A kind with every value of a shape that is worth trying, and with every two of different shapes: where a torque changes
+/// sign and how sharply, say, is seen only together.
+fn shaped(placing: &Placing<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
+    let searched = placing.kind.shapes.iter().filter(|shape| shape.parameter);
+    let searched = searched.filter_map(|shape| Some((shape.name, shape.values?(placing, observations))));
+    let searched: Vec<(&str, Vec<f64>)> = searched.collect();
+    let with = |spec: &EffectSpec, (name, values): &(&str, Vec<f64>)| -> Vec<EffectSpec> {
+        values.iter().map(|v| spec.clone().with(name, readable(*v))).collect()
+    };
+    let one: Vec<Vec<EffectSpec>> = searched.iter().map(|shape| with(placing.spec, shape)).collect();
+    let two = one.iter().enumerate().flat_map(|(k, first)| {
+        let later = searched[k + 1..].iter();
+        later.flat_map(move |shape| first.iter().flat_map(move |spec| with(spec, shape)))
+    });
+    let two: Vec<EffectSpec> = two.collect();
+    one.into_iter().flatten().chain(two).collect()
 }
