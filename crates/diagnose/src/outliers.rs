@@ -55,47 +55,46 @@ pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
 }
 
 /// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a
-/// prediction does not know allowed for: the best of all, which may be a flexible shape, and the best that have a name.
-/// What one of these predicts has a cause, even where another one weighs more as long as these dwells are in it.
+/// prediction does not know allowed for: the best of all, which may be a flexible shape and says how the rest scatters, and
+/// the best that have a name. What one of these predicts has a cause, even where another one weighs more while it is in; and
+/// what errs alike under one of them is structure.
 fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| b.0);
+    let (left, square) = predicted(problem, weighed, best, config);
+    let reduced: Vec<f64> =
+        problem.dwells.iter().zip(&square).map(|(d, square)| square / median_square(d.rows as f64)).collect();
+    let variance = median(&reduced).max(1e-300);
+    let limit = chi2_tail(config.outlier_sigma.powi(2), 1.0);
+    let rare = |i: usize, square: f64| chi2_tail(square / variance, problem.dwells[i].rows as f64) < limit;
+    let mut found: Vec<usize> = (0..square.len()).filter(|i| rare(*i, square[*i])).collect();
+    let mut lefts = vec![left];
     let named = weighed.ranking().into_iter().map(|k| &weighed.entries[k]).take(NAMED);
-    let named = named.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
-    let explanations: Vec<&Columns> = best.into_iter().chain(named).collect();
-    let Some((first, others)) = explanations.split_first() else {
-        return unpredicted(problem, weighed, None, config);
-    };
-    let mut found = unpredicted(problem, weighed, Some(first), config);
-    for other in others {
+    for entry in named.filter(|e| e.ln_evidence >= config.margin_nats) {
         if found.is_empty() {
             break;
         }
-        let also = unpredicted(problem, weighed, Some(other), config);
-        found.retain(|i| also.contains(i));
+        let (left, square) = predicted(problem, weighed, Some(&entry.candidate.columns), config);
+        found.retain(|i| rare(*i, square[*i]));
+        lefts.push(left);
     }
-    found
+    let alike = lefts.iter().any(|left| agreement(problem, left, &found) >= MAX_AGREEMENT);
+    if alike { Vec::new() } else { found }
 }
 
-/// Dwells that one explanation, or none, does not predict without them.
-fn unpredicted(
+/// Residual of each dwell as one explanation, or none, predicts it without the dwell, and its square in units of what that
+/// scatters.
+fn predicted(
     problem: &Problem,
     weighed: &Weighed,
     explanation: Option<&Columns>,
     config: &DiagnosisConfig,
-) -> Vec<usize> {
+) -> (DVector<f64>, Vec<f64>) {
     let effect = explanation.map(|columns| weighed.tamed(columns, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let left = left_out(problem, effect.as_ref(), &alone, weighed.scale);
     let fitted = left_out(problem, effect.as_ref(), &[], weighed.scale);
     let square = studentised(problem, &left, &fitted);
-    let reduced: Vec<f64> =
-        problem.dwells.iter().zip(&square).map(|(d, square)| square / median_square(d.rows as f64)).collect();
-    let variance = median(&reduced).max(1e-300);
-    let rare = chi2_tail(config.outlier_sigma.powi(2), 1.0);
-    let found: Vec<usize> = (0..square.len())
-        .filter(|i| chi2_tail(square[*i] / variance, problem.dwells[*i].rows as f64) < rare)
-        .collect();
-    if agreement(problem, &left, &found) < MAX_AGREEMENT { found } else { Vec::new() }
+    (left, square)
 }
 
 /// Median of chi-square with so many degrees of freedom, within one in a hundred (Wilson, Hilferty, PNAS 1931).
