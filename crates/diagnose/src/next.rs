@@ -37,8 +37,9 @@ pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names:
     if let Some(unexplained) = &d.unexplained {
         first.extend(unexplained.places.iter().map(|p| {
             format!(
-                "look first at {}: the mean error of these {} dwells is {:.3} mm, that of the others {:.3} mm",
-                p.place, p.dwells, p.error_mm, p.elsewhere_mm
+                "look first at {}: the errors of these {} dwells are {:.1} times what the declared noise gives, those of the \
+                 others {:.1} times",
+                p.place, p.dwells, p.times_noise, p.elsewhere_times_noise
             )
         }));
     }

@@ -36,7 +36,7 @@ fn said(s: &Synthetic, folder: &str) -> (String, Vec<String>) {
         assert!(header.contains(&flat(line)), "{line:?} in {header}");
         assert!(brief.contains(&flat(line)), "{line:?} in {brief}");
     }
-    if let Some(next) = lines.iter().find_map(|l| l.strip_prefix("next: ")) {
+    for next in lines.iter().filter_map(|l| l.strip_prefix("next: ")).take(2) {
         assert!(header.contains(&flat(next)) && brief.contains(&flat(next)), "{next:?}");
     }
     (string(&story, "lamp"), lines)
@@ -54,6 +54,33 @@ fn page_layout_and_terminal_say_the_same() {
     let mut found = synthetic();
     with_play_found(&mut found, 1e-3);
     said(&found, "found");
+}
+
+#[test]
+fn people_are_told_names_of_recordings_and_programs_their_indices() {
+    let mut s = synthetic();
+    with_play_found(&mut s, 1e-3);
+    let name = s.run.recordings[0].name.clone();
+    let asked = "to tell frame_shift@0 and tool_shift@0.4 apart look at recording 0 dwell 3";
+    s.run.diagnosis.as_mut().expect("a diagnosis").record_next = vec![asked.to_owned()];
+    let subject = "recording 0 dwell 5 (cavity a)";
+    s.run.warnings.push(Warning::new(
+        Severity::Inadequate,
+        Stage::Calibrate,
+        "odd",
+        subject,
+        "too far".to_owned(),
+    ));
+    let (_, lines) = said(&s, "named");
+    let told = format!(
+        "to tell frame_shift in `{name}` (frame_shift@0) and tool_shift from dwell 4 of `{name}` on (tool_shift@0.4) apart look \
+         at dwell 3 of `{name}`"
+    );
+    assert!(lines.contains(&format!("next: {told}")), "{lines:?}");
+    let warned = format!("dwell 5 of `{name}` (cavity a): too far");
+    assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(&warned));
+    let summary = armcal_report::summary_json(&s.run);
+    assert!(summary.contains(asked) && summary.contains(subject));
 }
 
 #[test]
