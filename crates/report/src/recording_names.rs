@@ -72,7 +72,7 @@ impl RecordingNames {
     fn event(&self, text: &str, before: &str) -> Option<(String, usize)> {
         let end = text.find(|c: char| !(c.is_alphanumeric() || "_:@.-,=".contains(c))).unwrap_or(text.len());
         let spec = text[..end].trim_end_matches(['.', ',', ':', '-']);
-        let (place, since) = place_and_moment(spec)?;
+        let (place, since) = place_and_moment(spec).filter(|(place, _)| !place.is_empty())?;
         let moment = self.moment(since?)?;
         let told_already = before.ends_with('(') && text[spec.len()..].starts_with(')');
         let words = if told_already { spec.to_owned() } else { format!("{place}{moment} ({spec})") };

@@ -4,7 +4,9 @@ use crate::findings::with_play_found;
 use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Detail, InputMessages, Status, TerminalStyle, terminal};
+use armcal_report::{
+    Basis, Detail, InputMessages, PageKind, Status, TerminalStyle, report_html, summary_json, terminal,
+};
 
 /// Text without line breaks, indents and markup of characters.
 fn flat(text: &str) -> String {
@@ -59,28 +61,20 @@ fn page_layout_and_terminal_say_the_same() {
 #[test]
 fn people_are_told_names_of_recordings_and_programs_their_indices() {
     let mut s = synthetic();
-    with_play_found(&mut s, 1e-3);
-    let name = s.run.recordings[0].name.clone();
-    let asked = "to tell frame_shift@0 and tool_shift@0.4 apart look at recording 0 dwell 3";
-    s.run.diagnosis.as_mut().expect("a diagnosis").record_next = vec![asked.to_owned()];
-    let subject = "recording 0 dwell 5 (cavity a)";
-    s.run.warnings.push(Warning::new(
-        Severity::Inadequate,
-        Stage::Calibrate,
-        "odd",
-        subject,
-        "too far".to_owned(),
-    ));
-    let (_, lines) = said(&s, "named");
-    let told = format!(
-        "to tell frame_shift in `{name}` (frame_shift@0) and tool_shift from dwell 4 of `{name}` on (tool_shift@0.4) apart look \
-         at dwell 3 of `{name}`"
+    let (subject, message) =
+        ("recording 0 dwell 5 (cavity a)", "frame_shift@0 and tool_shift@1.4 tell of it");
+    s.run.warnings.push(Warning::new(Severity::Inadequate, Stage::Calibrate, "odd", subject, message));
+    let told = "dwell 5 of `normal` (cavity a): frame_shift in `normal` (frame_shift@0) and tool_shift from dwell 4 of `roll` on \
+                (tool_shift@1.4) tell of it";
+    said(&s, "named");
+    assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(told));
+    let page = report_html(&s.run, &Basis::of(&s.run), PageKind::File).unwrap();
+    let [subject_told, message_told] = told.split_once(": ").map(|(a, b)| [a, b]).unwrap();
+    assert!(
+        flat(&page).contains(&format!("<td>{subject_told}</td><td>{message_told}</td>").replace("><", "> <"))
     );
-    assert!(lines.contains(&format!("next: {told}")), "{lines:?}");
-    let warned = format!("dwell 5 of `{name}` (cavity a): too far");
-    assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(&warned));
-    let summary = armcal_report::summary_json(&s.run);
-    assert!(summary.contains(asked) && summary.contains(subject));
+    let summary = summary_json(&s.run);
+    assert!(summary.contains(subject) && summary.contains(message));
 }
 
 #[test]

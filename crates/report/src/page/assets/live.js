@@ -117,7 +117,7 @@ function start() {
   dark.addEventListener("change", redraw);
   window.addEventListener("beforeprint", drawAll);
   printing.addEventListener("change", () => drawAll());
-  for (const said of document.querySelectorAll("#verdict, #do-next li, #next li, #next dd, #missing > ul li, #warnings-table td")) markCommands(said);
+  for (const said of document.querySelectorAll("#verdict, #do-next li, #next li, #next dd, #next td, #missing > ul li, #warnings-table td")) markCommands(said);
   document.querySelectorAll("td:not(.hash, .num)").forEach(breakable);
   show(base(), "as calibrated");
   document.documentElement.dataset.ready = "yes";

@@ -32,7 +32,7 @@ function breakable(box) {
   const texts = document.createTreeWalker(box, NodeFilter.SHOW_TEXT), all = [];
   while (texts.nextNode()) all.push(texts.currentNode);
   for (const text of all) {
-    const parts = text.data.split(/(?<=[A-Za-z0-9)][_/+:=,.@])(?=[A-Za-z])/);
+    const parts = text.data.split(/(?<=[/+,])(?=[A-Za-z])/);
     if (parts.length > 1) text.replaceWith(...parts.flatMap((part, k) => k ? [document.createElement("wbr"), part] : [part]));
   }
 }

@@ -35,7 +35,8 @@ function timeFigure() {
   more.xaxis = axis(x.label, { anchor: "y" + count });
   const floor = now.noise_floor_mm;
   const marks = rows.map((_, k) => beginnings(x, "x", "y" + (k ? k + 1 : ""))).concat(extra ? beginnings(x, "x", "y" + count) : []);
-  const told = { xref: "paper", x: 1, xanchor: "right", y: floor, yanchor: "bottom", text: "noise floor " + mm(floor) + " mm", showarrow: false, font: { size: 11, color: c.floor } };
+  const told = { xref: "paper", x: 1, xanchor: "right", y: floor, yanchor: "bottom", text: "noise floor " + mm(floor) + " mm", showarrow: false, font: { size: 11, color: c.floor },
+    bgcolor: c.paper, opacity: 0.85 };
   return { data, layout: layout({ height: 150 * count + 70, showlegend: true, ...more, annotations: [...marks[0].annotations, told],
     shapes: [...marks.flatMap((m) => m.shapes), { type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, dash: "dash" } }] }) };
 }
@@ -64,7 +65,7 @@ function arrowTraces(from, to, line, head) {
   ];
 }
 
-// The arrow that states the scale, below a map of these places.
+// The arrow that states the scale, below all that a map shows.
 function sampleArrow(x, y, scale) {
   const c = colours(), wide = span([x]), high = span([y]);
   const at = high[0] - 0.1 * Math.max(high[1] - high[0], wide[1] - wide[0]), end = wide[0] + scale.factor * scale.sample;
@@ -89,7 +90,7 @@ function arrows(x, y, dx, dy, own, title, xlabel, ylabel, scale, board) {
     marker: { size: 7, line: { color: c.minus, width: cut.map((is) => is ? 3 : 0) }, color: errors, cmin: 0, cmax: top, colorscale: c.errors, showscale: true,
       colorbar: { title: { text: "error [mm]", side: "right", font: { size: 11 } }, thickness: 10, len: 0.9, tickfont: { size: 10 } } },
     text: own.map((i, k) => plain(dwellName(i)) + ": " + mm(view.shown.error_mm[i]) + " mm, of it " + mm(dx[i]) + " and " + mm(dy[i]) + " mm in this view" + (cut[k] ? " (arrow cut short)" : "")),
-    hovertemplate: "%{text}<extra></extra>" }), ...sampleArrow(at(x), at(y), scale));
+    hovertemplate: "%{text}<extra></extra>" }), ...sampleArrow(at(x), at(y).concat(moved(y, dy)), scale));
   return { data, layout: layout({ height: 390, margin: { l: 58, r: 10, t: 40, b: 46 }, title: { text: plain(title) + (short ? " (" + short + (short > 1 ? " arrows" : " arrow") + " cut short, orange)" : ""), font: { size: 13 }, x: 0.02 },
     xaxis: axis(xlabel), yaxis: axis(ylabel, { scaleanchor: "x", scaleratio: 1 }) }) };
 }
