@@ -263,6 +263,8 @@ fn each_family_shows_its_own_shape() {
         ("compliance", "joint", &["tau1", "tau2", "tau3"]),
         ("eccentricity", "joint", &["q1", "q2", "q3"]),
         ("thermal_growth", "lengths", &["temperature", "time"]),
+        // The temperature, too, is another in every recording.
+        ("frame_shift", "world", &["time"]),
     ] {
         let folder = tempfile::tempdir().expect("temporary folder");
         let document = document(&sealed(family, folder.path()).join("report.html"));

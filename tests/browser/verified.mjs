@@ -15,8 +15,17 @@ try {
   const { page, seen } = await open(browser, address);
   await drawn(page);
   const [measured, nominal, calibrated] = await data(page, "#xy");
-  const apart = (a, b) => a.x.reduce((sum, x, i) => sum + Math.hypot(x - b.x[i], a.y[i] - b.y[i]), 0) / a.x.length;
-  assert.ok(apart(measured, calibrated) < 0.05 * apart(measured, nominal), "the calibrated path lies on the measured one");
+  // Deviations are drawn so many times as large as the name of their line says.
+  const motion = await page.evaluate(() => shownMotion());
+  const factor = (line) => Number((/deviation ×(\d+)$/.exec(line.name) || [, "1"])[1]);
+  for (const [line, of] of [[nominal, motion.nominal_mm], [calibrated, motion.calibrated_mm]]) {
+    assert.ok(/^[125]0*$/.test(factor(line)), `${line.name}: a round factor`);
+    const off = of[0].map((x, i) => motion.measured_mm[0][i] + factor(line) * (x - motion.measured_mm[0][i]) - line.x[i]);
+    assert.ok(Math.max(...off.map(Math.abs)) < 1e-6, `${line.name} is drawn as it says`);
+  }
+  const apart = (of) => of[0].reduce((sum, _, i) => sum + Math.hypot(...[0, 1, 2].map((k) => of[k][i] - motion.measured_mm[k][i])), 0);
+  assert.ok(apart(motion.calibrated_mm) < 0.05 * apart(motion.nominal_mm), "the calibrated path lies on the measured one");
+  assert.ok(factor(calibrated) > factor(nominal), "small deviations are enlarged more");
   await page.selectOption("#motion", "1");
   await drawn(page);
   const [other] = await data(page, "#xy");

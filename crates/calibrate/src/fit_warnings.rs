@@ -57,8 +57,8 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
     }
     if fit.sigma_scale > LARGE_SCALE {
         let message = format!(
-            "residuals are {:.2} times the declared noise: an effect is missing from the model or the noise is declared \
-             too small; intervals are widened accordingly",
+            "residuals are {:.2} times the declared noise: an effect is missing from the model, the setup is not as declared, \
+             or the noise is declared too small; intervals are widened accordingly",
             fit.sigma_scale
         );
         let inadequate = fit.sigma_scale > INADEQUATE_SCALE;

@@ -16,7 +16,7 @@ const MOST: usize = 2;
 /// Dwells in which the error is larger than elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorPlace {
-    /// Which: `recording 2`, `shoulder from 10 to 25 deg`.
+    /// Which: `recording 2` (by its index), `shoulder from 10 to 25 deg`.
     pub place: String,
     /// How many dwells that are.
     pub dwells: usize,
@@ -24,6 +24,10 @@ pub struct ErrorPlace {
     pub error_mm: f64,
     /// The mean error of all others [mm].
     pub elsewhere_mm: f64,
+    /// How many times the errors are what the declared noise gives, in the geometric mean: what makes it a place.
+    pub times_noise: f64,
+    /// The same of all others.
+    pub elsewhere_times_noise: f64,
 }
 
 /// The error of one dwell, and what the declared noise would give.
@@ -55,7 +59,12 @@ pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) ->
         let mean_mm =
             |of: &[usize]| of.iter().map(|i| errors[*i].error_m).sum::<f64>() / of.len() as f64 * 1e3;
         let (error_mm, elsewhere_mm) = (mean_mm(&inside), mean_mm(&outside));
-        found.push((sigmas, ErrorPlace { place, dwells: inside.len(), error_mm, elsewhere_mm }));
+        let (times_noise, elsewhere_times_noise) = (mean_in.exp(), mean_out.exp());
+        let dwells = inside.len();
+        found.push((
+            sigmas,
+            ErrorPlace { place, dwells, error_mm, elsewhere_mm, times_noise, elsewhere_times_noise },
+        ));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().take(MOST).map(|(_, place)| place).collect()
@@ -74,7 +83,7 @@ fn groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String,
     let ranges: Vec<(f64, f64)> = (0..joint_names.len()).map(|j| range(errors, j)).collect();
     for (i, e) in errors.iter().enumerate() {
         let o = e.observation;
-        add(format!("recording {}", o.dwell.recording + 1), i);
+        add(format!("recording {}", o.dwell.recording), i);
         match o.cavity() {
             Some(cavity) => {
                 add("the seated dwells".to_owned(), i);
@@ -161,8 +170,9 @@ mod tests {
         let all = observations(120);
         let third = |i, o: &Observation| if o.dwell.recording == 2 { 5.0 * spread(i) } else { spread(i) };
         let named = places(&all, third);
-        assert_eq!((named[0].place.as_str(), named[0].dwells), ("recording 3", 40));
+        assert_eq!((named[0].place.as_str(), named[0].dwells), ("recording 2", 40));
         assert!((named[0].error_mm / named[0].elsewhere_mm - 5.0).abs() < 0.5, "{named:?}");
+        assert!((named[0].times_noise / named[0].elsewhere_times_noise - 5.0).abs() < 0.5, "{named:?}");
 
         let far = |i, o: &Observation| if o.joint_rad[1] > 1.0 / 3.0 { 4.0 * spread(i) } else { spread(i) };
         assert_eq!(places(&all, far)[0].place, "elbow from 19 to 57 deg");

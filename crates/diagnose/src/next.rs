@@ -34,11 +34,13 @@ pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names:
         let frequency = e.shape.iter().find(|(name, _)| name == "frequency").map(|(_, n)| *n);
         first.extend(e.target.and_then(|joint| over_its_angle(joint, frequency)));
     }
+    let beside = if d.refitted.is_some() { "with what was found in the model " } else { "" };
     if let Some(unexplained) = &d.unexplained {
         first.extend(unexplained.places.iter().map(|p| {
             format!(
-                "look first at {}: the mean error of these {} dwells is {:.3} mm, that of the others {:.3} mm",
-                p.place, p.dwells, p.error_mm, p.elsewhere_mm
+                "look first at {}: {beside}the errors of these {} dwells are {:.1} times what the declared noise gives, those of the \
+                 others {:.1} times",
+                p.place, p.dwells, p.times_noise, p.elsewhere_times_noise
             )
         }));
     }

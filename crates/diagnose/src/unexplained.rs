@@ -42,8 +42,8 @@ impl Unexplained {
             .iter()
             .map(|p| {
                 format!(
-                    "{} ({} dwells, {:.3} mm; elsewhere {:.3})",
-                    p.place, p.dwells, p.error_mm, p.elsewhere_mm
+                    "{} ({} dwells, {:.3} mm, {:.1} times; elsewhere {:.3} mm, {:.1} times)",
+                    p.place, p.dwells, p.error_mm, p.times_noise, p.elsewhere_mm, p.elsewhere_times_noise
                 )
             })
             .collect();

@@ -1,7 +1,9 @@
 //! What is missing, for a person in the terminal.
 
+use crate::look_at::look_at;
 use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
+use crate::recording_names::RecordingNames;
 use crate::run::Run;
 use crate::text::{in_display_unit, printable};
 use armcal_core::SetupReport;
@@ -9,7 +11,7 @@ use armcal_diagnose::{
     CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
     Verdict,
 };
-use armcal_model::{effects_toml, place_and_moment};
+use armcal_model::{Family, effects_toml, find};
 use comfy_table::Cell;
 use serde_json::Value;
 
@@ -35,16 +37,18 @@ pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
 pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
     let pen = Pen { style };
     let d = &past.summary["diagnosis"];
+    let names = RecordingNames::new(past.recordings.iter().map(|r| r.name.clone()));
     let text = |v: &Value| v.as_str().map(printable).unwrap_or_default();
     let list = |v: &Value| v.as_array().into_iter().flatten().map(text).collect::<Vec<_>>();
-    let answer = text(&past.summary["answer_sentence"]);
+    let told = |v: &Value| names.in_words(&text(v));
+    let answer = told(&past.summary["answer_sentence"]);
     if d.is_null() {
         let answer = if answer.is_empty() { "It was not diagnosed.".to_owned() } else { answer };
         return format!("{}: {answer}\n", past.path.display());
     }
-    let names = list(&d["names"]).join(", ");
+    let missing = list(&d["names"]).join(", ");
     let headline = match answer.is_empty() {
-        true => format!("{} {names}", text(&d["verdict"]).replace('_', " ")),
+        true => format!("{} {missing}", text(&d["verdict"]).replace('_', " ")),
         false => answer,
     };
     let mut table = pen.table(&["effect", "probability", "ln B", "p", PREDICTED]);
@@ -52,7 +56,7 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
     for c in d["candidates"].as_array().into_iter().flatten().take(RANKED) {
         let h = &c["holdout_mm"];
         table.add_row(vec![
-            Cell::new(text(&c["spec"])),
+            Cell::new(told(&c["spec"])),
             number(three(&c["probability"])),
             number(three(&c["log_evidence"])),
             number(three(&c["p_adjusted"])),
@@ -60,8 +64,8 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
         ]);
     }
     let sentences = d["explanations"].as_array().into_iter().flatten();
-    let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), text(&e["sentence"]))));
-    let next = list(&d["record_next"]).into_iter().map(|r| ("next:", r));
+    let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), told(&e["sentence"]))));
+    let next = list(&d["record_next"]).into_iter().map(|r| ("next:", names.in_words(&r)));
     let mut sections = vec![
         pen.section(headline.trim(), pen.list(next)),
         pen.section("Candidates, best first", pen.render(&table)),
@@ -80,18 +84,19 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
 /// What is missing: the answer, what was found, what to do next.
 fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     let list = |label, entries: Vec<String>| pen.list(entries.into_iter().map(|entry| (label, entry)));
-    pen.section(&headline(run, d), list("-", all_found(d)) + &list("next:", next(d)))
+    pen.section(&headline(run, d), list("-", all_found(run, d)) + &list("next:", next(run, d)))
 }
 
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
-pub(crate) fn all_found(d: &Diagnosis) -> Vec<String> {
+pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&n.sentence()));
     let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
-    d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(beside).chain(nested).collect()
+    let all = d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(beside).chain(nested);
+    all.map(|said| run.in_words(&said)).collect()
 }
 
 /// The same in a line or two each: names, sizes, and what they take of the error.
-pub(crate) fn briefly_found(d: &Diagnosis) -> Vec<String> {
+pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
     let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
     let unlisted = d
@@ -102,15 +107,35 @@ pub(crate) fn briefly_found(d: &Diagnosis) -> Vec<String> {
         .beside_curves()
         .iter()
         .map(|e| format!("{WITH_CURVES}{}: {}", e.set.join(" or "), falls(&e.places)));
-    named.chain(unlisted).chain(beside).map(|said| printable(&said)).collect()
+    named.chain(unlisted).chain(beside).map(|said| run.in_words(&printable(&said))).collect()
 }
 
 /// What is said before an effect that shows only beside error curves of joints.
 pub(crate) const WITH_CURVES: &str = "with these curves in the model also ";
 
 /// What to do next, one step an entry.
-pub(crate) fn next(d: &Diagnosis) -> Vec<String> {
-    added(d).into_iter().chain(d.record_next.iter().map(|r| printable(r))).collect()
+pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
+    let recorded = d.record_next.iter().map(|r| run.in_words(&printable(r)));
+    added(d).into_iter().chain(looked_at(run, d)).chain(recorded).collect()
+}
+
+/// What to look at on the rig, once for all effects of one kind; only where one name is left.
+fn looked_at(run: &Run, d: &Diagnosis) -> Vec<String> {
+    let mut steps: Vec<(&str, Vec<&str>)> = Vec::new();
+    for e in d.effects.iter().filter(|e| e.set.len() == 1) {
+        let kind = e.name.split([':', '@', ',']).next().and_then(find);
+        let Some(kind) = kind.filter(|kind| kind.family != Family::User) else { continue };
+        match steps.iter_mut().find(|(advice, _)| *advice == look_at(kind)) {
+            Some((_, names)) => names.push(&e.name),
+            None => steps.push((look_at(kind), vec![&e.name])),
+        }
+    }
+    let step = |(advice, names): (&str, Vec<&str>)| {
+        let (capital, rest) = advice.split_at(1);
+        let advice = format!("{}{}", capital.to_ascii_lowercase(), rest.trim_end_matches('.'));
+        printable(&format!("{}: {advice}", names.join(", ")))
+    };
+    steps.into_iter().map(|s| run.in_words(&step(s))).collect()
 }
 
 /// What adding it to the model does, where something was found and a calibration with it confirms it.
@@ -129,6 +154,11 @@ fn added(d: &Diagnosis) -> Option<String> {
 
 /// The answer in one sentence.
 pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
+    run.in_words(&as_spelt(d))
+}
+
+/// The same with recordings by their index, and events as a pipeline spells them.
+fn as_spelt(d: &Diagnosis) -> String {
     let unseen = d.not_testable.len();
     match d.verdict {
         Verdict::NothingMissing => {
@@ -143,12 +173,11 @@ pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
-            let names: Vec<String> = d.names.iter().map(|name| told(run, name)).collect();
-            let names = printable(&names.join(", "));
+            let names = printable(&d.names.join(", "));
             format!("Missing: {names} ({probability}p = {:.3}){}.", d.p_adjusted, beside(d))
         }
         Verdict::Ambiguous => {
-            let sets: Vec<String> = d.effects.iter().map(|e| one_of(run, &e.set)).collect();
+            let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
             format!("Missing: {}{}.", printable(&sets.join("; and ")), beside(d))
         }
         Verdict::Unknown if d.unlisted.len() > 1 && curved_joints(d).len() == d.unlisted.len() => {
@@ -164,11 +193,18 @@ pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
             ))
         }
         Verdict::Unknown => match &d.unknown {
-            Some(u) => format!(
-                "Something unlisted is missing: it enters at {} and depends on {}.",
-                printable(&u.channel),
-                printable(&u.driver)
-            ),
+            Some(u) => match u.own_angle() {
+                Some(joint) => format!(
+                    "Something unlisted is missing: joint {} errs over its own angle ({}).",
+                    joint + 1,
+                    printable(&u.driver)
+                ),
+                None => format!(
+                    "Something unlisted is missing: it enters at {} and depends on {}.",
+                    printable(&u.channel),
+                    printable(&driver_told(&u.driver))
+                ),
+            },
             None => "Something is missing, and nothing listed explains it.".to_owned(),
         },
         Verdict::Unexplained => {
@@ -178,6 +214,19 @@ pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
             printable(&format!("Unexplained: {sentence}."))
         }
     }
+}
+
+/// What an error depends on, in words before its spelling in formulas; a product or a sum of drivers as it is spelt.
+fn driver_told(driver: &str) -> String {
+    let (kind, joint) = driver.split_at(driver.find(|c: char| c.is_ascii_digit()).unwrap_or(driver.len()));
+    let words = match (kind, joint.parse::<usize>()) {
+        ("q", Ok(joint)) => format!("the angle of joint {joint}"),
+        ("tau", Ok(joint)) => format!("the gravity torque on joint {joint}"),
+        ("s", Ok(joint)) => format!("the direction in which joint {joint} arrived"),
+        ("t", _) if joint.is_empty() => "time".to_owned(),
+        _ => return driver.to_owned(),
+    };
+    format!("{words} ({driver})")
 }
 
 /// The mistakes of the setup in one sentence; none where there is none.
@@ -191,18 +240,10 @@ fn curved_joints(d: &Diagnosis) -> Vec<String> {
     d.unlisted.iter().filter_map(UnknownReport::own_angle).map(|joint| (joint + 1).to_string()).collect()
 }
 
-/// A name; of an event with its moment in words before it: `frame_shift from dwell 43 of `roll` on (frame_shift@2.43)`.
-fn told(run: &Run, name: &str) -> String {
-    match place_and_moment(name) {
-        Some((place, Some(since))) => format!("{place}{} ({name})", run.moment(since)),
-        _ => name.to_owned(),
-    }
-}
-
 /// One effect by its name, or by all names that these data leave.
-fn one_of(run: &Run, set: &[String]) -> String {
+fn one_of(set: &[String]) -> String {
     match set {
-        [name] => told(run, name),
+        [name] => name.clone(),
         names => format!("one of {} (these data cannot tell which)", names.join(", ")),
     }
 }
@@ -215,10 +256,11 @@ fn beside(d: &Diagnosis) -> String {
 }
 
 fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
+    let told = |said: &str| run.in_words(&printable(said));
     let mut sections = vec![brief(pen, run, d)];
-    sections.push(pen.section("Candidates, best first", ranking(pen, d)));
+    sections.push(pen.section("Candidates, best first", ranking(pen, run, d)));
     if !d.cannot_tell_apart.is_empty() {
-        let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", printable(&format!("{a} and {b}"))));
+        let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", told(&format!("{a} and {b}"))));
         sections.push(pen.section("The same to these data", pen.list(pairs)));
     }
     if !d.not_testable.is_empty() {
@@ -227,7 +269,7 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
                 "{}: smallest size seen {}, typical {} ({})",
                 n.effect, n.smallest_seen, n.typical, n.why
             );
-            ("-", printable(&text))
+            ("-", told(&text))
         });
         sections.push(pen.section("What these data could not have shown", pen.list(rows)));
     }
@@ -235,23 +277,23 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
-    let sentences = d.explanations.iter().map(|e| ("-", printable(&format!("{}: {}", e.number, e.sentence))));
+    let sentences = d.explanations.iter().map(|e| ("-", told(&format!("{}: {}", e.number, e.sentence))));
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")
 }
 
-fn ranking(pen: &Pen, d: &Diagnosis) -> String {
+fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     let mut table = pen.table(&["effect", "size", "probability", "ln B", "p", PREDICTED, "absorbed", "also"]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
-            Cell::new(printable(&c.spec)),
+            Cell::new(run.in_words(&printable(&c.spec))),
             Cell::new(sizes(c)),
             number(format!("{:.3}", c.probability)),
             number(format!("{:.1}", c.log_evidence)),
             number(format!("{:.3}", c.p_adjusted)),
             number(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
             number(format!("{:.0} %", c.absorbed * 100.0)),
-            Cell::new(printable(&c.same_to_the_data.join(", "))),
+            Cell::new(run.in_words(&printable(&c.same_to_the_data.join(", ")))),
         ]);
     }
     pen.render(&table)
@@ -372,4 +414,27 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
          shape{range}{ripple}{formula}",
         u.channel, u.driver, u.places.before, u.places.after
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::driver_told;
+
+    #[test]
+    fn drivers_are_told_in_words_before_their_spelling() {
+        let told = ["q2", "tau3", "s1", "t", "s1*q1", "q1+q2", "temperature", "recording"].map(driver_told);
+        assert_eq!(
+            told,
+            [
+                "the angle of joint 2 (q2)",
+                "the gravity torque on joint 3 (tau3)",
+                "the direction in which joint 1 arrived (s1)",
+                "time (t)",
+                "s1*q1",
+                "q1+q2",
+                "temperature",
+                "recording"
+            ]
+        );
+    }
 }

@@ -23,6 +23,7 @@ mod diagnosis_text;
 mod error;
 mod findings;
 mod layouts;
+mod look_at;
 mod mcap_file;
 mod model_file;
 mod page;
@@ -35,6 +36,8 @@ mod pen;
 mod points;
 mod pooled;
 mod proto;
+mod recorded_time;
+mod recording_names;
 mod run;
 mod same_dwells;
 mod story;
@@ -56,6 +59,7 @@ pub use closed_chain::{
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{diagnosis_text, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
+pub use look_at::look_at;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use pairing::{Side, Unpaired};
 pub use past_model::{PastArms, PastModel, RecordingFacts, Value};
@@ -68,6 +72,7 @@ pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pooled::{
     POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_files, pooled_json, pooled_terminal, write_pooled,
 };
+pub use recording_names::RecordingNames;
 pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
 pub use summary::{SCHEMA, summary_json};

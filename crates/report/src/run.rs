@@ -1,11 +1,12 @@
 //! Everything a finished run knows. All outputs are views of this one value.
 
 use crate::diagnosis_text::{headline, setup_sentence};
+use crate::recording_names::RecordingNames;
 use armcal_calibrate::Calibration;
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
-use armcal_model::{Model, Session, Since};
+use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport};
 use armcal_table::{Assignment, Association, Board, Place};
 use serde::Serialize;
@@ -152,7 +153,7 @@ impl Run {
     /// What the run says about its model: the same in every output.
     pub fn answer(&self) -> Answer {
         if let Some(sentence) = setup_sentence(&self.setup) {
-            return Answer { word: "setup", sentence };
+            return Answer { word: "setup", sentence: self.in_words(&sentence) };
         }
         if let Some(diagnosis) = &self.diagnosis {
             return Answer { word: diagnosis.verdict.word(), sentence: headline(self, diagnosis) };
@@ -208,17 +209,14 @@ impl Run {
         self.steps.iter().zip(before).map(added).collect()
     }
 
-    /// When an effect acts, in words that stand after its name: ` from dwell 17 of `roll` on`, ` in dwells 17 to 25 of `roll``,
-    /// ` in `roll``.
-    pub fn moment(&self, since: Since) -> String {
-        let name = |index: usize| self.recordings.get(index).map_or("?", |r| r.name.as_str());
-        match since {
-            Since::Recording(index) => format!(" in `{}`", name(index)),
-            Since::Dwell(dwell) => format!(" from dwell {} of `{}` on", dwell.dwell, name(dwell.recording)),
-            Since::Dwells { first, last } => {
-                format!(" in dwells {} to {last} of `{}`", first.dwell, name(first.recording))
-            }
-        }
+    /// Its recordings as sentences call them.
+    pub fn recording_names(&self) -> RecordingNames {
+        RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
+    }
+
+    /// A sentence about it with recordings and moments by their names.
+    pub fn in_words(&self, sentence: &str) -> String {
+        self.recording_names().in_words(sentence)
     }
 
     /// Name of the recording a dwell belongs to.

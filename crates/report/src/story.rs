@@ -10,6 +10,9 @@ use armcal_core::Warning;
 const MEND: &str =
     "mend what is said above and run again; what is missing physically is looked for after that";
 
+/// Entries of a list that fit on one screen: of what was found, of what to do next, of grave warnings.
+pub(crate) const SHOWN: usize = 2;
+
 /// The end of a run.
 pub(crate) struct Story {
     /// One word for a lamp: the status where the result does not stand, or the verdict that says why; else the verdict.
@@ -21,6 +24,8 @@ pub(crate) struct Story {
     /// The same in a line or two each.
     pub found_briefly: Vec<String>,
     pub status: Status,
+    /// Whether the diagnosis found something that the model does not have.
+    incomplete: bool,
     /// What to do, one step an entry.
     pub next: Vec<String>,
     /// Every warning and how it is told, those of the recordings first.
@@ -35,11 +40,12 @@ impl Story {
         Story {
             lamp: lamp(answer.word, status),
             calibration: conclusion(&run.calibration),
-            found: diagnosis.map_or_else(Vec::new, all_found),
-            found_briefly: diagnosis.map_or_else(Vec::new, briefly_found),
+            found: diagnosis.map_or_else(Vec::new, |d| all_found(run, d)),
+            found_briefly: diagnosis.map_or_else(Vec::new, |d| briefly_found(run, d)),
             status,
+            incomplete: matches!(answer.word, "identified" | "ambiguous" | "unknown"),
             next: match diagnosis {
-                Some(d) => next(d),
+                Some(d) => next(run, d),
                 None if answer.word == "setup" => vec![MEND.to_owned()],
                 None => Vec::new(),
             },
@@ -57,6 +63,16 @@ impl Story {
         head.into_iter().chain([status]).chain(next).chain(found).collect()
     }
 
+    /// What to do first, as far as a screen has room.
+    pub fn first_steps(&self) -> &[String] {
+        &self.next[..self.next.len().min(SHOWN)]
+    }
+
+    /// How many steps there are beyond those.
+    pub fn more_steps(&self) -> usize {
+        self.next.len() - self.first_steps().len()
+    }
+
     /// The warnings by their severity.
     pub fn gravest_first(&self) -> Vec<&(String, Warning)> {
         let mut all: Vec<_> = self.warnings.iter().collect();
@@ -67,6 +83,7 @@ impl Story {
     /// Whether the result stands, and what the command exits with.
     pub fn status_sentence(&self) -> &'static str {
         match self.status {
+            Status::Ok if self.incomplete => "ok (exit code 0), with a model that misses what is said above.",
             Status::Ok => "ok.",
             Status::Inadequate => {
                 "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
@@ -79,7 +96,7 @@ impl Story {
 }
 
 fn warnings(run: &Run) -> Vec<(String, Warning)> {
-    let text = |w: &Warning| printable(&w.to_string());
+    let text = |w: &Warning| run.in_words(&printable(&w.to_string()));
     let of_recordings = run.recordings.iter().flat_map(|r| {
         let told = |w: &Warning| (format!("{}: {}", printable(&r.name), text(w)), w.clone());
         r.all_warnings().into_iter().map(told)

@@ -2,7 +2,7 @@
 
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
-use crate::story::Story;
+use crate::story::{SHOWN, Story};
 use crate::text::{estimate_shown, millimetres, printable, remark};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{ErrorStats, Severity, Warning};
@@ -17,8 +17,6 @@ pub enum Detail {
     Everything,
 }
 
-/// Entries of a list in the story: of what was found, of what to do next.
-const SHOWN: usize = 2;
 /// Names of parameters that stand for all that are not determined.
 const NAMED: usize = 4;
 
@@ -52,7 +50,7 @@ fn briefly(pen: &Pen, run: &Run, story: &Story) -> Vec<String> {
     let (notices, mut grave): (Vec<_>, Vec<_>) =
         story.gravest_first().into_iter().partition(|(_, w)| w.severity == Severity::Notice);
     // What the answer says already is not said once more.
-    let told = |w: &Warning| story.missing.contains(&printable(&w.message));
+    let told = |w: &Warning| story.missing.contains(&run.in_words(&printable(&w.message)));
     grave.retain(|(_, w)| !told(w));
     let left_out = [summarised(&run.calibration), counted(notices.len())];
     let left_out: Vec<String> = left_out.into_iter().flatten().collect();

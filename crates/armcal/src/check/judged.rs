@@ -105,10 +105,10 @@ fn missing(run: &Run, all_hold: bool) -> String {
         Some(d) => match d.verdict {
             Verdict::NothingMissing if all_hold => "nothing missing".to_owned(),
             Verdict::NothingMissing => "no effect found missing".to_owned(),
-            Verdict::Identified => format!("missing {}", d.names.join(", ")),
+            Verdict::Identified => run.in_words(&format!("missing {}", d.names.join(", "))),
             Verdict::Ambiguous => {
                 let sets = d.effects.iter().map(|e| e.set.join(" or ")).collect::<Vec<_>>();
-                format!("missing {}", sets.join(", and "))
+                run.in_words(&format!("missing {}", sets.join(", and ")))
             }
             Verdict::Unknown => "something unlisted missing".to_owned(),
             Verdict::Unexplained => {

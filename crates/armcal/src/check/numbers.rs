@@ -146,8 +146,11 @@ pub struct Told {
 
 /// Every warning of the run.
 pub fn all_warnings(run: &Run) -> Vec<Told> {
-    let told =
-        |w: &Warning, text: String| Told { severity: w.severity, code: w.code, text: printable(&text) };
+    let told = |w: &Warning, text: String| Told {
+        severity: w.severity,
+        code: w.code,
+        text: run.in_words(&printable(&text)),
+    };
     let of_recordings = run
         .recordings
         .iter()

@@ -5,15 +5,15 @@ use super::numbers::{all_warnings, listed_up};
 use armcal_calibrate::Estimate;
 use armcal_core::{Role, Severity};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport};
-use armcal_model::{EffectKind, EffectSpec, Family, Since, Target};
-use armcal_report::{Run, Status, amplitude_text, printable};
+use armcal_model::{EffectSpec, Since, Target};
+use armcal_report::{Run, Status, amplitude_text, look_at, printable};
 
 /// Everything the run says about what is wrong, the most telling first: bodies that moved, effects found, shapes
 /// without a name, parameters on their bounds, warnings.
 pub fn of_run(run: &Run, limits: &Limits) -> Vec<String> {
     let mut reasons = bodies_moved(run);
     if let Some(d) = &run.diagnosis {
-        reasons.extend(d.effects.iter().map(|effect| found(run, limits, effect)));
+        reasons.extend(d.effects.iter().map(|effect| run.in_words(&found(run, limits, effect))));
         reasons.extend(d.unlisted.iter().map(unlisted));
     }
     reasons.extend(on_bounds(run));
@@ -76,7 +76,7 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
         when(run, spec.since),
         kind.summary,
         sizes.join(", "),
-        advice(kind),
+        look_at(kind),
         effect.name,
     ))
 }
@@ -85,45 +85,8 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
 fn when(run: &Run, since: Option<Since>) -> String {
     let beside =
         if matches!(since, Some(Since::Recording(_))) { " as against the other recordings" } else { "" };
-    since.map_or(String::new(), |since| format!(",{}{beside}", run.moment(since)))
-}
-
-/// What to look at where an effect is named.
-fn advice(kind: &EffectKind) -> &'static str {
-    match (kind.name, kind.family) {
-        ("zero_slip", _) => {
-            "An encoder or a belt slipped: look at that joint's encoder coupling, set-screws and belt teeth, and home it again."
-        }
-        ("frame_shift", _) => {
-            "The robot's foot, the table or the cameras moved, or a tilt is not what was declared: look at their clamps and marker plates."
-        }
-        ("board_shift", _) => {
-            "The board slipped on its stand or under its markers: look at its clamps, and measure it again before and after."
-        }
-        ("tool_shift", _) => {
-            "The tool or its markers were remounted, bent or knocked: look at the last link."
-        }
-        ("unsettled_reading", _) => {
-            "Read the joints later, when arm and readings have settled: look at waiting times, filters and whether set-points are recorded."
-        }
-        ("undeclared_load", _) => {
-            "Weigh what the tool carried in that recording, and declare it as `load_kg`."
-        }
-        (_, Family::LostMotion) => "Look at that gear's preload and at the belt's tension.",
-        (_, Family::Elasticity) => {
-            "Something gives way under load: look at clamps, bearings and the declared load."
-        }
-        (_, Family::Transmission) => "Look at how gear and encoder are mounted, and at the counts a turn.",
-        (_, Family::Geometry) => "Look for a bent or remounted part.",
-        (_, Family::Event) => "Look for what was touched at that time.",
-        (_, Family::Drift) => {
-            "Something creeps or warms up: let the rig settle first, and look at clamps and temperature."
-        }
-        (_, Family::Sensor) => "Calibrate the position sensor again.",
-        (_, Family::Board) => "Measure the board again, and compare it with its file.",
-        (_, Family::Timing) => "Look at the clocks of robot and sensor.",
-        (_, Family::User) => "It is a formula of the pipeline's own.",
-    }
+    let moment = since.and_then(|since| run.recording_names().moment(since));
+    moment.map_or(String::new(), |moment| format!(",{moment}{beside}"))
 }
 
 fn unlisted(u: &UnknownReport) -> String {

@@ -98,16 +98,17 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         };
         print(&super::json_text(&value)?)?;
     } else {
-        print(&format!("Added {} to {}\n\n", added.join(", "), request.pipeline.display()))?;
+        let added = run.in_words(&added.join(", "));
+        print(&format!("Added {added} to {}\n\n", request.pipeline.display()))?;
         for LeftOut { effect, reason } in &left_out {
-            print(&format!("Left out: {effect}: {reason}\n\n"))?;
+            print(&format!("Left out: {}: {reason}\n\n", run.in_words(effect)))?;
         }
         print(&comparison.terminal(style()))?;
         for transfer in &transfer {
-            print(&format!("\nTransfer: {}.\n", transfer.sentence()))?;
+            print(&format!("\nTransfer: {}.\n", run.in_words(&transfer.sentence())))?;
         }
         if let Some(nested) = &nested {
-            print(&format!("\nThe choice: {}.\n", nested.sentence()))?;
+            print(&format!("\nThe choice: {}.\n", run.in_words(&nested.sentence())))?;
         }
         print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());

@@ -316,8 +316,8 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     assert!(first.dwells == N / 2 && near(first.error_mm, 6.0) && near(first.elsewhere_mm, 2.0));
     assert_eq!(
         unexplained.sentence().split("; elsewhere").next().unwrap(),
-        "the mean error of 4.000 mm is 4.0 times the noise floor of 1.000 mm, largest against their noise in recording 2 \
-         (20 dwells, 6.000 mm"
+        "the mean error of 4.000 mm is 4.0 times the noise floor of 1.000 mm, largest against their noise in recording 1 \
+         (20 dwells, 6.000 mm, 6.0 times"
     );
     let tail = "; the scatter is repeated at every place; 0 listed effects and 77 unlisted shapes were tried and do not \
                 explain it";
@@ -326,7 +326,7 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     assert_eq!((warning.severity, &warning.message), (Severity::Inadequate, &unexplained.sentence()));
     assert!(
         d.record_next[0]
-            .starts_with("look first at recording 2: the mean error of these 20 dwells is 6.000 mm")
+            .starts_with("look first at recording 1: the errors of these 20 dwells are 6.0 times what")
     );
     assert!(!d.explanations.is_empty());
 

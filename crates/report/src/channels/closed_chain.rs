@@ -33,15 +33,16 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     out.put("/armcal/parameters", begin_ns, &facts::parameters(fit, begin_ns));
     let report = facts::calibration(&run.pipeline_name, calibration, conclusion.clone(), begin_ns);
     out.put("/armcal/report", begin_ns, &report);
+    let names = run.recording_names();
     for warning in run.overall_warnings() {
-        log::put_warning(&mut out, begin_ns, warning);
+        log::put_warning(&mut out, begin_ns, &names.warning(warning));
     }
     let errors_m: Vec<f64> = calibration.residuals.iter().map(|r| r.fitted_m.norm()).collect();
     let factor = round_factor(LONG_ARROW_M / percentile(&errors_m, 0.95).max(1e-6));
     for recording in &run.recordings {
         let start_ns = recording.dwells.first().map_or(begin_ns, |d| d.start_ns);
         for warning in recording.all_warnings() {
-            log::put_warning(&mut out, start_ns, warning);
+            log::put_warning(&mut out, start_ns, &names.warning(warning));
         }
         for dwell in &recording.dwells {
             let time_ns = dwell.mid_ns();

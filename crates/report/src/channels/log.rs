@@ -14,8 +14,9 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     let opening = format!("armcal {VERSION}, pipeline {}", run.pipeline_name);
     put(out, begin_ns, Level::Info, "armcal", &run.pipeline_name, opening);
+    let names = run.recording_names();
     for warning in run.overall_warnings() {
-        put_warning(out, begin_ns, &warning);
+        put_warning(out, begin_ns, &names.warning(&warning));
     }
     for recording in &run.recordings {
         let start_ns = start_ns(recording);
@@ -28,7 +29,7 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
         );
         put(out, start_ns, Level::Info, "armcal.dwell", &recording.name, found);
         for warning in recording.all_warnings() {
-            put_warning(out, start_ns, warning);
+            put_warning(out, start_ns, &names.warning(warning));
         }
         for rejection in &recording.rejections {
             let dwell = recording.dwells.iter().find(|d| d.id == rejection.dwell);

@@ -9,6 +9,7 @@ mod terminal;
 pub use files::{CLOSED_SCHEMA, closed_files, closed_summary_json, write_closed};
 pub use terminal::closed_terminal;
 
+use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
 use armcal_calibrate::{Calibration, ClosedChain, ClosedObservation};
 use armcal_core::{Dwell, Rejection, Warning};
@@ -68,6 +69,11 @@ impl ClosedRun {
 }
 
 impl ClosedRun {
+    /// Its recordings as sentences call them.
+    pub(crate) fn recording_names(&self) -> RecordingNames {
+        RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
+    }
+
     /// One arm's part of the joints of both.
     pub(crate) fn of_arm<'q>(&self, arm: usize, joint_rad: &'q [f64]) -> &'q [f64] {
         let first = self.chain.arms()[0].model.joint_count().min(joint_rad.len());

@@ -46,7 +46,8 @@ fn recordings(pen: &Pen, run: &ClosedRun) -> String {
 }
 
 fn warnings(pen: &Pen, run: &ClosedRun) -> Option<String> {
-    let text = |warning: &Warning| printable(&warning.to_string());
+    let names = run.recording_names();
+    let text = |warning: &Warning| names.in_words(&printable(&warning.to_string()));
     let of_recordings = run.recordings.iter().flat_map(|r| {
         let named = |w: &Warning| (w.severity.word(), format!("{}: {}", printable(&r.name), text(w)));
         r.all_warnings().into_iter().map(named).collect::<Vec<_>>()

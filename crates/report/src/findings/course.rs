@@ -2,6 +2,7 @@
 
 use crate::points::Point;
 use crate::proto::Course;
+use crate::recorded_time::RecordedTime;
 use crate::run::Run;
 
 pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
@@ -31,26 +32,8 @@ pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
     m
 }
 
-/// When each point was taken, in minutes of recorded time: recordings follow one another in the order of their first
-/// points, without the gaps between them.
+/// When each point was taken, in minutes of recorded time.
 pub(super) fn recorded_min(run: &Run, points: &[Point]) -> Vec<f64> {
-    let mut spans: Vec<(i64, i64, usize)> = (0..run.recordings.len())
-        .filter_map(|r| {
-            let times =
-                || points.iter().map(|p| p.observation).filter(|o| o.dwell.recording == r).map(|o| o.time_ns);
-            Some((times().min()?, times().max()?, r))
-        })
-        .collect();
-    spans.sort_unstable();
-    let mut begins = vec![(0_i64, 0.0); run.recordings.len()];
-    let mut elapsed_min = 0.0;
-    for (first_ns, last_ns, r) in spans {
-        begins[r] = (first_ns, elapsed_min);
-        elapsed_min += (last_ns - first_ns) as f64 / 60e9;
-    }
-    let at = |p: &Point| {
-        let (first_ns, before_min) = begins[p.observation.dwell.recording];
-        before_min + (p.observation.time_ns - first_ns) as f64 / 60e9
-    };
-    points.iter().map(at).collect()
+    let time = RecordedTime::of(&run.observations, run.recordings.len());
+    points.iter().map(|p| time.at_min(p.observation)).collect()
 }

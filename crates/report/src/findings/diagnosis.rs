@@ -16,7 +16,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
     let explanations = d
         .explanations
         .iter()
-        .map(|e| proto::Explanation { number: e.number.clone(), sentence: e.sentence.clone() });
+        .map(|e| proto::Explanation { number: e.number.clone(), sentence: run.in_words(&e.sentence) });
     proto::Diagnosis {
         timestamp: None,
         verdict: d.verdict.word().into(),
@@ -26,7 +26,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         p_adjusted: finite(d.p_adjusted),
         p_nothing: or_zero(d.p_nothing),
         effects: d.effects.iter().map(found).collect(),
-        record_next: d.record_next.clone(),
+        record_next: d.record_next.iter().map(|r| run.in_words(r)).collect(),
         not_testable: not_testable.collect(),
         explanations: explanations.collect(),
         cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
@@ -38,14 +38,17 @@ pub(super) fn none(answer: Answer) -> proto::Diagnosis {
     proto::Diagnosis { verdict: answer.word.into(), sentence: answer.sentence, ..Default::default() }
 }
 
-pub(super) fn candidates(d: &Diagnosis) -> proto::Candidates {
-    proto::Candidates { timestamp: None, candidates: d.candidates.iter().map(candidate).collect() }
+pub(super) fn candidates(run: &Run, d: &Diagnosis) -> proto::Candidates {
+    proto::Candidates {
+        timestamp: None,
+        candidates: d.candidates.iter().map(|c| candidate(run, c)).collect(),
+    }
 }
 
-fn candidate(c: &CandidateReport) -> proto::Candidate {
+fn candidate(run: &Run, c: &CandidateReport) -> proto::Candidate {
     proto::Candidate {
         effect: c.spec.clone(),
-        target: c.target.clone(),
+        target: run.in_words(&c.target),
         size: sizes(c),
         probability: short(or_zero(c.probability)),
         log_evidence: finite(c.log_evidence).map(short),

@@ -47,7 +47,7 @@ impl Findings {
             course: course::course(run, points, &in_time),
             steps: steps::steps(run),
             diagnosis: match &run.diagnosis {
-                Some(d) => Some((diagnosis::diagnosis(run, d), diagnosis::candidates(d))),
+                Some(d) => Some((diagnosis::diagnosis(run, d), diagnosis::candidates(run, d))),
                 None if run.undiagnosed == Some(Undiagnosed::NotAsked) => None,
                 None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
             },

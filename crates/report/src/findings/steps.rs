@@ -16,7 +16,7 @@ pub(super) fn steps(run: &Run) -> Steps {
         ("calibration".to_owned(), side(calibration).fitted),
     ];
     for (step, name) in run.steps.iter().zip(run.step_names()) {
-        rows.push((name, side(&step.calibration).fitted));
+        rows.push((run.in_words(&name), side(&step.calibration).fitted));
     }
     let before = std::iter::once(None).chain(rows.iter().map(|(_, errors)| Some(errors.mean_m)));
     let steps = rows

@@ -2,6 +2,7 @@
 
 use super::levers::Levers;
 use super::numbers::Column;
+use crate::recorded_time::RecordedTime;
 use crate::run::Run;
 use armcal_core::Unit;
 use nalgebra::Vector3;
@@ -22,6 +23,8 @@ pub struct Basis {
     pub(super) arrival: Vec<Vec<i8>>,
     /// Rotates the world into the board of a seated observation's recording.
     pub(super) into_board: Vec<Option<nalgebra::UnitQuaternion<f64>>>,
+    /// Between recordings on the axis of time [min].
+    pub(super) time_cuts: Vec<f64>,
     /// From the base to the tip, of unit length.
     pub(super) outwards: Vec<Vector3<f64>>,
 }
@@ -59,6 +62,7 @@ impl Basis {
                     Some(board.rotation.inverse())
                 })
                 .collect(),
+            time_cuts: RecordedTime::of(observations, run.recordings.len()).cuts(),
             outwards: observations
                 .iter()
                 .map(|o| run.model.measured_tip_in_world(&values, o) - base_m)
@@ -98,11 +102,12 @@ fn drivers(run: &Run) -> Vec<Driver> {
     }
     let whole =
         |key: &str, label: &str, values| Driver { key: key.into(), label: label.into(), joint: None, values };
-    all.push(whole(
-        "time",
-        "time since the first dwell [min]",
-        Column::of_all(driven.iter().map(|d| d.time_s / 60.0)),
-    ));
+    let time = RecordedTime::of(&run.observations, run.recordings.len());
+    let label = match time.begins().0.iter().flatten().count() {
+        0 | 1 => "time since the first dwell [min]",
+        _ => "recorded time, without the time between recordings [min]",
+    };
+    all.push(whole("time", label, Column::of_all(run.observations.iter().map(|o| time.at_min(o)))));
     let temperature = Column::of(run.observations.iter().map(|o| o.temperature_c));
     all.push(whole("temperature", "temperature [°C]", temperature));
     all.push(whole(

@@ -6,10 +6,13 @@ use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
 use crate::diagnosis_text::sizes;
 use crate::findings::error_curve;
+use crate::recorded_time::RecordedTime;
+use crate::recording_names::RecordingNames;
 use crate::run::{Refit, Run};
 use armcal_diagnose::{CandidateReport, Diagnosis, UnknownReport};
 use armcal_model::{Chain, find};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Rows of the ranking.
 const RANKED: usize = 12;
@@ -27,6 +30,10 @@ pub(crate) struct Document {
     pub arrival: Vec<Vec<i8>>,
     /// Names of the recordings.
     pub recordings: Vec<String>,
+    /// Where they begin on the axis of time, in that order [min]; `null` without dwells.
+    pub begin_min: Column,
+    /// Effects in words, by their spelling, where the two differ.
+    pub told: BTreeMap<String, String>,
     /// The dwells that became observations.
     pub dwells: Dwells,
     /// Boards with seated dwells.
@@ -103,7 +110,8 @@ impl Document {
         refits.extend(all.iter().map(|refit| Shown::of(run, basis, refit)));
         let index_of = |effects: &[String]| all.iter().position(|r| r.effects == effects).map(|k| k + 1);
         let path = [0].into_iter().chain(run.steps.iter().filter_map(|s| index_of(&s.effects))).collect();
-        let candidates = run.diagnosis.iter().flat_map(|d| ranking(d, &index_of)).collect();
+        let candidates =
+            run.diagnosis.iter().flat_map(|d| ranking(d, &run.recording_names(), &index_of)).collect();
         let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
         Document {
             channels: basis.levers.channels.clone(),
@@ -111,6 +119,8 @@ impl Document {
             drivers: basis.drivers.clone(),
             arrival: basis.arrival.clone(),
             recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
+            begin_min: RecordedTime::of(&run.observations, run.recordings.len()).begins(),
+            told: told(run),
             dwells: dwells(run),
             boards: boards(run),
             refits,
@@ -122,8 +132,22 @@ impl Document {
     }
 }
 
+/// Every event that the page names, with its moment; no chart has a code font for what stands between backticks.
+fn told(run: &Run) -> BTreeMap<String, String> {
+    let ranked = run.diagnosis.iter().flat_map(|d| &d.candidates).map(|c| c.spec.clone());
+    let refitted = run.refits().flat_map(|r| r.effects.iter().cloned());
+    let all = ranked.chain(refitted).chain(effect_names(&run.model));
+    let names = run.recording_names();
+    let each = all.map(|spec| (names.in_words(&spec).replace('`', ""), spec));
+    each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words)).collect()
+}
+
 /// The best entries, and below them whatever was found.
-fn ranking(d: &Diagnosis, index_of: &dyn Fn(&[String]) -> Option<usize>) -> Vec<CandidateRow> {
+fn ranking(
+    d: &Diagnosis,
+    names: &RecordingNames,
+    index_of: &dyn Fn(&[String]) -> Option<usize>,
+) -> Vec<CandidateRow> {
     let found = |spec: &str| spec.split('+').all(|s| d.effects.iter().any(|e| e.set.iter().any(|n| n == s)));
     let row = |c: &CandidateReport| {
         let specs: Vec<String> = c.spec.split('+').map(str::to_owned).collect();
@@ -134,7 +158,7 @@ fn ranking(d: &Diagnosis, index_of: &dyn Fn(&[String]) -> Option<usize>) -> Vec<
             p_adjusted: c.p_adjusted,
             log_evidence: c.log_evidence,
             absorbed: c.absorbed,
-            also: c.same_to_the_data.clone(),
+            also: c.same_to_the_data.iter().map(|name| names.in_words(name).replace('`', "")).collect(),
             found: found(&c.spec),
             refit: index_of(&specs),
             spec: c.spec.clone(),

@@ -22,6 +22,7 @@ mod signature;
 
 pub use basis::Basis;
 pub use compared::comparison_html;
+pub(crate) use numbers::Column;
 
 use crate::ReportError;
 use crate::diagnosis_text::{WITH_CURVES, pasted, sizes_of, unlisted};
@@ -30,7 +31,7 @@ use crate::story::Story;
 use crate::text::millimetres;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
-use armcal_diagnose::{FoundEffect, Nested};
+use armcal_diagnose::{Explanation, FoundEffect, Nested, NotTestable};
 use armcal_model::find;
 use askama::Template;
 use document::Document;
@@ -130,8 +131,8 @@ struct Verdict {
     /// Tables to paste into the pipeline for what is unlisted.
     paste: Vec<String>,
     same: Vec<[String; 2]>,
-    unseen: Vec<armcal_diagnose::NotTestable>,
-    explanations: Vec<armcal_diagnose::Explanation>,
+    unseen: Vec<NotTestable>,
+    explanations: Vec<Explanation>,
 }
 
 fn verdict(run: &Run) -> Verdict {
@@ -149,11 +150,16 @@ fn verdict(run: &Run) -> Verdict {
             .chain(d.unlisted.iter().map(unlisted))
             .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
             .chain(d.nested.iter().map(Nested::sentence))
+            .map(|said| run.in_words(&said))
             .collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
-        same: d.cannot_tell_apart.clone(),
-        unseen: d.not_testable.clone(),
-        explanations: d.explanations.clone(),
+        same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| run.in_words(name))).collect(),
+        unseen: (d.not_testable.iter().cloned())
+            .map(|n| NotTestable { effect: run.in_words(&n.effect), ..n })
+            .collect(),
+        explanations: (d.explanations.iter().cloned())
+            .map(|e| Explanation { sentence: run.in_words(&e.sentence), ..e })
+            .collect(),
     }
 }
 

@@ -134,7 +134,11 @@ pub(crate) fn rejections(run: &Run) -> Vec<RejectionRow> {
 /// All warnings, the gravest first.
 pub(crate) fn warnings(run: &Run) -> Vec<WarningRow> {
     let overall = run.overall_warnings();
-    let named = |name: &str, w: &Warning| (w.severity, format!("{name}{}", w.subject), w.message.clone());
+    let names = run.recording_names();
+    let named = |name: &str, w: &Warning| {
+        let w = names.warning(w);
+        (w.severity, format!("{name}{}", w.subject), w.message)
+    };
     let of_recordings = run.recordings.iter().flat_map(|r| {
         r.all_warnings().into_iter().map(|w| named(&format!("{}: ", r.name), w)).collect::<Vec<_>>()
     });

@@ -65,14 +65,18 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     }
     let (channel, share) = channel(basis, &difference_m, effect.spec.target)?;
     let effect_is = basis.levers.implied(channel, &difference_m);
-    let driver = driver(basis, channel, effect.kind.family, &effect_is)?;
+    let driver = match effect.spec.since {
+        // What else changed at that moment, the temperature for one, is no cause of an event.
+        Some(_) => basis.driver("time"),
+        None => driver(basis, channel, effect.kind.family, &effect_is),
+    }?;
     let residuals = refit.calibration.residuals.iter().zip(&difference_m);
     let partial_m: Vec<Vector3<f64>> = residuals.map(|(r, d)| r.fitted_m + d).collect();
     let measured = basis.levers.implied(channel, &partial_m);
     let key = &basis.drivers[driver].key;
     Some(Signature {
         effect: effect.spec.to_string(),
-        summary: effect.kind.summary,
+        summary: summary(run, effect),
         channel,
         driver: key.clone(),
         share,
@@ -80,6 +84,15 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
         measured: Column::of(measured),
         effect_is: Column::of(effect_is),
     })
+}
+
+/// One line about an effect; a formula that a user did not write is one that the diagnosis proposes.
+fn summary(run: &Run, effect: &PlacedEffect) -> &'static str {
+    let own = run.model.effects().iter().any(|e| e.spec == effect.spec);
+    match effect.kind.family {
+        Family::User if !own => "a formula with the shape of what no listed effect explains",
+        _ => effect.kind.summary,
+    }
 }
 
 /// The channel that alone stands for most of the displacements; the effect's own joint where that is nearly as good.

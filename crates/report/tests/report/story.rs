@@ -4,7 +4,9 @@ use crate::findings::with_play_found;
 use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Detail, InputMessages, Status, TerminalStyle, terminal};
+use armcal_report::{
+    Basis, Detail, InputMessages, PageKind, Status, TerminalStyle, report_html, summary_json, terminal,
+};
 
 /// Text without line breaks, indents and markup of characters.
 fn flat(text: &str) -> String {
@@ -36,7 +38,7 @@ fn said(s: &Synthetic, folder: &str) -> (String, Vec<String>) {
         assert!(header.contains(&flat(line)), "{line:?} in {header}");
         assert!(brief.contains(&flat(line)), "{line:?} in {brief}");
     }
-    if let Some(next) = lines.iter().find_map(|l| l.strip_prefix("next: ")) {
+    for next in lines.iter().filter_map(|l| l.strip_prefix("next: ")).take(2) {
         assert!(header.contains(&flat(next)) && brief.contains(&flat(next)), "{next:?}");
     }
     (string(&story, "lamp"), lines)
@@ -54,6 +56,23 @@ fn page_layout_and_terminal_say_the_same() {
     let mut found = synthetic();
     with_play_found(&mut found, 1e-3);
     said(&found, "found");
+}
+
+#[test]
+fn people_are_told_names_of_recordings_and_programs_their_indices() {
+    let mut s = synthetic();
+    let (subject, message) =
+        ("recording 0 dwell 5 (cavity a)", "frame_shift@0 and tool_shift@1.4 tell of it");
+    s.run.warnings.push(Warning::new(Severity::Inadequate, Stage::Calibrate, "odd", subject, message));
+    let told = "dwell 5 of `normal` (cavity a): frame_shift in `normal` (frame_shift@0) and tool_shift from dwell 4 of `roll` on \
+                (tool_shift@1.4) tell of it";
+    said(&s, "named");
+    assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(told));
+    let page = report_html(&s.run, &Basis::of(&s.run), PageKind::File).unwrap();
+    let [subject_told, message_told] = told.split_once(": ").map(|(a, b)| [a, b]).unwrap();
+    assert!(flat(&page).contains(&format!("<td>{subject_told}</td><td>{message_told}</td>")));
+    let summary = summary_json(&s.run);
+    assert!(summary.contains(subject) && summary.contains(message));
 }
 
 #[test]

@@ -19,7 +19,7 @@ function curveFigure() {
   const points = { type: "scatter", mode: "markers", x: when(q.time_ms), y: q.value, text: named(q.row),
     marker: { size: q.row.map((_, i) => (changed[i] ? 11 : 7)), color: q.row.map((_, i) => (changed[i] ? c.minus : c.plus)), symbol: q.row.map((_, i) => (changed[i] ? "diamond" : "circle")) },
     error_y: { type: "data", array: q.half.map((h) => h ?? 0), color: c.ghost, thickness: 1.2, width: 0 },
-    hovertemplate: "%{text}<br>%{x}: %{y}<extra></extra>" };
+    hovertemplate: "%{text}<br>%{x}: %{y:.5~g} " + plain(q.unit || "") + "<extra></extra>" };
   return { data: [points],
     layout: layout({ height: 360, xaxis: axis("start of the recording (UTC)", { type: "date" }), yaxis: axis(plain(q.name) + (q.unit ? " [" + q.unit + "]" : "")) }) };
 }

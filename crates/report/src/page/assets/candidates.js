@@ -2,7 +2,7 @@
 
 function candidateRow(c) {
   const name = document.createElement(c.refit === null ? "span" : "button");
-  name.textContent = c.spec;
+  name.textContent = c.spec.split("+").map(told).join(" + ");
   name.title = c.summary;
   if (c.refit !== null) {
     name.type = "button";
@@ -25,10 +25,7 @@ function candidateRow(c) {
 
 function candidateTable() {
   const table = $("candidates");
-  if (!doc.candidates.length) {
-    table.replaceWith(element("p", "No candidate was weighed."));
-    return;
-  }
+  if (!table) return; // None was weighed.
   const head = document.createElement("thead");
   head.append(row(["explanation", "probability", "p", "error with it [mm]", "change, 95 % [mm]", "geometry can hide", "size", "also called, or the same here"], "th"));
   const body = document.createElement("tbody");

@@ -107,4 +107,8 @@ function beyond(x, y, range, unit, more) {
     marker: { symbol: out.map((i) => above(i) ? "triangle-up" : "triangle-down"), size: 10, color: colours().minus },
     text: out.map((i) => plain(dwellName(i)) + ": " + mm(y[i]) + " " + plain(unit)), hovertemplate: "%{text}<extra></extra>", ...more }];
 }
+// The largest of 1, 2, 5, 10, .. and their like that is not above.
+const nice = (value) => { const power = 10 ** Math.floor(Math.log10(value)); return [1, 2, 5, 10].map((k) => k * power).filter((k) => k <= 1.0001 * value).pop(); };
+// What a mean and its interval are, for the pointer.
+const meansTold = (mean, half, unit) => mean.map((m, k) => "bin mean " + digits(m) + (half[k] === null ? "" : " ± " + digits(half[k])) + " " + plain(unit));
 const marker = (look, size, opacity) => ({ color: colours()[look.colour], symbol: look.symbol, size, opacity, line: { width: 1, color: colours()[look.colour] } });

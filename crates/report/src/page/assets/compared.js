@@ -11,7 +11,7 @@ function pairsFigure() {
   doc.recordings.forEach((recording, k) => {
     const own = doc.pairs.filter((p) => p.recording === k);
     data.push({ type: "scatter", mode: "markers", name: plain(recording.name), x: own.map((p) => p.before_mm), y: own.map((p) => p.after_mm),
-      marker: { color: colourOf(k), symbol: symbolOf(k), size: 6, opacity: 0.7 }, text: own.map((p) => plain(nameOf(p))), hovertemplate: "%{text}<br>%{x} to %{y} mm<extra></extra>" });
+      marker: { color: colourOf(k), symbol: symbolOf(k), size: 6, opacity: 0.7 }, text: own.map((p) => plain(nameOf(p))), hovertemplate: "%{text}<br>from %{x:.3~g} to %{y:.3~g} mm<extra></extra>" });
   });
   return { data, layout: layout({ height: 440, showlegend: true, xaxis: axis("error before [mm]", { range: [0, top] }),
     yaxis: axis("error after [mm]", { range: [0, top] }),
@@ -31,7 +31,7 @@ function recordingsFigure() {
   const rows = doc.differences;
   return { data: [{ type: "scatter", mode: "markers", y: rows.map((r) => plain(r.name)), x: rows.map((r) => r.difference_mm), marker: { color: c.bar, size: 9 },
     error_x: { type: "data", symmetric: false, color: c.bar, thickness: 1.6, array: rows.map((r) => r.ci95_mm ? r.ci95_mm[1] - r.difference_mm : 0),
-      arrayminus: rows.map((r) => r.ci95_mm ? r.difference_mm - r.ci95_mm[0] : 0) }, hovertemplate: "%{x:.3f} mm<extra></extra>" }],
+      arrayminus: rows.map((r) => r.ci95_mm ? r.difference_mm - r.ci95_mm[0] : 0) }, hovertemplate: "%{y}: %{x:.3f} mm<extra></extra>" }],
   layout: layout({ height: 90 + 34 * rows.length, margin: { l: 160, r: 14, t: 20, b: 46 }, xaxis: axis("change of the mean error [mm], 95 % interval", { zeroline: true, rangemode: "tozero" }),
     yaxis: axis("", { type: "category", autorange: "reversed" }) }) };
 }

@@ -14,7 +14,7 @@ function live() {
       box.value = name;
       box.addEventListener("change", () => { effect.on = box.checked; refit(); });
       const label = document.createElement("label");
-      label.append(box, " " + name);
+      label.append(box, " " + told(name));
       return label;
     }));
   };
@@ -46,7 +46,7 @@ function live() {
       accepted = own;
       if (wanted) return; // Somebody clicked on.
       $("live-status").textContent = "refitted in " + value.milliseconds.toFixed(0) + " ms";
-      const names = value.shown.effects.join(" + ");
+      const names = value.shown.effects.map(told).join(" + ");
       show(value.shown, names ? "with " + names : "geometry alone");
     } catch (error) {
       if (wanted) return;
@@ -117,7 +117,8 @@ function start() {
   dark.addEventListener("change", redraw);
   window.addEventListener("beforeprint", drawAll);
   printing.addEventListener("change", () => drawAll());
-  for (const said of document.querySelectorAll("#verdict, #do-next, #next li, #missing > ul li")) markCommands(said);
+  for (const said of document.querySelectorAll("#verdict, #do-next li, #next li, #next dd, #next td, #missing > ul li, #warnings-table td")) markCommands(said);
+  document.querySelectorAll("td:not(.hash, .num)").forEach(breakable);
   show(base(), "as calibrated");
   document.documentElement.dataset.ready = "yes";
 }

@@ -12,12 +12,12 @@ function wrapped(text, width) {
 }
 
 // What a step adds, without the shapes of it; many of them by their number.
-const together = (added) => added.length > 3 ? added.length + " effects" : added.map((spec) => spec.split(",")[0]).join(", ");
+const together = (added) => added.length > 3 ? added.length + " effects" : added.map((spec) => told(spec).split(",")[0]).join(", ");
 
 function pathFigure() {
   const c = colours();
   const steps = doc.path.map((k) => doc.refits[k]);
-  const names = steps.map((s, k) => k === 0 ? (doc.own_effects.length ? "with " + doc.own_effects.join(", ") : "geometry")
+  const names = steps.map((s, k) => k === 0 ? (doc.own_effects.length ? "with " + doc.own_effects.map(told).join(", ") : "geometry")
     : "+ " + together(s.added.slice(steps[k - 1].added.length)));
   const means = steps.map((s) => judged(s).fitted_mm.mean);
   if (!steps.includes(view.shown) && !isBase()) {

@@ -17,6 +17,7 @@ function row(cells, tag = "td") {
     const own = cell instanceof Node ? cell : String(cell);
     const box = element(tag);
     box.append(own);
+    breakable(box);
     if (typeof cell === "string" && /^[+−-]?[\d.]+(e-?\d+)?( ?%)?$/.test(cell)) box.className = "num";
     made.append(box);
   }
@@ -26,6 +27,16 @@ function row(cells, tag = "td") {
 // The charts read a little HTML: what could be taken for it is spelt out.
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
+// Places where a long name may break, so that no column is as wide as its longest name and none breaks within a word.
+function breakable(box) {
+  const texts = document.createTreeWalker(box, NodeFilter.SHOW_TEXT), all = [];
+  while (texts.nextNode()) all.push(texts.currentNode);
+  for (const text of all) {
+    const parts = text.data.split(/(?<=[/+,])(?=[A-Za-z])/);
+    if (parts.length > 1) text.replaceWith(...parts.flatMap((part, k) => k ? [document.createElement("wbr"), part] : [part]));
+  }
+}
+
 // Millimetres as armcal writes them: two decimals, more where two would hide what matters.
 function mm(value) {
   if (value === null || value === undefined) return "–";
@@ -33,6 +44,8 @@ function mm(value) {
   const decimals = size >= 0.095 || size < 1e-9 ? 2 : size >= 0.0095 ? 3 : 4;
   return value.toFixed(decimals).replace("-", "−");
 }
+// Three digits that count.
+const digits = (value) => value === null ? "–" : String(Number(value.toPrecision(3))).replace("-", "−");
 // A change, to a thousandth; what rounds to nothing has no sign.
 function signed(value) {
   const text = Math.abs(value).toFixed(3);

@@ -10,14 +10,16 @@ function timeFigure() {
   const place = (k) => [1 - (k + 1) / count + 0.05, 1 - k / count];
   rows.forEach(([column, title], k) => {
     const yaxis = "y" + (k ? k + 1 : "");
+    const what = title.replace(/ \[.*/, "");
     if (!isBase()) data.push({ type: "scatter", mode: "markers", name: "as calibrated", x: x.values, y: first[column],
-      marker: { color: c.ghost, size: pointSize }, hoverinfo: "skip", showlegend: k === 0, yaxis });
+      marker: { color: c.ghost, size: pointSize }, text: indices.map((i) => plain(dwellName(i)) + ", as calibrated"), hovertemplate: hover(x, what, "mm"),
+      showlegend: k === 0, yaxis });
     for (const [held, name, symbol] of [[1, "held out", "circle"], [0, "seen by the fit", "circle-open"]]) {
       const own = indices.filter((i) => now.held_out[i] === held);
       if (!own.length) continue;
       data.push({ type: "scatter", mode: "markers", name: isBase() ? name : view.name + ", " + name, x: own.map((i) => x.values[i]), y: own.map((i) => now[column][i]),
         marker: { color: c.plus, symbol, size: pointSize, opacity: 0.8 }, text: own.map((i) => plain(dwellName(i))),
-        hovertemplate: "%{text}<br>%{y} mm<extra></extra>", showlegend: k === 0, yaxis });
+        hovertemplate: hover(x, what, "mm"), showlegend: k === 0, yaxis });
     }
     const range = rescaled() ? bulk([now[column]]) : bulk([first[column], now[column]]);
     if (column === "error_mm") range[0] = 0;
@@ -26,38 +28,70 @@ function timeFigure() {
   });
   if (extra) {
     const k = rows.length;
-    data.push({ type: "scatter", mode: "markers", x: x.values, y: extra.values, marker: { color: c.minus, size: pointSize - 1 }, showlegend: false, yaxis: "y" + (k + 1), hoverinfo: "y" });
+    data.push({ type: "scatter", mode: "markers", x: x.values, y: extra.values, marker: { color: c.minus, size: pointSize - 1 }, showlegend: false, yaxis: "y" + (k + 1),
+      text: indices.map((i) => plain(dwellName(i))), hovertemplate: hover(x, ...named(extra.label)) });
     more["yaxis" + (k + 1)] = axis(plain(extra.label).replace("load at the tip", "load"), { domain: place(k) });
   }
   more.xaxis = axis(x.label, { anchor: "y" + count });
   const floor = now.noise_floor_mm;
-  return { data, layout: layout({ height: 150 * count + 70, showlegend: true, ...more,
-    shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, dash: "dash" } }] }) };
+  const marks = rows.map((_, k) => beginnings(x, "x", "y" + (k ? k + 1 : ""))).concat(extra ? beginnings(x, "x", "y" + count) : []);
+  const told = { xref: "paper", x: 1, xanchor: "right", y: floor, yanchor: "bottom", text: "noise floor " + mm(floor) + " mm", showarrow: false, font: { size: 11, color: c.floor },
+    bgcolor: c.paper, opacity: 0.85 };
+  return { data, layout: layout({ height: 150 * count + 70, showlegend: true, ...more, annotations: [...marks[0].annotations, told],
+    shapes: [...marks.flatMap((m) => m.shapes), { type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, dash: "dash" } }] }) };
 }
 
-// Arrows stay as long as calibrated errors make them, so that a better model is seen to shorten them.
-const nice = (value) => { const power = 10 ** Math.floor(Math.log10(value)); return [1, 2, 5, 10].map((k) => k * power).filter((k) => k <= value).pop(); };
+// "temperature [°C]" as its name and its unit.
+const named = (label) => label.replace("]", "").split(" [");
+
+// Arrows stay as long as calibrated errors make them, so that a better model is seen to shorten them: enlarged by a round factor,
+// with a round error beside them, as large as the larger ones are, that says how long it is drawn. One far longer than these would
+// shrink the map: it is cut short, and marked.
 function arrowScale(x, y, errors) {
   const known = errors.filter((e) => e !== null).sort((a, b) => a - b);
-  const large = known[Math.floor(0.9 * (known.length - 1))] || 1;
+  const large = Math.max(known[Math.floor(0.9 * (known.length - 1))] || 1, 1e-6);
   const wide = span([x]), high = span([y]);
-  return nice(0.12 * Math.max(wide[1] - wide[0], high[1] - high[0]) / Math.max(large, 1e-6));
+  const extent = Math.max(wide[1] - wide[0], high[1] - high[0]);
+  return { factor: nice(0.2 * extent / large), sample: nice(large), longest: 0.4 * extent };
 }
 
-function arrows(x, y, dx, dy, own, title, xlabel, ylabel, scale, cavities) {
+// Lines from their places with a head where they end; `angle` counts from up, clockwise.
+function arrowTraces(from, to, line, head) {
+  const between = (a, b) => a.flatMap((v, i) => [v, b[i], null]);
+  const angle = to.x.map((v, i) => 180 / Math.PI * Math.atan2(v - from.x[i], to.y[i] - from.y[i]));
+  return [
+    { type: "scatter", mode: "lines", x: between(from.x, to.x), y: between(from.y, to.y), line, hoverinfo: "skip" },
+    { type: "scatter", mode: "markers", ...to, ...head, marker: { symbol: "arrow", angle, ...head.marker } },
+  ];
+}
+
+// The arrow that states the scale, below all that a map shows.
+function sampleArrow(x, y, scale) {
+  const c = colours(), wide = span([x]), high = span([y]);
+  const at = high[0] - 0.1 * Math.max(high[1] - high[0], wide[1] - wide[0]), end = wide[0] + scale.factor * scale.sample;
+  const told = "arrow of this length: " + digits(scale.sample) + " mm";
+  return [...arrowTraces({ x: [wide[0]], y: [at] }, { x: [end], y: [at] }, { color: c.ink, width: 1.6 },
+    { marker: { size: 7, color: c.ink }, text: [told], hovertemplate: "%{text}<extra></extra>" }),
+  { type: "scatter", mode: "text", x: [end], y: [at], text: ["  " + told], textposition: "middle right", textfont: { size: 11, color: c.ink }, hoverinfo: "skip" }];
+}
+
+function arrows(x, y, dx, dy, own, title, xlabel, ylabel, scale, board) {
   const c = colours();
-  const px = [], py = [];
-  for (const i of own) { px.push(x[i], x[i] + scale * dx[i], null); py.push(y[i], y[i] + scale * dy[i], null); }
+  const at = (values) => own.map((i) => values[i]);
+  const drawn = own.map((i) => Math.min(scale.factor, scale.longest / Math.max(Math.hypot(dx[i], dy[i]), 1e-9)));
+  const moved = (places, by) => own.map((i, k) => places[i] + drawn[k] * by[i]);
+  const cut = own.map((_, k) => drawn[k] < scale.factor), short = cut.filter(Boolean).length;
   const errors = own.map((i) => view.shown.error_mm[i]);
   const top = rescaled() ? Math.max(...errors) : Math.max(...own.map((i) => base().error_mm[i]));
   const data = [];
-  if (cavities) data.push({ type: "scatter", mode: "markers", x: cavities[0], y: cavities[1], marker: { symbol: "circle-open", size: 9, color: c.line }, hoverinfo: "skip" });
-  data.push({ type: "scatter", mode: "lines", x: px, y: py, line: { color: c.low, width: 1.4 }, hoverinfo: "skip" });
-  data.push({ type: "scatter", mode: "markers", x: own.map((i) => x[i] + scale * dx[i]), y: own.map((i) => y[i] + scale * dy[i]),
-    marker: { size: 6, color: errors, cmin: 0, cmax: top, colorscale: c.errors, showscale: true,
+  if (board) data.push({ type: "scatter", mode: "markers", x: board.cavities_mm[0], y: board.cavities_mm[1], marker: { symbol: "circle-open", size: 9, color: c.line },
+    text: board.names.map((name) => "cavity " + plain(name)), hovertemplate: "%{text}<extra></extra>" });
+  data.push(...arrowTraces({ x: at(x), y: at(y) }, { x: moved(x, dx), y: moved(y, dy) }, { color: c.low, width: 1.4 }, {
+    marker: { size: 7, line: { color: c.minus, width: cut.map((is) => is ? 3 : 0) }, color: errors, cmin: 0, cmax: top, colorscale: c.errors, showscale: true,
       colorbar: { title: { text: "error [mm]", side: "right", font: { size: 11 } }, thickness: 10, len: 0.9, tickfont: { size: 10 } } },
-    text: own.map((i) => plain(dwellName(i)) + ": " + mm(view.shown.error_mm[i]) + " mm"), hovertemplate: "%{text}<extra></extra>" });
-  return { data, layout: layout({ height: 360, margin: { l: 58, r: 10, t: 40, b: 46 }, title: { text: plain(title), font: { size: 13 }, x: 0.02 },
+    text: own.map((i, k) => plain(dwellName(i)) + ": " + mm(view.shown.error_mm[i]) + " mm, of it " + mm(dx[i]) + " and " + mm(dy[i]) + " mm in this view" + (cut[k] ? " (arrow cut short)" : "")),
+    hovertemplate: "%{text}<extra></extra>" }), ...sampleArrow(at(x), at(y).concat(moved(y, dy)), scale));
+  return { data, layout: layout({ height: 390, margin: { l: 58, r: 10, t: 40, b: 46 }, title: { text: plain(title) + (short ? " (" + short + (short > 1 ? " arrows" : " arrow") + " cut short, orange)" : ""), font: { size: 13 }, x: 0.02 },
     xaxis: axis(xlabel), yaxis: axis(ylabel, { scaleanchor: "x", scaleratio: 1 }) }) };
 }
 
@@ -72,22 +106,22 @@ function mapBoxes() {
   if (doc.boards.length) {
     const seated = indices.filter((i) => d.cavity[i] !== null);
     const scale = arrowScale(seated.map((i) => d.board_mm[0][i]), seated.map((i) => d.board_mm[1][i]), seated.map((i) => base().error_mm[i]));
-    scales.push("on the boards ×" + scale + " (1 mm of error is " + scale + " mm long)");
+    scales.push("×" + scale.factor + " on the boards");
     for (const board of doc.boards) {
       const own = seated.filter((i) => d.recording[i] === board.recording);
       add(() => arrows(d.board_mm[0], d.board_mm[1], view.shown.board_mm[0], view.shown.board_mm[1], own, "board of " + doc.recordings[board.recording],
-        "board x [mm]", "board y [mm]", scale, board.cavities_mm), doc.recordings[board.recording]);
+        "board x [mm]", "board y [mm]", scale, board), doc.recordings[board.recording]);
     }
   }
   const free = indices.filter((i) => d.cavity[i] === null);
   if (free.length) {
     const scale = arrowScale(free.map((i) => d.world_mm[0][i]), free.map((i) => d.world_mm[1][i]), free.map((i) => base().error_mm[i]));
-    scales.push("in space ×" + scale);
+    scales.push("×" + scale.factor + " in space");
     add(() => arrows(d.world_mm[0], d.world_mm[1], view.shown.world_mm[0], view.shown.world_mm[1], free, "free poses from above", "world x [mm]", "world y [mm]", scale), "above");
     add(() => arrows(d.world_mm[0], d.world_mm[2], view.shown.world_mm[0], view.shown.world_mm[2], free, "free poses from the side", "world x [mm]", "world z [mm]", scale), "side");
   }
-  $("map-caption").textContent = "Each line starts at its place and points, enlarged, the way from where the model puts the tip to where it was; the dot is " +
-    "its head. Enlarged " + scales.join(", ") + ". The colour is the size of the whole error.";
+  $("map-caption").textContent = "Each arrow starts at its place and points the way from where the model puts the tip to where it was, as long as the error " +
+    scales.join(" and ") + "; the arrow below a map states its scale. The colour is the size of the whole error, with its part across the view.";
 }
 
 function groupFigure() {
