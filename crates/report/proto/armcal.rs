@@ -723,6 +723,8 @@ pub struct Diagnosis {
     /// Pairs that are the same to these data.
     #[prost(string, repeated, tag = "12")]
     pub cannot_tell_apart: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    #[prost(string, repeated, tag = "13")]
+    pub told: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// An error that no listed effect explains, over what it depends on (topics /armcal/unlisted/1, ...), one message a run.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -802,4 +804,28 @@ pub struct Quality {
     pub recordings: ::prost::alloc::vec::Vec<RecordingQuality>,
     #[prost(message, repeated, tag = "3")]
     pub rejected: ::prost::alloc::vec::Vec<RejectedDwell>,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct EffectRow {
+    #[prost(string, tag = "1")]
+    pub effect: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub left_out_mm: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub probability: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub r#where: ::prost::alloc::string::String,
+    #[prost(string, tag = "5")]
+    pub size: ::prost::alloc::string::String,
+    #[prost(string, tag = "6")]
+    pub name: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct EffectTable {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub found: ::prost::alloc::vec::Vec<EffectRow>,
+    #[prost(message, repeated, tag = "3")]
+    pub candidates: ::prost::alloc::vec::Vec<EffectRow>,
 }

@@ -15,9 +15,12 @@ const MOVED: f64 = 0.3;
 /// Nor is one on which they act by less than this many times what is left.
 const ABOVE_REST: f64 = 1.5;
 
+const DEGREES: &str = "deg";
+/// Up to here an angle counts as small.
+const SMALL_ANGLE_DEG: f64 = 10.0;
 /// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
 const BLUNT: f64 = 5.0;
-/// Rows of joints that fit below each other on a laptop beside other panels.
+/// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
 
 /// What is drawn of a joint, split by direction of arrival.
@@ -44,8 +47,8 @@ impl What {
     fn words(self) -> &'static str {
         match self {
             What::Error => "",
-            What::After => ", rest",
-            What::Effect => ", effects",
+            What::After => " rest",
+            What::Effect => " effects",
         }
     }
 
@@ -58,14 +61,17 @@ impl What {
     }
 }
 
-/// The joints that move the tip in at least one dwell.
+/// The joints that move the tip. An implied error is linear in the angle, so of one that is usually large it says nothing but
+/// that the joint has no leverage, as one that only turns a ball about its middle.
 pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
-    f.joints.iter().filter(|m| !m.reading.is_empty())
+    let usual = |m: &JointErrors| median(&m.error.iter().map(|e| e.abs()).collect::<Vec<_>>());
+    let moves = move |m: &&JointErrors| m.unit != DEGREES || usual(m) < SMALL_ANGLE_DEG;
+    f.joints.iter().filter(|m| !m.reading.is_empty()).filter(moves)
 }
 
 /// Over its angle, where play and eccentricity show.
 pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
-    let title = format!("{}{} by angle", printable(&m.joint), what.words());
+    let title = format!("{}{}", printable(&m.joint), what.words());
     joint_plot(m, &title, ("reading", "reading", &m.unit), what, common_range(f, m, what))
 }
 
@@ -73,7 +79,7 @@ pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
 pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<Content> {
     let span = |m: &JointErrors| m.torque_nm.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
     let largest = f.joints.iter().map(span).fold(0.0, f64::max);
-    let title = format!("{}{} by torque", printable(&m.joint), what.words());
+    let title = format!("{}{}", printable(&m.joint), what.words());
     let torque = ("torque_nm", "gravity torque", "N m");
     (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, common_range(f, m, what)))
 }
@@ -90,15 +96,16 @@ fn joint_plot(
     let arrivals =
         [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
-    let dots_of = |(field, _, label, colour): (&str, i32, &str, Colour)| {
+    let dots_of = |(k, (field, _, label, colour)): (usize, (&str, i32, &str, Colour))| {
+        let label = if k == 0 { format!("arrived {label}") } else { label.to_owned() };
         dots(path(&format!("{field}{}", what.suffix())), label, colour)
     };
     let plot = Plot {
         x_path: path(x),
-        x_label: format!("{x_name} [{x_unit}]; colours: arrived in"),
+        x_label: format!("{x_name} [{x_unit}]"),
         y_label: format!("implied error [{}]", m.unit),
         y_range,
-        series: seen.map(dots_of).collect(),
+        series: seen.enumerate().map(dots_of).collect(),
     };
     Content::plot(title, plot)
 }
@@ -108,18 +115,29 @@ fn joint_plot(
 fn common_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
     let scale = if matches!(what, What::After) { What::Effect } else { what };
     let usual = |m: &JointErrors| median(&m.sigma);
-    let unit = || f.joints.iter().filter(|other| other.unit == m.unit && !other.sigma.is_empty());
+    let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
     let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
     let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
     let beside = unit().filter(|other| if sharp(m) { sharp(other) } else { other.number == m.number });
-    let errors: Vec<f64> = beside.flat_map(|m| scale.whole(m)).map(|e| e.abs()).collect();
-    let large = 1.3 * percentile(&errors, 0.98);
+    // Of each joint by itself: the errors of one are not far points among those of the others.
+    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.98);
+    let large = two_digits_up(1.2 * beside.map(far).fold(0.0, f64::max));
     (large > 0.0).then_some([-large, large])
+}
+
+/// The next number with two digits: an axis ends in it.
+fn two_digits_up(value: f64) -> f64 {
+    let exponent = value.log10().floor();
+    if !exponent.is_finite() {
+        return value;
+    }
+    let step = 10f64.powi(exponent as i32 - 1);
+    format!("{:.1e}", (value / step).ceil() * step).parse().unwrap_or(value)
 }
 
 /// The joints the effects found act on most, each with what they do and what is left. Sizes are counted in the standard
 /// deviations of the dwells, so that joints which hardly move the tip do not lead.
-pub(super) fn what_effects_do(f: &Findings) -> Vec<Content> {
+pub(super) fn what_effects_do(f: &Findings) -> Option<Content> {
     let size = |m: &JointErrors, what: What| {
         let sigmas: Vec<f64> = what.whole(m).iter().zip(&m.sigma).map(|(e, s)| (e / s).abs()).collect();
         percentile(&sigmas, 0.9)
@@ -130,11 +148,12 @@ pub(super) fn what_effects_do(f: &Findings) -> Vec<Content> {
         .filter(|m| effect(m) >= MOVED * largest && effect(m) > ABOVE_REST * size(m, What::After))
         .collect();
     moved.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
-    let row = |m: &JointErrors| {
-        let mut row = vec![over_angle(f, m, What::Effect)];
-        row.extend(over_torque(f, m, What::Effect));
-        row.push(over_angle(f, m, What::After));
-        Content::even(Direction::Row, row)
+    let column = |m: &JointErrors| {
+        let mut column = vec![over_angle(f, m, What::Effect)];
+        column.extend(over_torque(f, m, What::Effect));
+        column.push(over_angle(f, m, What::After));
+        Content::even(Direction::Column, column)
     };
-    moved.into_iter().take(SHOWN).map(row).collect()
+    moved.truncate(SHOWN);
+    (!moved.is_empty()).then(|| Content::even(Direction::Row, moved.into_iter().map(column).collect()))
 }

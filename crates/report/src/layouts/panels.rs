@@ -78,9 +78,9 @@ pub(super) fn over_recorded_time(f: &Findings, nominal: bool) -> Content {
     }
     series.push(dots(path("fitted_mm"), "calibrated", ORANGE));
     if !f.course.after_mm.is_empty() {
-        series.push(dots(path("after_mm"), "with what was found", GREEN));
+        series.push(dots(path("after_mm"), "with effects", GREEN));
     }
-    series.push(dots(path("expected_mm"), "noise", PURPLE));
+    series.push(line(path("expected_mm"), "noise", PURPLE));
     Content::plot("Error", course(path("time_min"), series))
 }
 
@@ -89,9 +89,9 @@ pub(super) fn outward(f: &Findings) -> Content {
     let path = |field: &str| format!("/armcal/course.{field}[:]");
     let mut series = vec![dots(path("outward_mm"), "calibrated", ORANGE)];
     if !f.course.effect_outward_mm.is_empty() {
-        series.push(dots(path("effect_outward_mm"), "what was found does", GREEN));
+        series.push(dots(path("effect_outward_mm"), "of effects", GREEN));
     }
-    Content::plot("Error away from the base", course(path("time_min"), series))
+    Content::plot("Error outward", course(path("time_min"), series))
 }
 
 fn course(x_path: String, series: Vec<Series>) -> Plot {
