@@ -66,14 +66,19 @@ impl Story {
 
     /// Whether the result stands, and what the command exits with.
     pub fn status_sentence(&self) -> &'static str {
-        match self.status {
-            Status::Ok => "ok.",
-            Status::Inadequate => {
-                "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
-            }
-            Status::DataLost => {
-                "data lost (exit code 3): a part of the input was not used; the warnings say which."
-            }
+        status_sentence(self.status)
+    }
+}
+
+/// Whether a result of this status stands, and what the command exits with.
+pub(crate) fn status_sentence(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "ok.",
+        Status::Inadequate => {
+            "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
+        }
+        Status::DataLost => {
+            "data lost (exit code 3): a part of the input was not used; the warnings say which."
         }
     }
 }
@@ -88,7 +93,7 @@ fn warnings(run: &Run) -> Vec<(String, Warning)> {
 }
 
 /// Never a verdict of success where the result does not stand.
-fn lamp(verdict: &'static str, status: Status) -> &'static str {
+pub(crate) fn lamp(verdict: &'static str, status: Status) -> &'static str {
     match status {
         Status::Ok => verdict,
         _ if matches!(verdict, "unexplained" | "setup") => verdict,

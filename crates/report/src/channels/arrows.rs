@@ -9,7 +9,7 @@ use crate::run::Run;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 
-const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
+pub(super) const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
 
 /// Longest arrow worth drawing beside an arm [m]; the 95th percentile of a set is kept below.
 const LONG_ARROW_M: f64 = 0.05;

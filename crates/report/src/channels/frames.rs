@@ -19,6 +19,12 @@ pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: standing(begin_ns) });
 }
 
+/// The world alone.
+pub(super) fn put_world(time_ns: i64, out: &mut Messages) {
+    let world = transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity());
+    out.put("/armcal/tf", time_ns, &fox::FrameTransforms { transforms: vec![world] });
+}
+
 /// The world, and the map of boards beside it.
 fn standing(time_ns: i64) -> Vec<fox::FrameTransform> {
     vec![transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity()), board_map(time_ns)]

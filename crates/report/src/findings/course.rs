@@ -3,9 +3,10 @@
 use crate::points::Point;
 use crate::proto::Course;
 use crate::run::Run;
+use std::collections::BTreeMap;
 
 pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
-    let time_min = recorded_min(run, points);
+    let time_min = recorded_min(points);
     let base_m = run.model.base_in_world(&run.calibration.fit.values()).translation.vector;
     let mut m = Course::default();
     for &i in in_time {
@@ -31,26 +32,33 @@ pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
     m
 }
 
-/// When each point was taken, in minutes of recorded time: recordings follow one another in the order of their first
-/// points, without the gaps between them.
-pub(super) fn recorded_min(run: &Run, points: &[Point]) -> Vec<f64> {
-    let mut spans: Vec<(i64, i64, usize)> = (0..run.recordings.len())
-        .filter_map(|r| {
-            let times =
-                || points.iter().map(|p| p.observation).filter(|o| o.dwell.recording == r).map(|o| o.time_ns);
-            Some((times().min()?, times().max()?, r))
-        })
-        .collect();
-    spans.sort_unstable();
-    let mut begins = vec![(0_i64, 0.0); run.recordings.len()];
+/// When each point was taken, in minutes of recorded time.
+pub(super) fn recorded_min(points: &[Point]) -> Vec<f64> {
+    let times: Vec<(usize, i64)> =
+        points.iter().map(|p| (p.observation.dwell.recording, p.observation.time_ns)).collect();
+    without_gaps_min(&times)
+}
+
+/// Minutes of recorded time at times in recordings: these follow one another in the order of their first times, without
+/// the gaps between them.
+pub(crate) fn without_gaps_min(times: &[(usize, i64)]) -> Vec<f64> {
+    let mut spans: BTreeMap<usize, (i64, i64)> = BTreeMap::new();
+    for (recording, time_ns) in times {
+        let span = spans.entry(*recording).or_insert((*time_ns, *time_ns));
+        *span = (span.0.min(*time_ns), span.1.max(*time_ns));
+    }
+    let mut in_time: Vec<(i64, i64, usize)> =
+        spans.into_iter().map(|(r, (first, last))| (first, last, r)).collect();
+    in_time.sort_unstable();
+    let mut begins: BTreeMap<usize, (i64, f64)> = BTreeMap::new();
     let mut elapsed_min = 0.0;
-    for (first_ns, last_ns, r) in spans {
-        begins[r] = (first_ns, elapsed_min);
+    for (first_ns, last_ns, recording) in in_time {
+        begins.insert(recording, (first_ns, elapsed_min));
         elapsed_min += (last_ns - first_ns) as f64 / 60e9;
     }
-    let at = |p: &Point| {
-        let (first_ns, before_min) = begins[p.observation.dwell.recording];
-        before_min + (p.observation.time_ns - first_ns) as f64 / 60e9
+    let at = |(recording, time_ns): &(usize, i64)| {
+        let (first_ns, before_min) = begins.get(recording).copied().unwrap_or_default();
+        before_min + (time_ns - first_ns) as f64 / 60e9
     };
-    points.iter().map(at).collect()
+    times.iter().map(at).collect()
 }

@@ -44,7 +44,7 @@ pub(super) fn joint_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Ve
             Seen { before, after, effect, torque_nm: torque.iter().map(|t| t.total_nm()).collect() }
         })
         .collect();
-    let time_min = recorded_min(run, points);
+    let time_min = recorded_min(points);
     let of_joint = |j: usize| joint(run, j, points, in_time, &seen, &time_min);
     (0..run.model.joint_count()).map(of_joint).collect()
 }

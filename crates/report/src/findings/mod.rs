@@ -12,6 +12,7 @@ mod quality;
 mod steps;
 
 pub(crate) use boards::round_factor;
+pub(crate) use course::without_gaps_min;
 pub(crate) use curves::error_curve;
 
 use crate::points::Point;

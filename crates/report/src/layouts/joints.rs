@@ -19,7 +19,7 @@ const DEGREES: &str = "deg";
 /// Up to here an angle counts as small.
 const SMALL_ANGLE_DEG: f64 = 10.0;
 /// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
-const BLUNT: f64 = 5.0;
+const BLUNT: f64 = 2.5;
 /// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
 

@@ -8,6 +8,7 @@ use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::Run;
 use Direction::{Column, Row};
+use armcal_calibrate::Calibration;
 
 /// Joints of which angle and torque fit side by side in one tab; with more, each has a tab of its own.
 const FEW: usize = 3;
@@ -21,7 +22,7 @@ pub(super) fn content(run: &Run, points: &[Point], f: &Findings) -> Content {
     let curves = (1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve));
     tabs.extend(grid(curves.collect()).map(|panels| ("Unlisted errors", panels)));
     tabs.extend(numbers(f).map(|panels| ("Numbers", panels)));
-    tabs.push(("Parameters", parameters(run)));
+    tabs.push(("Parameters", parameters(&run.calibration)));
     tabs.push(("Data quality", data_quality(run, f)));
     Content::Tabs(tabs)
 }
@@ -124,9 +125,9 @@ fn numbers(f: &Findings) -> Option<Content> {
     Some(Content::Split(Column, panels))
 }
 
-fn parameters(run: &Run) -> Content {
+pub(super) fn parameters(calibration: &Calibration) -> Content {
     let mut panels = vec![(4.0, table("Parameters, old and new", "/armcal/parameter_table.rows"))];
-    if !run.calibration.fit.undetermined.is_empty() {
+    if !calibration.fit.undetermined.is_empty() {
         panels.push((2.5, raw("What the data do not determine", "/armcal/parameters.undetermined")));
     }
     Content::Split(Column, panels)

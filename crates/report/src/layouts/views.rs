@@ -1,7 +1,8 @@
 //! What the 3D panels look at.
 
 use super::spec::View;
-use crate::channels::{board_grid, board_map, cloud, places_m, robots};
+use crate::channels::{board_grid, board_map, closed_places_m, cloud, places_m, robots};
+use crate::closed_chain::ClosedRun;
 use crate::findings::Findings;
 use crate::points::{Point, extent};
 use crate::run::Run;
@@ -50,6 +51,14 @@ pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
         topics,
         robots,
     }
+}
+
+/// Two arms in a closed chain.
+pub(super) fn both_arms(run: &ClosedRun) -> View {
+    let (target_m, distance_m) = sight(&closed_places_m(run));
+    let topics = vec![("/armcal/scene", true), ("/armcal/arms", true), ("/armcal/arrows_calibrated", true)];
+    let (target_m, angles_deg) = (target_m.into(), Some(ANGLES_DEG));
+    View { frame: "world", target_m, distance_m, angles_deg, topics, robots: Vec::new() }
 }
 
 /// Where the camera looks, and from how far all places are just in the picture [m].
