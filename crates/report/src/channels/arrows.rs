@@ -95,14 +95,12 @@ impl Drawing {
     /// The scale in words, above everything; short lines, because a panel cuts what is wider.
     pub fn legend(&self, time_ns: i64) -> Option<fox::SceneEntity> {
         let words = format!(
-            "arrows: from the measured tip to the predicted one\n\
-             nominal errors x {}\n\
-             calibrated errors x {}{}\n\
+            "arrows from the measured tip to the predicted one:\n\
+             nominal errors x {}, calibrated errors x {}\n\
              green {} mm, red {} mm and more\n\
              blue spheres: held out",
             self.nominal_factor,
             self.fitted_factor,
-            if self.found { ", also with what was found" } else { "" },
             crate::text::millimetres(self.small_m),
             crate::text::millimetres(self.large_m)
         );

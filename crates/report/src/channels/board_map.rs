@@ -19,7 +19,7 @@ pub(crate) const FRAME: &str = "board_map";
 
 const INK: Rgba = [0.35, 0.35, 0.35, 1.0];
 /// Sizes as shares of the width of what the panel shows, so that they can be read where it shows all of it.
-const TEXT_HEIGHT: f64 = 0.022;
+const TEXT_HEIGHT: f64 = 0.028;
 const CAVITY_DIAMETER: f64 = 0.004;
 const THICKNESS: f64 = 0.0035;
 /// Share of the arrows that are drawn within the room of their board.

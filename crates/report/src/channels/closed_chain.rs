@@ -46,6 +46,8 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     if let Some(dwell) = run.recordings.iter().flat_map(|r| &r.dwells).next() {
         out.put("/armcal/arms", begin_ns, &arms(run, dwell, begin_ns));
     }
+    let nothing = fox::SceneUpdate { deletions: vec![all(begin_ns)], entities: Vec::new() };
+    out.put("/armcal/arrows_calibrated", begin_ns, &nothing);
     let errors_m: Vec<f64> = calibration.residuals.iter().map(|r| r.fitted_m.norm()).collect();
     let factor = round_factor(LONG_ARROW_M / percentile(&errors_m, 0.95).max(1e-6));
     out.put("/armcal/scene", begin_ns, &scale(run, factor));

@@ -25,7 +25,7 @@ pub(super) const CAVITY_DIAMETER_M: f64 = 0.008;
 const PLATE_M: f64 = 0.004;
 const PLATE_MARGIN_M: f64 = 0.02;
 /// How far the legend is above everything, as a share of its diagonal.
-const ABOVE: f64 = 0.08;
+const ABOVE: f64 = 0.05;
 
 /// Board, points and scale of one recording; replaces those of the recording before.
 pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Drawing, out: &mut Messages) {

@@ -6,7 +6,7 @@ use foxglove::messages as fox;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Height of a line of a label on the screen [pixels].
-const LABEL_PX: f64 = 13.0;
+const LABEL_PX: f64 = 14.0;
 
 /// Red, green, blue, opacity, 0 to 1.
 pub(super) type Rgba = [f64; 4];

@@ -97,7 +97,8 @@ fn joint_plot(
         [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
     let dots_of = |(k, (field, _, label, colour)): (usize, (&str, i32, &str, Colour))| {
-        let label = if k == 0 { format!("arrived {label}") } else { label.to_owned() };
+        let label =
+            if k == 0 && matches!(what, What::Error) { format!("arrived {label}") } else { label.to_owned() };
         dots(path(&format!("{field}{}", what.suffix())), label, colour)
     };
     let plot = Plot {
@@ -111,14 +112,18 @@ fn joint_plot(
 }
 
 /// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
-/// wrist that only turns the tool, would flatten the others. What is left keeps the scale of what the effects do.
+/// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
+/// the same scale.
 fn common_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
-    let scale = if matches!(what, What::After) { What::Effect } else { what };
     let usual = |m: &JointErrors| median(&m.sigma);
     let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
     let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
     let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
-    let beside = unit().filter(|other| if sharp(m) { sharp(other) } else { other.number == m.number });
+    let (scale, shared) = match what {
+        What::Error => (What::Error, sharp(m)),
+        What::After | What::Effect => (What::Effect, false),
+    };
+    let beside = unit().filter(|other| if shared { sharp(other) } else { other.number == m.number });
     // Of each joint by itself: the errors of one are not far points among those of the others.
     let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.98);
     let large = two_digits_up(1.2 * beside.map(far).fold(0.0, f64::max));

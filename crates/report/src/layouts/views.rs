@@ -14,8 +14,8 @@ const PANEL: f64 = 0.8;
 pub(super) const OPENING_DEG: f64 = 45.0;
 /// Nearer than this the camera does not go [m].
 const NEAREST_M: f64 = 0.5;
-/// Around what is there.
-const MARGIN: f64 = 1.08;
+/// Around what is there: half of it is what the lines of a legend need above its place.
+const MARGIN: f64 = 1.14;
 /// Where the camera stands: its angle from the vertical, and its direction about it [deg].
 const ANGLES_DEG: [f64; 2] = [60.0, 45.0];
 
