@@ -1,6 +1,7 @@
 //! What the dwells say about each joint, by direction of arrival.
 
 use super::panels::{BLUE, GREY, VERMILION, dots};
+use super::scale::range;
 use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
 use crate::findings::Findings;
@@ -18,8 +19,6 @@ const ABOVE_REST: f64 = 1.5;
 const DEGREES: &str = "deg";
 /// Up to here an angle counts as small.
 const SMALL_ANGLE_DEG: f64 = 10.0;
-/// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
-const BLUNT: f64 = 2.5;
 /// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
 
@@ -36,7 +35,7 @@ pub(super) enum What {
 
 impl What {
     /// All directions together, for the scale.
-    fn whole(self, m: &JointErrors) -> &[f64] {
+    pub fn whole(self, m: &JointErrors) -> &[f64] {
         match self {
             What::Error => &m.error,
             What::After => &m.error_after,
@@ -72,7 +71,7 @@ pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
 /// Over its angle, where play and eccentricity show.
 pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
     let title = format!("{}{}", printable(&m.joint), what.words());
-    joint_plot(m, &title, ("reading", "reading", &m.unit), what, common_range(f, m, what))
+    joint_plot(m, &title, ("reading", "reading", &m.unit), what, range(f, m, what))
 }
 
 /// Over its torque, where compliance shows; none where gravity hardly loads it.
@@ -81,7 +80,7 @@ pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<C
     let largest = f.joints.iter().map(span).fold(0.0, f64::max);
     let title = format!("{}{}", printable(&m.joint), what.words());
     let torque = ("torque_nm", "gravity torque", "N m");
-    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, common_range(f, m, what)))
+    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, range(f, m, what)))
 }
 
 /// Implied error by direction of arrival against one of the arrays: field, name and unit.
@@ -109,35 +108,6 @@ fn joint_plot(
         series: seen.enumerate().map(dots_of).collect(),
     };
     Content::plot(title, plot)
-}
-
-/// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
-/// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
-/// the same scale.
-fn common_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
-    let usual = |m: &JointErrors| median(&m.sigma);
-    let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
-    let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
-    let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
-    let (scale, shared) = match what {
-        What::Error => (What::Error, sharp(m)),
-        What::After | What::Effect => (What::Effect, false),
-    };
-    let beside = unit().filter(|other| if shared { sharp(other) } else { other.number == m.number });
-    // Of each joint by itself: the errors of one are not far points among those of the others.
-    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.98);
-    let large = two_digits_up(1.2 * beside.map(far).fold(0.0, f64::max));
-    (large > 0.0).then_some([-large, large])
-}
-
-/// The next number with two digits: an axis ends in it.
-fn two_digits_up(value: f64) -> f64 {
-    let exponent = value.log10().floor();
-    if !exponent.is_finite() {
-        return value;
-    }
-    let step = 10f64.powi(exponent as i32 - 1);
-    format!("{:.1e}", (value / step).ceil() * step).parse().unwrap_or(value)
 }
 
 /// The joints the effects found act on most, each with what they do and what is left. Sizes are counted in the standard

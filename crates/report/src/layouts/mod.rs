@@ -10,6 +10,7 @@ mod current;
 mod joints;
 mod legacy;
 mod panels;
+mod scale;
 mod spec;
 mod tabs;
 mod views;
