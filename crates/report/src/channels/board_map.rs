@@ -2,13 +2,14 @@
 //! found. A frame of its own, so that one panel looks straight down on it.
 
 use super::arrows::ramp;
-use super::board_grid::{GAP_M, Grid, PANEL};
+use super::board_grid::{Grid, PANEL};
+use super::board_scale::Scale;
 use super::shapes::{Rgba, arrow, disc, entity, note, text};
 use super::{Messages, run_start_ns};
 use crate::findings::Findings;
 use crate::proto::BoardErrors;
 use crate::run::Run;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use armcal_core::Pose;
 use armcal_core::robust::percentile;
 use foxglove::messages as fox;
@@ -18,17 +19,16 @@ use nalgebra::{Translation3, Vector2, Vector3};
 pub(crate) const FRAME: &str = "board_map";
 
 const INK: Rgba = [0.35, 0.35, 0.35, 1.0];
-/// Sizes as shares of the width of what the panel shows, so that they can be read where it shows all of it.
-const TEXT_HEIGHT: f64 = 0.028;
+/// Sizes as shares of the width of what the panel shows, so that they can be seen where it shows all of it.
 const CAVITY_DIAMETER: f64 = 0.004;
 const THICKNESS: f64 = 0.0035;
 /// Share of the arrows that are drawn within the room of their board.
 const MOST: f64 = 0.95;
-/// Width of a letter over its height.
-const LETTER: f64 = 0.62;
 
 /// One row of vectors on a board, in millimetres.
 struct Vectors<'a> {
+    id: &'static str,
+    /// What its title has behind the name of the recording.
     title: &'static str,
     x_mm: &'a [f64],
     y_mm: &'a [f64],
@@ -40,11 +40,10 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
     let time_ns = run_start_ns(run);
     let grid = grid(findings);
     let (middle_m, [width_m, height_m]) = grid.middle_and_size_m();
-    let longest =
-        findings.boards.iter().flat_map(|b| rows(b).into_iter().map(|v| title(b, &v).chars().count()));
-    let fits_m = grid.cell_m.x / (LETTER * longest.max().unwrap_or(1) as f64);
-    let mut scale = Scale::of(run, findings, width_m.max(PANEL * height_m));
-    scale.text_m = scale.text_m.min(fits_m);
+    let titles: Vec<String> =
+        findings.boards.iter().flat_map(|b| rows(b).into_iter().map(|v| title(b, &v))).collect();
+    let scale = Scale::of(run, findings, width_m.max(PANEL * height_m), (&titles, &grid));
+    let words = scale.words(first.magnification);
     let mut entities = Vec::new();
     for (index, board) in findings.boards.iter().enumerate() {
         for (row, vectors) in rows(board).into_iter().enumerate() {
@@ -58,14 +57,8 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
             ));
         }
     }
-    let words = format!(
-        "errors along the board (measured minus predicted) x {}\ngreen {} mm, red {} mm and more",
-        first.magnification,
-        millimetres(scale.small_m),
-        millimetres(scale.large_m)
-    );
     let mut legend = entity("scale", time_ns);
-    let at_m = Vector3::new(middle_m[0], (grid.cell_m.y + GAP_M) / 2.0, 0.0);
+    let at_m = Vector3::new(middle_m[0], (grid.cell_m.y + grid.gap_m) / 2.0, 0.0);
     legend.texts.push(text(&at_m, scale.text_m, INK, words));
     entities.push(legend);
     for entity in &mut entities {
@@ -81,7 +74,7 @@ pub(crate) fn middle_and_size_m(findings: &Findings) -> ([f64; 3], [f64; 2]) {
 
 fn grid(findings: &Findings) -> Grid {
     let each = findings.boards.first().map_or(1, |b| rows(b).len());
-    Grid::of(findings.boards.len(), each, extent_m(findings) + Vector2::repeat(GAP_M))
+    Grid::of(findings.boards.len(), each, extent_m(findings))
 }
 
 /// Width and height that one board and its arrows take [m]; the largest few arrows may reach into the gap.
@@ -103,9 +96,20 @@ fn extent_m(findings: &Findings) -> Vector2<f64> {
 }
 
 fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
-    let fitted =
-        Vectors { title: "calibrated", x_mm: &b.fitted_x_mm, y_mm: &b.fitted_y_mm, z_mm: &b.fitted_z_mm };
-    let after = Vectors { title: "after", x_mm: &b.after_x_mm, y_mm: &b.after_y_mm, z_mm: &b.after_z_mm };
+    let fitted = Vectors {
+        id: "calibrated",
+        title: "",
+        x_mm: &b.fitted_x_mm,
+        y_mm: &b.fitted_y_mm,
+        z_mm: &b.fitted_z_mm,
+    };
+    let after = Vectors {
+        id: "after",
+        title: ", after",
+        x_mm: &b.after_x_mm,
+        y_mm: &b.after_y_mm,
+        z_mm: &b.after_z_mm,
+    };
     [fitted, after].into_iter().filter(|v| !v.x_mm.is_empty()).collect()
 }
 
@@ -117,7 +121,7 @@ fn map(
     scale: &Scale,
     time_ns: i64,
 ) -> fox::SceneEntity {
-    let mut map = entity(format!("{}/{}", v.title, board.recording_index), time_ns);
+    let mut map = entity(format!("{}/{}", v.id, board.recording_index), time_ns);
     map.metadata.push(note("recording", &board.recording));
     map.metadata.push(note("magnification", board.magnification));
     for i in 0..v.x_mm.len() {
@@ -143,29 +147,5 @@ fn map(
 }
 
 fn title(board: &BoardErrors, v: &Vectors) -> String {
-    format!("{}, {}", printable(&board.recording), v.title)
-}
-
-/// Colours of the map: it starts where the noise ends, and red is the largest calibrated error.
-struct Scale {
-    small_m: f64,
-    large_m: f64,
-    /// Width of what the panel shows [m].
-    width_m: f64,
-    /// Height of text [m].
-    text_m: f64,
-}
-
-impl Scale {
-    fn of(run: &Run, findings: &Findings, width_m: f64) -> Scale {
-        let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 1e-6 };
-        let small_m = positive(run.calibration.noise_floor_m);
-        let largest_mm = findings.course.fitted_mm.iter().copied().fold(0.0, f64::max);
-        Scale {
-            small_m,
-            large_m: (largest_mm * 1e-3).max(3.0 * small_m),
-            width_m,
-            text_m: TEXT_HEIGHT * width_m,
-        }
-    }
+    printable(&board.recording) + v.title
 }

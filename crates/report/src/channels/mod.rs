@@ -41,6 +41,7 @@
 mod arrows;
 pub(crate) mod board_grid;
 pub(crate) mod board_map;
+mod board_scale;
 mod closed_chain;
 mod closed_story;
 pub(crate) mod cloud;

@@ -102,7 +102,7 @@ fn kinds<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
         let end = if name.starts_with("expression:") {
             name.len()
         } else {
-            name.find([':', '@', ',']).unwrap_or(name.len())
+            name.find([':', '@']).unwrap_or(name.len())
         };
         if !kinds.contains(&&name[..end]) {
             kinds.push(&name[..end]);
@@ -135,6 +135,7 @@ mod tests {
         let kinds = |names: &[&str]| kinds(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
         assert_eq!(kinds(&["bearing_compliance:2+bearing_compliance:3"]), "bearing_compliance");
         assert_eq!(kinds(&["compliance:2", "compliance:3", "frame_shift@2.43"]), "compliance or frame_shift");
+        assert_eq!(kinds(&["base_compliance,height=0.1"]), "base_compliance,height=0.1");
         assert_eq!(
             kinds(&["expression:lengths_over_t", "something not listed"]),
             "expression:lengths_over_t or something not listed"

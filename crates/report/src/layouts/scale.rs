@@ -7,6 +7,9 @@ use armcal_core::robust::{median, percentile};
 
 /// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
 const BLUNT: f64 = 2.5;
+/// Share of the errors of a joint that its axis reaches to, and how much further it goes.
+const MOST: f64 = 0.95;
+const ROOM: f64 = 1.3;
 
 /// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
 /// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
@@ -22,8 +25,8 @@ pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2
     };
     let beside = unit().filter(|other| if shared { sharp(other) } else { other.number == m.number });
     // Of each joint by itself: the errors of one are not far points among those of the others.
-    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.98);
-    let large = nice_up(1.2 * beside.map(far).fold(0.0, f64::max));
+    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), MOST);
+    let large = nice_up(ROOM * beside.map(far).fold(0.0, f64::max));
     (large > 0.0).then_some([-large, large])
 }
 

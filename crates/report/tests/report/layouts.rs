@@ -6,7 +6,7 @@ use crate::recording::{Full, get, list, number, own, read, rotation, string, vec
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_report::InputMessages;
 use nalgebra::{Matrix3, Vector3};
-use prost_reflect::{DynamicMessage, Value as Field};
+use prost_reflect::{DynamicMessage, ReflectMessage as _, Value as Field};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -50,16 +50,14 @@ impl Opened {
     }
 
     fn numbers(&self, path: &str) -> Vec<f64> {
+        let number = |v: &Field| v.as_f64().or_else(|| v.as_u32().map(f64::from)).unwrap();
         // The steps are messages, each with its own field.
         if let Some((list, field)) = path.split_once("[1:].") {
             let steps = self.at(list);
-            return steps.as_list().unwrap()[1..]
-                .iter()
-                .map(|s| number(s.as_message().unwrap(), field))
-                .collect();
+            let steps = steps.as_list().unwrap()[1..].iter();
+            return steps.map(|s| number(&get(s.as_message().unwrap(), field))).collect();
         }
-        let numbers = self.at(path);
-        numbers.as_list().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+        self.at(path).as_list().unwrap().iter().map(number).collect()
     }
 }
 
@@ -101,7 +99,8 @@ fn tables_have_rows_and_all_columns_in_the_first() {
             let rows: Vec<&DynamicMessage> =
                 rows.as_list().unwrap().iter().map(|row| row.as_message().unwrap()).collect();
             let absent = |row: &DynamicMessage| {
-                let fields = row.descriptor().fields().filter(|f| f.supports_presence() && !row.has_field(f));
+                let descriptor = row.descriptor();
+                let fields = descriptor.fields().filter(|f| f.supports_presence() && !row.has_field(f));
                 fields.map(|f| f.name().to_owned()).collect::<Vec<_>>()
             };
             let first = absent(rows.first().unwrap_or_else(|| panic!("{path} is empty")));
