@@ -7,8 +7,10 @@ use armcal_core::robust::{median, percentile};
 
 /// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
 const BLUNT: f64 = 2.5;
-/// Share of the errors of a joint that its axis reaches to, and how much further it goes.
+/// Share of the errors of a joint that its axis reaches to, and of what effects do, which has a shape and few far points.
 const MOST: f64 = 0.95;
+const MOST_OF_EFFECTS: f64 = 0.98;
+/// How much further it goes.
 const ROOM: f64 = 1.3;
 
 /// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
@@ -19,13 +21,13 @@ pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2
     let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
     let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
     let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
-    let (scale, shared) = match what {
-        What::Error => (What::Error, sharp(m)),
-        What::After | What::Effect => (What::Effect, false),
+    let (scale, shared, most) = match what {
+        What::Error => (What::Error, sharp(m), MOST),
+        What::After | What::Effect => (What::Effect, false, MOST_OF_EFFECTS),
     };
     let beside = unit().filter(|other| if shared { sharp(other) } else { other.number == m.number });
     // Of each joint by itself: the errors of one are not far points among those of the others.
-    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), MOST);
+    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), most);
     let large = nice_up(ROOM * beside.map(far).fold(0.0, f64::max));
     (large > 0.0).then_some([-large, large])
 }
