@@ -10,12 +10,12 @@
 //! | `/armcal/parameters`, `/armcal/parameter_table`, `/armcal/report`, `/armcal/log` | as for one arm |
 //! | `/armcal/story`, `/armcal/course` | as for one arm, of closing errors |
 //! | `/armcal/scene` | one a run: the scale of the arrows |
-//! | `/armcal/tf` | one a run: the world, which everything is drawn in |
+//! | `/armcal/tf` | one a dwell: both arms link by link, nominal and calibrated |
+//! | `/armcal/right/nominal/robot_description`, ... | one a run: URDF of each arm, whose links are frames of `/armcal/tf` |
 
 use super::arrows::{INK, all};
-use super::scene::{GREEN, GREY, above_m, arm};
 use super::shapes::{Rgba, arrow, entity, label, note};
-use super::{Messages, ResultMessage, closed_story, facts, frames, log};
+use super::{Messages, ResultMessage, closed_arms, closed_story, facts, log};
 use crate::closed_chain::ClosedRun;
 use crate::findings::round_factor;
 use crate::text::conclusion_about;
@@ -23,7 +23,6 @@ use armcal_core::Dwell;
 use armcal_core::robust::percentile;
 use foxglove::messages as fox;
 use foxglove::messages::log::Level;
-use nalgebra::Vector3;
 
 /// The 95th percentile of the closing errors is drawn this long [m].
 const LONG_ARROW_M: f64 = 0.05;
@@ -40,12 +39,8 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     for warning in run.overall_warnings() {
         log::put_warning(&mut out, begin_ns, warning);
     }
-    frames::put_world(begin_ns, &mut out);
     closed_story::put(run, &mut out);
-    // A viewer draws nothing before the first message.
-    if let Some(dwell) = run.recordings.iter().flat_map(|r| &r.dwells).next() {
-        out.put("/armcal/arms", begin_ns, &arms(run, dwell, begin_ns));
-    }
+    closed_arms::put_first(run, &mut out);
     let nothing = fox::SceneUpdate { deletions: vec![all(begin_ns)], entities: Vec::new() };
     out.put("/armcal/arrows_calibrated", begin_ns, &nothing);
     let errors_m: Vec<f64> = calibration.residuals.iter().map(|r| r.fitted_m.norm()).collect();
@@ -59,7 +54,7 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
         for dwell in &recording.dwells {
             let time_ns = dwell.mid_ns();
             out.put("/armcal/dwells", time_ns, &facts::dwell_message(&recording.name, dwell));
-            out.put("/armcal/arms", time_ns, &arms(run, dwell, time_ns));
+            closed_arms::put(run, dwell, time_ns, &mut out);
             put_error(run, &recording.name, dwell, factor, &mut out);
         }
         for open in &recording.open {
@@ -74,42 +69,11 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     out.messages
 }
 
-fn arms(run: &ClosedRun, dwell: &Dwell, time_ns: i64) -> fox::SceneUpdate {
-    let fitted = run.calibration.fit.values();
-    let mut entities = Vec::new();
-    for (index, own) in run.chain.arms().iter().enumerate() {
-        let joint_rad = run.of_arm(index, &dwell.joint_rad);
-        let sets = [("nominal", &run.calibration.nominal_values, GREY), ("calibrated", &fitted, GREEN)];
-        for (which, p, rgba) in sets {
-            let (id, p) = (format!("{}/{which}", own.name), run.chain.of_arm(index, p));
-            entities.push(arm(&id, &own.model, p, rgba, time_ns, joint_rad));
-        }
-    }
-    fox::SceneUpdate { deletions: Vec::new(), entities }
-}
-
-/// Everywhere that the arms go, and the legend above them [m].
-pub(crate) fn closed_places_m(run: &ClosedRun) -> Vec<Vector3<f64>> {
-    let fitted = run.calibration.fit.values();
-    let mut places = Vec::new();
-    for dwell in run.recordings.iter().flat_map(|r| &r.dwells) {
-        for (index, own) in run.chain.arms().iter().enumerate() {
-            let p = run.chain.of_arm(index, &fitted);
-            let base = own.model.base_in_world(p);
-            let frames = own.model.link_frames_in_base(p, run.of_arm(index, &dwell.joint_rad));
-            places.extend(frames.iter().map(|(_, frame)| (base * frame).translation.vector));
-        }
-    }
-    places.retain(|m| m.iter().all(|x| x.is_finite()));
-    places.extend(above_m(&places));
-    places
-}
-
 /// How much the arrows are exaggerated.
 fn scale(run: &ClosedRun, factor: f64) -> fox::SceneUpdate {
     let mut scale = entity("scale", run.start_ns());
     let words = format!("arrow: closing error x {factor}");
-    scale.texts.extend(closed_places_m(run).last().map(|m| label(m, INK, words)));
+    scale.texts.extend(closed_arms::closed_places_m(run).last().map(|m| label(m, INK, words)));
     fox::SceneUpdate { deletions: Vec::new(), entities: vec![scale] }
 }
 

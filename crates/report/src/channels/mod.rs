@@ -42,6 +42,7 @@ mod arrows;
 pub(crate) mod board_grid;
 pub(crate) mod board_map;
 mod board_scale;
+mod closed_arms;
 mod closed_chain;
 mod closed_story;
 pub(crate) mod cloud;
@@ -54,7 +55,8 @@ pub(crate) mod robots;
 mod scene;
 mod shapes;
 
-pub(crate) use closed_chain::{closed_messages, closed_places_m};
+pub(crate) use closed_arms::closed_places_m;
+pub(crate) use closed_chain::closed_messages;
 pub(crate) use findings::{curve_topic, implied_topic};
 pub(crate) use scene::places_m;
 

@@ -121,6 +121,18 @@ fn tables_have_rows_and_all_columns_in_the_first() {
 }
 
 #[test]
+fn parameters_have_the_digits_that_count() {
+    for run in opened() {
+        let rows = run.at("/armcal/parameter_table.rows");
+        for row in rows.as_list().unwrap().iter().map(|row| row.as_message().unwrap()) {
+            let powers = |field: &str| string(row, field).contains("e-");
+            // A power of ten beside an interval that has none would be nothing, told to nine decimals.
+            assert!(powers("interval95") || !(powers("calibrated") || powers("change")), "{row:?}");
+        }
+    }
+}
+
+#[test]
 fn plots_have_points_on_their_scale_and_no_legend_over_them() {
     for run in opened() {
         for config in run.of("Plot") {
