@@ -36,10 +36,11 @@ impl Scale {
         scale
     }
 
-    /// The scale in words.
+    /// The scale in words, in short lines: the longest says how large they can be.
     pub fn words(&self, magnification: f64) -> String {
         format!(
-            "calibrated errors along the board, measured minus predicted, x {magnification}\n\
+            "calibrated errors along the board,\n\
+             measured minus predicted, x {magnification}\n\
              green {} mm, red {} mm and more",
             millimetres(self.small_m),
             millimetres(self.large_m)
