@@ -68,7 +68,18 @@ fn every_path_of_the_layouts_resolves() {
     run_pipeline(&root().join("pipelines/paper.toml"), out.path(), &[0]);
     let titles = layouts_resolve(&python, out.path());
     assert!(titles.iter().any(|t| t == "Errors on the boards, from above"));
-    assert!(!titles.iter().any(|t| t.contains(", effects by")), "nothing was found: {titles:?}");
+    assert!(!titles.iter().any(|t| t.contains(" effects")), "nothing was found: {titles:?}");
+}
+
+#[test]
+fn every_path_of_the_layouts_of_two_arms_resolves() {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    run_pipeline(&root().join("pipelines/two-arms.toml"), out.path(), &[0]);
+    let titles = layouts_resolve(&python, out.path());
+    for title in ["Status", "Closing error: calibrated orange, noise pink", "Parameters, old and new"] {
+        assert!(titles.iter().any(|t| t == title), "no {title} in {titles:?}");
+    }
 }
 
 #[test]
@@ -84,7 +95,7 @@ fn the_layout_of_a_hidden_effect_shows_what_it_does() {
     let summary = run_pipeline(&rig.join("pipeline.toml"), &out, &[0, 3]);
     assert_eq!(summary["diagnosis"]["names"][0], "backlash:1", "{}", summary["diagnosis"]["names"]);
     let titles = layouts_resolve(&python, &out);
-    for title in ["joint1, effects by angle", "joint1, rest by angle"] {
+    for title in ["joint1 effects", "joint1 rest"] {
         assert!(titles.iter().any(|t| t.starts_with(title)), "no {title} in {titles:?}");
     }
 }

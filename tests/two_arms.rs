@@ -112,7 +112,16 @@ fn the_shipped_recording_is_what_its_seed_gives_and_each_arm_gets_its_table_back
     let path = root().join("pipelines/two-arms.toml");
     let (summary, files) = run(&path, &folder.path().join("out"));
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    assert_eq!(names, ["left.toml", "parameters.toml", "right.toml", "run.mcap", "summary.json"]);
+    let expected = [
+        "foxglove-layout-legacy.json",
+        "foxglove-layout.json",
+        "left.toml",
+        "parameters.toml",
+        "right.toml",
+        "run.mcap",
+        "summary.json",
+    ];
+    assert_eq!(names, expected);
     assert_eq!(run(&path, &folder.path().join("again")).1, files, "the same input gives the same bytes");
     for arm in ["right", "left"] {
         let text = String::from_utf8(files[&format!("{arm}.toml")].clone()).expect("text");

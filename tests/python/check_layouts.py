@@ -31,7 +31,6 @@ KEYS = {
     "Table": {"topicPath"},
     "RawMessages": {"topicPath", "diffEnabled", "expansion"},
     "Indicator": {"path", "style", "rules", "fallbackColor", "fallbackLabel"},
-    "StateTransitions": {"paths", "isSynced"},
 }
 LEGACY_NAME = {"3D": "ThreeDee"}
 NUMBERS = {FieldDescriptor.CPPTYPE_INT32, FieldDescriptor.CPPTYPE_INT64, FieldDescriptor.CPPTYPE_UINT32,
@@ -133,6 +132,10 @@ class Resolver:
             values, field, many, whole = self.resolve(config["topicPath"])
             assert field.message_type is not None and whole and not many, f"{config['topicPath']} is no table"
             assert len(values[0][0]) > 0, f"{config['topicPath']} is empty"
+            # The columns are those of the first row.
+            columns = {f.name for f, _ in values[0][0][0].ListFields() if f.has_presence}
+            more = {f.name for row in values[0][0] for f, _ in row.ListFields() if f.has_presence} - columns
+            assert not more, f"{config['topicPath']}: no column {more}"
         elif kind == "RawMessages":
             values, _, _, whole = self.resolve(config["topicPath"])
             assert not whole or len(values[0][0]) > 0, f"{config['topicPath']} is empty"
@@ -145,10 +148,6 @@ class Resolver:
             # What must not be relied upon is red, and nothing else is.
             bad = {"inadequate", "data_lost", "unexplained", "setup"}
             assert {v for v, c in colour.items() if c == colour["inadequate"]} == bad, colour
-        elif kind == "StateTransitions":
-            for path in config["paths"]:
-                _, field, many, whole = self.resolve(path["value"])
-                assert field.message_type is None and not many and not whole, path
         elif kind == "ThreeDee":
             assert set(config["cameraState"]) == CAMERA
             assert config["followTf"] in frames, f"no frame {config['followTf']}"
@@ -163,7 +162,8 @@ class Resolver:
                     assert settings["axisScale"] <= 0.05, "axes of a metre"
                 if schemas[topic] == "foxglove.PointCloud":
                     fields = {f.name for m in self.messages[topic] for f in m.fields}
-                    assert {"x", "y", "z", settings["colorField"]} <= fields, fields
+                    assert settings["colorMode"] == "rgba-fields"
+                    assert {"x", "y", "z", "red", "green", "blue", "alpha"} <= fields, fields
                 # The measured tip is not there before it was seen.
                 if settings["visible"] and schemas[topic] != "foxglove.PoseInFrame":
                     first = min(self.times[t] for t in self.times)

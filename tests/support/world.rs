@@ -169,7 +169,15 @@ pub fn cases() -> Vec<Case> {
     };
     let results = ["result/model.json", "targets.csv"];
     let two = vec!["two.toml", "closed.mcap", "right_arm.toml", "left_arm.toml"];
-    let of_two = ["run.mcap", "summary.json", "parameters.toml", "right.toml", "left.toml"];
+    let of_two = [
+        "run.mcap",
+        "summary.json",
+        "parameters.toml",
+        "foxglove-layout.json",
+        "foxglove-layout-legacy.json",
+        "right.toml",
+        "left.toml",
+    ];
     let simulated = ["normal.mcap", "roll.mcap", "pitch.mcap", "truth.json"];
     let hidden = ["pipeline.toml", "arm.toml", "board.toml"];
     let map = ["map", "--shard", "1/1", "--manifest", "manifest.txt", "--pipeline", "p.toml"];

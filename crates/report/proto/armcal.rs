@@ -723,6 +723,39 @@ pub struct Diagnosis {
     /// Pairs that are the same to these data.
     #[prost(string, repeated, tag = "12")]
     pub cannot_tell_apart: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// The explanations, each with its number before it: panels that show text wrap them.
+    #[prost(string, repeated, tag = "13")]
+    pub told: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+}
+/// An effect as people read it. All in words: a table panel has the columns that its first row has.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct EffectRow {
+    /// Kind of effect.
+    #[prost(string, tag = "1")]
+    pub effect: ::prost::alloc::string::String,
+    /// Mean error on places the fit did not see, without it and with it; empty where that was not worked out.
+    #[prost(string, tag = "2")]
+    pub left_out_mm: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub probability: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub r#where: ::prost::alloc::string::String,
+    /// With its 95 % interval.
+    #[prost(string, tag = "5")]
+    pub size: ::prost::alloc::string::String,
+    /// As `armcal add` takes it; of what was found, all names that these data leave.
+    #[prost(string, tag = "6")]
+    pub name: ::prost::alloc::string::String,
+}
+/// What was found, and all candidates, best first (topic /armcal/effect_table), one message a run that was diagnosed.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct EffectTable {
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: ::core::option::Option<::prost_types::Timestamp>,
+    #[prost(message, repeated, tag = "2")]
+    pub found: ::prost::alloc::vec::Vec<EffectRow>,
+    #[prost(message, repeated, tag = "3")]
+    pub candidates: ::prost::alloc::vec::Vec<EffectRow>,
 }
 /// An error that no listed effect explains, over what it depends on (topics /armcal/unlisted/1, ...), one message a run.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -773,7 +806,7 @@ pub struct RecordingQuality {
     pub damaged: u32,
     #[prost(uint32, tag = "8")]
     pub warnings: u32,
-    /// Absent without a sensor clock.
+    /// Not a number without a sensor clock; absent where no recording of the run has one.
     #[prost(double, optional, tag = "9")]
     pub clock_offset_ms: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "10")]

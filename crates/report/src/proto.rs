@@ -47,6 +47,7 @@ impl_encode!(
     Steps,
     Story,
     Candidates,
+    EffectTable,
     Diagnosis,
     ErrorCurve,
     Quality

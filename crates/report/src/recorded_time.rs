@@ -13,13 +13,18 @@ pub(crate) struct RecordedTime {
 }
 
 impl RecordedTime {
-    /// Of recordings in the order of their first observations. Where one ends and the next begins stands one usual step
-    /// between observations, so that no two of them fall together.
+    /// Of the observations of recordings.
     pub fn of(observations: &[Observation], recordings: usize) -> RecordedTime {
+        RecordedTime::of_times(observations.iter().map(|o| (o.dwell.recording, o.time_ns)), recordings)
+    }
+
+    /// Of times [ns] in recordings, in the order of their first ones. Where one ends and the next begins stands one usual step
+    /// between two times, so that no two of them fall together.
+    pub fn of_times(times: impl IntoIterator<Item = (usize, i64)>, recordings: usize) -> RecordedTime {
         let mut times_ns: Vec<Vec<i64>> = vec![Vec::new(); recordings];
-        for o in observations {
-            if let Some(own) = times_ns.get_mut(o.dwell.recording) {
-                own.push(o.time_ns);
+        for (recording, time_ns) in times {
+            if let Some(own) = times_ns.get_mut(recording) {
+                own.push(time_ns);
             }
         }
         times_ns.iter_mut().for_each(|own| own.sort_unstable());
@@ -40,8 +45,13 @@ impl RecordedTime {
 
     /// Where an observation stands [min].
     pub fn at_min(&self, o: &Observation) -> f64 {
-        let (first_ns, begin_min) = self.begins.get(o.dwell.recording).copied().flatten().unwrap_or_default();
-        begin_min + min(o.time_ns - first_ns)
+        self.time_min(o.dwell.recording, o.time_ns)
+    }
+
+    /// Where a time in a recording stands [min].
+    pub fn time_min(&self, recording: usize, time_ns: i64) -> f64 {
+        let (first_ns, begin_min) = self.begins.get(recording).copied().flatten().unwrap_or_default();
+        begin_min + min(time_ns - first_ns)
     }
 
     /// Between the recordings [min]: nothing that is averaged or drawn as a line reaches across.

@@ -84,13 +84,20 @@ impl Story {
     pub fn status_sentence(&self) -> &'static str {
         match self.status {
             Status::Ok if self.incomplete => "ok (exit code 0), with a model that misses what is said above.",
-            Status::Ok => "ok.",
-            Status::Inadequate => {
-                "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
-            }
-            Status::DataLost => {
-                "data lost (exit code 3): a part of the input was not used; the warnings say which."
-            }
+            status => status_sentence(status),
+        }
+    }
+}
+
+/// Whether a result of this status stands, and what the command exits with.
+pub(crate) fn status_sentence(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "ok.",
+        Status::Inadequate => {
+            "inadequate (exit code 3): the result cannot be trusted as it is, for what is said above."
+        }
+        Status::DataLost => {
+            "data lost (exit code 3): a part of the input was not used; the warnings say which."
         }
     }
 }
@@ -105,7 +112,7 @@ fn warnings(run: &Run) -> Vec<(String, Warning)> {
 }
 
 /// Never a verdict of success where the result does not stand.
-fn lamp(verdict: &'static str, status: Status) -> &'static str {
+pub(crate) fn lamp(verdict: &'static str, status: Status) -> &'static str {
     match status {
         Status::Ok => verdict,
         _ if matches!(verdict, "unexplained" | "setup") => verdict,

@@ -65,6 +65,9 @@ pub fn millimetres(metres: f64) -> String {
     }
 }
 
+/// What four decimals show at least.
+const SMALLEST_SHOWN: f64 = 5e-5;
+
 /// An SI value in the unit shown to people, without the symbol.
 pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
     let shown = unit.to_display(si);
@@ -72,7 +75,7 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
         return "-".into();
     }
     match shown.abs() {
-        a if a != 0.0 && a < 5e-5 => format!("{shown:.1e}"),
+        a if a != 0.0 && a < SMALLEST_SHOWN => format!("{shown:.1e}"),
         a if a >= 1e5 => format!("{shown:.3e}"),
         _ => format!("{shown:.4}"),
     }
@@ -80,9 +83,13 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
 
 /// An estimate in the unit shown to people: nominal value, value, change, half the width of the 95 % interval.
 pub(crate) fn estimate_shown(e: &Estimate) -> [String; 4] {
-    let half = (e.ci95[1] - e.ci95[0]) / 2.0;
-    [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half]
-        .map(|si| in_display_unit(e.parameter.unit, si))
+    let (unit, half) = (e.parameter.unit, (e.ci95[1] - e.ci95[0]) / 2.0);
+    let shown = |si: f64| {
+        // Powers of ten where the interval has none would be digits that do not count.
+        let nothing = unit.to_display(si).abs() < SMALLEST_SHOWN && unit.to_display(half) >= SMALLEST_SHOWN;
+        in_display_unit(unit, if nothing { 0.0 } else { si })
+    };
+    [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half].map(shown)
 }
 
 /// What is to be known of an estimate beside its numbers.

@@ -22,8 +22,8 @@ const PAGE: &str = "report.html";
 const SUMMARY: &str = "summary.json";
 const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
-const LAYOUT: &str = "foxglove-layout.json";
-const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
+pub(crate) const LAYOUT: &str = "foxglove-layout.json";
+pub(crate) const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
 
 /// The `[output]` section of a pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

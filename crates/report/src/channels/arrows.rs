@@ -1,22 +1,19 @@
 //! Error arrows, exaggerated by a stated factor and coloured by size; one topic a model, to be switched on and off.
 
-use super::shapes::{Rgba, arrow, entity, note, text};
+use super::scene::places_m;
+use super::shapes::{Rgba, arrow, entity, label, note};
 use super::{Messages, start_ns, timestamp};
 use crate::findings::round_factor;
-use crate::points::{Point, extent};
+use crate::points::Point;
 use crate::run::Run;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 
-const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
+pub(super) const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
 
 /// Longest arrow worth drawing beside an arm [m]; the 95th percentile of a set is kept below.
 const LONG_ARROW_M: f64 = 0.05;
 const THICKNESS_M: f64 = 0.0025;
-/// Extent of the points that text is sized for at least [m].
-const SMALLEST_M: f64 = 0.2;
-/// Height of the text as a share of the extent of the points: to be read from where all of them are seen.
-const TEXT_HEIGHT: f64 = 0.018;
 
 /// Where an arrow begins and the error it shows: place of the tip, measured minus predicted [m].
 type Error = fn(&Point) -> (Vector3<f64>, Vector3<f64>);
@@ -41,6 +38,8 @@ pub(super) struct Drawing {
     small_m: f64,
     /// Error drawn in red [m].
     large_m: f64,
+    /// Where the scale is told [m]; none where nothing is seen.
+    legend_m: Option<Vector3<f64>>,
 }
 
 /// The arrows of one recording; they replace those of the recording before.
@@ -83,6 +82,8 @@ impl Drawing {
             found: !run.steps.is_empty(),
             small_m,
             large_m: p95_m(&nominal_m).max(10.0 * small_m),
+            // The last of the places is the one of the legend.
+            legend_m: places_m(run, all).pop(),
         }
     }
 
@@ -91,25 +92,20 @@ impl Drawing {
         ramp(self.small_m, self.large_m, error_m)
     }
 
-    /// The scale in words, above the points.
-    pub fn legend(&self, own: &[&Point], time_ns: i64) -> Option<fox::SceneEntity> {
-        let seen: Vec<&Vector3<f64>> =
-            own.iter().map(|p| &p.measured_m).filter(|m| m.iter().all(|x| x.is_finite())).collect();
-        let mut place_m = seen.iter().copied().sum::<Vector3<f64>>() / seen.len() as f64;
-        let (low_m, high_m) = extent(seen.iter().copied().copied())?;
-        place_m.z = high_m.z + 0.1;
+    /// The scale in words, above everything; short lines, because a panel cuts what is wider.
+    pub fn legend(&self, time_ns: i64) -> Option<fox::SceneEntity> {
         let words = format!(
-            "arrows: from the measured tip towards the predicted one\n\
-             nominal errors x {}, calibrated errors{} x {}\n\
-             green {} mm, red {} mm and more; blue spheres are held out",
+            "arrows from the measured tip to the predicted one:\n\
+             nominal errors x {}, calibrated errors x {}\n\
+             green {} mm, red {} mm and more\n\
+             blue spheres: held out",
             self.nominal_factor,
-            if self.found { " and those with what was found" } else { "" },
             self.fitted_factor,
             crate::text::millimetres(self.small_m),
             crate::text::millimetres(self.large_m)
         );
         let mut legend = entity("scale", time_ns);
-        legend.texts.push(text(&place_m, TEXT_HEIGHT * (high_m - low_m).norm().max(SMALLEST_M), INK, words));
+        legend.texts.push(label(&self.legend_m?, INK, words));
         Some(legend)
     }
 }

@@ -2,31 +2,33 @@
 //! found. A frame of its own, so that one panel looks straight down on it.
 
 use super::arrows::ramp;
+use super::board_grid::{Grid, PANEL};
+use super::board_scale::Scale;
 use super::shapes::{Rgba, arrow, disc, entity, note, text};
 use super::{Messages, run_start_ns};
 use crate::findings::Findings;
 use crate::proto::BoardErrors;
 use crate::run::Run;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use armcal_core::Pose;
+use armcal_core::robust::percentile;
 use foxglove::messages as fox;
-use nalgebra::{Translation3, Vector3};
+use nalgebra::{Translation3, Vector2, Vector3};
 
 /// The frame the map lies in: x and y are those of the boards.
 pub(crate) const FRAME: &str = "board_map";
 
 const INK: Rgba = [0.35, 0.35, 0.35, 1.0];
-/// Between two boards [m].
-const GAP_M: f64 = 0.08;
-/// A panel is so many times as wide as high: a map that is less wide leaves room at its sides.
-const WIDE: f64 = 1.6;
-/// Sizes as shares of the width of the map, so that they can be read in a panel that shows all of it.
-const TEXT_HEIGHT: f64 = 0.02;
+/// Sizes as shares of the width of what the panel shows, so that they can be seen where it shows all of it.
 const CAVITY_DIAMETER: f64 = 0.004;
 const THICKNESS: f64 = 0.0035;
+/// Share of the arrows that are drawn within the room of their board.
+const MOST: f64 = 0.95;
 
 /// One row of vectors on a board, in millimetres.
 struct Vectors<'a> {
+    id: &'static str,
+    /// What its title has behind the name of the recording.
     title: &'static str,
     x_mm: &'a [f64],
     y_mm: &'a [f64],
@@ -36,27 +38,28 @@ struct Vectors<'a> {
 pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
     let Some(first) = findings.boards.first() else { return };
     let time_ns = run_start_ns(run);
-    let extent_m = extent_m(findings);
-    let (middle_m, [width_m, height_m]) = middle_and_size_m(findings);
-    let width_m = width_m.max(WIDE * height_m);
-    let scale = Scale::of(run, findings, width_m);
+    let grid = grid(findings);
+    let (middle_m, [width_m, height_m]) = grid.middle_and_size_m();
+    let titles: Vec<String> =
+        findings.boards.iter().flat_map(|b| rows(b).into_iter().map(|v| title(b, &v))).collect();
+    let scale = Scale::of(run, findings, width_m.max(PANEL * height_m), (&titles, &grid));
+    let words = scale.words(first.magnification);
     let mut entities = Vec::new();
-    for (column, board) in findings.boards.iter().enumerate() {
+    for (index, board) in findings.boards.iter().enumerate() {
         for (row, vectors) in rows(board).into_iter().enumerate() {
-            let centre_m =
-                Vector3::new(column as f64 * (extent_m.x + GAP_M), -(row as f64) * (extent_m.y + GAP_M), 0.0);
-            entities.push(map(board, &vectors, &centre_m, extent_m.y / 2.0, &scale, time_ns));
+            entities.push(map(
+                board,
+                &vectors,
+                &grid.centre_m(index, row),
+                grid.cell_m.y / 2.0,
+                &scale,
+                time_ns,
+            ));
         }
     }
-    let words = format!(
-        "errors along the board (measured minus predicted) x {}\ngreen {} mm, red {} mm and more",
-        first.magnification,
-        millimetres(scale.small_m),
-        millimetres(scale.large_m)
-    );
     let mut legend = entity("scale", time_ns);
-    let at_m = Vector3::new(middle_m[0], extent_m.y / 2.0 + GAP_M, 0.0);
-    legend.texts.push(text(&at_m, TEXT_HEIGHT * width_m, INK, words));
+    let at_m = Vector3::new(middle_m[0], (grid.cell_m.y + grid.gap_m) / 2.0, 0.0);
+    legend.texts.push(text(&at_m, scale.text_m, INK, words));
     entities.push(legend);
     for entity in &mut entities {
         entity.frame_id = FRAME.into();
@@ -66,25 +69,47 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
 
 /// Middle of the map, and its width and height [m], for a camera that shows all of it.
 pub(crate) fn middle_and_size_m(findings: &Findings) -> ([f64; 3], [f64; 2]) {
-    let columns = findings.boards.len().max(1) as f64;
-    let rows = findings.boards.first().map_or(1, |b| rows(b).len()).max(1) as f64;
-    let step_m = extent_m(findings) + Vector3::new(GAP_M, GAP_M, 0.0);
-    let middle_m = [(columns - 1.0) * step_m.x / 2.0, GAP_M / 2.0 - (rows - 1.0) * step_m.y / 2.0, 0.0];
-    (middle_m, [columns * step_m.x, rows * step_m.y + GAP_M])
+    grid(findings).middle_and_size_m()
 }
 
-/// Width and height of one board [m].
-fn extent_m(findings: &Findings) -> Vector3<f64> {
-    let large_mm = |v: fn(&BoardErrors) -> &Vec<f64>| {
-        findings.boards.iter().flat_map(v).fold(0.0, |most: f64, x| most.max(x.abs()))
+fn grid(findings: &Findings) -> Grid {
+    let each = findings.boards.first().map_or(1, |b| rows(b).len());
+    Grid::of(findings.boards.len(), each, extent_m(findings))
+}
+
+/// Width and height that one board and its arrows take [m]; the largest few arrows may reach into the gap.
+fn extent_m(findings: &Findings) -> Vector2<f64> {
+    let half_mm = |place: fn(&BoardErrors) -> &[f64], error: fn(&Vectors) -> Vec<f64>| {
+        let mut most: f64 = 0.0;
+        let mut ends = Vec::new();
+        for board in &findings.boards {
+            most = place(board).iter().fold(most, |most, x| most.max(x.abs()));
+            for vectors in rows(board) {
+                let end = |(x, e): (&f64, f64)| (x + e * board.magnification).abs();
+                ends.extend(place(board).iter().zip(error(&vectors)).map(end));
+            }
+        }
+        most.max(percentile(&ends, MOST))
     };
-    Vector3::new(large_mm(|b| &b.x_mm), large_mm(|b| &b.y_mm), 0.0) * 2e-3
+    let (x, y) = (half_mm(|b| &b.x_mm, |v| v.x_mm.to_vec()), half_mm(|b| &b.y_mm, |v| v.y_mm.to_vec()));
+    Vector2::new(x, y) * 2e-3
 }
 
 fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
-    let fitted =
-        Vectors { title: "calibrated", x_mm: &b.fitted_x_mm, y_mm: &b.fitted_y_mm, z_mm: &b.fitted_z_mm };
-    let after = Vectors { title: "after", x_mm: &b.after_x_mm, y_mm: &b.after_y_mm, z_mm: &b.after_z_mm };
+    let fitted = Vectors {
+        id: "calibrated",
+        title: "",
+        x_mm: &b.fitted_x_mm,
+        y_mm: &b.fitted_y_mm,
+        z_mm: &b.fitted_z_mm,
+    };
+    let after = Vectors {
+        id: "after",
+        title: ", after",
+        x_mm: &b.after_x_mm,
+        y_mm: &b.after_y_mm,
+        z_mm: &b.after_z_mm,
+    };
     [fitted, after].into_iter().filter(|v| !v.x_mm.is_empty()).collect()
 }
 
@@ -96,7 +121,7 @@ fn map(
     scale: &Scale,
     time_ns: i64,
 ) -> fox::SceneEntity {
-    let mut map = entity(format!("{}/{}", v.title, board.recording_index), time_ns);
+    let mut map = entity(format!("{}/{}", v.id, board.recording_index), time_ns);
     map.metadata.push(note("recording", &board.recording));
     map.metadata.push(note("magnification", board.magnification));
     for i in 0..v.x_mm.len() {
@@ -116,25 +141,11 @@ fn map(
             ramp(scale.small_m, scale.large_m, error_m),
         ));
     }
-    let title_m = centre_m + Vector3::new(0.0, half_height_m + GAP_M / 3.0, 0.0);
-    let title = format!("{}, {}", printable(&board.recording), v.title);
-    map.texts.push(text(&title_m, TEXT_HEIGHT * scale.width_m, INK, title));
+    let title_m = centre_m + Vector3::new(0.0, half_height_m - scale.text_m, 0.0);
+    map.texts.push(text(&title_m, scale.text_m, INK, title(board, v)));
     map
 }
 
-/// Colours of the map: it starts where the noise ends, and red is the largest calibrated error.
-struct Scale {
-    small_m: f64,
-    large_m: f64,
-    /// Width of what the panel shows [m].
-    width_m: f64,
-}
-
-impl Scale {
-    fn of(run: &Run, findings: &Findings, width_m: f64) -> Scale {
-        let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 1e-6 };
-        let small_m = positive(run.calibration.noise_floor_m);
-        let largest_mm = findings.course.fitted_mm.iter().copied().fold(0.0, f64::max);
-        Scale { small_m, large_m: (largest_mm * 1e-3).max(3.0 * small_m), width_m }
-    }
+fn title(board: &BoardErrors, v: &Vectors) -> String {
+    printable(&board.recording) + v.title
 }

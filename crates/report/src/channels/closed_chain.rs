@@ -7,12 +7,15 @@
 //! | `/armcal/dwells` | one a dwell, the joints of the first arm before those of the second |
 //! | `/armcal/residuals` | one a joined dwell: `measured_m` is where the first arm has the joined point, `predicted_m` the \
 //!   second |
-//! | `/armcal/parameters`, `/armcal/report`, `/armcal/log` | as for one arm |
+//! | `/armcal/parameters`, `/armcal/parameter_table`, `/armcal/report`, `/armcal/log` | as for one arm |
+//! | `/armcal/story`, `/armcal/course` | as for one arm, of closing errors |
+//! | `/armcal/scene` | one a run: the scale of the arrows |
+//! | `/armcal/tf` | one a dwell: both arms link by link, nominal and calibrated |
+//! | `/armcal/right/nominal/robot_description`, ... | one a run: URDF of each arm, whose links are frames of `/armcal/tf` |
 
-use super::arrows::all;
-use super::scene::{GREEN, GREY, arm};
-use super::shapes::{Rgba, arrow, entity, note};
-use super::{Messages, ResultMessage, facts, log};
+use super::arrows::{INK, all};
+use super::shapes::{Rgba, arrow, entity, label, note};
+use super::{Messages, ResultMessage, closed_arms, closed_story, facts, log};
 use crate::closed_chain::ClosedRun;
 use crate::findings::round_factor;
 use crate::text::conclusion_about;
@@ -37,8 +40,13 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     for warning in run.overall_warnings() {
         log::put_warning(&mut out, begin_ns, &names.warning(warning));
     }
+    closed_story::put(run, &mut out);
+    closed_arms::put_first(run, &mut out);
+    let nothing = fox::SceneUpdate { deletions: vec![all(begin_ns)], entities: Vec::new() };
+    out.put("/armcal/arrows_calibrated", begin_ns, &nothing);
     let errors_m: Vec<f64> = calibration.residuals.iter().map(|r| r.fitted_m.norm()).collect();
     let factor = round_factor(LONG_ARROW_M / percentile(&errors_m, 0.95).max(1e-6));
+    out.put("/armcal/scene", begin_ns, &scale(run, factor));
     for recording in &run.recordings {
         let start_ns = recording.dwells.first().map_or(begin_ns, |d| d.start_ns);
         for warning in recording.all_warnings() {
@@ -47,7 +55,7 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
         for dwell in &recording.dwells {
             let time_ns = dwell.mid_ns();
             out.put("/armcal/dwells", time_ns, &facts::dwell_message(&recording.name, dwell));
-            out.put("/armcal/arms", time_ns, &arms(run, dwell));
+            closed_arms::put(run, dwell, time_ns, &mut out);
             put_error(run, &recording.name, dwell, factor, &mut out);
         }
         for open in &recording.open {
@@ -62,18 +70,12 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
     out.messages
 }
 
-fn arms(run: &ClosedRun, dwell: &Dwell) -> fox::SceneUpdate {
-    let fitted = run.calibration.fit.values();
-    let mut entities = Vec::new();
-    for (index, own) in run.chain.arms().iter().enumerate() {
-        let joint_rad = run.of_arm(index, &dwell.joint_rad);
-        let sets = [("nominal", &run.calibration.nominal_values, GREY), ("calibrated", &fitted, GREEN)];
-        for (which, p, rgba) in sets {
-            let (id, p) = (format!("{}/{which}", own.name), run.chain.of_arm(index, p));
-            entities.push(arm(&id, &own.model, p, rgba, dwell.mid_ns(), joint_rad));
-        }
-    }
-    fox::SceneUpdate { deletions: Vec::new(), entities }
+/// How much the arrows are exaggerated.
+fn scale(run: &ClosedRun, factor: f64) -> fox::SceneUpdate {
+    let mut scale = entity("scale", run.start_ns());
+    let words = format!("arrow: closing error x {factor}");
+    scale.texts.extend(closed_arms::closed_places_m(run).last().map(|m| label(m, INK, words)));
+    fox::SceneUpdate { deletions: Vec::new(), entities: vec![scale] }
 }
 
 /// The closing error of a dwell as numbers and as an arrow; an open dwell takes the arrow before it away.

@@ -1,5 +1,6 @@
 //! Errors as a point cloud, one a recording: every measured tip with its errors as fields, for viewers that colour by one.
 
+use super::arrows::Drawing;
 use super::shapes::at;
 use super::{Messages, WORLD, start_ns, timestamp};
 use crate::points::Point;
@@ -10,16 +11,20 @@ use nalgebra::Vector3;
 
 /// Topic of the clouds.
 pub(crate) const TOPIC: &str = "/armcal/errors";
-/// Field that a layout colours by.
-pub(crate) const SHOWN: &str = "calibrated_mm";
 /// Fields, each a 32-bit number: where the tip was [m], and its errors.
-const FIELDS: [&str; 7] = ["x", "y", "z", SHOWN, "nominal_mm", "after_mm", "expected_mm"];
+const FIELDS: [&str; 7] = ["x", "y", "z", "calibrated_mm", "nominal_mm", "after_mm", "expected_mm"];
+/// Fields behind them, each a byte: the colour of the calibrated error, as its arrow has it.
+const COLOUR: [&str; 4] = ["red", "green", "blue", "alpha"];
 const BYTES: u32 = 4;
 
-pub(super) fn put(recording: &RecordingRun, own: &[&Point], out: &mut Messages) {
+pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, out: &mut Messages) {
     let start_ns = start_ns(recording);
     let seen = own.iter().filter(|p| p.measured_m.iter().all(|x| x.is_finite()));
-    let data: Vec<u8> = seen.flat_map(|p| row(p)).flat_map(f32::to_le_bytes).collect();
+    let bytes = |p: &&Point| {
+        let colour = drawing.ramp(p.residual.fitted_m.norm()).map(|part| (255.0 * part).round() as u8);
+        row(p).into_iter().flat_map(f32::to_le_bytes).chain(colour).collect::<Vec<u8>>()
+    };
+    let data: Vec<u8> = seen.flat_map(bytes).collect();
     if data.is_empty() {
         return;
     }
@@ -28,12 +33,18 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], out: &mut Messages) 
         offset: k * BYTES,
         r#type: NumericType::Float32 as i32,
     };
+    let numbers = super::count(FIELDS.len()) * BYTES;
+    let part = |(k, name): (u32, &&str)| fox::PackedElementField {
+        name: (*name).to_owned(),
+        offset: numbers + k,
+        r#type: NumericType::Uint8 as i32,
+    };
     let cloud = fox::PointCloud {
         timestamp: Some(timestamp(start_ns)),
         frame_id: WORLD.into(),
         pose: Some(at(&Vector3::zeros())),
-        point_stride: BYTES * super::count(FIELDS.len()),
-        fields: (0..).zip(&FIELDS).map(field).collect(),
+        point_stride: numbers + super::count(COLOUR.len()),
+        fields: (0..).zip(&FIELDS).map(field).chain((0..).zip(&COLOUR).map(part)).collect(),
         data: data.into(),
     };
     out.put(TOPIC, start_ns, &cloud);

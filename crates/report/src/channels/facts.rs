@@ -182,7 +182,7 @@ fn parameter(e: &Estimate) -> proto::Parameter {
 }
 
 /// The free parameters of a fit as the terminal shows them.
-fn parameter_table(fit: &Fit, time_ns: i64) -> proto::ParameterTable {
+pub(super) fn parameter_table(fit: &Fit, time_ns: i64) -> proto::ParameterTable {
     let row = |e: &Estimate| {
         let [nominal, calibrated, change, half] = estimate_shown(e);
         proto::ParameterRow {

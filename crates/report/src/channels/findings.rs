@@ -26,6 +26,8 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
         out.put("/armcal/diagnosis", begin_ns, &diagnosis);
         let candidates = crate::proto::Candidates { timestamp: stamp(), ..candidates.clone() };
         out.put("/armcal/candidates", begin_ns, &candidates);
+        let effects = crate::proto::EffectTable { timestamp: stamp(), ..f.effects.clone() };
+        out.put("/armcal/effect_table", begin_ns, &effects);
     }
     for (number, curve) in (1..).zip(&f.curves) {
         let message = crate::proto::ErrorCurve { timestamp: stamp(), ..curve.clone() };

@@ -19,9 +19,31 @@ pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: standing(begin_ns) });
 }
 
+/// The world, with nothing in it yet.
+pub(super) fn world(time_ns: i64) -> fox::FrameTransform {
+    transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity())
+}
+
+/// The frames of an arm under a prefix, each in the one before it.
+pub(super) fn arm(
+    model: &Model,
+    prefix: &str,
+    p: &[f64],
+    joint_rad: &[f64],
+    time_ns: i64,
+) -> Vec<fox::FrameTransform> {
+    let mut parent = WORLD.to_owned();
+    let hung = |link: Link| {
+        let transform = transform(time_ns, &parent, &link.name, &link.in_parent);
+        parent = link.name;
+        transform
+    };
+    links(model, prefix, p, joint_rad).into_iter().map(hung).collect()
+}
+
 /// The world, and the map of boards beside it.
 fn standing(time_ns: i64) -> Vec<fox::FrameTransform> {
-    vec![transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity()), board_map(time_ns)]
+    vec![world(time_ns), board_map(time_ns)]
 }
 
 /// The map of boards is a drawing, so where it lies does not matter.
@@ -57,11 +79,7 @@ pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, time_ns: i64, out:
     let fitted = run.calibration.fit.values();
     let mut transforms = standing(time_ns);
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
-        let mut parent = WORLD.to_owned();
-        for link in links(&run.model, prefix, p, &dwell.joint_rad) {
-            transforms.push(transform(time_ns, &parent, &link.name, &link.in_parent));
-            parent = link.name;
-        }
+        transforms.extend(arm(&run.model, prefix, p, &dwell.joint_rad, time_ns));
     }
     if let Some(board) = run.model.board_in_world(&fitted, recording) {
         let name = format!("board/{}", run.recordings[recording].name);

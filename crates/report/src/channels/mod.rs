@@ -26,6 +26,7 @@
 //! | `/armcal/course` | `armcal.Course` | one a run: error over recorded time |
 //! | `/armcal/steps` | `armcal.Steps` | one a run: the falling error |
 //! | `/armcal/diagnosis`, `/armcal/candidates` | `armcal.Diagnosis`, `armcal.Candidates` | one a diagnosed run |
+//! | `/armcal/effect_table` | `armcal.EffectTable` | one a diagnosed run: what was found and the candidates as people read them |
 //! | `/armcal/unlisted/1`, ... | `armcal.ErrorCurve` | one an error without a name |
 //! | `/armcal/quality` | `armcal.Quality` | one a run: clocks, occlusion, dwells not used |
 //! | `/armcal/log` | `foxglove.Log` | warnings and milestones |
@@ -38,8 +39,12 @@
 //! the tip: there it is the sensor's own stamp.
 
 mod arrows;
+pub(crate) mod board_grid;
 pub(crate) mod board_map;
+mod board_scale;
+mod closed_arms;
 mod closed_chain;
+mod closed_story;
 pub(crate) mod cloud;
 mod facts;
 mod findings;
@@ -50,8 +55,10 @@ pub(crate) mod robots;
 mod scene;
 mod shapes;
 
+pub(crate) use closed_arms::closed_places_m;
 pub(crate) use closed_chain::closed_messages;
 pub(crate) use findings::{curve_topic, implied_topic};
+pub(crate) use scene::places_m;
 
 use crate::findings::Findings;
 use crate::points::Point;
@@ -89,7 +96,7 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
         let of_recording: Vec<&Point> =
             points.iter().filter(|p| p.observation.dwell.recording == index).collect();
         paths::put(recording, &of_recording, &mut out);
-        cloud::put(recording, &of_recording, &mut out);
+        cloud::put(recording, &of_recording, &drawing, &mut out);
         scene::standing(run, index, &of_recording, &drawing, &mut out);
         arrows::put(run, index, &of_recording, &drawing, &mut out);
         let shown = || run.posed(recording);

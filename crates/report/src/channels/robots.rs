@@ -7,6 +7,7 @@ use super::shapes::Rgba;
 use super::{Messages, run_start_ns, scene};
 use crate::run::Run;
 use armcal_core::Pose;
+use armcal_model::Model;
 use armcal_table::Board;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::fmt::Write as _;
@@ -33,15 +34,20 @@ pub(super) fn put(run: &Run, out: &mut Messages) {
         say(BOARD, board_urdf(board));
     }
     let Some(dwell) = run.first_posed() else { return };
-    let turned: Vec<f64> = dwell.joint_rad.iter().map(|q| q + TURNED).collect();
     let fitted = run.calibration.fit.values();
     let mut robot = |topic, prefix, p: &[f64], rgba| {
-        let [stands, turned] =
-            [&dwell.joint_rad, &turned].map(|joint_rad| links(&run.model, prefix, p, joint_rad));
-        say(topic, urdf(prefix, &stands, &turned, rgba));
+        say(topic, arm_urdf(&run.model, prefix, p, &dwell.joint_rad, rgba));
     };
     robot(NOMINAL, "nominal", &run.calibration.nominal_values, scene::GREY);
     robot(CALIBRATED, "calibrated", &fitted, scene::GREEN);
+}
+
+/// An arm, whose links are called like its frames under the prefix.
+pub(super) fn arm_urdf(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], rgba: Rgba) -> String {
+    let turned: Vec<f64> = joint_rad.iter().map(|q| q + TURNED).collect();
+    let [stands, turned] = [joint_rad, &turned].map(|joint_rad| links(model, prefix, p, joint_rad));
+    // Viewers make a path of it.
+    urdf(&escaped(&prefix.replace('/', "_")), &stands, &turned, rgba)
 }
 
 /// Plate and cavities in the frame of the board.

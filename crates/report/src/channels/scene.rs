@@ -24,6 +24,8 @@ pub(super) const CAVITY_DIAMETER_M: f64 = 0.008;
 /// The plate under the cavities: thickness, and how far it reaches beyond them.
 const PLATE_M: f64 = 0.004;
 const PLATE_MARGIN_M: f64 = 0.02;
+/// How far the legend is above everything, as a share of its diagonal.
+const ABOVE: f64 = 0.05;
 
 /// Board, points and scale of one recording; replaces those of the recording before.
 pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Drawing, out: &mut Messages) {
@@ -31,7 +33,7 @@ pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Dr
     let mut entities = Vec::new();
     entities.extend(board(run, recording, time_ns));
     entities.push(measured_points(own, time_ns));
-    entities.extend(drawing.legend(own, time_ns));
+    entities.extend(drawing.legend(time_ns));
     out.put("/armcal/scene", time_ns, &fox::SceneUpdate { deletions: vec![all(time_ns)], entities });
 }
 
@@ -49,6 +51,26 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: 
     }
     entities.push(measured);
     out.put("/armcal/arms", time_ns, &fox::SceneUpdate { deletions: Vec::new(), entities });
+}
+
+/// Everywhere that the arm and the measured tips go, and the legend above them [m].
+pub(crate) fn places_m(run: &Run, points: &[Point]) -> Vec<Vector3<f64>> {
+    let fitted = run.calibration.fit.values();
+    let base = run.model.base_in_world(&fitted);
+    let links = run.recordings.iter().flat_map(|r| run.posed(r)).flat_map(|dwell| {
+        let frames = run.model.link_frames_in_base(&fitted, &dwell.joint_rad);
+        frames.into_iter().map(|(_, frame)| (base * frame).translation.vector).collect::<Vec<_>>()
+    });
+    let places = points.iter().map(|p| p.measured_m).chain(links).chain([base.translation.vector]);
+    let mut places: Vec<Vector3<f64>> = places.filter(|m| m.iter().all(|x| x.is_finite())).collect();
+    places.extend(above_m(&places));
+    places
+}
+
+/// Over the middle of places, where nothing is in the way [m].
+pub(super) fn above_m(places: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let (low, high) = extent(places.iter().copied())?;
+    Some(((low + high) / 2.0).xy().push(high.z + ABOVE * (high - low).norm()))
 }
 
 /// Links as lines, joints as spheres, the predicted tip as a smaller one.

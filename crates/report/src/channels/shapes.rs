@@ -5,6 +5,9 @@ use armcal_core::Pose;
 use foxglove::messages as fox;
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Height of a line of a label on the screen [pixels].
+const LABEL_PX: f64 = 14.0;
+
 /// Red, green, blue, opacity, 0 to 1.
 pub(super) type Rgba = [f64; 4];
 
@@ -82,6 +85,11 @@ pub(super) fn text(
         color: Some(colour(rgba)),
         text: words,
     }
+}
+
+/// Text that is as large on the screen wherever the camera stands.
+pub(super) fn label(position_m: &Vector3<f64>, rgba: Rgba, words: String) -> fox::TextPrimitive {
+    fox::TextPrimitive { scale_invariant: true, ..text(position_m, LABEL_PX, rgba, words) }
 }
 
 /// An arrow with its tail at `tail_m` and the tip of its head at `tail_m + along_m`; `None` when that is nowhere.

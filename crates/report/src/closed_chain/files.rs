@@ -5,13 +5,14 @@
 use super::{ClosedRecording, ClosedRun};
 use crate::ReportError;
 use crate::channels::closed_messages;
+use crate::layouts::closed_layouts;
 use crate::mcap_file::{Attachment, write_results};
 use crate::model_file::calibrated;
 use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
 use crate::run::{Status, VERSION};
 use crate::summary::{FitSummary, fit};
 use crate::text::conclusion_about;
-use crate::write::{RUN, at, commit_all, stage};
+use crate::write::{LAYOUT, LAYOUT_LEGACY, RUN, at, commit_all, stage};
 use armcal_calibrate::Residual;
 use armcal_core::Warning;
 use armcal_recording::Recording;
@@ -93,8 +94,9 @@ struct Parameters<'a> {
     frames: Vec<FrameEntry>,
 }
 
-/// Writes `run.mcap` (the inputs' own messages and the result channels), `summary.json`, `parameters.toml` and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into
-/// `out_dir`, which is made if need be; returns their paths. Files of an earlier run are replaced, each at once.
+/// Writes `run.mcap` (the inputs' own messages and the result channels), `summary.json`, `parameters.toml`, Foxglove layouts
+/// and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into `out_dir`, which is made if need be; returns their
+/// paths. Files of an earlier run are replaced, each at once.
 ///
 /// # Errors
 /// A folder or file that cannot be written, a model that its form cannot express.
@@ -103,9 +105,12 @@ pub fn write_closed(
     recordings: &[Recording],
     out_dir: &Path,
 ) -> Result<Vec<PathBuf>, ReportError> {
+    let layouts = closed_layouts(run);
     let mut texts = vec![
         ("summary.json".to_owned(), closed_summary_json(run)?),
         ("parameters.toml".to_owned(), parameters_toml(run)?),
+        (LAYOUT.to_owned(), layouts.current),
+        (LAYOUT_LEGACY.to_owned(), layouts.legacy),
     ];
     let values = run.calibration.fit.values();
     for (index, (arm, text)) in run.chain.arms().iter().zip(&run.model_texts).enumerate() {
@@ -125,7 +130,7 @@ pub fn write_closed(
 /// The files that [`write_closed`] writes into `out_dir`, of arms by name, each with a URDF or a DH file.
 pub fn closed_files<'a>(out_dir: &Path, arms: impl IntoIterator<Item = (&'a str, bool)>) -> Vec<PathBuf> {
     let models = arms.into_iter().map(|(arm, urdf)| format!("{arm}.{}", if urdf { "urdf" } else { "toml" }));
-    let fixed = [RUN, "summary.json", "parameters.toml"].map(str::to_owned);
+    let fixed = [RUN, "summary.json", "parameters.toml", LAYOUT, LAYOUT_LEGACY].map(str::to_owned);
     fixed.into_iter().chain(models).map(|name| out_dir.join(name)).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Errors on each board, in its own frame: a map that a person can hold against the table.
 
 use crate::channels::count;
-use crate::points::Point;
+use crate::points::{Point, extent};
 use crate::proto::BoardErrors;
 use crate::run::Run;
 use armcal_core::robust::percentile;
@@ -11,6 +11,8 @@ use nalgebra::Vector3;
 /// Distances between neighbouring cavities that a large error vector may cover: shorter ones cannot be seen in a panel that
 /// shows all boards.
 const REACH: f64 = 1.5;
+/// Or this share of the board, where cavities are so close that arrows would be dots beside it.
+const ACROSS: f64 = 0.12;
 
 pub(super) fn board_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<BoardErrors> {
     let magnification = magnification(run, points);
@@ -66,7 +68,7 @@ fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnificatio
 }
 
 /// The largest round factor at which the 95th percentile of the calibrated errors stays within [`REACH`] of the
-/// distance between neighbouring cavities.
+/// distance between neighbouring cavities or [`ACROSS`] of the board.
 fn magnification(run: &Run, points: &[Point]) -> f64 {
     let errors_m: Vec<f64> =
         points.iter().filter(|p| drawable(p)).map(|p| p.residual.fitted_m.norm()).collect();
@@ -77,7 +79,8 @@ fn magnification(run: &Run, points: &[Point]) -> f64 {
         others.map(|(_, p)| (p - places[i]).norm()).fold(f64::INFINITY, f64::min)
     };
     let apart: Vec<f64> = (0..places.len()).map(nearest).collect();
-    let reach_m = REACH * percentile(&apart, 0.5);
+    let size_m = extent(places.iter().copied()).map_or(0.0, |(low, high)| (high - low).max());
+    let reach_m = (REACH * percentile(&apart, 0.5)).max(ACROSS * size_m);
     let large_m = percentile(&errors_m, 0.95);
     round_factor(reach_m / large_m)
 }

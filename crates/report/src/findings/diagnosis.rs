@@ -28,6 +28,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         effects: d.effects.iter().map(found).collect(),
         record_next: d.record_next.iter().map(|r| run.in_words(r)).collect(),
         not_testable: not_testable.collect(),
+        told: d.explanations.iter().map(|e| format!("{}: {}", e.number, e.sentence)).collect(),
         explanations: explanations.collect(),
         cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
     }
@@ -71,5 +72,84 @@ fn found(e: &FoundEffect) -> proto::FoundEffect {
         after_mm: finite(e.places.after).map(short),
         rival: e.rival.as_ref().map(|r| r.name.clone()).unwrap_or_default(),
         rival_behind_nats: e.rival.as_ref().and_then(|r| finite(r.behind_nats).map(short)),
+    }
+}
+
+/// What was found and the candidates, each in a row of words: a table panel has the columns that its first row has, and
+/// begins with what comes first.
+pub(super) fn table(d: &Diagnosis) -> proto::EffectTable {
+    let candidates = d.candidates.iter().map(|c| proto::EffectRow {
+        effect: kinds([&c.spec]),
+        left_out_mm: c.holdout_mm.map_or_else(String::new, |h| fall(h.before, h.after)),
+        probability: probability(c.probability),
+        r#where: c.target.clone(),
+        size: sizes(c),
+        name: c.spec.clone(),
+    });
+    let found = d.effects.iter().map(|e| proto::EffectRow {
+        effect: kinds(&e.set),
+        left_out_mm: fall(e.places.before, e.places.after),
+        probability: probability(e.probability),
+        r#where: d.candidates.iter().find(|c| c.spec == e.name).map(|c| c.target.clone()).unwrap_or_default(),
+        size: sizes_of(e),
+        name: e.set.join(" or "),
+    });
+    proto::EffectTable { timestamp: None, found: found.collect(), candidates: candidates.collect() }
+}
+
+/// The kinds of effects, each once: the names of a group are wider than a panel.
+fn kinds<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
+    let mut kinds: Vec<&str> = Vec::new();
+    for name in names {
+        // What a user calls an expression follows a colon too.
+        let end = if name.starts_with("expression:") {
+            name.len()
+        } else {
+            name.find([':', '@']).unwrap_or(name.len())
+        };
+        if !kinds.contains(&&name[..end]) {
+            kinds.push(&name[..end]);
+        }
+    }
+    kinds.join(" or ")
+}
+
+fn fall(before_mm: f64, after_mm: f64) -> String {
+    match before_mm.is_finite() && after_mm.is_finite() {
+        true => format!("{before_mm:.3} -> {after_mm:.3}"),
+        false => String::new(),
+    }
+}
+
+fn probability(p: f64) -> String {
+    match p {
+        p if p.is_nan() => String::new(),
+        p if p < 5e-4 => "< 0.001".into(),
+        p => format!("{p:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_and_alternatives_are_called_by_their_kinds() {
+        let kinds = |names: &[&str]| kinds(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
+        assert_eq!(kinds(&["bearing_compliance:2+bearing_compliance:3"]), "bearing_compliance");
+        assert_eq!(kinds(&["compliance:2", "compliance:3", "frame_shift@2.43"]), "compliance or frame_shift");
+        assert_eq!(kinds(&["base_compliance,height=0.1"]), "base_compliance,height=0.1");
+        assert_eq!(
+            kinds(&["expression:lengths_over_t", "something not listed"]),
+            "expression:lengths_over_t or something not listed"
+        );
+    }
+
+    #[test]
+    fn a_small_probability_is_not_none() {
+        assert_eq!(
+            [0.0, 1e-9, 0.02, 1.0, f64::NAN].map(probability),
+            ["< 0.001", "< 0.001", "0.020", "1.000", ""]
+        );
     }
 }

@@ -18,6 +18,9 @@ use crate::points::Point;
 use crate::proto;
 use crate::run::{Run, Undiagnosed};
 
+/// What is less probable than this is not drawn as if it were there.
+const IMPROBABLE: f64 = 0.05;
+
 /// Everything a run found.
 pub(crate) struct Findings {
     /// One entry a joint of the model.
@@ -30,7 +33,9 @@ pub(crate) struct Findings {
     pub steps: proto::Steps,
     /// The verdict (or that the setup comes first), and what it was weighed against; `None` when nobody asked.
     pub diagnosis: Option<(proto::Diagnosis, proto::Candidates)>,
-    /// What no name explains.
+    /// What was found and the candidates as people read them; empty where nothing was looked for.
+    pub effects: proto::EffectTable,
+    /// What no name explains, unless that anything does not have one is improbable.
     pub curves: Vec<proto::ErrorCurve>,
     /// What the data are like.
     pub quality: proto::Quality,
@@ -40,7 +45,8 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
-        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
+        let unlisted =
+            run.diagnosis.iter().flat_map(|d| &d.unlisted).filter(|u| !(u.probability < IMPROBABLE));
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             boards: boards::board_errors(run, points, &in_time),
@@ -51,6 +57,7 @@ impl Findings {
                 None if run.undiagnosed == Some(Undiagnosed::NotAsked) => None,
                 None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
             },
+            effects: run.diagnosis.as_ref().map(diagnosis::table).unwrap_or_default(),
             curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
             quality: quality::quality(run),
         }

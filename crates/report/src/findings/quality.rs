@@ -6,7 +6,8 @@ use crate::proto::{Quality, RecordingQuality, RejectedDwell};
 use crate::run::{RecordingRun, Run};
 
 pub(super) fn quality(run: &Run) -> Quality {
-    let recordings = run.recordings.iter().map(|r| recording(run, r)).collect();
+    let mut recordings: Vec<RecordingQuality> = run.recordings.iter().map(|r| recording(run, r)).collect();
+    columns_of_all(&mut recordings);
     let rejected = run.recordings.iter().flat_map(|r| {
         r.rejections.iter().map(|rejection| RejectedDwell {
             recording: r.name.clone(),
@@ -15,6 +16,21 @@ pub(super) fn quality(run: &Run) -> Quality {
         })
     });
     Quality { timestamp: None, recordings, rejected: rejected.collect() }
+}
+
+/// A table has the columns of its first row, so what a later recording has must not be absent there: it is no number.
+fn columns_of_all(recordings: &mut [RecordingQuality]) {
+    let clock: [fn(&mut RecordingQuality) -> &mut Option<f64>; 4] = [
+        |r| &mut r.clock_offset_ms,
+        |r| &mut r.clock_offset_sigma_ms,
+        |r| &mut r.clock_drift_ppm,
+        |r| &mut r.clock_correlation,
+    ];
+    for field in clock {
+        if recordings.iter_mut().any(|r| field(r).is_some()) {
+            recordings.iter_mut().for_each(|r| *field(r) = field(r).or(Some(f64::NAN)));
+        }
+    }
 }
 
 fn recording(run: &Run, r: &RecordingRun) -> RecordingQuality {

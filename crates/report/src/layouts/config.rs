@@ -1,6 +1,7 @@
 //! Settings of panels, which both formats share.
 
 use super::spec::{Colour, Kind, Plot, Series, View};
+use super::views::OPENING_DEG;
 use crate::channels::cloud;
 use serde_json::{Map, Value, json};
 
@@ -16,11 +17,6 @@ pub(super) fn config(kind: &Kind) -> Map<String, Value> {
             let rules: Vec<Value> = rules.iter().map(rule).collect();
             json!({ "path": path, "style": "background", "rules": rules,
                     "fallbackColor": "#777777", "fallbackLabel": "waiting for the first message" })
-        }
-        Kind::States(paths) => {
-            let path = |[value, label]: &[&str; 2]| json!({ "value": value, "label": label, "timestampMethod": "receiveTime" });
-            let paths: Vec<Value> = paths.iter().map(path).collect();
-            json!({ "paths": paths, "isSynced": true })
         }
     };
     match value {
@@ -67,8 +63,7 @@ fn view_config(view: &View) -> Value {
         let settings = match *topic {
             t if t.contains("/path_") => json!({ "visible": visible, "type": "line", "lineWidth": 0.001 }),
             cloud::TOPIC => json!({
-                "visible": visible, "pointSize": 8, "pointShape": "circle",
-                "colorMode": "colormap", "colorMap": "turbo", "colorField": cloud::SHOWN,
+                "visible": visible, "pointSize": 7, "pointShape": "circle", "colorMode": "rgba-fields",
             }),
             // Axes of a metre otherwise.
             "/armcal/tip_measured" => json!({ "visible": visible, "axisScale": 0.03 }),
@@ -78,16 +73,17 @@ fn view_config(view: &View) -> Value {
     };
     let topics: Map<String, Value> = view.topics.iter().map(topic).collect();
     let [x, y, z] = view.target_m;
+    let [phi, theta] = view.angles_deg.unwrap_or_default();
     json!({
         "cameraState": {
-            "perspective": !view.from_above,
+            "perspective": view.angles_deg.is_some(),
             "distance": view.distance_m,
-            "phi": if view.from_above { 0.0 } else { 60.0 },
-            "thetaOffset": if view.from_above { 0.0 } else { 45.0 },
+            "phi": phi,
+            "thetaOffset": theta,
             "targetOffset": [x, y, z],
             "target": [0, 0, 0],
             "targetOrientation": [0, 0, 0, 1],
-            "fovy": 45,
+            "fovy": OPENING_DEG,
             "near": 0.01,
             "far": 100,
         },

@@ -41,6 +41,5 @@ fn panel_type(kind: &Kind) -> &'static str {
         Kind::Table(_) => "Table",
         Kind::Raw(_) => "RawMessages",
         Kind::Indicator(..) => "Indicator",
-        Kind::States(_) => "StateTransitions",
     }
 }

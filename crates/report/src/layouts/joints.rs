@@ -1,6 +1,7 @@
 //! What the dwells say about each joint, by direction of arrival.
 
 use super::panels::{BLUE, GREY, VERMILION, dots};
+use super::scale::range;
 use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
 use crate::findings::Findings;
@@ -15,9 +16,10 @@ const MOVED: f64 = 0.3;
 /// Nor is one on which they act by less than this many times what is left.
 const ABOVE_REST: f64 = 1.5;
 
-/// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
-const BLUNT: f64 = 5.0;
-/// Rows of joints that fit below each other on a laptop beside other panels.
+const DEGREES: &str = "deg";
+/// Up to here an angle counts as small.
+const SMALL_ANGLE_DEG: f64 = 10.0;
+/// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
 
 /// What is drawn of a joint, split by direction of arrival.
@@ -33,7 +35,7 @@ pub(super) enum What {
 
 impl What {
     /// All directions together, for the scale.
-    fn whole(self, m: &JointErrors) -> &[f64] {
+    pub fn whole(self, m: &JointErrors) -> &[f64] {
         match self {
             What::Error => &m.error,
             What::After => &m.error_after,
@@ -44,8 +46,8 @@ impl What {
     fn words(self) -> &'static str {
         match self {
             What::Error => "",
-            What::After => ", rest",
-            What::Effect => ", effects",
+            What::After => " rest",
+            What::Effect => " effects",
         }
     }
 
@@ -58,24 +60,27 @@ impl What {
     }
 }
 
-/// The joints that move the tip in at least one dwell.
+/// The joints that move the tip. An implied error is linear in the angle, so of one that is usually large it says nothing but
+/// that the joint has no leverage, as one that only turns a ball about its middle.
 pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
-    f.joints.iter().filter(|m| !m.reading.is_empty())
+    let usual = |m: &JointErrors| median(&m.error.iter().map(|e| e.abs()).collect::<Vec<_>>());
+    let moves = move |m: &&JointErrors| m.unit != DEGREES || usual(m) < SMALL_ANGLE_DEG;
+    f.joints.iter().filter(|m| !m.reading.is_empty()).filter(moves)
 }
 
 /// Over its angle, where play and eccentricity show.
 pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
-    let title = format!("{}{} by angle", printable(&m.joint), what.words());
-    joint_plot(m, &title, ("reading", "reading", &m.unit), what, common_range(f, m, what))
+    let title = format!("{}{}", printable(&m.joint), what.words());
+    joint_plot(m, &title, ("reading", "reading", &m.unit), what, range(f, m, what))
 }
 
 /// Over its torque, where compliance shows; none where gravity hardly loads it.
 pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<Content> {
     let span = |m: &JointErrors| m.torque_nm.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
     let largest = f.joints.iter().map(span).fold(0.0, f64::max);
-    let title = format!("{}{} by torque", printable(&m.joint), what.words());
+    let title = format!("{}{}", printable(&m.joint), what.words());
     let torque = ("torque_nm", "gravity torque", "N m");
-    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, common_range(f, m, what)))
+    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, range(f, m, what)))
 }
 
 /// Implied error by direction of arrival against one of the arrays: field, name and unit.
@@ -90,36 +95,24 @@ fn joint_plot(
     let arrivals =
         [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
-    let dots_of = |(field, _, label, colour): (&str, i32, &str, Colour)| {
+    let dots_of = |(k, (field, _, label, colour)): (usize, (&str, i32, &str, Colour))| {
+        let label =
+            if k == 0 && matches!(what, What::Error) { format!("arrived {label}") } else { label.to_owned() };
         dots(path(&format!("{field}{}", what.suffix())), label, colour)
     };
     let plot = Plot {
         x_path: path(x),
-        x_label: format!("{x_name} [{x_unit}]; colours: arrived in"),
+        x_label: format!("{x_name} [{x_unit}]"),
         y_label: format!("implied error [{}]", m.unit),
         y_range,
-        series: seen.map(dots_of).collect(),
+        series: seen.enumerate().map(dots_of).collect(),
     };
     Content::plot(title, plot)
 }
 
-/// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
-/// wrist that only turns the tool, would flatten the others. What is left keeps the scale of what the effects do.
-fn common_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
-    let scale = if matches!(what, What::After) { What::Effect } else { what };
-    let usual = |m: &JointErrors| median(&m.sigma);
-    let unit = || f.joints.iter().filter(|other| other.unit == m.unit && !other.sigma.is_empty());
-    let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
-    let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
-    let beside = unit().filter(|other| if sharp(m) { sharp(other) } else { other.number == m.number });
-    let errors: Vec<f64> = beside.flat_map(|m| scale.whole(m)).map(|e| e.abs()).collect();
-    let large = 1.3 * percentile(&errors, 0.98);
-    (large > 0.0).then_some([-large, large])
-}
-
 /// The joints the effects found act on most, each with what they do and what is left. Sizes are counted in the standard
 /// deviations of the dwells, so that joints which hardly move the tip do not lead.
-pub(super) fn what_effects_do(f: &Findings) -> Vec<Content> {
+pub(super) fn what_effects_do(f: &Findings) -> Option<Content> {
     let size = |m: &JointErrors, what: What| {
         let sigmas: Vec<f64> = what.whole(m).iter().zip(&m.sigma).map(|(e, s)| (e / s).abs()).collect();
         percentile(&sigmas, 0.9)
@@ -130,11 +123,12 @@ pub(super) fn what_effects_do(f: &Findings) -> Vec<Content> {
         .filter(|m| effect(m) >= MOVED * largest && effect(m) > ABOVE_REST * size(m, What::After))
         .collect();
     moved.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
-    let row = |m: &JointErrors| {
-        let mut row = vec![over_angle(f, m, What::Effect)];
-        row.extend(over_torque(f, m, What::Effect));
-        row.push(over_angle(f, m, What::After));
-        Content::even(Direction::Row, row)
+    let column = |m: &JointErrors| {
+        let mut column = vec![over_angle(f, m, What::Effect)];
+        column.extend(over_torque(f, m, What::Effect));
+        column.push(over_angle(f, m, What::After));
+        Content::even(Direction::Column, column)
     };
-    moved.into_iter().take(SHOWN).map(row).collect()
+    moved.truncate(SHOWN);
+    (!moved.is_empty()).then(|| Content::even(Direction::Row, moved.into_iter().map(column).collect()))
 }

@@ -78,7 +78,7 @@ pub(super) fn over_recorded_time(f: &Findings, nominal: bool) -> Content {
     }
     series.push(dots(path("fitted_mm"), "calibrated", ORANGE));
     if !f.course.after_mm.is_empty() {
-        series.push(dots(path("after_mm"), "with what was found", GREEN));
+        series.push(dots(path("after_mm"), "with effects", GREEN));
     }
     series.push(dots(path("expected_mm"), "noise", PURPLE));
     Content::plot("Error", course(path("time_min"), series))
@@ -89,9 +89,21 @@ pub(super) fn outward(f: &Findings) -> Content {
     let path = |field: &str| format!("/armcal/course.{field}[:]");
     let mut series = vec![dots(path("outward_mm"), "calibrated", ORANGE)];
     if !f.course.effect_outward_mm.is_empty() {
-        series.push(dots(path("effect_outward_mm"), "what was found does", GREEN));
+        series.push(dots(path("effect_outward_mm"), "of effects", GREEN));
     }
-    Content::plot("Error away from the base", course(path("time_min"), series))
+    Content::plot("Error outward", course(path("time_min"), series))
+}
+
+/// Closing errors of two arms, before and after the calibration each on a scale of its own.
+pub(super) fn closing_over_recorded_time() -> Vec<Content> {
+    let path = |field: &str| format!("/armcal/course.{field}[:]");
+    let nominal = vec![dots(path("nominal_mm"), "nominal", GREY)];
+    let fitted =
+        vec![dots(path("fitted_mm"), "calibrated", ORANGE), dots(path("expected_mm"), "noise", PURPLE)];
+    vec![
+        Content::plot("Closing error, nominal", course(path("time_min"), nominal)),
+        Content::plot("Closing error", course(path("time_min"), fitted)),
+    ]
 }
 
 fn course(x_path: String, series: Vec<Series>) -> Plot {

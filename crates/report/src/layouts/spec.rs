@@ -38,8 +38,6 @@ pub(super) enum Kind {
     Raw(String),
     /// A lamp: path, and value, colour and label of each rule.
     Indicator(String, Vec<(&'static str, Colour, &'static str)>),
-    /// Values over time, each with its path and label.
-    States(Vec<[&'static str; 2]>),
 }
 
 /// Arrays of one message against an array of the same message: a plot against time would show the days between recordings.
@@ -73,8 +71,8 @@ pub(super) struct View {
     pub frame: &'static str,
     pub target_m: [f64; 3],
     pub distance_m: f64,
-    /// Straight down, without perspective.
-    pub from_above: bool,
+    /// Angle of the camera from the vertical and about it [deg]; none looks straight down, without perspective.
+    pub angles_deg: Option<[f64; 2]>,
     /// Topics, and whether they are shown at first.
     pub topics: Vec<(&'static str, bool)>,
     /// Topics with the text of a robot, to be switched on.

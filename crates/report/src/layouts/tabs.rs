@@ -8,6 +8,7 @@ use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::Run;
 use Direction::{Column, Row};
+use armcal_calibrate::Calibration;
 
 /// Joints of which angle and torque fit side by side in one tab; with more, each has a tab of its own.
 const FEW: usize = 3;
@@ -21,7 +22,7 @@ pub(super) fn content(run: &Run, points: &[Point], f: &Findings) -> Content {
     let curves = (1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve));
     tabs.extend(grid(curves.collect()).map(|panels| ("Unlisted errors", panels)));
     tabs.extend(numbers(f).map(|panels| ("Numbers", panels)));
-    tabs.push(("Parameters", parameters(run)));
+    tabs.push(("Parameters", parameters(&run.calibration)));
     tabs.push(("Data quality", data_quality(run, f)));
     Content::Tabs(tabs)
 }
@@ -29,12 +30,12 @@ pub(super) fn content(run: &Run, points: &[Point], f: &Findings) -> Content {
 /// What came out and what to do, beside the arm.
 fn overview(run: &Run, points: &[Point], f: &Findings) -> Content {
     let mut right = vec![
-        (1.3, lamp()),
-        (4.0, raw("What came out", "/armcal/story.lines")),
+        (1.0, lamp()),
+        (4.6, raw("What came out", "/armcal/story.lines")),
         (3.0, over_recorded_time(f, true)),
     ];
-    right.extend(falling_error(f).map(|panel| (2.5, panel)));
-    let title = "Nominal arm grey, calibrated arm green, arrows: its errors, enlarged";
+    right.extend(falling_error(f).map(|panel| (2.3, panel)));
+    let title = "Nominal arm grey, calibrated arm green; arrows: calibrated errors";
     let scene = Content::panel(title, Kind::View(world(run, points, f)));
     Content::Split(Row, vec![(1.0, scene), (1.0, Content::Split(Column, right))])
 }
@@ -82,29 +83,33 @@ fn grid(panels: Vec<Content>) -> Option<Content> {
     (!rows.is_empty()).then(|| Content::even(Column, rows))
 }
 
+/// The answer in words and tables, beside pictures of what is not on other tabs already.
 fn what_is_missing(f: &Findings) -> Content {
     let some = |n: usize, share: f64, panel: Content| (n > 0).then_some((share, panel));
-    let (found, next, candidates) = f
-        .diagnosis
-        .as_ref()
-        .map_or((0, 0, 0), |(d, c)| (d.effects.len(), d.record_next.len(), c.candidates.len()));
+    let next = f.diagnosis.as_ref().map_or(0, |(d, _)| d.record_next.len());
+    let (found, candidates) = (f.effects.found.len(), f.effects.candidates.len());
     let answer = [
         Some((2.0, raw("The answer", "/armcal/diagnosis.sentence"))),
-        some(found, 3.0, table("What was found", "/armcal/diagnosis.effects")),
+        some(found, 2.4, table("What was found", "/armcal/effect_table.found")),
         some(
             candidates,
-            4.0,
-            table("Candidates, each on its own, best first", "/armcal/candidates.candidates"),
+            4.6,
+            table("Candidates, each on its own, best first", "/armcal/effect_table.candidates"),
         ),
-        some(next, 2.0, raw("What to record next", "/armcal/diagnosis.record_next")),
+        some(next, 2.6, raw("What to record next", "/armcal/diagnosis.record_next")),
     ];
-    let mut pictures: Vec<Content> = falling_error(f).into_iter().collect();
-    pictures.push(over_recorded_time(f, false));
-    if !f.course.after_mm.is_empty() {
-        pictures.extend(what_effects_do(f));
-    }
     let answer = Content::Split(Column, answer.into_iter().flatten().collect());
-    Content::Split(Row, vec![(1.0, answer), (1.0, Content::even(Column, pictures))])
+    let mut pictures = vec![(1.0, over_recorded_time(f, false))];
+    // An event shows over time; a joint may follow it, but has no part in it.
+    let lasting = f.effects.found.iter().any(|e| !e.name.contains('@'));
+    match what_effects_do(f).filter(|_| lasting) {
+        Some(joints) => pictures.push((3.0, joints)),
+        None => pictures.extend(falling_error(f).map(|panel| (1.0, panel))),
+    }
+    match found {
+        0 => answer,
+        _ => Content::Split(Row, vec![(1.0, answer), (1.0, Content::Split(Column, pictures))]),
+    }
 }
 
 /// The numbers behind the answer; none where nothing was diagnosed.
@@ -112,7 +117,7 @@ fn numbers(f: &Findings) -> Option<Content> {
     let (d, _) = f.diagnosis.as_ref()?;
     let mut panels = vec![(2.0, table("Step by step", "/armcal/steps.steps"))];
     if !d.explanations.is_empty() {
-        panels.push((3.0, table("The numbers, one by one", "/armcal/diagnosis.explanations")));
+        panels.push((3.5, raw("The numbers, one by one", "/armcal/diagnosis.told")));
     }
     if !d.not_testable.is_empty() {
         panels.push((2.0, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
@@ -120,21 +125,19 @@ fn numbers(f: &Findings) -> Option<Content> {
     Some(Content::Split(Column, panels))
 }
 
-fn parameters(run: &Run) -> Content {
+pub(super) fn parameters(calibration: &Calibration) -> Content {
     let mut panels = vec![(4.0, table("Parameters, old and new", "/armcal/parameter_table.rows"))];
-    if !run.calibration.fit.undetermined.is_empty() {
-        panels.push((1.0, raw("What the data do not determine", "/armcal/parameters.undetermined")));
+    if !calibration.fit.undetermined.is_empty() {
+        panels.push((2.5, raw("What the data do not determine", "/armcal/parameters.undetermined")));
     }
     Content::Split(Column, panels)
 }
 
 fn data_quality(run: &Run, f: &Findings) -> Content {
-    let states = vec![["/armcal/assignments.recording", "recording"], ["/armcal/assignments.used", "used"]];
     let mut panels = vec![(2.0, table("Recordings and their clocks", "/armcal/quality.recordings"))];
     if !f.quality.rejected.is_empty() {
         panels.push((2.0, table("Dwells that were not used", "/armcal/quality.rejected")));
     }
-    panels.push((1.5, Content::panel("Dwells used, over time", Kind::States(states))));
     if f.quality.recordings.iter().any(|r| r.warnings > 0) || !run.overall_warnings().is_empty() {
         panels.push((3.0, raw("Warnings, the gravest first", "/armcal/story.warnings")));
     }

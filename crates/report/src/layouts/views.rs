@@ -1,33 +1,28 @@
 //! What the 3D panels look at.
 
 use super::spec::View;
-use crate::channels::{board_map, cloud, robots};
+use crate::channels::{board_grid, board_map, closed_places_m, cloud, places_m, robots};
+use crate::closed_chain::ClosedRun;
 use crate::findings::Findings;
 use crate::points::{Point, extent};
 use crate::run::Run;
+use nalgebra::{Matrix3, Vector3};
 
-/// From how many diagonals of what is there the camera looks at it: with its opening of 45 degrees all of it is seen.
-const AWAY: f64 = 1.1;
-/// Around a map.
-const MARGIN: f64 = 1.05;
-/// Width of the map's panel over its height on a laptop; a wider one shows more at the sides.
-const PANEL: f64 = 2.2;
+/// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides.
+const PANEL: f64 = 0.8;
+/// Opening of the camera from top to bottom [deg].
+pub(super) const OPENING_DEG: f64 = 45.0;
+/// Nearer than this the camera does not go [m].
+const NEAREST_M: f64 = 0.5;
+/// Around what is there: half of it is what the lines of a legend need above its place.
+const MARGIN: f64 = 1.14;
+/// Where the camera stands: its angle from the vertical, and its direction about it [deg].
+const ANGLES_DEG: [f64; 2] = [60.0, 45.0];
 
 /// The arm and the points it visited.
 pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
-    let fitted = run.calibration.fit.values();
-    let base = run.model.base_in_world(&fitted);
-    let arm =
-        run.first_posed().map_or_else(Vec::new, |d| run.model.link_frames_in_base(&fitted, &d.joint_rad));
-    let links = arm.iter().map(|(_, frame)| (base * frame).translation.vector);
-    let places = points
-        .iter()
-        .map(|p| p.measured_m)
-        .chain(links)
-        .chain([base.translation.vector])
-        .filter(|m| m.iter().all(|x| x.is_finite()));
-    let (low, high) = extent(places).unwrap_or_default();
-    let (target_m, distance_m) = ((low + high) / 2.0, (AWAY * (high - low).norm()).clamp(0.5, 20.0));
+    let places = places_m(run, points);
+    let (target_m, distance_m) = sight(&places);
     let mut topics = vec![
         ("/armcal/scene", true),
         ("/armcal/arms", true),
@@ -46,8 +41,43 @@ pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
         // It has a frame of its own and would lie on the floor here.
         topics.push(("/armcal/board_map", false));
     }
-    let robots = if arm.is_empty() { Vec::new() } else { vec![robots::NOMINAL, robots::CALIBRATED] };
-    View { frame: "world", target_m: target_m.into(), distance_m, from_above: false, topics, robots }
+    let posed = run.first_posed().is_some();
+    let robots = if posed { vec![robots::NOMINAL, robots::CALIBRATED] } else { Vec::new() };
+    View {
+        frame: "world",
+        target_m: target_m.into(),
+        distance_m,
+        angles_deg: Some(ANGLES_DEG),
+        topics,
+        robots,
+    }
+}
+
+/// Two arms in a closed chain.
+pub(super) fn both_arms(run: &ClosedRun) -> View {
+    let (target_m, distance_m) = sight(&closed_places_m(run));
+    let topics = vec![("/armcal/scene", true), ("/armcal/arms", true), ("/armcal/arrows_calibrated", true)];
+    let (target_m, angles_deg) = (target_m.into(), Some(ANGLES_DEG));
+    View { frame: "world", target_m, distance_m, angles_deg, topics, robots: Vec::new() }
+}
+
+/// Where the camera looks, and from how far all places are just in the picture [m].
+fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
+    let [phi, theta] = ANGLES_DEG.map(f64::to_radians);
+    // The viewers' camera stands in -x and -y for an angle of 45 degrees about the vertical.
+    let towards = Vector3::new(-phi.sin() * theta.sin(), -phi.sin() * theta.cos(), phi.cos());
+    let right = Vector3::z().cross(&towards).normalize();
+    let axes = Matrix3::from_columns(&[right, towards.cross(&right), towards]);
+    let seen: Vec<Vector3<f64>> = places.iter().map(|m| axes.tr_mul(m)).collect();
+    let Some((low, high)) = extent(seen.iter().copied()) else { return (Vector3::zeros(), NEAREST_M) };
+    let middle = (low + high) / 2.0;
+    let half_height = (OPENING_DEG.to_radians() / 2.0).tan() / MARGIN;
+    let from = |m: &Vector3<f64>| {
+        let off = m - middle;
+        off.z + (off.x.abs() / PANEL).max(off.y.abs()) / half_height
+    };
+    let distance_m = seen.iter().map(from).fold(NEAREST_M, f64::max);
+    (axes * middle, distance_m)
 }
 
 /// All boards from above.
@@ -57,8 +87,8 @@ pub(super) fn map(f: &Findings) -> View {
     View {
         frame: board_map::FRAME,
         target_m,
-        distance_m: MARGIN * height_m.max(width_m / PANEL),
-        from_above: true,
+        distance_m: MARGIN * height_m.max(width_m / board_grid::PANEL),
+        angles_deg: None,
         topics,
         robots: Vec::new(),
     }

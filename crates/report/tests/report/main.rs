@@ -11,6 +11,9 @@ mod proto_is_current;
 /// What was found: arrays to plot, maps to look at, layouts that point at them.
 mod findings;
 
+/// Layouts by the keys that the viewers' panels document.
+mod layouts;
+
 /// `run.mcap`: input untouched, every message decodable, pictures in the right place.
 mod recording;
 

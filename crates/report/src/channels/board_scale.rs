@@ -1,0 +1,49 @@
+//! Colours and sizes on the map of the boards.
+
+use super::board_grid::Grid;
+use crate::findings::Findings;
+use crate::run::Run;
+use crate::text::millimetres;
+
+/// Height of text as a share of the width of what the panel shows, where there is room for it.
+const TEXT_HEIGHT: f64 = 0.028;
+/// Width of a letter over its height.
+const LETTER: f64 = 0.62;
+
+/// Green is where the noise ends, and red the largest calibrated error.
+pub(super) struct Scale {
+    pub small_m: f64,
+    pub large_m: f64,
+    /// Width of what the panel shows [m].
+    pub width_m: f64,
+    /// Height of text [m].
+    pub text_m: f64,
+}
+
+impl Scale {
+    /// For a panel that shows `width_m`, and the titles of drawings in a grid.
+    pub fn of(run: &Run, findings: &Findings, width_m: f64, (titles, grid): (&[String], &Grid)) -> Scale {
+        let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 1e-6 };
+        let small_m = positive(run.calibration.noise_floor_m);
+        let largest_mm = findings.course.fitted_mm.iter().copied().fold(0.0, f64::max);
+        let large_m = (largest_mm * 1e-3).max(3.0 * small_m);
+        let mut scale = Scale { small_m, large_m, width_m, text_m: TEXT_HEIGHT * width_m };
+        let fits = |room_m: f64, line: &str| room_m / (LETTER * line.chars().count().max(1) as f64);
+        let words = scale.words(findings.boards.first().map_or(1.0, |b| b.magnification));
+        let lines = words.lines().map(|line| fits(width_m, line));
+        scale.text_m =
+            titles.iter().map(|title| fits(grid.cell_m.x, title)).chain(lines).fold(scale.text_m, f64::min);
+        scale
+    }
+
+    /// The scale in words, in short lines: the longest says how large they can be.
+    pub fn words(&self, magnification: f64) -> String {
+        format!(
+            "calibrated errors along the board,\n\
+             measured minus predicted, x {magnification}\n\
+             green {} mm, red {} mm and more",
+            millimetres(self.small_m),
+            millimetres(self.large_m)
+        )
+    }
+}

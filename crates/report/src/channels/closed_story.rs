@@ -1,0 +1,65 @@
+//! What came out of a run of two arms: in sentences, over recorded time, and as a table.
+
+use super::{Messages, facts};
+use crate::closed_chain::ClosedRun;
+use crate::proto::{Course, Story};
+use crate::recorded_time::RecordedTime;
+use crate::story::{lamp, status_sentence};
+use crate::text::{conclusion_about, printable};
+use armcal_core::Warning;
+
+pub(super) fn put(run: &ClosedRun, out: &mut Messages) {
+    let begin_ns = run.start_ns();
+    let table = facts::parameter_table(&run.calibration.fit, begin_ns);
+    out.put("/armcal/parameter_table", begin_ns, &table);
+    out.put("/armcal/story", begin_ns, &story(run));
+    out.put("/armcal/course", begin_ns, &course(run));
+}
+
+/// Nothing is looked for beyond the geometry of two arms, so nothing is said about what is missing.
+fn story(run: &ClosedRun) -> Story {
+    let status = format!("Status: {}", status_sentence(run.status()));
+    Story {
+        timestamp: facts::time(run.start_ns()),
+        lamp: lamp("not_diagnosed", run.status()).into(),
+        lines: vec![conclusion_about(&run.calibration, "closing error"), status],
+        warnings: warnings(run),
+    }
+}
+
+/// The gravest first.
+fn warnings(run: &ClosedRun) -> Vec<String> {
+    let of_recordings = run.recordings.iter().flat_map(|r| {
+        let told = |w: &Warning| {
+            (w.severity, format!("{}: {}", printable(&r.name), printable(&w.to_string())), w.code)
+        };
+        r.all_warnings().into_iter().map(told).collect::<Vec<_>>()
+    });
+    let overall = run.overall_warnings().into_iter().map(|w| (w.severity, printable(&w.to_string()), w.code));
+    let mut all: Vec<_> = of_recordings.chain(overall).collect();
+    all.sort_by_key(|(severity, ..)| std::cmp::Reverse(*severity));
+    all.into_iter().map(|(severity, text, code)| format!("{}: {text} [{code}]", severity.word())).collect()
+}
+
+/// Closing errors in the order of time.
+fn course(run: &ClosedRun) -> Course {
+    let times: Vec<(usize, i64)> =
+        run.observations.iter().map(|o| (o.dwell().recording, o.arms[0].time_ns)).collect();
+    let time = RecordedTime::of_times(times.iter().copied(), run.recordings.len());
+    let mut in_time: Vec<usize> = (0..run.observations.len().min(run.calibration.residuals.len())).collect();
+    in_time.sort_by_key(|&i| (times[i].1, run.observations[i].dwell()));
+    let mut m = Course { timestamp: facts::time(run.start_ns()), ..Default::default() };
+    for i in in_time {
+        let r = &run.calibration.residuals[i];
+        let norms_m = [r.nominal_m.norm(), r.fitted_m.norm(), r.expected_norm_m];
+        if !norms_m.iter().all(|x| x.is_finite()) {
+            continue;
+        }
+        m.time_min.push(time.time_min(times[i].0, times[i].1));
+        m.recording.extend(run.recordings.get(times[i].0).map(|recording| recording.name.clone()));
+        m.nominal_mm.push(norms_m[0] * 1e3);
+        m.fitted_mm.push(norms_m[1] * 1e3);
+        m.expected_mm.push(norms_m[2] * 1e3);
+    }
+    m
+}

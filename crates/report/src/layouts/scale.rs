@@ -1,0 +1,58 @@
+//! What the axes of joints reach to.
+
+use super::joints::{What, drawn};
+use crate::findings::Findings;
+use crate::proto::JointErrors;
+use armcal_core::robust::{median, percentile};
+
+/// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
+const BLUNT: f64 = 2.5;
+/// Share of the errors of a joint that its axis reaches to, and of what effects do, which has a shape and few far points.
+const MOST: f64 = 0.95;
+const MOST_OF_EFFECTS: f64 = 0.98;
+/// How much further it goes.
+const ROOM: f64 = 1.3;
+
+/// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
+/// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
+/// the same scale.
+pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
+    let usual = |m: &JointErrors| median(&m.sigma);
+    let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
+    let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
+    let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
+    let (scale, shared, most) = match what {
+        What::Error => (What::Error, sharp(m), MOST),
+        What::After | What::Effect => (What::Effect, false, MOST_OF_EFFECTS),
+    };
+    let beside = unit().filter(|other| if shared { sharp(other) } else { other.number == m.number });
+    // Of each joint by itself: the errors of one are not far points among those of the others.
+    let far = |m: &JointErrors| percentile(&scale.whole(m).iter().map(|e| e.abs()).collect::<Vec<_>>(), most);
+    let large = nice_up(ROOM * beside.map(far).fold(0.0, f64::max));
+    (large > 0.0).then_some([-large, large])
+}
+
+/// The next number that an axis ends in without a crowd at its end.
+fn nice_up(value: f64) -> f64 {
+    const ENDS: [&str; 9] = ["1", "1.5", "2", "3", "4", "5", "6", "8", "10"];
+    let exponent = value.log10().floor();
+    if !exponent.is_finite() {
+        return value;
+    }
+    // By its digits, because powers of ten are no floating-point numbers.
+    let ends = ENDS.iter().filter_map(|digits| format!("{digits}e{exponent}").parse::<f64>().ok());
+    ends.into_iter().find(|end| *end >= value).unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_ends_in_a_round_number_above_the_data() {
+        assert_eq!(
+            [0.12, 0.18, 2.0, 2.1, 9e-7, 81.0, 0.0].map(nice_up),
+            [0.15, 0.2, 2.0, 3.0, 1e-6, 100.0, 0.0]
+        );
+    }
+}
