@@ -45,8 +45,7 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
-        let unlisted =
-            run.diagnosis.iter().flat_map(|d| &d.unlisted).filter(|u| !(u.probability < IMPROBABLE));
+        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted).filter(|u| u.probability >= IMPROBABLE);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             boards: boards::board_errors(run, points, &in_time),
