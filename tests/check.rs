@@ -175,7 +175,11 @@ fn a_slipped_encoder_is_named_with_its_joint_and_its_recording() {
         assert!(why.contains("An encoder or a belt slipped") && why.contains("1.00 of 128 teeth"), "{why}");
     }
     assert!(said.last_line().contains("broken: max_holdout_mean_mm"), "{}", said.last_line());
-    assert!(said.last_line().contains("missing zero_slip:2 in `pitch` (zero_slip:2@2)"), "{}", said.last_line());
+    assert!(
+        said.last_line().contains("missing zero_slip:2 in `pitch` (zero_slip:2@2)"),
+        "{}",
+        said.last_line()
+    );
     assert!(said.markdown.contains("An encoder or a belt slipped"));
     // One cause of many broken limits is told once in the terminal.
     assert_eq!(said.stdout.matches("`zero_slip:2@2` at joint2").count(), 1);
