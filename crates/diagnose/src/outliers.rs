@@ -5,8 +5,9 @@ use crate::crossval::{Group, left_out};
 use crate::drivers::standardised_joints;
 use crate::problem::{Columns, DwellRow, Problem};
 use crate::special::chi2_tail;
-use crate::weigh::{Weighed, weigh};
+use crate::weigh::{Entry, Weighed, weigh};
 use armcal_core::robust::median;
+use armcal_model::Toggle;
 use nalgebra::DVector;
 use std::collections::BTreeSet;
 
@@ -56,7 +57,7 @@ pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
 
 /// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a
 /// prediction does not know allowed for: the best of all, which may be a flexible shape and says how the rest scatters, and
-/// the best that have a name. What one of these predicts has a cause, even where another one weighs more while it is in; and
+/// the best lasting ones that have a name. What one of these predicts has a cause, even where another one weighs more while it is in; and
 /// what errs alike under one of them is structure.
 fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| b.0);
@@ -68,7 +69,9 @@ fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
     let rare = |i: usize, square: f64| chi2_tail(square / variance, problem.dwells[i].rows as f64) < limit;
     let mut found: Vec<usize> = (0..square.len()).filter(|i| rare(*i, square[*i])).collect();
     let mut lefts = vec![left];
-    let named = weighed.ranking().into_iter().map(|k| &weighed.entries[k]).take(NAMED);
+    // An event is placed where accidents are: that it predicts them is no sign of a cause.
+    let lasts = |e: &&Entry| !matches!(e.candidate.toggle, Toggle::Time | Toggle::Recording);
+    let named = weighed.ranking().into_iter().map(|k| &weighed.entries[k]).filter(lasts).take(NAMED);
     for entry in named.filter(|e| e.ln_evidence >= config.margin_nats) {
         if found.is_empty() {
             break;
