@@ -80,6 +80,17 @@ pub(crate) fn left_out(
     groups: &[Group],
     scale: f64,
 ) -> DVector<f64> {
+    let [_, left] = fitted_and_left_out(problem, effect, groups, scale);
+    left
+}
+
+/// Residual rows of the fit to all dwells, and those of [`left_out`].
+pub(crate) fn fitted_and_left_out(
+    problem: &Problem,
+    effect: Option<&DMatrix<f64>>,
+    groups: &[Group],
+    scale: f64,
+) -> [DVector<f64>; 2] {
     let geometry = problem.geometry.ncols();
     let extra = effect.map_or(0, |e| e.ncols());
     let mut x = DMatrix::zeros(problem.rows(), geometry + extra);
@@ -129,7 +140,7 @@ pub(crate) fn left_out(
             .filter(|(r, _)| scored.contains(r))
             .for_each(|(r, v)| predicted[*r] = *v);
     }
-    predicted
+    [out, predicted]
 }
 
 /// `(I - H_gg)^-1 r_g`, r the residual of the whole fit: the same number by a small matrix.

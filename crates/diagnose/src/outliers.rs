@@ -1,7 +1,7 @@
 //! Dwells that fit nothing: set aside and reported, never silently (notes 9, DATA SUSPECT).
 
 use crate::config::DiagnosisConfig;
-use crate::crossval::{Group, left_out};
+use crate::crossval::{Group, fitted_and_left_out};
 use crate::drivers::standardised_joints;
 use crate::problem::{Columns, DwellRow, Problem};
 use crate::special::chi2_tail;
@@ -57,8 +57,8 @@ pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
 
 /// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a
 /// prediction does not know allowed for: the best of all, which may be a flexible shape and says how the rest scatters, and
-/// the best lasting ones that have a name. What one of these predicts has a cause, even where another one weighs more while it is in; and
-/// what errs alike under one of them is structure.
+/// the best lasting ones that have a name. What one of these predicts has a cause, even where another one weighs more while
+/// it is in; and what errs alike under one of them is structure.
 fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| b.0);
     let (left, square) = predicted(problem, weighed, best, config);
@@ -94,8 +94,7 @@ fn predicted(
 ) -> (DVector<f64>, Vec<f64>) {
     let effect = explanation.map(|columns| weighed.tamed(columns, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
-    let left = left_out(problem, effect.as_ref(), &alone, weighed.scale);
-    let fitted = left_out(problem, effect.as_ref(), &[], weighed.scale);
+    let [fitted, left] = fitted_and_left_out(problem, effect.as_ref(), &alone, weighed.scale);
     let square = studentised(problem, &left, &fitted);
     (left, square)
 }

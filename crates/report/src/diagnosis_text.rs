@@ -11,7 +11,7 @@ use armcal_diagnose::{
     CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
     Verdict,
 };
-use armcal_model::{Family, effects_toml, find};
+use armcal_model::{EffectKind, Family, effects_toml, find};
 use comfy_table::Cell;
 use serde_json::Value;
 
@@ -119,12 +119,16 @@ pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
     added(d).into_iter().chain(looked_at(run, d)).chain(recorded).collect()
 }
 
+/// The kind of an effect that was found; none of something without a name.
+pub(crate) fn kind_of(e: &FoundEffect) -> Option<&'static EffectKind> {
+    e.name.split([':', '@', ',']).next().and_then(find)
+}
+
 /// What to look at on the rig, once for all effects of one kind; only where one name is left.
 fn looked_at(run: &Run, d: &Diagnosis) -> Vec<String> {
     let mut steps: Vec<(&str, Vec<&str>)> = Vec::new();
     for e in d.effects.iter().filter(|e| e.set.len() == 1) {
-        let kind = e.name.split([':', '@', ',']).next().and_then(find);
-        let Some(kind) = kind.filter(|kind| kind.family != Family::User) else { continue };
+        let Some(kind) = kind_of(e).filter(|kind| kind.family != Family::User) else { continue };
         match steps.iter_mut().find(|(advice, _)| *advice == look_at(kind)) {
             Some((_, names)) => names.push(&e.name),
             None => steps.push((look_at(kind), vec![&e.name])),

@@ -39,6 +39,11 @@ impl RecordingNames {
         told.collect::<Vec<_>>().join("`")
     }
 
+    /// The same for a chart, which has no code font for what stands between backticks.
+    pub(crate) fn in_chart(&self, sentence: &str) -> String {
+        self.in_words(sentence).replace('`', "")
+    }
+
     /// A warning for people.
     pub fn warning(&self, warning: &Warning) -> Warning {
         let Warning { subject, message, .. } = warning;

@@ -1,6 +1,7 @@
 //! Everything a finished run knows. All outputs are views of this one value.
 
 use crate::diagnosis_text::{headline, setup_sentence};
+use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
 use armcal_calibrate::Calibration;
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
@@ -212,6 +213,11 @@ impl Run {
     /// Its recordings as sentences call them.
     pub fn recording_names(&self) -> RecordingNames {
         RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
+    }
+
+    /// Its recordings one after the other, without the time between them.
+    pub(crate) fn recorded_time(&self) -> RecordedTime {
+        RecordedTime::of(&self.observations, self.recordings.len())
     }
 
     /// A sentence about it with recordings and moments by their names.

@@ -79,19 +79,19 @@ fn grid(findings: &Findings) -> Grid {
 
 /// Width and height that one board and its arrows take [m]; the largest few arrows may reach into the gap.
 fn extent_m(findings: &Findings) -> Vector2<f64> {
-    let half_mm = |place: fn(&BoardErrors) -> &[f64], error: fn(&Vectors) -> Vec<f64>| {
+    let half_mm = |place: fn(&BoardErrors) -> &[f64], error: for<'b> fn(&Vectors<'b>) -> &'b [f64]| {
         let mut most: f64 = 0.0;
         let mut ends = Vec::new();
         for board in &findings.boards {
             most = place(board).iter().fold(most, |most, x| most.max(x.abs()));
             for vectors in rows(board) {
-                let end = |(x, e): (&f64, f64)| (x + e * board.magnification).abs();
+                let end = |(x, e): (&f64, &f64)| (x + e * board.magnification).abs();
                 ends.extend(place(board).iter().zip(error(&vectors)).map(end));
             }
         }
         most.max(percentile(&ends, MOST))
     };
-    let (x, y) = (half_mm(|b| &b.x_mm, |v| v.x_mm.to_vec()), half_mm(|b| &b.y_mm, |v| v.y_mm.to_vec()));
+    let (x, y) = (half_mm(|b| &b.x_mm, |v| v.x_mm), half_mm(|b| &b.y_mm, |v| v.y_mm));
     Vector2::new(x, y) * 2e-3
 }
 

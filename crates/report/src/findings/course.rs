@@ -2,7 +2,6 @@
 
 use crate::points::Point;
 use crate::proto::Course;
-use crate::recorded_time::RecordedTime;
 use crate::run::Run;
 
 pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
@@ -34,6 +33,6 @@ pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
 
 /// When each point was taken, in minutes of recorded time.
 pub(super) fn recorded_min(run: &Run, points: &[Point]) -> Vec<f64> {
-    let time = RecordedTime::of(&run.observations, run.recordings.len());
+    let time = run.recorded_time();
     points.iter().map(|p| time.at_min(p.observation)).collect()
 }

@@ -2,7 +2,6 @@
 
 use super::levers::Levers;
 use super::numbers::Column;
-use crate::recorded_time::RecordedTime;
 use crate::run::Run;
 use armcal_core::Unit;
 use nalgebra::Vector3;
@@ -62,7 +61,7 @@ impl Basis {
                     Some(board.rotation.inverse())
                 })
                 .collect(),
-            time_cuts: RecordedTime::of(observations, run.recordings.len()).cuts(),
+            time_cuts: run.recorded_time().cuts(),
             outwards: observations
                 .iter()
                 .map(|o| run.model.measured_tip_in_world(&values, o) - base_m)
@@ -102,7 +101,7 @@ fn drivers(run: &Run) -> Vec<Driver> {
     }
     let whole =
         |key: &str, label: &str, values| Driver { key: key.into(), label: label.into(), joint: None, values };
-    let time = RecordedTime::of(&run.observations, run.recordings.len());
+    let time = run.recorded_time();
     let label = match time.begins().0.iter().flatten().count() {
         0 | 1 => "time since the first dwell [min]",
         _ => "recorded time, without the time between recordings [min]",

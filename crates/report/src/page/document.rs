@@ -6,7 +6,6 @@ use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
 use crate::diagnosis_text::sizes;
 use crate::findings::error_curve;
-use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
 use crate::run::{Refit, Run};
 use armcal_diagnose::{CandidateReport, Diagnosis, UnknownReport};
@@ -119,7 +118,7 @@ impl Document {
             drivers: basis.drivers.clone(),
             arrival: basis.arrival.clone(),
             recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
-            begin_min: RecordedTime::of(&run.observations, run.recordings.len()).begins(),
+            begin_min: run.recorded_time().begins(),
             told: told(run),
             dwells: dwells(run),
             boards: boards(run),
@@ -132,13 +131,13 @@ impl Document {
     }
 }
 
-/// Every event that the page names, with its moment; no chart has a code font for what stands between backticks.
+/// Every event that the page names, with its moment.
 fn told(run: &Run) -> BTreeMap<String, String> {
     let ranked = run.diagnosis.iter().flat_map(|d| &d.candidates).map(|c| c.spec.clone());
     let refitted = run.refits().flat_map(|r| r.effects.iter().cloned());
     let all = ranked.chain(refitted).chain(effect_names(&run.model));
     let names = run.recording_names();
-    let each = all.map(|spec| (names.in_words(&spec).replace('`', ""), spec));
+    let each = all.map(|spec| (names.in_chart(&spec), spec));
     each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words)).collect()
 }
 
@@ -158,7 +157,7 @@ fn ranking(
             p_adjusted: c.p_adjusted,
             log_evidence: c.log_evidence,
             absorbed: c.absorbed,
-            also: c.same_to_the_data.iter().map(|name| names.in_words(name).replace('`', "")).collect(),
+            also: c.same_to_the_data.iter().map(|name| names.in_chart(name)).collect(),
             found: found(&c.spec),
             refit: index_of(&specs),
             spec: c.spec.clone(),

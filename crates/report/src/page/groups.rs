@@ -1,7 +1,6 @@
 //! Where the error is large: its mean by recording, direction of arrival, joint range, time and load.
 
 use super::basis::Basis;
-use crate::recorded_time::RecordedTime;
 use crate::run::Run;
 use armcal_calibrate::{grouped_ci95, independent_groups};
 use serde::Serialize;
@@ -47,7 +46,7 @@ pub(crate) fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<
             all.extend(table.group("joint angle", format!("{name} {word}"), |i| part[i] == k));
         }
     }
-    let time = RecordedTime::of(&run.observations, run.recordings.len());
+    let time = run.recorded_time();
     let part = thirds(&run.observations.iter().map(|o| time.at_min(o)).collect::<Vec<f64>>());
     for (k, word) in ["first", "second", "last"].iter().enumerate() {
         all.extend(table.group("time", format!("{word} third"), |i| part[i] == k));

@@ -25,14 +25,13 @@ pub use compared::comparison_html;
 pub(crate) use numbers::Column;
 
 use crate::ReportError;
-use crate::diagnosis_text::{WITH_CURVES, pasted, sizes_of, unlisted};
+use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, sizes_of, unlisted};
 use crate::run::{Refit, Run, Status, VERSION};
 use crate::story::Story;
 use crate::text::millimetres;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
 use armcal_diagnose::{Explanation, FoundEffect, Nested, NotTestable};
-use armcal_model::find;
 use askama::Template;
 use document::Document;
 use shown::Shown;
@@ -165,8 +164,7 @@ fn verdict(run: &Run) -> Verdict {
 
 /// A found effect in sentences, `fall` what it takes of the error.
 fn found(e: &FoundEffect, fall: &str) -> String {
-    let kind = e.name.split([':', '@', ',']).next().and_then(find);
-    let summary = kind.map_or(String::new(), |kind| format!(": {}", kind.summary));
+    let summary = kind_of(e).map_or(String::new(), |kind| format!(": {}", kind.summary));
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let rival =
         e.rival.as_ref().map_or(String::new(), |r| format!(" The next best explanation is {}.", r.name));
