@@ -5,8 +5,7 @@ use crate::closed_chain::ClosedRun;
 use crate::proto::{Course, Story};
 use crate::recorded_time::RecordedTime;
 use crate::story::{lamp, status_sentence};
-use crate::text::{conclusion_about, printable};
-use armcal_core::Warning;
+use crate::text::conclusion_about;
 
 pub(super) fn put(run: &ClosedRun, out: &mut Messages) {
     let begin_ns = run.start_ns();
@@ -29,16 +28,9 @@ fn story(run: &ClosedRun) -> Story {
 
 /// The gravest first.
 fn warnings(run: &ClosedRun) -> Vec<String> {
-    let of_recordings = run.recordings.iter().flat_map(|r| {
-        let told = |w: &Warning| {
-            (w.severity, format!("{}: {}", printable(&r.name), printable(&w.to_string())), w.code)
-        };
-        r.all_warnings().into_iter().map(told).collect::<Vec<_>>()
-    });
-    let overall = run.overall_warnings().into_iter().map(|w| (w.severity, printable(&w.to_string()), w.code));
-    let mut all: Vec<_> = of_recordings.chain(overall).collect();
-    all.sort_by_key(|(severity, ..)| std::cmp::Reverse(*severity));
-    all.into_iter().map(|(severity, text, code)| format!("{}: {text} [{code}]", severity.word())).collect()
+    let mut all = run.told_warnings();
+    all.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
+    all.into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code)).collect()
 }
 
 /// Closing errors in the order of time.

@@ -11,6 +11,7 @@ pub use terminal::closed_terminal;
 
 use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
+use crate::text::printable;
 use armcal_calibrate::{Calibration, ClosedChain, ClosedObservation};
 use armcal_core::{Dwell, Rejection, Warning};
 use armcal_recording::RecordingReport;
@@ -72,6 +73,17 @@ impl ClosedRun {
     /// Its recordings as sentences call them.
     pub(crate) fn recording_names(&self) -> RecordingNames {
         RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
+    }
+
+    /// Every warning and how it is told, those of the recordings first.
+    pub(crate) fn told_warnings(&self) -> Vec<(String, &Warning)> {
+        let names = self.recording_names();
+        let text = |warning: &Warning| names.in_words(&printable(&warning.to_string()));
+        let of_recordings = self.recordings.iter().flat_map(|r| {
+            let named = |w| (format!("{}: {}", printable(&r.name), text(w)), w);
+            r.all_warnings().into_iter().map(named).collect::<Vec<_>>()
+        });
+        of_recordings.chain(self.overall_warnings().into_iter().map(|w| (text(w), w))).collect()
     }
 
     /// One arm's part of the joints of both.

@@ -5,7 +5,6 @@ use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{Status, VERSION};
 use crate::terminal::{errors, parameters, undetermined};
 use crate::text::{conclusion_about, millimetres, printable};
-use armcal_core::Warning;
 use comfy_table::Cell;
 
 /// The summary of a run, ending in a newline.
@@ -46,13 +45,7 @@ fn recordings(pen: &Pen, run: &ClosedRun) -> String {
 }
 
 fn warnings(pen: &Pen, run: &ClosedRun) -> Option<String> {
-    let names = run.recording_names();
-    let text = |warning: &Warning| names.in_words(&printable(&warning.to_string()));
-    let of_recordings = run.recordings.iter().flat_map(|r| {
-        let named = |w: &Warning| (w.severity.word(), format!("{}: {}", printable(&r.name), text(w)));
-        r.all_warnings().into_iter().map(named).collect::<Vec<_>>()
-    });
-    let overall = run.overall_warnings().into_iter().map(|w| (w.severity.word(), text(w)));
-    let all: Vec<_> = of_recordings.chain(overall).collect();
+    let all = run.told_warnings().into_iter().map(|(text, w)| (w.severity.word(), text));
+    let all: Vec<_> = all.collect();
     (!all.is_empty()).then(|| pen.section("Warnings", pen.list(all.into_iter())))
 }

@@ -28,7 +28,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         effects: d.effects.iter().map(found).collect(),
         record_next: d.record_next.iter().map(|r| run.in_words(r)).collect(),
         not_testable: not_testable.collect(),
-        told: d.explanations.iter().map(|e| format!("{}: {}", e.number, e.sentence)).collect(),
+        told: d.explanations.iter().map(|e| run.in_words(&format!("{}: {}", e.number, e.sentence))).collect(),
         explanations: explanations.collect(),
         cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
     }
@@ -77,12 +77,12 @@ fn found(e: &FoundEffect) -> proto::FoundEffect {
 
 /// What was found and the candidates, each in a row of words: a table panel has the columns that its first row has, and
 /// begins with what comes first.
-pub(super) fn table(d: &Diagnosis) -> proto::EffectTable {
+pub(super) fn table(run: &Run, d: &Diagnosis) -> proto::EffectTable {
     let candidates = d.candidates.iter().map(|c| proto::EffectRow {
         effect: kinds([&c.spec]),
         left_out_mm: c.holdout_mm.map_or_else(String::new, |h| fall(h.before, h.after)),
         probability: probability(c.probability),
-        r#where: c.target.clone(),
+        r#where: run.in_words(&c.target),
         size: sizes(c),
         name: c.spec.clone(),
     });
@@ -90,7 +90,12 @@ pub(super) fn table(d: &Diagnosis) -> proto::EffectTable {
         effect: kinds(&e.set),
         left_out_mm: fall(e.places.before, e.places.after),
         probability: probability(e.probability),
-        r#where: d.candidates.iter().find(|c| c.spec == e.name).map(|c| c.target.clone()).unwrap_or_default(),
+        r#where: d
+            .candidates
+            .iter()
+            .find(|c| c.spec == e.name)
+            .map(|c| run.in_words(&c.target))
+            .unwrap_or_default(),
         size: sizes_of(e),
         name: e.set.join(" or "),
     });

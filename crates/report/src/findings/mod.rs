@@ -56,7 +56,7 @@ impl Findings {
                 None if run.undiagnosed == Some(Undiagnosed::NotAsked) => None,
                 None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
             },
-            effects: run.diagnosis.as_ref().map(diagnosis::table).unwrap_or_default(),
+            effects: run.diagnosis.as_ref().map(|d| diagnosis::table(run, d)).unwrap_or_default(),
             curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
             quality: quality::quality(run),
         }
