@@ -4,6 +4,7 @@ use super::kind::{EffectKind, Offered, Target};
 use super::placed::{self, Effects, PlacedEffect};
 use super::placing::Placing;
 use super::spec::Since;
+use super::state::SEATED;
 use super::{Drivers, EffectSpec, NominalPose, Session, catalogue};
 use crate::{Model, ModelError};
 use armcal_core::{DwellId, Observation};
@@ -199,7 +200,8 @@ fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
 }
 
 /// A kind with every value of a shape that is worth trying, and with every two of different shapes: where a torque changes
-/// sign and how sharply, say, is seen only together.
+/// sign and how sharply, say, is seen only together. Who holds the arm is asked of each kind by itself: with another shape
+/// beside it a base that rocks at the height of a joint is that joint's spring.
 fn shaped(placing: &Placing<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
     let searched = placing.kind.shapes.iter().filter(|shape| shape.parameter);
     let searched = searched.filter_map(|shape| Some((shape.name, shape.values?(placing, observations))));
@@ -207,11 +209,12 @@ fn shaped(placing: &Placing<'_>, observations: &[Observation]) -> Vec<EffectSpec
     let with = |spec: &EffectSpec, (name, values): &(&str, Vec<f64>)| -> Vec<EffectSpec> {
         values.iter().map(|v| spec.clone().with(name, readable(*v))).collect()
     };
-    let one: Vec<Vec<EffectSpec>> = searched.iter().map(|shape| with(placing.spec, shape)).collect();
-    let two = one.iter().enumerate().flat_map(|(k, first)| {
-        let later = searched[k + 1..].iter();
-        later.flat_map(move |shape| first.iter().flat_map(move |spec| with(spec, shape)))
-    });
-    let two: Vec<EffectSpec> = two.collect();
-    one.into_iter().flatten().chain(two).collect()
+    let mut members: Vec<EffectSpec> = searched.iter().flat_map(|shape| with(placing.spec, shape)).collect();
+    let own: Vec<_> = searched.iter().filter(|(name, _)| *name != SEATED.name).collect();
+    for (k, shape) in own.iter().enumerate() {
+        for first in with(placing.spec, shape) {
+            members.extend(own[k + 1..].iter().flat_map(|later| with(&first, later)));
+        }
+    }
+    members
 }

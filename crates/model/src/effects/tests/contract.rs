@@ -90,8 +90,9 @@ fn the_jacobian_is_the_slope_at_amplitudes_that_are_not_zero() {
             for o in &observations {
                 let (_, jacobian) = extended.residual_with_jacobian(&p, o);
                 for (k, parameter) in extended.parameters().iter().enumerate() {
-                    // Units range from m to 1/K and turns: the step follows the size of the parameter.
-                    let h = 1e-3 * parameter.prior_sigma.unwrap_or(0.1).min(0.1);
+                    // Units range from m to 1/K and turns: the step follows the size of the parameter, of a shape its value.
+                    let shape = Some(parameter.nominal.abs()).filter(|value| *value > 0.0);
+                    let h = 1e-3 * parameter.prior_sigma.or(shape).unwrap_or(0.1).min(0.1);
                     let moved = |step: f64| {
                         let mut p = p.clone();
                         p[k] += step;

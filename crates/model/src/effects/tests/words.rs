@@ -59,12 +59,11 @@ fn candidates_and_scans_say_everything_once() {
     assert!(
         has("tool_shift@1.17") && !has("tool_shift@1.0") && !has("tool_shift@2.0") && !has("tool_shift@0.1")
     );
-    // Of one kind, shapes are searched one at a time and by twos.
+    // Of one kind, shapes are searched one at a time and by twos; who holds the arm by itself.
     assert!(has("gravity_backlash:2,outer=1.25") && has("gravity_backlash:2,smoothing=0.01"));
-    assert!(
-        has("gravity_backlash:2,smoothing=0.01,outer=1.25") && has("gravity_backlash:2,outer=1.25,seated=0")
-    );
-    assert!(!has("gravity_backlash:2,smoothing=0.01,outer=1.25,seated=0"));
+    assert!(has("gravity_backlash:2,smoothing=0.01,outer=1.25") && has("gravity_backlash:2,seated=0"));
+    assert!(!has("gravity_backlash:2,outer=1.25,seated=0"));
+    assert!(!has("gravity_backlash:2,friction=0.1,smoothing=0.01,outer=1.25"));
     assert!(
         has("periodic:1,frequency=30") && !has("periodic:1") && !has("axis_tilt:2") && !has("seat_offset")
     );
