@@ -39,23 +39,11 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
     let sites: Vec<(Vector3<f64>, f64)> =
         problem.sites.iter().map(|s| (supposed.supposed_m(&s.at_m) - middle_m, s.weight)).collect();
     let shifts = steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
-    let all: f64 = sites.iter().map(|s| s.1).sum();
     let (mut scored, mut highest) = (Vec::new(), f64::NEG_INFINITY);
     for turn_rad in steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD) {
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad);
         let turned: Vec<_> = sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect();
-        for (x, y) in shifts.iter().flat_map(|&x| shifts.iter().map(move |&y| (x, y))) {
-            let shift = Vector3::new(x, y, 0.0);
-            let far = 0.1 * (x * x + y * y) / problem.prior.offset_m.powi(2);
-            // Given up where even full support of what is left would not make it worth keeping.
-            let (mut score, mut left) = (-far, all);
-            for (p, w) in &turned {
-                score += w * support(problem, &(p + shift), false).1;
-                left -= w;
-                if score + left < WORTH * highest {
-                    break;
-                }
-            }
+        for (score, shift) in shifted(problem, &turned, &shifts) {
             if score >= WORTH * highest {
                 highest = highest.max(score);
                 scored.push((score, (turn_rad, shift)));
@@ -68,6 +56,44 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
         field
     };
     different(problem, scored, field, false)
+}
+
+/// Support of the sites (place on the board, weight) at every shift of the grid, less what a far shift costs.
+///
+/// Site by site and cavity by cavity: each supports the few shifts that bring the one to the other.
+fn shifted(
+    problem: &Problem,
+    sites: &[(Vector3<f64>, f64)],
+    shifts: &[f64],
+) -> impl Iterator<Item = (f64, Vector3<f64>)> {
+    let (n, reach_m) = (shifts.len(), REACH * problem.layout.spacing_m);
+    let grid = (0..n * n).map(|at| Vector3::new(shifts[at / n], shifts[at % n], 0.0));
+    let grid: Vec<Vector3<f64>> = grid.collect();
+    let far = |s: &Vector3<f64>| 0.1 * (s.x * s.x + s.y * s.y) / problem.prior.offset_m.powi(2);
+    let mut scores: Vec<f64> = grid.iter().map(|s| -far(s)).collect();
+    let mut best = vec![0.0; n * n];
+    // Indices of the shifts that bring `from` within reach of `to`.
+    let within = |from: f64, to: f64| {
+        let at = |side: f64| ((to - from + side - shifts[0]) / GRID_M).clamp(0.0, n as f64);
+        at(-reach_m).floor() as usize..(at(reach_m).ceil() as usize + 1).min(n)
+    };
+    for (p, weight) in sites {
+        best.fill(0.0);
+        for cavity in &problem.layout.points_m {
+            let along = within(p.y, cavity.y);
+            for x in within(p.x, cavity.x) {
+                for at in along.clone().map(|y| x * n + y) {
+                    let gap = p + grid[at] - cavity;
+                    let support = 1.0 - (gap.x * gap.x + gap.y * gap.y) / (reach_m * reach_m);
+                    if support > best[at] {
+                        best[at] = support;
+                    }
+                }
+            }
+        }
+        scores.iter_mut().zip(&best).for_each(|(score, support)| *score += weight * support);
+    }
+    scores.into_iter().zip(grid)
 }
 
 /// Rough alignments without a pose.
