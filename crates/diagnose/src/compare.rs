@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Of fewer places than this no interval can be told: what a change does to an error differs with the posture in which the
 /// arm reaches a place, so each pose counts by itself there.
-const FEWEST_PLACES: usize = 6;
+const FEWEST_PLACES: usize = 7;
 
 /// Errors on held-out dwells of two calibrations of the same observations, paired by dwell, in groups of one place
 /// (cavity) each where there are enough of them. None where they share no held-out dwell.

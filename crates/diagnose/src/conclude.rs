@@ -19,6 +19,8 @@ use armcal_core::{Observation, Severity, Stage, Warning, listed};
 const CONFIRMED_SHARE: f64 = 0.95;
 /// Mean errors that fall by less than this share of the floor are not worth a name.
 const WORTH_NAMING: f64 = 0.02;
+/// Held-out points whose mean error changes by less than this share of the floor, with 95 %, do not see an effect.
+const UNSEEN: f64 = 0.1;
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
 const SPREAD_OF_NORM: f64 = 0.422;
@@ -176,30 +178,31 @@ fn noise_alone(calibration: &Calibration, share: f64) -> bool {
 
 /// By which points a model with more effects errs less.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ShownBy {
+pub(crate) enum ShownBy {
     /// By those that are judged: held out, or all where nothing is.
     Judged,
-    /// By those that were fitted, the held-out ones being no worse by more than chance.
+    /// By those that were fitted, where the held-out ones do not see what the effects do.
     Fitted,
     /// By none.
     Nothing,
 }
 
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
-/// or, where these cannot show what an effect does (it acts only in what was held out) and are not worse for it by more than
-/// chance, clearly less on those that were fitted.
-fn shown_by(
+/// or, where these do not see what an effect does (each turn leaves out what it acts in, and cannot learn it), clearly less on
+/// those that were fitted. An effect that changes held-out errors, and does not clearly lower them, is refuted.
+pub(crate) fn shown_by(
     before: &Calibration,
     after: &Calibration,
     observations: &[Observation],
     config: &DiagnosisConfig,
 ) -> ShownBy {
-    let gain_m = before.judged().fitted.mean_m - after.judged().fitted.mean_m;
-    let worth = gain_m > WORTH_NAMING * before.noise_floor_m;
+    let floor_mm = before.noise_floor_m * 1e3;
+    let worth = error_mm(before) - error_mm(after) > WORTH_NAMING * floor_mm;
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
+    let unseen = |change_mm: &f64| change_mm.abs() < UNSEEN * floor_mm;
     match compare_heldout(before, after, observations, config) {
         Some(held) if worth && held.helps() => ShownBy::Judged,
-        Some(held) if fitted && !held.harms() => ShownBy::Fitted,
+        Some(held) if fitted && !held.harms() && held.change_ci95.iter().all(unseen) => ShownBy::Fitted,
         None if worth => ShownBy::Judged,
         _ => ShownBy::Nothing,
     }

@@ -121,6 +121,22 @@ impl Diagnosis {
         self.verdict == Verdict::NothingMissing && self.probability.is_none()
     }
 
+    /// Takes verdict, names and their probability from the effects that were found, if any.
+    pub(crate) fn name_again(&mut self) {
+        let of = |number: fn(&FoundEffect) -> f64| self.effects.iter().map(number);
+        let (probability, p_adjusted) =
+            (of(|e| e.probability).fold(1.0, f64::min), of(|e| e.p_adjusted).fold(0.0, f64::max));
+        let single = self.effects.iter().all(|e| e.set.len() == 1);
+        self.names = match single {
+            true => self.effects.iter().map(|e| e.name.clone()).collect(),
+            false => self.effects.iter().flat_map(|e| e.set.iter().cloned()).collect(),
+        };
+        if !self.effects.is_empty() {
+            self.verdict = if single { Verdict::Identified } else { Verdict::Ambiguous };
+            (self.probability, self.p_adjusted) = (Some(probability), p_adjusted);
+        }
+    }
+
     /// Keeps what the choice is worth on points that had no part in it, or says why that was not asked.
     pub fn chosen_again(&mut self, nested: Result<Nested, String>) {
         let sentence = match &nested {

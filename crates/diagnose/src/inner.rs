@@ -52,34 +52,13 @@ fn assemble(
 ) -> Diagnosis {
     let (problem, weighed) = (&first.problem, &first.weighed);
     let effects: Vec<FoundEffect> = search.accepted.iter().map(|a| found_effect(a, config)).collect();
-    let single = search.accepted.iter().all(|a| a.judged.set.len() == 1 && a.grade == Grade::Named);
-    let verdict = match (effects.is_empty(), search.left_over) {
-        (true, false) => Verdict::NothingMissing,
-        (true, true) => Verdict::Unknown,
-        (false, _) if single => Verdict::Identified,
-        (false, _) => Verdict::Ambiguous,
-    };
+    let verdict = if search.left_over { Verdict::Unknown } else { Verdict::NothingMissing };
     let rest = &search.rest;
     let mut unlisted: Vec<UnknownReport> = search.curves.iter().map(|c| c.report.clone()).collect();
     if search.left_over && unlisted.is_empty() {
         unlisted.extend(unknown_report(&rest.problem, &rest.weighed, config));
     }
-    let names = match verdict {
-        Verdict::Ambiguous => effects.iter().flat_map(|e| e.set.iter().cloned()).collect(),
-        _ => effects.iter().map(|e| e.name.clone()).collect(),
-    };
-    let probability = match verdict {
-        Verdict::NothingMissing => Some(weighed.p_nothing),
-        Verdict::Unexplained => None,
-        Verdict::Unknown => Some(1.0 - weighed.p_nothing),
-        Verdict::Identified | Verdict::Ambiguous => {
-            Some(effects.iter().map(|e| e.probability).fold(1.0, f64::min))
-        }
-    };
-    let p_adjusted = match effects.is_empty() {
-        true => top.map_or(1.0, |t| t.own().p_adjusted),
-        false => effects.iter().map(|e| e.p_adjusted).fold(0.0, f64::max),
-    };
+    let probability = if search.left_over { 1.0 - weighed.p_nothing } else { weighed.p_nothing };
     let mean = |p: &Problem, w: &Weighed| {
         let norms = norms_m(p, &left_out(p, None, &by_place(p), w.scale));
         norms.iter().sum::<f64>() / norms.len().max(1) as f64 * 1e3
@@ -88,9 +67,9 @@ fn assemble(
     let set_aside: Vec<_> = whole.dwells.iter().zip(keep).filter(|(_, k)| !**k).map(|(d, _)| d.id).collect();
     let mut diagnosis = Diagnosis {
         verdict,
-        names,
-        probability,
-        p_adjusted,
+        names: Vec::new(),
+        probability: Some(probability),
+        p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
         candidates: candidate_reports(problem, weighed, top, &by_place(problem), config),
         cannot_tell_apart: confused(problem, weighed, config),
         not_testable: not_testable(problem, weighed),
@@ -117,6 +96,7 @@ fn assemble(
         explanations: Vec::new(),
         nested: None,
     };
+    diagnosis.name_again();
     diagnosis.record_next = next::record_next(problem, &diagnosis);
     diagnosis.explanations = explanations(&diagnosis, config);
     diagnosis

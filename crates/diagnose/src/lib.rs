@@ -15,6 +15,7 @@
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `absence`: of several names each by its absence from the refitted model;
 //! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
 //!   explains;
 //! * `rests`: where a joint rests in a gap that was found;
@@ -24,6 +25,7 @@
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
 
+mod absence;
 mod bootstrap;
 mod cells;
 mod combination;

@@ -62,7 +62,9 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     };
     let mut diagnosis = diagnose_problem(&mut refit, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
-    let refitted = refitted(calibrated, &diagnosis).map(|found| diagnosis.with_rests(calibrated, found));
+    let refitted = refitted(calibrated, &diagnosis)
+        .map(|found| diagnosis.each_by_its_absence(calibrated, found, config))
+        .map(|found| diagnosis.with_rests(calibrated, found));
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
 }

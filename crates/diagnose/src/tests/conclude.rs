@@ -266,14 +266,21 @@ fn the_fit_decides_where_the_held_out_points_cannot_and_says_so() {
     let d = concluded(found(Identified), &erring(1.2, 1.2), Some(erring(1.2, 1.1)));
     assert_eq!((d.verdict, codes(&d)), (Identified, vec!["judged-by-fit", "of-refit"]));
     assert!(d.warnings.iter().any(|w| w.code == "judged-by-fit" && w.subject == "backlash:1"));
-    // Worse where it was not fitted, but by no more than chance: as where a fold leaves out all that shows a flank.
-    let mut chance = erring(1.2, 1.1);
-    chance.residuals.iter_mut().step_by(2).for_each(|r| r.fitted_m *= 0.6);
-    chance.residuals.iter_mut().skip(1).step_by(2).for_each(|r| r.fitted_m *= 1.45);
-    chance.holdout.fitted = of_residuals(&chance);
-    assert!(chance.judged().fitted.mean_m > 1.2e-3);
-    let d = concluded(found(Identified), &erring(1.2, 1.2), Some(chance));
+    // Worse where it was not fitted, but by no more than chance and in few dwells: as where a fold leaves out all that shows a
+    // flank.
+    let changed = |every: usize, [one, other]: [f64; 2]| {
+        let mut c = erring(1.2, 1.1);
+        c.residuals.iter_mut().step_by(every).for_each(|r| r.fitted_m *= one);
+        c.residuals.iter_mut().skip(1).step_by(every).for_each(|r| r.fitted_m *= other);
+        c.holdout.fitted = of_residuals(&c);
+        assert!(c.judged().fitted.mean_m > 1.2e-3);
+        c
+    };
+    let d = concluded(found(Identified), &erring(1.2, 1.2), Some(changed(20, [1.5, 0.9])));
     assert_eq!((d.verdict, codes(&d)), (Identified, vec!["judged-by-fit", "of-refit"]));
+    // Held-out points that see what the effect does, and are no better for it, refute what the fitted ones show.
+    let d = concluded(found(Identified), &erring(1.2, 1.2), Some(changed(2, [0.6, 1.45])));
+    assert_eq!((d.verdict, d.names.len()), (NothingMissing, 0));
     // Without a hold-out the fitted points are the judged ones.
     let d = concluded(found(Identified), &fitted_only(1.4), Some(fitted_only(1.37)));
     assert_eq!((d.verdict, d.judged, codes(&d)), (Identified, JudgedOn::Fitted, vec!["of-refit"]));
