@@ -64,7 +64,7 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
         ]);
     }
     let sentences = d["explanations"].as_array().into_iter().flatten();
-    let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), told(&e["sentence"]))));
+    let sentences = sentences.map(|e| ("-", format!("{}: {}", names.number_label(&text(&e["number"])), told(&e["sentence"]))));
     let next = list(&d["record_next"]).into_iter().map(|r| ("next:", names.in_words(&r)));
     let mut sections = vec![
         pen.section(headline.trim(), pen.list(next)),
@@ -261,6 +261,7 @@ fn beside(d: &Diagnosis) -> String {
 
 fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     let told = |said: &str| run.in_words(&printable(said));
+    let names = run.recording_names();
     let mut sections = vec![brief(pen, run, d)];
     sections.push(pen.section("Candidates, best first", ranking(pen, run, d)));
     if !d.cannot_tell_apart.is_empty() {
@@ -281,7 +282,10 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
-    let sentences = d.explanations.iter().map(|e| ("-", told(&format!("{}: {}", e.number, e.sentence))));
+    let sentences = d
+        .explanations
+        .iter()
+        .map(|e| ("-", format!("{}: {}", names.number_label(&printable(&e.number)), told(&e.sentence))));
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")
 }

@@ -9,7 +9,7 @@ use crate::text::conclusion_about;
 
 pub(super) fn put(run: &ClosedRun, out: &mut Messages) {
     let begin_ns = run.start_ns();
-    let table = facts::parameter_table(&run.calibration.fit, begin_ns);
+    let table = facts::parameter_table(&run.calibration.fit, &run.recording_names(), begin_ns);
     out.put("/armcal/parameter_table", begin_ns, &table);
     out.put("/armcal/story", begin_ns, &story(run));
     out.put("/armcal/course", begin_ns, &course(run));

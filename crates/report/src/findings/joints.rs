@@ -10,6 +10,18 @@ use armcal_core::robust::median;
 use armcal_diagnose::{BLURRED, ImpliedError, implied_joint_errors};
 use nalgebra::Vector3;
 
+const DEGREES: &str = "deg";
+/// Up to here an angle counts as small.
+const SMALL_ANGLE_DEG: f64 = 10.0;
+
+/// Whether a joint of these implied errors moves the tip, so that page and layouts draw it. An implied error is linear in the
+/// angle, so of one that is usually large it says nothing but that the joint has no leverage, as one that only turns a ball
+/// about its middle.
+pub(crate) fn moves_tip(unit: &str, errors: impl IntoIterator<Item = f64>) -> bool {
+    let sizes: Vec<f64> = errors.into_iter().map(f64::abs).collect();
+    !sizes.is_empty() && (unit != DEGREES || median(&sizes) < SMALL_ANGLE_DEG)
+}
+
 /// What one dwell says about all joints.
 struct Seen {
     before: Vec<Option<ImpliedError>>,

@@ -13,6 +13,7 @@ mod steps;
 
 pub(crate) use boards::round_factor;
 pub(crate) use curves::error_curve;
+pub(crate) use joints::moves_tip;
 
 use crate::points::Point;
 use crate::proto;
@@ -45,7 +46,6 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
-        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted).filter(|u| u.probability >= IMPROBABLE);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             boards: boards::board_errors(run, points, &in_time),
@@ -57,10 +57,17 @@ impl Findings {
                 None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
             },
             effects: run.diagnosis.as_ref().map(|d| diagnosis::table(run, d)).unwrap_or_default(),
-            curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
+            curves: unlisted_curves(run),
             quality: quality::quality(run),
         }
     }
+}
+
+/// What no name explains, as page and layouts draw it: unless that anything does not have one is improbable.
+pub(crate) fn unlisted_curves(run: &Run) -> Vec<proto::ErrorCurve> {
+    let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
+    let drawn = unlisted.filter(|u| u.probability >= IMPROBABLE);
+    drawn.map(|u| error_curve(u, run.model.chain())).collect()
 }
 
 /// Indices of the points in the order of time.

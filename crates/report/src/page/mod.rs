@@ -144,6 +144,7 @@ fn verdict(run: &Run) -> Verdict {
             explanations: Vec::new(),
         };
     };
+    let names = run.recording_names();
     Verdict {
         found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
             .chain(d.unlisted.iter().map(unlisted))
@@ -152,12 +153,12 @@ fn verdict(run: &Run) -> Verdict {
             .map(|said| run.in_words(&said))
             .collect(),
         paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
-        same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| run.in_words(name))).collect(),
+        same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| names.label(name))).collect(),
         unseen: (d.not_testable.iter().cloned())
-            .map(|n| NotTestable { effect: run.in_words(&n.effect), ..n })
+            .map(|n| NotTestable { effect: names.label(&n.effect), ..n })
             .collect(),
         explanations: (d.explanations.iter().cloned())
-            .map(|e| Explanation { sentence: run.in_words(&e.sentence), ..e })
+            .map(|e| Explanation { number: names.number_label(&e.number), sentence: run.in_words(&e.sentence) })
             .collect(),
     }
 }
