@@ -64,7 +64,8 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
         ]);
     }
     let sentences = d["explanations"].as_array().into_iter().flatten();
-    let sentences = sentences.map(|e| ("-", format!("{}: {}", names.number_label(&text(&e["number"])), told(&e["sentence"]))));
+    let sentences = sentences
+        .map(|e| ("-", format!("{}: {}", names.number_label(&text(&e["number"])), told(&e["sentence"]))));
     let next = list(&d["record_next"]).into_iter().map(|r| ("next:", names.in_words(&r)));
     let mut sections = vec![
         pen.section(headline.trim(), pen.list(next)),

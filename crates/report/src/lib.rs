@@ -45,6 +45,7 @@ mod summary;
 mod tables;
 mod terminal;
 mod text;
+mod told_warning;
 mod verification;
 mod write;
 

@@ -51,7 +51,8 @@ impl RecordingNames {
             let (place, since) = place_and_moment(spec).filter(|(place, _)| !place.is_empty())?;
             Some(format!("{place}{}", self.moment(since?)?.replace('`', "")))
         };
-        let shapes = |spec: &str| spec.split_once(',').map_or(String::new(), |(_, shapes)| format!(", {shapes}"));
+        let shapes =
+            |spec: &str| spec.split_once(',').map_or(String::new(), |(_, shapes)| format!(", {shapes}"));
         let whole = moment_of(name).map(|words| words + &shapes(name));
         whole.or_else(|| {
             let (event, parameter) = name.rsplit_once('.')?;

@@ -115,7 +115,9 @@ fn errors_above_twice_the_floor_are_inadequate_whatever_the_scatter_says() {
     let erring = |from: usize, by_m: f64| {
         let mut all = observations.clone();
         for o in all.iter_mut().skip(from) {
-            let armcal_core::Reference::Tracked { position_m, .. } = &mut o.reference else { panic!("not tracked") };
+            let armcal_core::Reference::Tracked { position_m, .. } = &mut o.reference else {
+                panic!("not tracked")
+            };
             position_m.x += by_m;
         }
         all

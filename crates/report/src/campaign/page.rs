@@ -2,15 +2,19 @@
 
 use super::Campaign;
 use super::date::minute;
-use super::terminal::conclusion;
 use super::words::{meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
-use crate::run::VERSION;
-use crate::text::millimetres;
+use crate::page::shell::Shell;
+use crate::story::Story;
+use crate::text::{millimetres, printable};
+use crate::told_warning::ToldWarning;
 use armcal_campaign::{Row, RowStatus, Series};
+use armcal_core::{Severity, listed};
 use askama::Template;
 use serde::Serialize;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 /// Points of one curve; more are thinned out evenly.
 const MOST_POINTS: usize = 5000;
@@ -19,18 +23,13 @@ const MOST_POINTS: usize = 5000;
 #[derive(Template)]
 #[template(path = "campaign.html")]
 pub(super) struct CampaignPage<'a> {
-    policy: String,
-    style: &'a str,
-    plotly: &'a str,
-    data: String,
-    script: String,
-    version: &'a str,
-    pipeline: &'a str,
-    sentence: String,
+    shell: Shell,
+    next: Vec<String>,
     changes: Vec<(String, &'static str)>,
     rows: Vec<Shown<'a>>,
     failed: &'a [super::FailedRecording],
     repeats: Vec<String>,
+    warnings: Vec<ToldWarning>,
 }
 
 struct Shown<'a> {
@@ -50,24 +49,40 @@ impl<'a> CampaignPage<'a> {
     /// # Errors
     /// Data that cannot be written as JSON.
     pub fn of(campaign: &'a Campaign) -> Result<CampaignPage<'a>, ReportError> {
-        let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")]);
+        let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")];
+        let name = &campaign.pipeline;
+        let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
+        let shell = Shell::new("campaign-page", names, &scripts, &Document::of(campaign), "'none'")?;
+        let story = Story::of_campaign(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
         let rows = campaign.rows.iter().zip(&campaign.folders);
         Ok(CampaignPage {
-            policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
-            style: embed::STYLE,
-            plotly: embed::PLOTLY,
-            data: embed::json_for_html(&Document::of(campaign))?,
-            script,
-            version: VERSION,
-            pipeline: &campaign.pipeline,
-            sentence: conclusion(campaign),
+            shell: shell.telling(&story),
+            next: story.next,
             changes: told.collect(),
             rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
             failed: &campaign.failed,
             repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
+            warnings: warnings(campaign),
         })
     }
+}
+
+/// Warnings of all recordings that are not merely notices, one that several have once, the gravest first.
+fn warnings(campaign: &Campaign) -> Vec<ToldWarning> {
+    let mut all: BTreeMap<(Reverse<Severity>, &str), Vec<String>> = BTreeMap::new();
+    for row in &campaign.rows {
+        for (text, severity) in row.warnings.iter().zip(&row.severities) {
+            let grave = [Severity::Inadequate, Severity::DataLost].into_iter().find(|s| s.word() == severity);
+            if let Some(severity) = grave {
+                all.entry((Reverse(severity), text)).or_default().push(printable(&row.recording));
+            }
+        }
+    }
+    let told = |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| {
+        ToldWarning { severity, code: "", subject: listed(&recordings), message: printable(text) }
+    };
+    all.into_iter().map(told).collect()
 }
 
 fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {

@@ -15,7 +15,11 @@ use nalgebra::Vector3;
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     out.put("/armcal/parameters", begin_ns, &parameters(&run.calibration.fit, begin_ns));
-    out.put("/armcal/parameter_table", begin_ns, &parameter_table(&run.calibration.fit, &run.recording_names(), begin_ns));
+    out.put(
+        "/armcal/parameter_table",
+        begin_ns,
+        &parameter_table(&run.calibration.fit, &run.recording_names(), begin_ns),
+    );
     out.put(
         "/armcal/report",
         begin_ns,
