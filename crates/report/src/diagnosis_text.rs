@@ -1,5 +1,6 @@
 //! What is missing, for a person in the terminal.
 
+use crate::findings::shown_unlisted;
 use crate::look_at::look_at;
 use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
@@ -92,7 +93,7 @@ fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
 pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&n.sentence()));
     let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
-    let all = d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(beside).chain(nested);
+    let all = d.effects.iter().map(found).chain(shown_unlisted(d).map(unlisted)).chain(beside).chain(nested);
     all.map(|said| run.in_words(&said)).collect()
 }
 
@@ -100,9 +101,7 @@ pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
 pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
     let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
-    let unlisted = d
-        .unlisted
-        .iter()
+    let unlisted = shown_unlisted(d)
         .map(|u| format!("unlisted, at {} over {}: {}", u.channel, u.driver, falls(&u.places)));
     let beside = d
         .beside_curves()
@@ -123,6 +122,13 @@ pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
 /// The kind of an effect that was found; none of something without a name.
 pub(crate) fn kind_of(e: &FoundEffect) -> Option<&'static EffectKind> {
     e.name.split([':', '@', ',']).next().and_then(find)
+}
+
+/// The kind of all effects that were found, where they are of one.
+fn one_kind(d: &Diagnosis) -> Option<&'static EffectKind> {
+    let mut kinds = d.effects.iter().map(|e| kind_of(e).filter(|kind| kind.family != Family::User));
+    let first = kinds.next()??;
+    kinds.all(|kind| kind.is_some_and(|k| k.name == first.name)).then_some(first)
 }
 
 /// What to look at on the rig, once for all effects of one kind; only where one name is left.
@@ -179,7 +185,8 @@ fn as_spelt(d: &Diagnosis) -> String {
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
             let names = printable(&d.names.join(", "));
-            format!("Missing: {names} ({probability}p = {:.3}){}.", d.p_adjusted, beside(d))
+            let meaning = one_kind(d).map_or(String::new(), |kind| format!(" In words: {}.", kind.summary));
+            format!("Missing: {names} ({probability}p = {:.3}){}.{meaning}", d.p_adjusted, beside(d))
         }
         Verdict::Ambiguous => {
             let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
@@ -279,7 +286,7 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
         });
         sections.push(pen.section("What these data could not have shown", pen.list(rows)));
     }
-    let tables: Vec<String> = d.unlisted.iter().map(pasted).filter(|t| !t.is_empty()).collect();
+    let tables: Vec<String> = shown_unlisted(d).map(pasted).filter(|t| !t.is_empty()).collect();
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }

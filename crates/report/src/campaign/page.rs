@@ -7,14 +7,11 @@ use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;
 use crate::story::Story;
-use crate::text::{millimetres, printable};
+use crate::text::millimetres;
 use crate::told_warning::ToldWarning;
 use armcal_campaign::{Row, RowStatus, Series};
-use armcal_core::{Severity, listed};
 use askama::Template;
 use serde::Serialize;
-use std::cmp::Reverse;
-use std::collections::BTreeMap;
 
 /// Points of one curve; more are thinned out evenly.
 const MOST_POINTS: usize = 5000;
@@ -63,26 +60,9 @@ impl<'a> CampaignPage<'a> {
             rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
             failed: &campaign.failed,
             repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
-            warnings: warnings(campaign),
+            warnings: story.warnings,
         })
     }
-}
-
-/// Warnings of all recordings that are not merely notices, one that several have once, the gravest first.
-fn warnings(campaign: &Campaign) -> Vec<ToldWarning> {
-    let mut all: BTreeMap<(Reverse<Severity>, &str), Vec<String>> = BTreeMap::new();
-    for row in &campaign.rows {
-        for (text, severity) in row.warnings.iter().zip(&row.severities) {
-            let grave = [Severity::Inadequate, Severity::DataLost].into_iter().find(|s| s.word() == severity);
-            if let Some(severity) = grave {
-                all.entry((Reverse(severity), text)).or_default().push(printable(&row.recording));
-            }
-        }
-    }
-    let told = |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| {
-        ToldWarning { severity, code: "", subject: listed(&recordings), message: printable(text) }
-    };
-    all.into_iter().map(told).collect()
 }
 
 fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {

@@ -5,11 +5,14 @@ use super::words::{meaning, sentence};
 use crate::run::Status;
 use crate::story::Story;
 use crate::text::{millimetres, printable};
+use crate::told_warning::ToldWarning;
 use armcal_campaign::{ErrorFigures, Row, RowStatus};
+use armcal_core::{Severity, listed};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 impl Story {
-    /// Of a campaign. Its warnings are those of its recordings, which its page lists.
+    /// Of a campaign.
     pub fn of_campaign(campaign: &Campaign) -> Story {
         let wrong = wrong(campaign);
         let wrong = (!wrong.is_empty()).then(|| format!("{}.", wrong.join("; ")));
@@ -18,7 +21,7 @@ impl Story {
             wrong.into_iter().collect(),
             campaign.status(),
             next(campaign),
-            Vec::new(),
+            warnings(campaign),
         )
     }
 }
@@ -57,8 +60,9 @@ fn wrong(campaign: &Campaign) -> Vec<String> {
         (count(RowStatus::DataLost), "calibrated from damaged data"),
         (count(RowStatus::Inadequate), "inadequate"),
     ];
-    let doubtful = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}"));
-    let named = missing(campaign).into_iter().map(|(name, n)| format!("missing in {n}: {name}"));
+    let all = campaign.rows.len() + campaign.failed.len();
+    let doubtful = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} of {all} {what}"));
+    let named = missing(campaign).into_iter().map(|(name, n)| format!("{name} missing in {n} of {all}"));
     doubtful.chain(named.take(1)).collect()
 }
 
@@ -115,4 +119,25 @@ fn next(campaign: &Campaign) -> Vec<String> {
         return vec!["`armcal pool` calibrates the arm on all of them together".to_owned()];
     }
     steps
+}
+
+/// What keeps recordings from being calibrated or relied upon, what several have once, the gravest first. Notices are left to
+/// the results of each.
+fn warnings(campaign: &Campaign) -> Vec<ToldWarning> {
+    let mut all: BTreeMap<(Reverse<Severity>, &str), Vec<String>> = BTreeMap::new();
+    for f in &campaign.failed {
+        all.entry((Reverse(Severity::DataLost), &f.why)).or_default().push(printable(&f.recording));
+    }
+    for row in &campaign.rows {
+        for (text, severity) in row.warnings.iter().zip(&row.severities) {
+            let grave = [Severity::Inadequate, Severity::DataLost].into_iter().find(|s| s.word() == severity);
+            if let Some(severity) = grave {
+                all.entry((Reverse(severity), text)).or_default().push(printable(&row.recording));
+            }
+        }
+    }
+    let told = |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| {
+        ToldWarning { severity, code: "", subject: listed(&recordings), message: printable(text) }
+    };
+    all.into_iter().map(told).collect()
 }

@@ -18,6 +18,7 @@ pub(crate) use joints::moves_tip;
 use crate::points::Point;
 use crate::proto;
 use crate::run::{Run, Undiagnosed};
+use armcal_diagnose::{Diagnosis, UnknownReport, Verdict};
 
 /// What is less probable than this is not drawn as if it were there.
 const IMPROBABLE: f64 = 0.05;
@@ -63,11 +64,16 @@ impl Findings {
     }
 }
 
-/// What no name explains, as page and layouts draw it: unless that anything does not have one is improbable.
+/// What no name explains, as people are told it and shown it: where it is the answer, and unless that anything does not have a
+/// name is improbable.
+pub(crate) fn shown_unlisted(d: &Diagnosis) -> impl Iterator<Item = &UnknownReport> {
+    d.unlisted.iter().filter(|u| d.verdict == Verdict::Unknown || u.probability >= IMPROBABLE)
+}
+
+/// The same as curves.
 pub(crate) fn unlisted_curves(run: &Run) -> Vec<proto::ErrorCurve> {
-    let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
-    let drawn = unlisted.filter(|u| u.probability >= IMPROBABLE);
-    drawn.map(|u| error_curve(u, run.model.chain())).collect()
+    let shown = run.diagnosis.iter().flat_map(shown_unlisted);
+    shown.map(|u| error_curve(u, run.model.chain())).collect()
 }
 
 /// Indices of the points in the order of time.

@@ -29,6 +29,7 @@ pub(crate) use numbers::Column;
 
 use crate::ReportError;
 use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, sizes_of, unlisted};
+use crate::findings::shown_unlisted;
 use crate::run::{Refit, Run};
 use crate::story::Story;
 use crate::text::millimetres;
@@ -132,12 +133,12 @@ fn verdict(run: &Run) -> Verdict {
     let names = run.recording_names();
     Verdict {
         found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
-            .chain(d.unlisted.iter().map(unlisted))
+            .chain(shown_unlisted(d).map(unlisted))
             .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
             .chain(d.nested.iter().map(Nested::sentence))
             .map(|said| run.in_words(&said))
             .collect(),
-        paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
+        paste: shown_unlisted(d).map(pasted).filter(|table| !table.is_empty()).collect(),
         same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| names.label(name))).collect(),
         unseen: (d.not_testable.iter().cloned())
             .map(|n| NotTestable { effect: names.label(&n.effect), ..n })

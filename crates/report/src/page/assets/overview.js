@@ -39,7 +39,7 @@ function timeFigure() {
 
 function start() {
   document.querySelectorAll("#do-next li, #next li, #warnings-table td").forEach(markCommands);
-  chart($("by-recording"), byRecordingFigure);
+  if ($("by-recording")) chart($("by-recording"), byRecordingFigure);
   chart($("time"), timeFigure);
   dark.addEventListener("change", redraw);
   window.addEventListener("beforeprint", drawAll);
