@@ -101,8 +101,14 @@ pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
 pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
     let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
-    let unlisted = shown_unlisted(d)
-        .map(|u| format!("unlisted, at {} over {}: {}", u.channel, u.driver, falls(&u.places)));
+    let unlisted = shown_unlisted(d).map(|u| {
+        format!(
+            "unlisted, at {} over {}: {}",
+            channel_told(&u.channel),
+            driver_told(&u.driver),
+            falls(&u.places)
+        )
+    });
     let beside = d
         .beside_curves()
         .iter()
@@ -213,7 +219,7 @@ fn as_spelt(d: &Diagnosis) -> String {
                 ),
                 None => format!(
                     "Something unlisted is missing: it enters at {} and depends on {}.",
-                    printable(&u.channel),
+                    printable(&channel_told(&u.channel)),
                     printable(&driver_told(&u.driver))
                 ),
             },
@@ -228,8 +234,19 @@ fn as_spelt(d: &Diagnosis) -> String {
     }
 }
 
+/// Where an error enters, in words.
+pub fn channel_told(channel: &str) -> String {
+    let joint = channel.strip_prefix("joint").filter(|n| n.chars().all(|c| c.is_ascii_digit()));
+    match (channel, joint) {
+        (_, Some(number)) if !number.is_empty() => format!("joint {number}"),
+        ("lengths", _) => "all lengths of the arm".to_owned(),
+        ("world", _) => "the tip, along an axis of the world".to_owned(),
+        _ => channel.to_owned(),
+    }
+}
+
 /// What an error depends on, in words before its spelling in formulas; a product or a sum of drivers as it is spelt.
-fn driver_told(driver: &str) -> String {
+pub fn driver_told(driver: &str) -> String {
     let (kind, joint) = driver.split_at(driver.find(|c: char| c.is_ascii_digit()).unwrap_or(driver.len()));
     let words = match (kind, joint.parse::<usize>()) {
         ("q", Ok(joint)) => format!("the angle of joint {joint}"),
@@ -428,13 +445,30 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
     printable(&format!(
         "unlisted, at {} over {}: linearised, each place left out in turn: {:.3} -> {:.3} mm with its \
          shape{range}{ripple}{formula}",
-        u.channel, u.driver, u.places.before, u.places.after
+        channel_told(&u.channel),
+        driver_told(&u.driver),
+        u.places.before,
+        u.places.after
     ))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::driver_told;
+    use super::{channel_told, driver_told};
+
+    #[test]
+    fn places_where_an_error_enters_are_told_in_words() {
+        let told = ["joint12", "lengths", "joint2.a", "joint2 with the direction of joint3 kept", "joint"]
+            .map(channel_told);
+        let words = [
+            "joint 12",
+            "all lengths of the arm",
+            "joint2.a",
+            "joint2 with the direction of joint3 kept",
+            "joint",
+        ];
+        assert_eq!(told, words);
+    }
 
     #[test]
     fn drivers_are_told_in_words_before_their_spelling() {

@@ -121,3 +121,16 @@ fn of_arrival(sign: i32, arrival: &[i32], error: &[f64]) -> Vec<f64> {
 fn effort_nm(o: &Observation, j: usize) -> Option<f64> {
     o.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::moves_tip;
+
+    #[test]
+    fn a_joint_with_large_implied_errors_has_no_leverage_and_a_slide_has() {
+        assert!(moves_tip("deg", [0.2, -0.7, 170.0]));
+        assert!(!moves_tip("deg", [12.0, -90.0, 0.1]));
+        assert!(moves_tip("mm", [12.0, -90.0]));
+        assert!(!moves_tip("deg", []) && !moves_tip("mm", []), "a joint of which no dwell says anything");
+    }
+}

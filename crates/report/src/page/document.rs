@@ -4,7 +4,7 @@ use super::basis::{Basis, Driver};
 use super::levers::Channel;
 use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
-use crate::diagnosis_text::sizes;
+use crate::diagnosis_text::{channel_told, driver_told, sizes};
 use crate::findings::unlisted_curves;
 use crate::proto::ErrorCurve;
 use crate::recording_names::RecordingNames;
@@ -213,8 +213,8 @@ fn unlisted_shape(curve: ErrorCurve) -> UnlistedShape {
     let half = curve.high.iter().zip(&curve.low).map(|(high, low)| (high - low) / 2.0);
     UnlistedShape {
         half: Column::of_all(half),
-        channel: curve.channel,
-        driver: curve.driver,
+        channel: channel_told(&curve.channel),
+        driver: driver_told(&curve.driver),
         driver_unit: curve.driver_unit,
         unit: curve.unit,
         at: Column::of_all(curve.at),

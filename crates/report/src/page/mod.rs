@@ -143,7 +143,7 @@ fn verdict(run: &Run) -> Verdict {
         unseen: (d.not_testable.iter().cloned())
             .map(|n| NotTestable { effect: names.label(&n.effect), ..n })
             .collect(),
-        explanations: (d.explanations.iter().cloned())
+        explanations: (d.explanations.iter())
             .map(|e| Explanation {
                 number: names.number_label(&e.number),
                 sentence: run.in_words(&e.sentence),
