@@ -78,7 +78,8 @@ impl Story {
 
     /// All of it, a sentence an entry, what a reader needs first first.
     pub fn lines(&self) -> Vec<String> {
-        let found = self.found.iter().map(|f| format!("found: {f}"));
+        let label = if self.missing.is_empty() { "" } else { "found: " };
+        let found = self.found.iter().map(|f| format!("{label}{f}"));
         let next = self.next.iter().map(|n| format!("next: {n}"));
         let status = format!("Status: {}", self.status_sentence());
         let head =
