@@ -131,7 +131,8 @@ impl Document {
     }
 }
 
-/// Every event that the page names, and every parameter of one, with its moment.
+/// Every event that the page names, and every parameter of one, with its moment; what has no name, by where it enters and what
+/// it depends on.
 fn told(run: &Run) -> BTreeMap<String, String> {
     let ranked = run.diagnosis.iter().flat_map(|d| &d.candidates).map(|c| c.spec.clone());
     let refitted = run.refits().flat_map(|r| r.effects.iter().cloned());
@@ -140,7 +141,12 @@ fn told(run: &Run) -> BTreeMap<String, String> {
     let all = ranked.chain(refitted).chain(effect_names(&run.model)).chain(parameters);
     let names = run.recording_names();
     let each = all.map(|spec| (names.label(&spec), spec));
-    each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words)).collect()
+    let events = each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words));
+    let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted).filter_map(|u| {
+        let words = format!("unlisted, {} over {}", channel_told(&u.channel), u.driver);
+        Some((u.effect()?.to_string(), words))
+    });
+    events.chain(unlisted).collect()
 }
 
 /// The best entries, and below them whatever was found.

@@ -41,7 +41,7 @@ fn next(run: &PooledRun) -> Vec<String> {
     steps
 }
 
-/// Where an effect is missing: the recording to look for it in.
+/// Where an effect is missing: what looks for it. An event between recordings does not show in one of them alone.
 fn effect(run: &PooledRun) -> Option<String> {
     let times = run.calibration.left_over();
     let errors = run.errors();
@@ -49,8 +49,8 @@ fn effect(run: &PooledRun) -> Option<String> {
     let worst = (0..errors.len()).max_by(|a, b| mean_m(a).total_cmp(&mean_m(b)))?;
     (times.is_finite() && times > INADEQUATE).then(|| {
         format!(
-            "errors are {times:.1} times the noise floor: `armcal diagnose` with the pipeline of `{}`, which errs most ({} mm), \
-             looks for what is missing; pool again with it among the `[[effects]]`",
+            "errors are {times:.1} times the noise floor, most in `{}` ({} mm): `armcal diagnose` of a pipeline with that recording and \
+             others looks for what is missing, and for what moved between them; pool again with it among the `[[effects]]`",
             printable(&run.recordings[worst].name),
             millimetres(errors[worst].calibrated.mean_m)
         )
