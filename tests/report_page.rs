@@ -98,6 +98,84 @@ fn a_comparison_is_a_page_too() {
     println!("{}", scripted(&browser, "compare.mjs", &[&page, &json, &screenshots("compare")]));
 }
 
+#[test]
+fn two_arms_have_the_page_and_it_says_what_the_terminal_says() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let out = folder.path().join("out");
+    let arguments = [Path::new("run"), &root().join("pipelines/two-arms.toml"), Path::new("--out"), &out];
+    let output = armcal(arguments.map(Path::as_os_str));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    says_the_same(&out, &String::from_utf8_lossy(&output.stdout));
+    let Some(browser) = browser() else { return };
+    let files =
+        [out.join("report.html"), out.join("summary.json"), screenshots("overview"), "two-arms".into()];
+    println!("{}", scripted(&browser, "overview.mjs", &files.each_ref().map(PathBuf::as_path)));
+}
+
+/// One recording of the pool stands elsewhere than declared: geometry of three boards cannot explain it.
+#[test]
+fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_terminal() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path();
+    let rig = path.join("rig");
+    let how = ["simulate", "--hide", "frame_shift", "--size", "medium", "--seed", "3", "--out"];
+    let output = armcal(how.iter().map(Path::new).chain([rig.as_path()]));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(rig.join("pipeline.toml")).expect("pipeline");
+    let begin = text.find("[[recordings]]").expect("recordings");
+    let (recordings, rest) = text[begin..].split_once("[streams.joints]").expect("streams");
+    for (at, recording) in recordings.split("[[recordings]]").skip(1).enumerate() {
+        let own = rig.join(format!("{at}.toml"));
+        let pipeline = format!(
+            "{}[[recordings]]{recording}[streams.joints]{rest}\n[diagnosis]\nenabled = false\n",
+            &text[..begin]
+        );
+        std::fs::write(&own, pipeline).expect("pipeline");
+        run_pipeline(&own, &path.join("runs").join(at.to_string()), &[0]);
+    }
+    let out = path.join("pool");
+    let arguments = [Path::new("pool"), &rig.join("0.toml"), &path.join("runs"), Path::new("--out"), &out];
+    let output = armcal(arguments.map(Path::as_os_str));
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    says_the_same(&out, &String::from_utf8_lossy(&output.stdout));
+    let result = read_json(&out.join("pool.json"));
+    let warnings = result["warnings"].as_array().expect("warnings");
+    assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:#?}");
+    let Some(browser) = browser() else { return };
+    let files = [out.join("report.html"), out.join("pool.json"), screenshots("overview"), "pool".into()];
+    println!("{}", scripted(&browser, "overview.mjs", &files.each_ref().map(PathBuf::as_path)));
+}
+
+/// Headline, status and steps of a page are in the text of the terminal.
+fn says_the_same(out: &Path, terminal: &str) {
+    let flat = |text: &str| {
+        let plain = ["&#60;<", "&#62;>", "&#38;&", "&#39;'", "&#34;\""]
+            .iter()
+            .fold(text.to_owned(), |text, pair| text.replace(&pair[..5], &pair[5..]));
+        plain.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let page = std::fs::read_to_string(out.join("report.html")).expect("report.html");
+    let header = page.split_once("</header>").expect("a header").0;
+    let terminal = flat(terminal);
+    let mut told = 0;
+    for (begin, end) in
+        [("<h1 id=\"verdict\"", "</h1>"), ("<p id=\"status\"", "</p>"), ("<strong>Next:</strong>", "</li>")]
+    {
+        for part in header.split(begin).skip(1) {
+            let words = part.split_once(end).expect("its end").0.trim_start();
+            let words = flat(
+                words
+                    .split_once('>')
+                    .filter(|_| begin.starts_with("<h") || begin.starts_with("<p"))
+                    .map_or(words, |w| w.1),
+            );
+            assert!(terminal.contains(&words), "{words:?} is not in {terminal}");
+            told += 1;
+        }
+    }
+    assert!(told >= 3, "headline, status and next step: {told}");
+}
+
 /// A server that ends with the test.
 struct Server(Child);
 

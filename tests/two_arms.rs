@@ -117,6 +117,7 @@ fn the_shipped_recording_is_what_its_seed_gives_and_each_arm_gets_its_table_back
         "foxglove-layout.json",
         "left.toml",
         "parameters.toml",
+        "report.html",
         "right.toml",
         "run.mcap",
         "summary.json",

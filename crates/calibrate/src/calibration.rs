@@ -12,6 +12,7 @@
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
 use crate::fit::{Near, fit_near};
+use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
 use crate::model_problem::{ModelProblem, describe, position_covariance_m2};
@@ -167,7 +168,7 @@ fn gathered(
             warnings.push(warning.clone());
         }
     }
-    Ok(Calibration {
+    let mut calibration = Calibration {
         fit: last.fit,
         nominal_values: last.nominal_values,
         residuals,
@@ -176,7 +177,9 @@ fn gathered(
         noise_floor_m,
         prediction_factor,
         warnings,
-    })
+    };
+    calibration.warnings.extend(fit_warnings::above_floor(&calibration));
+    Ok(calibration)
 }
 
 struct Judge<'a> {

@@ -1,6 +1,6 @@
 //! What the user should know about a fit.
 
-use crate::outcome::{Fit, Status};
+use crate::outcome::{Calibration, Fit, Status};
 use crate::whitened::Whitened;
 use armcal_core::{Severity, Stage, Warning, listed};
 
@@ -8,8 +8,13 @@ use armcal_core::{Severity, Stage, Warning, listed};
 const OUTLIER_WEIGHT: f64 = 0.25;
 /// Residual scale from which on the declared noise is questioned.
 const LARGE_SCALE: f64 = 1.5;
-/// Residual scale from which on the model cannot be called adequate.
-const INADEQUATE_SCALE: f64 = 2.0;
+/// Times the floor, or the declared scatter, above which the model that was fitted cannot be called adequate, whatever is
+/// known about the cause.
+pub const INADEQUATE: f64 = 2.0;
+/// Code of the warning about residuals that scatter more than declared.
+const ABOVE_NOISE: &str = "residuals-above-noise";
+/// Code of the warning about a mean error above the floor.
+pub const ABOVE_FLOOR: &str = "errors-above-floor";
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
 
@@ -61,9 +66,9 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
              or the noise is declared too small; intervals are widened accordingly",
             fit.sigma_scale
         );
-        let inadequate = fit.sigma_scale > INADEQUATE_SCALE;
+        let inadequate = fit.sigma_scale > INADEQUATE;
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
-        add(severity, "residuals-above-noise", "fit", message);
+        add(severity, ABOVE_NOISE, "fit", message);
     }
     let outliers: Vec<String> = (0..fit.weights.len())
         .filter(|&j| fit.weights[j] < OUTLIER_WEIGHT)
@@ -81,4 +86,21 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         add(severity, "outliers", &listed(&outliers), message);
     }
     warnings
+}
+
+/// That the mean error is above the floor by so much that the model is inadequate; none where the scatter has said it.
+pub(crate) fn above_floor(calibration: &Calibration) -> Option<Warning> {
+    let times = calibration.left_over();
+    let said = |w: &Warning| w.code == ABOVE_NOISE && w.severity == Severity::Inadequate;
+    if !times.is_finite() || times <= INADEQUATE || calibration.warnings.iter().any(said) {
+        return None;
+    }
+    let message = format!(
+        "the mean error of {:.3} mm is {:.1} times the noise floor of {:.3} mm: an effect is missing from the model, the \
+         setup is not as declared, or the noise is declared too small",
+        calibration.judged().fitted.mean_m * 1e3,
+        calibration.times_floor(),
+        calibration.noise_floor_m * 1e3
+    );
+    Some(Warning::new(Severity::Inadequate, Stage::Calibrate, ABOVE_FLOOR, "fit", message))
 }

@@ -64,6 +64,7 @@ pub use covariance::Covariance;
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
+pub use fit_warnings::{ABOVE_FLOOR, INADEQUATE};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
 pub use linearise::{LinearAxis, Linearisation, linearise};
 pub use model_problem::{ModelProblem, position_covariance_m2};

@@ -153,6 +153,14 @@ impl Calibration {
         self.judged().fitted.mean_m / self.noise_floor_m
     }
 
+    /// How many times the floor the errors are; of a hold-out that cannot learn an effect, those of the fitted side.
+    pub fn left_over(&self) -> f64 {
+        match self.held_out() && self.train.fitted.n > 0 {
+            true => self.times_floor().min(self.train.fitted.mean_m / self.noise_floor_m),
+            false => self.times_floor(),
+        }
+    }
+
     /// The residuals of the judged side.
     pub fn judged_residuals(&self) -> impl Iterator<Item = &Residual> {
         let held_out = self.held_out();

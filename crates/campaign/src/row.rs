@@ -42,6 +42,9 @@ pub struct Row {
     pub missing: Vec<String>,
     /// Warnings, in words.
     pub warnings: Vec<String>,
+    /// The severity of each of them, as outputs write it; empty in rows of earlier versions.
+    #[serde(default)]
+    pub severities: Vec<String>,
     /// What may change over months: parameters, the board's pose, errors.
     pub quantities: Vec<Quantity>,
 }

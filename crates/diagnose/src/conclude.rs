@@ -29,7 +29,7 @@ const CHANCE: f64 = 2.58;
 
 /// Where more than this many times the floor remains, a name stays only if it explains at least this share of what lay above
 /// the floor: what leaves the most unexplained has only leaned on another cause.
-pub(crate) const LARGE_REST: f64 = 2.0;
+pub(crate) const LARGE_REST: f64 = armcal_calibrate::INADEQUATE;
 const LEAST_EXPLAINED: f64 = 0.5;
 
 /// What the verdict is settled with.
@@ -115,7 +115,7 @@ impl Diagnosis {
         config: &DiagnosisConfig,
     ) {
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
-        let times_floor = left_over(settled);
+        let times_floor = settled.left_over();
         let beside_names = self.verdict != Verdict::NothingMissing && times_floor > config.floor_factor;
         if self.verdict != Verdict::Unexplained && !beside_names {
             return;
@@ -154,7 +154,7 @@ fn together(refitted: &Refitted) -> String {
 
 /// Whether what a refit with more effects leaves is so much that they have only leaned on another cause.
 fn leans(before: &Calibration, after: &Calibration, config: &DiagnosisConfig) -> bool {
-    let left = left_over(after);
+    let left = after.left_over();
     left > config.unexplained_factor || (left > LARGE_REST && explained(before, after) < LEAST_EXPLAINED)
 }
 
@@ -227,15 +227,6 @@ fn explained(before: &Calibration, after: &Calibration) -> f64 {
     let judged = share(before.judged().fitted.mean_m, after.judged().fitted.mean_m);
     let fitted = share(before.train.fitted.mean_m, after.train.fitted.mean_m);
     judged.max(fitted)
-}
-
-/// How many times the floor the errors are; of a hold-out that cannot learn an effect, those of the fitted side.
-fn left_over(calibration: &Calibration) -> f64 {
-    let fitted = calibration.train.fitted;
-    match calibration.held_out() && fitted.n > 0 {
-        true => calibration.times_floor().min(fitted.mean_m / calibration.noise_floor_m),
-        false => calibration.times_floor(),
-    }
 }
 
 #[cfg(test)]

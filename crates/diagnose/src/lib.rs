@@ -74,6 +74,7 @@ mod stretches;
 mod structure;
 mod suggestion;
 mod unexplained;
+pub use unexplained::UNEXPLAINED;
 mod unknown;
 mod view;
 mod weigh;

@@ -5,6 +5,9 @@ use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Unexplained, Verdict};
 use armcal_core::{Severity, Stage, Warning};
 
+/// Code of the warning about what is neither explained nor at the floor.
+pub const UNEXPLAINED: &str = "unexplained";
+
 impl Unexplained {
     /// The warning, of the verdict and of the times that the floor is exceeded on either side of a hold-out: errors far above
     /// the floor make a result inadequate, whatever was named beside them. None where what is left beside names is small.
@@ -25,7 +28,7 @@ impl Unexplained {
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
         let beside = if alone { "" } else { "beside what is named, " };
         let message = format!("{beside}{}", self.sentence());
-        Some(Warning::new(severity, Stage::Diagnose, "unexplained", "diagnosis", message))
+        Some(Warning::new(severity, Stage::Diagnose, UNEXPLAINED, "diagnosis", message))
     }
 
     /// How much, where, and what was tried, in one sentence without its capital.

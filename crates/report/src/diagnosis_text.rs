@@ -1,5 +1,6 @@
 //! What is missing, for a person in the terminal.
 
+use crate::findings::shown_unlisted;
 use crate::look_at::look_at;
 use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
@@ -64,7 +65,8 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
         ]);
     }
     let sentences = d["explanations"].as_array().into_iter().flatten();
-    let sentences = sentences.map(|e| ("-", format!("{}: {}", text(&e["number"]), told(&e["sentence"]))));
+    let sentences = sentences
+        .map(|e| ("-", format!("{}: {}", names.number_label(&text(&e["number"])), told(&e["sentence"]))));
     let next = list(&d["record_next"]).into_iter().map(|r| ("next:", names.in_words(&r)));
     let mut sections = vec![
         pen.section(headline.trim(), pen.list(next)),
@@ -91,7 +93,7 @@ fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
 pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&n.sentence()));
     let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
-    let all = d.effects.iter().map(found).chain(d.unlisted.iter().map(unlisted)).chain(beside).chain(nested);
+    let all = d.effects.iter().map(found).chain(shown_unlisted(d).map(unlisted)).chain(beside).chain(nested);
     all.map(|said| run.in_words(&said)).collect()
 }
 
@@ -99,10 +101,14 @@ pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
 pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
     let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
-    let unlisted = d
-        .unlisted
-        .iter()
-        .map(|u| format!("unlisted, at {} over {}: {}", u.channel, u.driver, falls(&u.places)));
+    let unlisted = shown_unlisted(d).map(|u| {
+        format!(
+            "unlisted, at {} over {}: {}",
+            channel_told(&u.channel),
+            driver_told(&u.driver),
+            falls(&u.places)
+        )
+    });
     let beside = d
         .beside_curves()
         .iter()
@@ -122,6 +128,13 @@ pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
 /// The kind of an effect that was found; none of something without a name.
 pub(crate) fn kind_of(e: &FoundEffect) -> Option<&'static EffectKind> {
     e.name.split([':', '@', ',']).next().and_then(find)
+}
+
+/// The kind of all effects that were found, where they are of one.
+fn one_kind(d: &Diagnosis) -> Option<&'static EffectKind> {
+    let mut kinds = d.effects.iter().map(|e| kind_of(e).filter(|kind| kind.family != Family::User));
+    let first = kinds.next()??;
+    kinds.all(|kind| kind.is_some_and(|k| k.name == first.name)).then_some(first)
 }
 
 /// What to look at on the rig, once for all effects of one kind; only where one name is left.
@@ -178,7 +191,8 @@ fn as_spelt(d: &Diagnosis) -> String {
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
             let names = printable(&d.names.join(", "));
-            format!("Missing: {names} ({probability}p = {:.3}){}.", d.p_adjusted, beside(d))
+            let meaning = one_kind(d).map_or(String::new(), |kind| format!(" In words: {}.", kind.summary));
+            format!("Missing: {names} ({probability}p = {:.3}){}.{meaning}", d.p_adjusted, beside(d))
         }
         Verdict::Ambiguous => {
             let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
@@ -205,7 +219,7 @@ fn as_spelt(d: &Diagnosis) -> String {
                 ),
                 None => format!(
                     "Something unlisted is missing: it enters at {} and depends on {}.",
-                    printable(&u.channel),
+                    printable(&channel_told(&u.channel)),
                     printable(&driver_told(&u.driver))
                 ),
             },
@@ -220,8 +234,19 @@ fn as_spelt(d: &Diagnosis) -> String {
     }
 }
 
+/// Where an error enters, in words.
+pub fn channel_told(channel: &str) -> String {
+    let joint = channel.strip_prefix("joint").filter(|n| n.chars().all(|c| c.is_ascii_digit()));
+    match (channel, joint) {
+        (_, Some(number)) if !number.is_empty() => format!("joint {number}"),
+        ("lengths", _) => "all lengths of the arm".to_owned(),
+        ("world", _) => "the tip, along an axis of the world".to_owned(),
+        _ => channel.to_owned(),
+    }
+}
+
 /// What an error depends on, in words before its spelling in formulas; a product or a sum of drivers as it is spelt.
-fn driver_told(driver: &str) -> String {
+pub fn driver_told(driver: &str) -> String {
     let (kind, joint) = driver.split_at(driver.find(|c: char| c.is_ascii_digit()).unwrap_or(driver.len()));
     let words = match (kind, joint.parse::<usize>()) {
         ("q", Ok(joint)) => format!("the angle of joint {joint}"),
@@ -261,6 +286,7 @@ fn beside(d: &Diagnosis) -> String {
 
 fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     let told = |said: &str| run.in_words(&printable(said));
+    let names = run.recording_names();
     let mut sections = vec![brief(pen, run, d)];
     sections.push(pen.section("Candidates, best first", ranking(pen, run, d)));
     if !d.cannot_tell_apart.is_empty() {
@@ -277,11 +303,14 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
         });
         sections.push(pen.section("What these data could not have shown", pen.list(rows)));
     }
-    let tables: Vec<String> = d.unlisted.iter().map(pasted).filter(|t| !t.is_empty()).collect();
+    let tables: Vec<String> = shown_unlisted(d).map(pasted).filter(|t| !t.is_empty()).collect();
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
-    let sentences = d.explanations.iter().map(|e| ("-", told(&format!("{}: {}", e.number, e.sentence))));
+    let sentences = d
+        .explanations
+        .iter()
+        .map(|e| ("-", format!("{}: {}", names.number_label(&printable(&e.number)), told(&e.sentence))));
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")
 }
@@ -416,13 +445,30 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
     printable(&format!(
         "unlisted, at {} over {}: linearised, each place left out in turn: {:.3} -> {:.3} mm with its \
          shape{range}{ripple}{formula}",
-        u.channel, u.driver, u.places.before, u.places.after
+        channel_told(&u.channel),
+        driver_told(&u.driver),
+        u.places.before,
+        u.places.after
     ))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::driver_told;
+    use super::{channel_told, driver_told};
+
+    #[test]
+    fn places_where_an_error_enters_are_told_in_words() {
+        let told = ["joint12", "lengths", "joint2.a", "joint2 with the direction of joint3 kept", "joint"]
+            .map(channel_told);
+        let words = [
+            "joint 12",
+            "all lengths of the arm",
+            "joint2.a",
+            "joint2 with the direction of joint3 kept",
+            "joint",
+        ];
+        assert_eq!(told, words);
+    }
 
     #[test]
     fn drivers_are_told_in_words_before_their_spelling() {

@@ -45,6 +45,7 @@ mod summary;
 mod tables;
 mod terminal;
 mod text;
+mod told_warning;
 mod verification;
 mod write;
 
@@ -57,7 +58,7 @@ pub use closed_chain::{
     write_closed,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use diagnosis_text::{diagnosis_text, past_diagnosis, size as amplitude_text};
+pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis, size as amplitude_text};
 pub use error::ReportError;
 pub use look_at::look_at;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};

@@ -39,9 +39,50 @@ impl RecordingNames {
         told.collect::<Vec<_>>().join("`")
     }
 
-    /// The same for a chart, which has no code font for what stands between backticks.
-    pub(crate) fn in_chart(&self, sentence: &str) -> String {
-        self.in_words(sentence).replace('`', "")
+    /// Effects, or a parameter of one, as tables, axes and legends call them: an event by its moment and not by its spelling,
+    /// `tool_shift from dwell 17 of roll on, x` for `tool_shift@1.17.x`.
+    pub(crate) fn label(&self, name: &str) -> String {
+        let each = name.split('+').map(|part| self.event_label(part).unwrap_or_else(|| part.to_owned()));
+        each.collect::<Vec<_>>().join(" + ")
+    }
+
+    fn event_label(&self, name: &str) -> Option<String> {
+        let moment_of = |spec: &str| {
+            let (place, since) = place_and_moment(spec).filter(|(place, _)| !place.is_empty())?;
+            Some(format!("{place}{}", self.moment(since?)?.replace('`', "")))
+        };
+        let shapes =
+            |spec: &str| spec.split_once(',').map_or(String::new(), |(_, shapes)| format!(", {shapes}"));
+        let whole = moment_of(name).map(|words| words + &shapes(name));
+        whole.or_else(|| {
+            let (event, parameter) = name.rsplit_once('.')?;
+            Some(format!("{}{}, {parameter}", moment_of(event)?, shapes(event)))
+        })
+    }
+
+    /// A number of the verdict as people call it: `probability of backlash:1` for `backlash:1.probability`.
+    pub(crate) fn number_label(&self, number: &str) -> String {
+        let of = |words: &str, effect: &str| format!("{words} {}", self.label(effect));
+        match number.rsplit_once('.') {
+            Some((effect, "probability")) => return of("probability of", effect),
+            Some((effect, "log_evidence")) => return of("evidence for", effect),
+            Some((effect, "places")) => return of("places left out in turn, without and with", effect),
+            Some((effect, "rival")) => return of("next best explanation after", effect),
+            Some((effect, "contrast")) => return of("pairs of dwells that show", effect),
+            _ => {}
+        }
+        let words = match number {
+            "p_nothing" => "probability that nothing is missing",
+            "p_adjusted" => "how often noise would look like it",
+            "holdout_mm" => "mean error",
+            "sigma_ratio" => "scatter",
+            "not_testable" => "what these data could not have shown",
+            "unknown" => "what has no listed cause",
+            "tentative" => "what else the data ask for",
+            "nested" => "the choice made again",
+            other => other,
+        };
+        words.to_owned()
     }
 
     /// A warning for people.
@@ -113,6 +154,27 @@ mod tests {
         {
             assert_eq!(told(as_it_is), as_it_is);
         }
+    }
+
+    #[test]
+    fn tables_and_legends_have_words_and_no_spelling_of_moments() {
+        let names = RecordingNames::new(["normal", "roll"].map(str::to_owned));
+        let label = |name| names.label(name);
+        assert_eq!(label("frame_shift@0"), "frame_shift in normal");
+        assert_eq!(label("frame_shift@0.x"), "frame_shift in normal, x");
+        assert_eq!(label("tool_shift@1.50"), "tool_shift from dwell 50 of roll on");
+        assert_eq!(label("tool_shift@1.50.rx"), "tool_shift from dwell 50 of roll on, rx");
+        assert_eq!(
+            label("zero_slip:2@0.3-25,rest=0.5+backlash:1"),
+            "zero_slip:2 in dwells 3 to 25 of normal, rest=0.5 + backlash:1"
+        );
+        for as_it_is in ["joint1.theta", "backlash:1.width", "frame_shift@9", "base_compliance,height=0.1"] {
+            assert_eq!(label(as_it_is), as_it_is);
+        }
+        assert_eq!(names.number_label("frame_shift@0.probability"), "probability of frame_shift in normal");
+        assert_eq!(names.number_label("backlash:1.rival"), "next best explanation after backlash:1");
+        assert_eq!(names.number_label("p_nothing"), "probability that nothing is missing");
+        assert_eq!(names.number_label("verdict"), "verdict");
     }
 
     #[test]

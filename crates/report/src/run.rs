@@ -3,9 +3,9 @@
 use crate::diagnosis_text::{headline, setup_sentence};
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
-use armcal_calibrate::Calibration;
+use armcal_calibrate::{ABOVE_FLOOR, Calibration};
 use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
-use armcal_diagnose::Diagnosis;
+use armcal_diagnose::{Diagnosis, UNEXPLAINED};
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport};
@@ -148,6 +148,9 @@ impl Run {
         let all = of_setup.iter().chain(all).chain(of_diagnosis);
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));
+        // How far above the floor, the diagnosis tells with the places.
+        let unexplained = own.iter().any(|w| w.code == UNEXPLAINED && w.severity == Severity::Inadequate);
+        own.retain(|w| w.code != ABOVE_FLOOR || !unexplained);
         own.into_iter().cloned().collect()
     }
 

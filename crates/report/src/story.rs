@@ -3,8 +3,8 @@
 
 use crate::diagnosis_text::{all_found, briefly_found, next};
 use crate::run::{Run, Status};
-use crate::text::{conclusion, printable};
-use armcal_core::Warning;
+use crate::text::conclusion;
+use crate::told_warning::{ToldWarning, gravest_first};
 
 /// What to do where the setup contradicts the data.
 const MEND: &str =
@@ -18,6 +18,7 @@ pub(crate) struct Story {
     /// One word for a lamp: the status where the result does not stand, or the verdict that says why; else the verdict.
     pub lamp: &'static str,
     pub calibration: String,
+    /// What is missing; empty where that is never looked for.
     pub missing: String,
     /// One entry for everything that was found.
     pub found: Vec<String>,
@@ -28,8 +29,8 @@ pub(crate) struct Story {
     incomplete: bool,
     /// What to do, one step an entry.
     pub next: Vec<String>,
-    /// Every warning and how it is told, those of the recordings first.
-    pub warnings: Vec<(String, Warning)>,
+    /// Every warning, the gravest first, otherwise those of the recordings first.
+    pub warnings: Vec<ToldWarning>,
 }
 
 impl Story {
@@ -54,13 +55,36 @@ impl Story {
         }
     }
 
+    /// Of what has no diagnosis: what was reached, and what else is to be known at first sight.
+    pub fn undiagnosed(
+        calibration: String,
+        found: Vec<String>,
+        status: Status,
+        next: Vec<String>,
+        warnings: Vec<ToldWarning>,
+    ) -> Story {
+        Story {
+            lamp: lamp("not_diagnosed", status),
+            calibration,
+            missing: String::new(),
+            found_briefly: found.clone(),
+            found,
+            status,
+            incomplete: false,
+            next,
+            warnings: gravest_first(warnings),
+        }
+    }
+
     /// All of it, a sentence an entry, what a reader needs first first.
     pub fn lines(&self) -> Vec<String> {
-        let found = self.found.iter().map(|f| format!("found: {f}"));
+        let label = if self.missing.is_empty() { "" } else { "found: " };
+        let found = self.found.iter().map(|f| format!("{label}{f}"));
         let next = self.next.iter().map(|n| format!("next: {n}"));
         let status = format!("Status: {}", self.status_sentence());
-        let head = [self.missing.clone(), self.calibration.clone()];
-        head.into_iter().chain([status]).chain(next).chain(found).collect()
+        let head =
+            [self.missing.clone(), self.calibration.clone()].into_iter().filter(|line| !line.is_empty());
+        head.chain([status]).chain(next).chain(found).collect()
     }
 
     /// What to do first, as far as a screen has room.
@@ -71,13 +95,6 @@ impl Story {
     /// How many steps there are beyond those.
     pub fn more_steps(&self) -> usize {
         self.next.len() - self.first_steps().len()
-    }
-
-    /// The warnings by their severity.
-    pub fn gravest_first(&self) -> Vec<&(String, Warning)> {
-        let mut all: Vec<_> = self.warnings.iter().collect();
-        all.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
-        all
     }
 
     /// Whether the result stands, and what the command exits with.
@@ -102,17 +119,18 @@ pub(crate) fn status_sentence(status: Status) -> &'static str {
     }
 }
 
-fn warnings(run: &Run) -> Vec<(String, Warning)> {
-    let text = |w: &Warning| run.in_words(&printable(&w.to_string()));
+fn warnings(run: &Run) -> Vec<ToldWarning> {
+    let names = run.recording_names();
     let of_recordings = run.recordings.iter().flat_map(|r| {
-        let told = |w: &Warning| (format!("{}: {}", printable(&r.name), text(w)), w.clone());
-        r.all_warnings().into_iter().map(told)
+        let told = |w| ToldWarning::new(&names, Some(&r.name), w);
+        r.all_warnings().into_iter().map(told).collect::<Vec<_>>()
     });
-    of_recordings.chain(run.overall_warnings().into_iter().map(|w| (text(&w), w))).collect()
+    let overall = run.overall_warnings();
+    gravest_first(of_recordings.chain(overall.iter().map(|w| ToldWarning::new(&names, None, w))).collect())
 }
 
 /// Never a verdict of success where the result does not stand.
-pub(crate) fn lamp(verdict: &'static str, status: Status) -> &'static str {
+fn lamp(verdict: &'static str, status: Status) -> &'static str {
     match status {
         Status::Ok => verdict,
         _ if matches!(verdict, "unexplained" | "setup") => verdict,

@@ -4,8 +4,9 @@ use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::story::{SHOWN, Story};
 use crate::text::{estimate_shown, millimetres, printable, remark};
+use crate::told_warning::ToldWarning;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
-use armcal_core::{ErrorStats, Severity, Warning};
+use armcal_core::{ErrorStats, Severity};
 use comfy_table::Cell;
 
 /// How much of a run is told.
@@ -39,20 +40,19 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
             sections.extend(undetermined(&pen, &run.calibration));
             sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
         }
-        Detail::Story => sections.extend(briefly(&pen, run, &story)),
+        Detail::Story => sections.extend(briefly(&pen, summarised(&run.calibration), &story)),
     }
     sections.extend(ending(&pen, &story, detail));
     sections.join("\n")
 }
 
-/// Parameters and notices by their number, the gravest warnings by their words.
-fn briefly(pen: &Pen, run: &Run, story: &Story) -> Vec<String> {
+/// What is said of the `parameters`, notices by their number, the gravest warnings by their words.
+pub(crate) fn briefly(pen: &Pen, parameters: Option<String>, story: &Story) -> Vec<String> {
     let (notices, mut grave): (Vec<_>, Vec<_>) =
-        story.gravest_first().into_iter().partition(|(_, w)| w.severity == Severity::Notice);
+        story.warnings.iter().partition(|w| w.severity == Severity::Notice);
     // What the answer says already is not said once more.
-    let told = |w: &Warning| story.missing.contains(&run.in_words(&printable(&w.message)));
-    grave.retain(|(_, w)| !told(w));
-    let left_out = [summarised(&run.calibration), counted(notices.len())];
+    grave.retain(|w| !story.missing.contains(&w.message));
+    let left_out = [parameters, counted(notices.len())];
     let left_out: Vec<String> = left_out.into_iter().flatten().collect();
     let brief =
         (!left_out.is_empty()).then(|| format!("{} (`armcal run -v` lists them)", left_out.join("; ")));
@@ -63,15 +63,16 @@ fn briefly(pen: &Pen, run: &Run, story: &Story) -> Vec<String> {
 }
 
 /// What it came to, what is missing, the status and the next step.
-fn ending(pen: &Pen, story: &Story, detail: Detail) -> [String; 2] {
+pub(crate) fn ending(pen: &Pen, story: &Story, detail: Detail) -> [String; 2] {
     let verdict = |text: &str| pen.verdict(text, story.status == Status::Ok);
     let list = |label, entries: &[String]| match detail {
         Detail::Everything => pen.list(entries.iter().map(|e| (label, e.clone()))),
         Detail::Story => pen.list(first_ones(entries).into_iter().map(|e| (label, e))),
     };
+    let missing = if story.missing.is_empty() { String::new() } else { verdict(&story.missing) };
     let found = if detail == Detail::Story { &story.found_briefly } else { &story.found };
     [
-        verdict(&story.calibration) + &verdict(&story.missing) + &list("-", found),
+        verdict(&story.calibration) + &missing + &list("-", found),
         verdict(&format!("Status: {}", story.status_sentence())) + &list("next:", &story.next),
     ]
 }
@@ -84,7 +85,7 @@ fn first_ones(entries: &[String]) -> Vec<String> {
 }
 
 /// The parameters in one sentence; none where none is free.
-fn summarised(calibration: &Calibration) -> Option<String> {
+pub(crate) fn summarised(calibration: &Calibration) -> Option<String> {
     let free = || calibration.fit.estimates.iter().filter(|e| e.parameter.free);
     let open: Vec<String> = free().filter(|e| !e.determined).map(|e| printable(&e.parameter.name)).collect();
     let named = open.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
@@ -201,8 +202,8 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
 }
 
 /// Warnings, and that there are more of them.
-fn listed(pen: &Pen, warnings: Vec<&(String, Warning)>, more: usize) -> Option<String> {
-    let entries = warnings.iter().map(|(text, w)| (w.severity.word(), text.clone()));
+pub(crate) fn listed(pen: &Pen, warnings: Vec<&ToldWarning>, more: usize) -> Option<String> {
+    let entries = warnings.iter().map(|w| (w.severity.word(), w.text()));
     let rest = (more > 0).then(|| ("", format!("and {more} more (`armcal run -v` lists them)")));
     (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries.chain(rest))))
 }

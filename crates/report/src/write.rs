@@ -18,7 +18,8 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 pub(crate) const RUN: &str = "run.mcap";
-const PAGE: &str = "report.html";
+/// The page.
+pub(crate) const REPORT: &str = "report.html";
 const SUMMARY: &str = "summary.json";
 const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
@@ -79,7 +80,7 @@ pub fn write_all(
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let mut staged = Vec::new();
     let texts = [
-        (PAGE, &page),
+        (REPORT, &page),
         (SUMMARY, &summary),
         (PARAMETERS, &parameters),
         (model.name, &model.text),
@@ -97,7 +98,7 @@ pub fn write_all(
 
     let attachments = [
         Attachment { name: "pipeline.toml", media_type: "application/toml", text: &run.pipeline_text },
-        Attachment { name: PAGE, media_type: "text/html", text: &page },
+        Attachment { name: REPORT, media_type: "text/html", text: &page },
         Attachment { name: SUMMARY, media_type: "application/json", text: &summary },
         Attachment { name: PARAMETERS, media_type: "application/toml", text: &parameters },
         Attachment { name: model.name, media_type: model.media_type, text: &model.text },
@@ -121,7 +122,7 @@ pub fn write_all(
 pub fn run_files(out_dir: &Path, urdf: bool) -> Vec<PathBuf> {
     let model = if urdf { model_file::URDF } else { model_file::DH };
     let texts =
-        [PAGE, SUMMARY, PARAMETERS, model, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
+        [REPORT, SUMMARY, PARAMETERS, model, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
     std::iter::once(RUN).chain(texts).chain(tables::FILES).map(|name| out_dir.join(name)).collect()
 }
 

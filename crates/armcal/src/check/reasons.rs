@@ -6,7 +6,7 @@ use armcal_calibrate::Estimate;
 use armcal_core::{Role, Severity};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport};
 use armcal_model::{EffectSpec, Since, Target};
-use armcal_report::{Run, Status, amplitude_text, look_at, printable};
+use armcal_report::{Run, Status, amplitude_text, channel_told, driver_told, look_at, printable};
 
 /// Everything the run says about what is wrong, the most telling first: bodies that moved, effects found, shapes
 /// without a name, parameters on their bounds, warnings.
@@ -92,7 +92,8 @@ fn when(run: &Run, since: Option<Since>) -> String {
 fn unlisted(u: &UnknownReport) -> String {
     printable(&format!(
         "Something unlisted enters at {} and depends on {}: `armcal diagnose` shows its shape and a formula to add.",
-        u.channel, u.driver
+        channel_told(&u.channel),
+        driver_told(&u.driver)
     ))
 }
 

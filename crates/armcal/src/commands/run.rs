@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub fn run(path: &Path, out: &Path, detail: Detail, json: bool) -> Result<Outcome, Error> {
     let pipeline = match Job::load(path)? {
         Job::OneArm(pipeline) => pipeline,
-        Job::TwoArms(pipeline) => return two_arms(&pipeline, out, json),
+        Job::TwoArms(pipeline) => return two_arms(&pipeline, out, detail, json),
     };
     may_write(results(&pipeline, out))?;
     let progress = Progress::new();
@@ -43,7 +43,7 @@ pub(super) fn results(pipeline: &Pipeline, out: &Path) -> Vec<PathBuf> {
 }
 
 /// The same for two arms in a closed chain.
-fn two_arms(pipeline: &ClosedPipeline, out: &Path, json: bool) -> Result<Outcome, Error> {
+fn two_arms(pipeline: &ClosedPipeline, out: &Path, detail: Detail, json: bool) -> Result<Outcome, Error> {
     let arms = pipeline.arms.iter().map(|arm| (arm.name.as_str(), arm.model.urdf.is_some()));
     may_write(closed_files(out, arms))?;
     let progress = Progress::new();
@@ -54,7 +54,7 @@ fn two_arms(pipeline: &ClosedPipeline, out: &Path, json: bool) -> Result<Outcome
     if json {
         print(&closed_summary_json(&run)?)?;
     } else {
-        print(&closed_terminal(&run, style()))?;
+        print(&closed_terminal(&run, style(), detail))?;
         print_written(out, &written)?;
     }
     Ok(outcome(run.status()))

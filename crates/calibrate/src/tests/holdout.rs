@@ -101,6 +101,37 @@ fn what_few_dwells_do_not_tell_is_expected_of_the_held_out_ones() {
     assert_eq!(run(&model, &observations, "kind = \"none\"").unwrap().prediction_factor, 1.0);
 }
 
+/// Whether few dwells err by much or all by a little more than declared: above twice the floor the model is inadequate, and
+/// that is one warning.
+#[test]
+fn errors_above_twice_the_floor_are_inadequate_whatever_the_scatter_says() {
+    let (model, observations) = tracked();
+    let grave = |observations: &[Observation]| -> (Vec<&'static str>, Calibration) {
+        let c = run(&model, observations, "kind = \"cavity-folds\"\nk = 8").unwrap();
+        let grave = c.warnings.iter().filter(|w| w.severity == armcal_core::Severity::Inadequate);
+        (grave.map(|w| w.code).collect(), c)
+    };
+    assert!(grave(&observations).0.is_empty());
+    let erring = |from: usize, by_m: f64| {
+        let mut all = observations.clone();
+        for o in all.iter_mut().skip(from) {
+            let armcal_core::Reference::Tracked { position_m, .. } = &mut o.reference else {
+                panic!("not tracked")
+            };
+            position_m.x += by_m;
+        }
+        all
+    };
+    let (codes, few) = grave(&erring(70, 40.0 * rig::SIGMA_M));
+    assert!(few.fit.sigma_scale < crate::INADEQUATE && few.times_floor() > 2.5, "{}", few.times_floor());
+    assert_eq!(codes, [crate::ABOVE_FLOOR]);
+    let mut sharper = observations.clone();
+    sharper.iter_mut().for_each(|o| o.covariance_m2 /= 9.0);
+    let (codes, all) = grave(&sharper);
+    assert!(all.fit.sigma_scale > crate::INADEQUATE && all.times_floor() > 2.5, "{}", all.times_floor());
+    assert_eq!(codes, ["residuals-above-noise"]);
+}
+
 #[test]
 fn a_recording_held_out_gets_its_own_board_and_nothing_else() {
     let (model, observations) = boards();

@@ -1,7 +1,7 @@
 //! A campaign for programs, and its page.
 
 use super::page::CampaignPage;
-use super::terminal::conclusion;
+use super::story::conclusion;
 use super::words::{meaning, repeated, sentence};
 use super::{Campaign, FailedRecording, Repeat};
 use crate::ReportError;

@@ -7,6 +7,7 @@ mod date;
 mod files;
 mod page;
 mod row;
+mod story;
 mod terminal;
 mod words;
 

@@ -2,12 +2,13 @@
 
 use super::Campaign;
 use super::date::minute;
-use super::terminal::conclusion;
 use super::words::{meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
-use crate::run::VERSION;
+use crate::page::shell::Shell;
+use crate::story::Story;
 use crate::text::millimetres;
+use crate::told_warning::ToldWarning;
 use armcal_campaign::{Row, RowStatus, Series};
 use askama::Template;
 use serde::Serialize;
@@ -19,18 +20,13 @@ const MOST_POINTS: usize = 5000;
 #[derive(Template)]
 #[template(path = "campaign.html")]
 pub(super) struct CampaignPage<'a> {
-    policy: String,
-    style: &'a str,
-    plotly: &'a str,
-    data: String,
-    script: String,
-    version: &'a str,
-    pipeline: &'a str,
-    sentence: String,
+    shell: Shell,
+    next: Vec<String>,
     changes: Vec<(String, &'static str)>,
     rows: Vec<Shown<'a>>,
     failed: &'a [super::FailedRecording],
     repeats: Vec<String>,
+    warnings: Vec<ToldWarning>,
 }
 
 struct Shown<'a> {
@@ -50,22 +46,21 @@ impl<'a> CampaignPage<'a> {
     /// # Errors
     /// Data that cannot be written as JSON.
     pub fn of(campaign: &'a Campaign) -> Result<CampaignPage<'a>, ReportError> {
-        let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")]);
+        let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")];
+        let name = &campaign.pipeline;
+        let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
+        let shell = Shell::new("campaign-page", names, &scripts, &Document::of(campaign), "'none'")?;
+        let story = Story::of_campaign(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
         let rows = campaign.rows.iter().zip(&campaign.folders);
         Ok(CampaignPage {
-            policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
-            style: embed::STYLE,
-            plotly: embed::PLOTLY,
-            data: embed::json_for_html(&Document::of(campaign))?,
-            script,
-            version: VERSION,
-            pipeline: &campaign.pipeline,
-            sentence: conclusion(campaign),
+            shell: shell.telling(&story),
+            next: story.next,
             changes: told.collect(),
             rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
             failed: &campaign.failed,
             repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
+            warnings: story.warnings,
         })
     }
 }

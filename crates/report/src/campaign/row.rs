@@ -3,7 +3,7 @@
 use crate::run::{Run, Status};
 use armcal_calibrate::Estimate;
 use armcal_campaign::{ErrorFigures, Quantity, Row, RowStatus};
-use armcal_core::{ErrorStats, RollPitchYaw, Unit};
+use armcal_core::{ErrorStats, RollPitchYaw, Unit, Warning};
 use armcal_table::Tilt;
 
 /// The row of a run on a single recording.
@@ -14,7 +14,9 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
     let recording = run.recordings.first()?;
     let calibration = &run.calibration;
     let judged = calibration.judged();
-    let warnings = recording.all_warnings().into_iter().map(ToString::to_string);
+    let overall = run.overall_warnings();
+    let mut warnings: Vec<&Warning> = recording.all_warnings().into_iter().chain(&overall).collect();
+    warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
     let tilt = words(tilt);
     Some(Row {
         recording: recording.name.clone(),
@@ -37,7 +39,8 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         noise_floor_m: calibration.noise_floor_m,
         verdict: run.answer().sentence,
         missing: missing(run),
-        warnings: warnings.chain(run.overall_warnings().iter().map(ToString::to_string)).collect(),
+        warnings: warnings.iter().map(|w| run.in_words(&w.to_string())).collect(),
+        severities: warnings.iter().map(|w| w.severity.word().to_owned()).collect(),
         quantities: quantities(run, &judged.fitted, &tilt),
         tilt,
     })

@@ -4,7 +4,9 @@ use super::Campaign;
 use super::date::minute;
 use super::words::{meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::{Status, VERSION};
+use crate::run::VERSION;
+use crate::story::Story;
+use crate::terminal::{Detail, ending};
 use crate::text::{millimetres, printable};
 use armcal_campaign::{ErrorFigures, Row};
 use comfy_table::Cell;
@@ -41,7 +43,7 @@ pub fn campaign_text(campaign: &Campaign, style: TerminalStyle) -> String {
             .map(|f| ("failed", format!("{}: {}", printable(&f.recording), printable(&f.why))));
         sections.push(pen.section("Not calibrated", pen.list(failed)));
     }
-    sections.push(pen.verdict(&conclusion(campaign), campaign.status() == Status::Ok));
+    sections.extend(ending(&pen, &Story::of_campaign(campaign), Detail::Everything));
     sections.join("\n")
 }
 
@@ -66,30 +68,4 @@ fn recordings(pen: &Pen, rows: &[Row]) -> String {
         text.push_str(&format!(" and {} more in campaign.html and campaign.parquet\n", rows.len() - LISTED));
     }
     text
-}
-
-/// What it comes to, in one sentence.
-pub(super) fn conclusion(campaign: &Campaign) -> String {
-    let (done, failed) = (campaign.rows.len(), campaign.failed.len());
-    let of = done + failed;
-    let median = |of: fn(&Row) -> &ErrorFigures| {
-        let mut means: Vec<f64> = campaign.counted().filter_map(|r| of(r).mean_m).collect();
-        means.sort_by(f64::total_cmp);
-        means.get(means.len() / 2).map(|m| millimetres(*m))
-    };
-    let errors = match (median(|r| &r.nominal), median(|r| &r.calibrated)) {
-        (Some(before), Some(after)) => format!(": mean error {before} mm before, {after} mm after (median)"),
-        _ => String::new(),
-    };
-    let changes = match campaign.changes.len() {
-        0 => "nothing changed beyond scatter".to_owned(),
-        1 => "1 change".to_owned(),
-        n => format!("{n} changes"),
-    };
-    let once = match done - campaign.counted().count() {
-        0 => String::new(),
-        1 => ", 1 of them a repetition that counts once".to_owned(),
-        n => format!(", {n} of them repetitions that count once"),
-    };
-    format!("{done} of {of} recordings calibrated{once}{errors}; {changes}.")
 }

@@ -1,36 +1,17 @@
 //! What came out of a run of two arms: in sentences, over recorded time, and as a table.
 
-use super::{Messages, facts};
+use super::{Messages, facts, findings};
 use crate::closed_chain::ClosedRun;
-use crate::proto::{Course, Story};
+use crate::proto::Course;
 use crate::recorded_time::RecordedTime;
-use crate::story::{lamp, status_sentence};
-use crate::text::conclusion_about;
+use crate::story::Story;
 
 pub(super) fn put(run: &ClosedRun, out: &mut Messages) {
     let begin_ns = run.start_ns();
-    let table = facts::parameter_table(&run.calibration.fit, begin_ns);
+    let table = facts::parameter_table(&run.calibration.fit, &run.recording_names(), begin_ns);
     out.put("/armcal/parameter_table", begin_ns, &table);
-    out.put("/armcal/story", begin_ns, &story(run));
+    out.put("/armcal/story", begin_ns, &findings::story(&Story::of_two_arms(run), begin_ns));
     out.put("/armcal/course", begin_ns, &course(run));
-}
-
-/// Nothing is looked for beyond the geometry of two arms, so nothing is said about what is missing.
-fn story(run: &ClosedRun) -> Story {
-    let status = format!("Status: {}", status_sentence(run.status()));
-    Story {
-        timestamp: facts::time(run.start_ns()),
-        lamp: lamp("not_diagnosed", run.status()).into(),
-        lines: vec![conclusion_about(&run.calibration, "closing error"), status],
-        warnings: warnings(run),
-    }
-}
-
-/// The gravest first.
-fn warnings(run: &ClosedRun) -> Vec<String> {
-    let mut all = run.told_warnings();
-    all.sort_by_key(|(_, w)| std::cmp::Reverse(w.severity));
-    all.into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code)).collect()
 }
 
 /// Closing errors in the order of time.

@@ -3,6 +3,7 @@
 use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use crate::points::Point;
 use crate::proto;
+use crate::recording_names::RecordingNames;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
 use crate::text::{conclusion, estimate_shown, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
@@ -14,7 +15,11 @@ use nalgebra::Vector3;
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     out.put("/armcal/parameters", begin_ns, &parameters(&run.calibration.fit, begin_ns));
-    out.put("/armcal/parameter_table", begin_ns, &parameter_table(&run.calibration.fit, begin_ns));
+    out.put(
+        "/armcal/parameter_table",
+        begin_ns,
+        &parameter_table(&run.calibration.fit, &run.recording_names(), begin_ns),
+    );
     out.put(
         "/armcal/report",
         begin_ns,
@@ -181,12 +186,12 @@ fn parameter(e: &Estimate) -> proto::Parameter {
     }
 }
 
-/// The free parameters of a fit as the terminal shows them.
-pub(super) fn parameter_table(fit: &Fit, time_ns: i64) -> proto::ParameterTable {
+/// The free parameters of a fit as people read them.
+pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -> proto::ParameterTable {
     let row = |e: &Estimate| {
         let [nominal, calibrated, change, half] = estimate_shown(e);
         proto::ParameterRow {
-            parameter: e.parameter.name.clone(),
+            parameter: names.label(&e.parameter.name),
             nominal,
             calibrated,
             change,

@@ -5,6 +5,7 @@ use super::{Messages, run_start_ns, start_ns};
 use crate::findings::Findings;
 use crate::run::Run;
 use crate::story::Story;
+use crate::told_warning::ToldWarning;
 
 pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
@@ -36,14 +37,12 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     out.put("/armcal/quality", begin_ns, &crate::proto::Quality { timestamp: stamp(), ..f.quality.clone() });
 }
 
-fn story(s: &Story, time_ns: i64) -> crate::proto::Story {
-    let told =
-        s.gravest_first().into_iter().map(|(text, w)| format!("{}: {text} [{}]", w.severity.word(), w.code));
+pub(super) fn story(s: &Story, time_ns: i64) -> crate::proto::Story {
     crate::proto::Story {
         timestamp: time(time_ns),
         lamp: s.lamp.into(),
         lines: s.lines(),
-        warnings: told.collect(),
+        warnings: s.warnings.iter().map(ToldWarning::line).collect(),
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! The names in `summary.json` are a contract (`armcal.closed-chain/1`): fields are added, never renamed.
 
+use super::page::closed_html;
 use super::{ClosedRecording, ClosedRun};
 use crate::ReportError;
 use crate::channels::closed_messages;
@@ -12,7 +13,7 @@ use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
 use crate::run::{Status, VERSION};
 use crate::summary::{FitSummary, fit};
 use crate::text::conclusion_about;
-use crate::write::{LAYOUT, LAYOUT_LEGACY, RUN, at, commit_all, stage};
+use crate::write::{LAYOUT, LAYOUT_LEGACY, REPORT, RUN, at, commit_all, stage};
 use armcal_calibrate::Residual;
 use armcal_core::Warning;
 use armcal_recording::Recording;
@@ -94,7 +95,7 @@ struct Parameters<'a> {
     frames: Vec<FrameEntry>,
 }
 
-/// Writes `run.mcap` (the inputs' own messages and the result channels), `summary.json`, `parameters.toml`, Foxglove layouts
+/// Writes `run.mcap` (the inputs' own messages and the result channels), `report.html`, `summary.json`, `parameters.toml`, Foxglove layouts
 /// and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into `out_dir`, which is made if need be; returns their
 /// paths. Files of an earlier run are replaced, each at once.
 ///
@@ -111,6 +112,7 @@ pub fn write_closed(
         ("parameters.toml".to_owned(), parameters_toml(run)?),
         (LAYOUT.to_owned(), layouts.current),
         (LAYOUT_LEGACY.to_owned(), layouts.legacy),
+        (REPORT.to_owned(), closed_html(run)?),
     ];
     let values = run.calibration.fit.values();
     for (index, (arm, text)) in run.chain.arms().iter().zip(&run.model_texts).enumerate() {
@@ -130,7 +132,7 @@ pub fn write_closed(
 /// The files that [`write_closed`] writes into `out_dir`, of arms by name, each with a URDF or a DH file.
 pub fn closed_files<'a>(out_dir: &Path, arms: impl IntoIterator<Item = (&'a str, bool)>) -> Vec<PathBuf> {
     let models = arms.into_iter().map(|(arm, urdf)| format!("{arm}.{}", if urdf { "urdf" } else { "toml" }));
-    let fixed = [RUN, "summary.json", "parameters.toml", LAYOUT, LAYOUT_LEGACY].map(str::to_owned);
+    let fixed = [RUN, "summary.json", "parameters.toml", LAYOUT, LAYOUT_LEGACY, REPORT].map(str::to_owned);
     fixed.into_iter().chain(models).map(|name| out_dir.join(name)).collect()
 }
 
@@ -145,6 +147,7 @@ fn stage_run(
         let media_type = match name.rsplit_once('.').map(|(_, form)| form) {
             Some("json") => "application/json",
             Some("urdf") => "application/xml",
+            Some("html") => "text/html",
             _ => "application/toml",
         };
         (name.clone(), media_type, text.clone())

@@ -1,9 +1,11 @@
 //! Results of two arms in a closed chain: the same tables, names and files as for one arm, with a prefix an arm.
 //!
-//! `ClosedRun -> write_closed -> files`: `run.mcap`, `summary.json`, `parameters.toml`, and each arm's calibrated model in the form it
+//! `ClosedRun -> write_closed -> files`: `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, and each arm's calibrated model in the form it
 //! came in. An error is a closing error here: how far the joined tips are from where each arm puts the other.
 
 mod files;
+mod page;
+mod story;
 mod terminal;
 
 pub use files::{CLOSED_SCHEMA, closed_files, closed_summary_json, write_closed};
@@ -11,7 +13,6 @@ pub use terminal::closed_terminal;
 
 use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
-use crate::text::printable;
 use armcal_calibrate::{Calibration, ClosedChain, ClosedObservation};
 use armcal_core::{Dwell, Rejection, Warning};
 use armcal_recording::RecordingReport;
@@ -73,17 +74,6 @@ impl ClosedRun {
     /// Its recordings as sentences call them.
     pub(crate) fn recording_names(&self) -> RecordingNames {
         RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
-    }
-
-    /// Every warning and how it is told, those of the recordings first.
-    pub(crate) fn told_warnings(&self) -> Vec<(String, &Warning)> {
-        let names = self.recording_names();
-        let text = |warning: &Warning| names.in_words(&printable(&warning.to_string()));
-        let of_recordings = self.recordings.iter().flat_map(|r| {
-            let named = |w| (format!("{}: {}", printable(&r.name), text(w)), w);
-            r.all_warnings().into_iter().map(named).collect::<Vec<_>>()
-        });
-        of_recordings.chain(self.overall_warnings().into_iter().map(|w| (text(w), w))).collect()
     }
 
     /// One arm's part of the joints of both.

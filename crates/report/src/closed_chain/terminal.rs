@@ -2,13 +2,14 @@
 
 use super::ClosedRun;
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::{Status, VERSION};
-use crate::terminal::{errors, parameters, undetermined};
-use crate::text::{conclusion_about, millimetres, printable};
+use crate::run::VERSION;
+use crate::story::Story;
+use crate::terminal::{Detail, briefly, ending, errors, listed, parameters, undetermined};
+use crate::text::{millimetres, printable};
 use comfy_table::Cell;
 
 /// The summary of a run, ending in a newline.
-pub fn closed_terminal(run: &ClosedRun, style: TerminalStyle) -> String {
+pub fn closed_terminal(run: &ClosedRun, style: TerminalStyle, detail: Detail) -> String {
     let pen = Pen { style };
     let [first, second] = run.chain.arms();
     let joined = match run.chain.link_length_m(&run.chain.nominal()) {
@@ -24,10 +25,16 @@ pub fn closed_terminal(run: &ClosedRun, style: TerminalStyle) -> String {
     let calibration = &run.calibration;
     let mut sections = vec![head, pen.section("Recordings", recordings(&pen, run))];
     sections.push(pen.section("Closing errors [mm]", errors(&pen, calibration)));
-    sections.push(pen.section("Parameters", parameters(&pen, calibration)));
-    sections.extend(undetermined(&pen, calibration));
-    sections.extend(warnings(&pen, run));
-    sections.push(pen.verdict(&conclusion_about(calibration, "closing error"), run.status() == Status::Ok));
+    let story = Story::of_two_arms(run);
+    match detail {
+        Detail::Everything => {
+            sections.push(pen.section("Parameters", parameters(&pen, calibration)));
+            sections.extend(undetermined(&pen, calibration));
+            sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
+        }
+        Detail::Story => sections.extend(briefly(&pen, None, &story)),
+    }
+    sections.extend(ending(&pen, &story, detail));
     sections.join("\n")
 }
 
@@ -42,10 +49,4 @@ fn recordings(pen: &Pen, run: &ClosedRun) -> String {
         ]);
     }
     pen.render(&table)
-}
-
-fn warnings(pen: &Pen, run: &ClosedRun) -> Option<String> {
-    let all = run.told_warnings().into_iter().map(|(text, w)| (w.severity.word(), text));
-    let all: Vec<_> = all.collect();
-    (!all.is_empty()).then(|| pen.section("Warnings", pen.list(all.into_iter())))
 }

@@ -7,8 +7,9 @@ use crate::run::{Answer, Run};
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect};
 
 pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
+    let names = run.recording_names();
     let not_testable = d.not_testable.iter().map(|n| proto::NotTestable {
-        effect: n.effect.clone(),
+        effect: names.label(&n.effect),
         smallest_seen: n.smallest_seen.clone(),
         typical: n.typical.clone(),
         why: n.why.clone(),
@@ -28,9 +29,15 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         effects: d.effects.iter().map(found).collect(),
         record_next: d.record_next.iter().map(|r| run.in_words(r)).collect(),
         not_testable: not_testable.collect(),
-        told: d.explanations.iter().map(|e| run.in_words(&format!("{}: {}", e.number, e.sentence))).collect(),
+        told: d
+            .explanations
+            .iter()
+            .map(|e| format!("{}: {}", names.number_label(&e.number), run.in_words(&e.sentence)))
+            .collect(),
         explanations: explanations.collect(),
-        cannot_tell_apart: d.cannot_tell_apart.iter().map(|[a, b]| format!("{a} and {b}")).collect(),
+        cannot_tell_apart: (d.cannot_tell_apart.iter())
+            .map(|[a, b]| format!("{} and {}", names.label(a), names.label(b)))
+            .collect(),
     }
 }
 
@@ -78,13 +85,14 @@ fn found(e: &FoundEffect) -> proto::FoundEffect {
 /// What was found and the candidates, each in a row of words: a table panel has the columns that its first row has, and
 /// begins with what comes first.
 pub(super) fn table(run: &Run, d: &Diagnosis) -> proto::EffectTable {
+    let names = run.recording_names();
     let candidates = d.candidates.iter().map(|c| proto::EffectRow {
         effect: kinds([&c.spec]),
         left_out_mm: c.holdout_mm.map_or_else(String::new, |h| fall(h.before, h.after)),
         probability: probability(c.probability),
         r#where: run.in_words(&c.target),
         size: sizes(c),
-        name: c.spec.clone(),
+        name: names.label(&c.spec),
     });
     let found = d.effects.iter().map(|e| proto::EffectRow {
         effect: kinds(&e.set),
@@ -97,7 +105,7 @@ pub(super) fn table(run: &Run, d: &Diagnosis) -> proto::EffectTable {
             .map(|c| run.in_words(&c.target))
             .unwrap_or_default(),
         size: sizes_of(e),
-        name: e.set.join(" or "),
+        name: e.set.iter().map(|name| names.label(name)).collect::<Vec<_>>().join(" or "),
     });
     proto::EffectTable { timestamp: None, found: found.collect(), candidates: candidates.collect() }
 }

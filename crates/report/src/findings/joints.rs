@@ -10,6 +10,18 @@ use armcal_core::robust::median;
 use armcal_diagnose::{BLURRED, ImpliedError, implied_joint_errors};
 use nalgebra::Vector3;
 
+const DEGREES: &str = "deg";
+/// Up to here an angle counts as small.
+const SMALL_ANGLE_DEG: f64 = 10.0;
+
+/// Whether a joint of these implied errors moves the tip, so that page and layouts draw it. An implied error is linear in the
+/// angle, so of one that is usually large it says nothing but that the joint has no leverage, as one that only turns a ball
+/// about its middle.
+pub(crate) fn moves_tip(unit: &str, errors: impl IntoIterator<Item = f64>) -> bool {
+    let sizes: Vec<f64> = errors.into_iter().map(f64::abs).collect();
+    !sizes.is_empty() && (unit != DEGREES || median(&sizes) < SMALL_ANGLE_DEG)
+}
+
 /// What one dwell says about all joints.
 struct Seen {
     before: Vec<Option<ImpliedError>>,
@@ -108,4 +120,17 @@ fn of_arrival(sign: i32, arrival: &[i32], error: &[f64]) -> Vec<f64> {
 
 fn effort_nm(o: &Observation, j: usize) -> Option<f64> {
     o.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moves_tip;
+
+    #[test]
+    fn a_joint_with_large_implied_errors_has_no_leverage_and_a_slide_has() {
+        assert!(moves_tip("deg", [0.2, -0.7, 170.0]));
+        assert!(!moves_tip("deg", [12.0, -90.0, 0.1]));
+        assert!(moves_tip("mm", [12.0, -90.0]));
+        assert!(!moves_tip("deg", []) && !moves_tip("mm", []), "a joint of which no dwell says anything");
+    }
 }

@@ -13,10 +13,12 @@ mod steps;
 
 pub(crate) use boards::round_factor;
 pub(crate) use curves::error_curve;
+pub(crate) use joints::moves_tip;
 
 use crate::points::Point;
 use crate::proto;
 use crate::run::{Run, Undiagnosed};
+use armcal_diagnose::{Diagnosis, UnknownReport, Verdict};
 
 /// What is less probable than this is not drawn as if it were there.
 const IMPROBABLE: f64 = 0.05;
@@ -45,7 +47,6 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
-        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted).filter(|u| u.probability >= IMPROBABLE);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             boards: boards::board_errors(run, points, &in_time),
@@ -57,10 +58,22 @@ impl Findings {
                 None => Some((diagnosis::none(run.answer()), proto::Candidates::default())),
             },
             effects: run.diagnosis.as_ref().map(|d| diagnosis::table(run, d)).unwrap_or_default(),
-            curves: unlisted.map(|u| error_curve(u, run.model.chain())).collect(),
+            curves: unlisted_curves(run),
             quality: quality::quality(run),
         }
     }
+}
+
+/// What no name explains, as people are told it and shown it: where it is the answer, and unless that anything does not have a
+/// name is improbable.
+pub(crate) fn shown_unlisted(d: &Diagnosis) -> impl Iterator<Item = &UnknownReport> {
+    d.unlisted.iter().filter(|u| d.verdict == Verdict::Unknown || u.probability >= IMPROBABLE)
+}
+
+/// The same as curves.
+pub(crate) fn unlisted_curves(run: &Run) -> Vec<proto::ErrorCurve> {
+    let shown = run.diagnosis.iter().flat_map(shown_unlisted);
+    shown.map(|u| error_curve(u, run.model.chain())).collect()
 }
 
 /// Indices of the points in the order of time.

@@ -15,8 +15,9 @@ pub(super) fn steps(run: &Run) -> Steps {
         ("nominal".to_owned(), side(calibration).nominal),
         ("calibration".to_owned(), side(calibration).fitted),
     ];
+    let names = run.recording_names();
     for (step, name) in run.steps.iter().zip(run.step_names()) {
-        rows.push((run.in_words(&name), side(&step.calibration).fitted));
+        rows.push((names.label(&name), side(&step.calibration).fitted));
     }
     let before = std::iter::once(None).chain(rows.iter().map(|(_, errors)| Some(errors.mean_m)));
     let steps = rows

@@ -4,10 +4,10 @@ use super::panels::{BLUE, GREY, VERMILION, dots};
 use super::scale::range;
 use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
-use crate::findings::Findings;
+use crate::findings::{Findings, moves_tip};
 use crate::proto::JointErrors;
 use crate::text::printable;
-use armcal_core::robust::{median, percentile};
+use armcal_core::robust::percentile;
 
 /// A joint that gravity loads by less than this share of the most loaded one is not drawn over its torque.
 const UNLOADED: f64 = 0.05;
@@ -16,9 +16,6 @@ const MOVED: f64 = 0.3;
 /// Nor is one on which they act by less than this many times what is left.
 const ABOVE_REST: f64 = 1.5;
 
-const DEGREES: &str = "deg";
-/// Up to here an angle counts as small.
-const SMALL_ANGLE_DEG: f64 = 10.0;
 /// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
 
@@ -60,12 +57,9 @@ impl What {
     }
 }
 
-/// The joints that move the tip. An implied error is linear in the angle, so of one that is usually large it says nothing but
-/// that the joint has no leverage, as one that only turns a ball about its middle.
+/// The joints that move the tip.
 pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
-    let usual = |m: &JointErrors| median(&m.error.iter().map(|e| e.abs()).collect::<Vec<_>>());
-    let moves = move |m: &&JointErrors| m.unit != DEGREES || usual(m) < SMALL_ANGLE_DEG;
-    f.joints.iter().filter(|m| !m.reading.is_empty()).filter(moves)
+    f.joints.iter().filter(|m| moves_tip(&m.unit, m.error.iter().copied()))
 }
 
 /// Over its angle, where play and eccentricity show.

@@ -2,6 +2,7 @@
 
 use super::spec::{Colour, Content, Kind, Plot, Series};
 use crate::channels::curve_topic;
+use crate::diagnosis_text::{channel_told, driver_told};
 use crate::findings::Findings;
 use crate::proto::ErrorCurve;
 use crate::text::printable;
@@ -122,10 +123,10 @@ pub(super) fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
     let unit = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
     let plot = Plot {
         x_path: path("at"),
-        x_label: format!("{}{}", curve.driver, unit(&curve.driver_unit)),
+        x_label: format!("{}{}", printable(&driver_told(&curve.driver)), unit(&curve.driver_unit)),
         y_label: format!("error{}", unit(&curve.unit)),
         y_range: None,
         series,
     };
-    Content::plot(&format!("Unlisted, {}", printable(&curve.channel)), plot)
+    Content::plot(&format!("Unlisted, {}", printable(&channel_told(&curve.channel))), plot)
 }

@@ -101,7 +101,7 @@ fn what_is_missing(f: &Findings) -> Content {
     let answer = Content::Split(Column, answer.into_iter().flatten().collect());
     let mut pictures = vec![(1.0, over_recorded_time(f, false))];
     // An event shows over time; a joint may follow it, but has no part in it.
-    let lasting = f.effects.found.iter().any(|e| !e.name.contains('@'));
+    let lasting = f.diagnosis.iter().flat_map(|(d, _)| &d.effects).any(|e| !e.effect.contains('@'));
     match what_effects_do(f).filter(|_| lasting) {
         Some(joints) => pictures.push((3.0, joints)),
         None => pictures.extend(falling_error(f).map(|panel| (1.0, panel))),

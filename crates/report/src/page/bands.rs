@@ -29,8 +29,11 @@ pub(crate) struct Band {
     pub half: Column,
 }
 
-/// Which drivers are drawn for a channel.
+/// Which drivers are drawn for a channel; none for one that is not drawn.
 pub(crate) fn drivers_of(basis: &Basis, channel: usize) -> Vec<String> {
+    if !basis.drawn[channel] {
+        return Vec::new();
+    }
     let keys: Vec<String> = match basis.levers.channels[channel].joint {
         Some(j) => vec![format!("q{}", j + 1), format!("tau{}", j + 1), "time".into()],
         None => ["time", "temperature", "load"].map(str::to_owned).to_vec(),

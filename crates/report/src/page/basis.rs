@@ -17,6 +17,8 @@ const SMALLEST_TORQUE: f64 = 0.03;
 /// Made once; every refit, embedded or live, is drawn with it.
 pub struct Basis {
     pub(super) levers: Levers,
+    /// Whether each channel is drawn: a joint that does not move the tip is not.
+    pub(super) drawn: Vec<bool>,
     pub(super) drivers: Vec<Driver>,
     /// Direction of arrival, `[joint][observation]`: 1, -1, or 0 where it is not known.
     pub(super) arrival: Vec<Vec<i8>>,
@@ -49,8 +51,10 @@ impl Basis {
         let observations = &run.observations;
         let sign = |o: &armcal_core::Observation, j: usize| o.arrival.get(j).map_or(0, |a| a.sign() as i8);
         let joints = 0..run.model.joint_count();
+        let levers = Levers::of(run);
         Basis {
-            levers: Levers::of(run),
+            drawn: levers.drawn(run),
+            levers,
             drivers: drivers(run),
             arrival: joints.map(|j| observations.iter().map(|o| sign(o, j)).collect()).collect(),
             into_board: observations

@@ -1,11 +1,11 @@
 //! The page of `armcal compare`: two results, dwell by dwell.
 
 use super::embed;
+use super::shell::Shell;
 use crate::ReportError;
 use crate::comparison::{Comparison, Difference};
 use crate::pairing::paired;
 use crate::past_run::PastRun;
-use crate::run::VERSION;
 use crate::text::millimetres;
 use askama::Template;
 use serde::Serialize;
@@ -19,18 +19,18 @@ pub fn comparison_html(
     after: &PastRun,
     comparison: &Comparison,
 ) -> Result<String, ReportError> {
-    let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("assets/compared.js")]);
+    let with = |name: &str, effects: &[String]| match effects.is_empty() {
+        true => name.to_owned(),
+        false => format!("{name} with {}", effects.join(", ")),
+    };
+    let [own, other] = &comparison.effects;
+    let kicker = format!("{} against {}", with(&before.pipeline, own), with(&after.pipeline, other));
+    let title = format!("{} and {}", before.pipeline, after.pipeline);
+    let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
+    let document = Document::of(before, after, comparison);
+    let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document, "'none'")?;
     let page = ComparePage {
-        policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
-        style: embed::STYLE,
-        plotly: embed::PLOTLY,
-        data: embed::json_for_html(&Document::of(before, after, comparison))?,
-        script: &script,
-        version: VERSION,
-        before: &before.pipeline,
-        after: &after.pipeline,
-        effects: (comparison.effects[0].join(", "), comparison.effects[1].join(", ")),
-        sentence: comparison.sentence(),
+        shell: shell.saying(comparison.sentence()),
         differences: differences(comparison).into_iter().map(DifferenceRow::of).collect(),
         moved: comparison.moved.iter().map(moved).collect(),
         comparison,
@@ -41,16 +41,7 @@ pub fn comparison_html(
 #[derive(Template)]
 #[template(path = "compare.html")]
 struct ComparePage<'a> {
-    policy: String,
-    style: &'a str,
-    plotly: &'a str,
-    data: String,
-    script: &'a str,
-    version: &'a str,
-    before: &'a str,
-    after: &'a str,
-    effects: (String, String),
-    sentence: String,
+    shell: Shell,
     differences: Vec<DifferenceRow>,
     moved: Vec<MovedRow>,
     comparison: &'a Comparison,

@@ -4,12 +4,13 @@ use super::basis::{Basis, Driver};
 use super::levers::Channel;
 use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
-use crate::diagnosis_text::sizes;
-use crate::findings::error_curve;
+use crate::diagnosis_text::{channel_told, driver_told, sizes};
+use crate::findings::unlisted_curves;
+use crate::proto::ErrorCurve;
 use crate::recording_names::RecordingNames;
 use crate::run::{Refit, Run};
-use armcal_diagnose::{CandidateReport, Diagnosis, UnknownReport};
-use armcal_model::{Chain, find};
+use armcal_diagnose::{CandidateReport, Diagnosis};
+use armcal_model::find;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -21,7 +22,7 @@ const RANKED: usize = 12;
 pub(crate) struct Document {
     /// Joints and the other places where an error may enter.
     pub channels: Vec<Channel>,
-    /// Drivers drawn for each of the first channels.
+    /// Drivers drawn for each of the first channels; none for a joint that does not move the tip.
     pub drawn: Vec<Vec<String>>,
     /// What errors may follow.
     pub drivers: Vec<Driver>,
@@ -31,7 +32,7 @@ pub(crate) struct Document {
     pub recordings: Vec<String>,
     /// Where they begin on the axis of time, in that order [min]; `null` without dwells.
     pub begin_min: Column,
-    /// Effects in words, by their spelling, where the two differ.
+    /// Effects and parameters in words, by their spelling, where the two differ.
     pub told: BTreeMap<String, String>,
     /// The dwells that became observations.
     pub dwells: Dwells,
@@ -111,7 +112,6 @@ impl Document {
         let path = [0].into_iter().chain(run.steps.iter().filter_map(|s| index_of(&s.effects))).collect();
         let candidates =
             run.diagnosis.iter().flat_map(|d| ranking(d, &run.recording_names(), &index_of)).collect();
-        let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted);
         Document {
             channels: basis.levers.channels.clone(),
             drawn: drawn_drivers(basis),
@@ -125,20 +125,28 @@ impl Document {
             refits,
             path,
             candidates,
-            unlisted: unlisted.map(|u| unlisted_shape(u, run.model.chain())).collect(),
+            unlisted: unlisted_curves(run).into_iter().map(unlisted_shape).collect(),
             own_effects: effect_names(&run.model),
         }
     }
 }
 
-/// Every event that the page names, with its moment.
+/// Every event that the page names, and every parameter of one, with its moment; what has no name, by where it enters and what
+/// it depends on.
 fn told(run: &Run) -> BTreeMap<String, String> {
     let ranked = run.diagnosis.iter().flat_map(|d| &d.candidates).map(|c| c.spec.clone());
     let refitted = run.refits().flat_map(|r| r.effects.iter().cloned());
-    let all = ranked.chain(refitted).chain(effect_names(&run.model));
+    let calibrations = std::iter::once(&run.calibration).chain(run.refits().map(|r| &r.calibration));
+    let parameters = calibrations.flat_map(|c| &c.fit.estimates).map(|e| e.parameter.name.clone());
+    let all = ranked.chain(refitted).chain(effect_names(&run.model)).chain(parameters);
     let names = run.recording_names();
-    let each = all.map(|spec| (names.in_chart(&spec), spec));
-    each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words)).collect()
+    let each = all.map(|spec| (names.label(&spec), spec));
+    let events = each.filter(|(words, spec)| words != spec).map(|(words, spec)| (spec, words));
+    let unlisted = run.diagnosis.iter().flat_map(|d| &d.unlisted).filter_map(|u| {
+        let words = format!("unlisted, {} over {}", channel_told(&u.channel), u.driver);
+        Some((u.effect()?.to_string(), words))
+    });
+    events.chain(unlisted).collect()
 }
 
 /// The best entries, and below them whatever was found.
@@ -157,7 +165,7 @@ fn ranking(
             p_adjusted: c.p_adjusted,
             log_evidence: c.log_evidence,
             absorbed: c.absorbed,
-            also: c.same_to_the_data.iter().map(|name| names.in_chart(name)).collect(),
+            also: c.same_to_the_data.iter().map(|name| names.label(name)).collect(),
             found: found(&c.spec),
             refit: index_of(&specs),
             spec: c.spec.clone(),
@@ -207,13 +215,12 @@ fn boards(run: &Run) -> Vec<BoardMap> {
 }
 
 /// The curve that Foxglove plots, as a line with half its band.
-fn unlisted_shape(u: &UnknownReport, chain: &Chain) -> UnlistedShape {
-    let curve = error_curve(u, chain);
+fn unlisted_shape(curve: ErrorCurve) -> UnlistedShape {
     let half = curve.high.iter().zip(&curve.low).map(|(high, low)| (high - low) / 2.0);
     UnlistedShape {
         half: Column::of_all(half),
-        channel: curve.channel,
-        driver: curve.driver,
+        channel: channel_told(&curve.channel),
+        driver: driver_told(&curve.driver),
         driver_unit: curve.driver_unit,
         unit: curve.unit,
         at: Column::of_all(curve.at),

@@ -16,6 +16,9 @@ pub(crate) const TEXT: &str = include_str!("assets/text.js");
 /// How scripts draw charts.
 pub(crate) const CHART: &str = include_str!("assets/chart.js");
 
+/// How scripts draw an axis of recorded time.
+pub(crate) const TIME: &str = include_str!("assets/time.js");
+
 /// Scripts as one, which then starts.
 pub(crate) fn script(parts: &[&str]) -> String {
     format!("\"use strict\";\n{}start();\n", parts.concat())

@@ -59,13 +59,16 @@ pub(crate) fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<
     all
 }
 
-struct Table<'a> {
-    places: Vec<String>,
-    error_mm: &'a [Option<f64>],
+/// Errors, and what each shares its luck with.
+pub(crate) struct Table<'a> {
+    pub places: Vec<String>,
+    /// `None` for an error that does not count.
+    pub error_mm: &'a [Option<f64>],
 }
 
 impl Table<'_> {
-    fn group(&self, by: &'static str, name: String, is_in: impl Fn(usize) -> bool) -> Option<Group> {
+    /// The mean of those in a group; none where it is empty.
+    pub fn group(&self, by: &'static str, name: String, is_in: impl Fn(usize) -> bool) -> Option<Group> {
         let mut sums: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
         for (i, error) in self.error_mm.iter().enumerate() {
             if let Some(error) = error.filter(|_| is_in(i)) {

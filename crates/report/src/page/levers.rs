@@ -4,6 +4,7 @@
 //! the run's own fit, and serve every refit: geometry that differs by some millimetres does not move them.
 
 use super::basis::joint_units;
+use crate::findings::moves_tip;
 use crate::run::Run;
 use armcal_calibrate::position_covariance_m2;
 use armcal_core::Observation;
@@ -65,6 +66,14 @@ impl Levers {
     pub fn implied(&self, channel: usize, residuals_m: &[Vector3<f64>]) -> Vec<Option<f64>> {
         let each = self.levers[channel].iter().zip(residuals_m);
         each.map(|(lever, r)| lever.map(|l| l.gain.dot(r))).collect()
+    }
+
+    /// Whether each channel is drawn, by what the run's own calibration leaves: all but joints that do not move the tip.
+    pub fn drawn(&self, run: &Run) -> Vec<bool> {
+        let residuals_m: Vec<_> = run.calibration.residuals.iter().map(|r| r.fitted_m).collect();
+        let implied = |channel| self.implied(channel, &residuals_m).into_iter().flatten();
+        let each = self.channels.iter().enumerate();
+        each.map(|(k, c)| c.joint.is_none() || moves_tip(c.unit, implied(k))).collect()
     }
 
     /// Which share of these displacements [m] a channel alone can stand for, squared, 0 to 1.

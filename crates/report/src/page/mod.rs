@@ -6,7 +6,8 @@
 //! * [`Basis`]: what all refits share, with `levers` (implied errors of joints and lengths);
 //! * `shown`: one calibration as it is drawn, with `bands`, `groups`, `signature`;
 //! * `document`: all of it as one value; `embed`: how it gets into the page; `quality`: the tables about the data;
-//! * `compared`: the page of `armcal compare`.
+//! * `shell`: what all pages have in common; `overview`: the page of a pool and of two arms; `compared`: that of
+//!   `armcal compare`.
 
 mod bands;
 mod basis;
@@ -16,7 +17,9 @@ pub(crate) mod embed;
 mod groups;
 mod levers;
 mod numbers;
+pub(crate) mod overview;
 mod quality;
+pub(crate) mod shell;
 mod shown;
 mod signature;
 
@@ -26,20 +29,24 @@ pub(crate) use numbers::Column;
 
 use crate::ReportError;
 use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, sizes_of, unlisted};
-use crate::run::{Refit, Run, Status, VERSION};
+use crate::findings::shown_unlisted;
+use crate::run::{Refit, Run};
 use crate::story::Story;
 use crate::text::millimetres;
+use crate::told_warning::ToldWarning;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
 use armcal_diagnose::{Explanation, FoundEffect, Nested, NotTestable};
 use askama::Template;
 use document::Document;
+use shell::Shell;
 use shown::Shown;
 
 /// The page's own scripts, in the order in which they use each other.
-const SCRIPTS: [&str; 11] = [
+const SCRIPTS: [&str; 12] = [
     embed::TEXT,
     embed::CHART,
+    embed::TIME,
     include_str!("assets/page.js"),
     include_str!("assets/headline.js"),
     include_str!("assets/path.js"),
@@ -65,29 +72,19 @@ pub enum PageKind {
 /// # Errors
 /// A template or document that cannot be written.
 pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, ReportError> {
-    let script = own_script();
     let story = Story::of(run);
     let connect = if kind == PageKind::Live { "'self'" } else { "'none'" };
+    let title = || run.pipeline_name.clone();
+    let shell = Shell::new("report-page", (title(), title()), &SCRIPTS, &Document::of(run, basis), connect)?;
     let page = ReportPage {
-        policy: embed::policy(&[embed::PLOTLY, &script], connect),
-        style: embed::STYLE,
-        plotly: embed::PLOTLY,
-        data: embed::json_for_html(&Document::of(run, basis))?,
-        script: &script,
+        shell: shell.telling(&story),
         live: kind == PageKind::Live,
-        title: &run.pipeline_name,
-        version: VERSION,
-        status: match story.status {
-            Status::Ok => "ok",
-            Status::Inadequate => "inadequate",
-            Status::DataLost => "data lost",
-        },
-        story,
         verdict: verdict(run),
         run,
         recordings: quality::recordings(run),
         rejections: quality::rejections(run),
-        warnings: quality::warnings(run),
+        next: &story.next,
+        warnings: &story.warnings,
     };
     Ok(page.render()?)
 }
@@ -100,28 +97,17 @@ pub fn refit_json(run: &Run, basis: &Basis, refit: &Refit) -> Result<String, Rep
     serde_json::to_string(&Shown::of(run, basis, refit)).map_err(ReportError::Page)
 }
 
-fn own_script() -> String {
-    embed::script(&SCRIPTS)
-}
-
 #[derive(Template)]
 #[template(path = "report.html")]
 struct ReportPage<'a> {
-    policy: String,
-    style: &'a str,
-    plotly: &'a str,
-    data: String,
-    script: &'a str,
+    shell: Shell,
     live: bool,
-    title: &'a str,
-    version: &'a str,
-    status: &'a str,
-    story: Story,
     verdict: Verdict,
     run: &'a Run,
     recordings: Vec<quality::RecordingRow>,
     rejections: Vec<quality::RejectionRow>,
-    warnings: Vec<quality::WarningRow>,
+    next: &'a [String],
+    warnings: &'a [ToldWarning],
 }
 
 /// What the diagnosis says, in sentences.
@@ -144,20 +130,24 @@ fn verdict(run: &Run) -> Verdict {
             explanations: Vec::new(),
         };
     };
+    let names = run.recording_names();
     Verdict {
         found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
-            .chain(d.unlisted.iter().map(unlisted))
+            .chain(shown_unlisted(d).map(unlisted))
             .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
             .chain(d.nested.iter().map(Nested::sentence))
             .map(|said| run.in_words(&said))
             .collect(),
-        paste: d.unlisted.iter().map(pasted).filter(|table| !table.is_empty()).collect(),
-        same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| run.in_words(name))).collect(),
+        paste: shown_unlisted(d).map(pasted).filter(|table| !table.is_empty()).collect(),
+        same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| names.label(name))).collect(),
         unseen: (d.not_testable.iter().cloned())
-            .map(|n| NotTestable { effect: run.in_words(&n.effect), ..n })
+            .map(|n| NotTestable { effect: names.label(&n.effect), ..n })
             .collect(),
-        explanations: (d.explanations.iter().cloned())
-            .map(|e| Explanation { sentence: run.in_words(&e.sentence), ..e })
+        explanations: (d.explanations.iter())
+            .map(|e| Explanation {
+                number: names.number_label(&e.number),
+                sentence: run.in_words(&e.sentence),
+            })
             .collect(),
     }
 }

@@ -1,7 +1,6 @@
 //! What the page's tables say about the data themselves.
 
 use crate::run::{RecordingRun, Run};
-use armcal_core::{Severity, Warning};
 use armcal_recording::StreamReport;
 
 /// One recording.
@@ -41,15 +40,6 @@ pub(crate) struct RejectionRow {
     pub recording: String,
     pub why: String,
     pub dwells: String,
-}
-
-/// A warning and how much it matters.
-pub(crate) struct WarningRow {
-    pub severity: &'static str,
-    /// Class of its style.
-    pub class: &'static str,
-    pub subject: String,
-    pub message: String,
 }
 
 /// All recordings.
@@ -129,24 +119,4 @@ pub(crate) fn rejections(run: &Run) -> Vec<RejectionRow> {
     rows.into_iter()
         .map(|(recording, why, dwells)| RejectionRow { recording, why, dwells: dwells.join(", ") })
         .collect()
-}
-
-/// All warnings, the gravest first.
-pub(crate) fn warnings(run: &Run) -> Vec<WarningRow> {
-    let overall = run.overall_warnings();
-    let names = run.recording_names();
-    let named = |name: &str, w: &Warning| {
-        let w = names.warning(w);
-        (w.severity, format!("{name}{}", w.subject), w.message)
-    };
-    let of_recordings = run.recordings.iter().flat_map(|r| {
-        r.all_warnings().into_iter().map(|w| named(&format!("{}: ", r.name), w)).collect::<Vec<_>>()
-    });
-    let mut all: Vec<_> = of_recordings.chain(overall.iter().map(|w| named("", w))).collect();
-    all.sort_by_key(|w| std::cmp::Reverse(w.0));
-    let row = |(severity, subject, message): (Severity, String, String)| {
-        let class = if severity == Severity::Notice { "notice" } else { "grave" };
-        WarningRow { severity: severity.word(), class, subject, message }
-    };
-    all.into_iter().map(row).collect()
 }

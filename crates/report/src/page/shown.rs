@@ -96,6 +96,18 @@ pub(crate) struct ParameterRow {
     pub at_bound: bool,
 }
 
+impl ParameterRow {
+    /// What is to be known of it beside its numbers.
+    pub fn notes(&self) -> &'static str {
+        match (self.determined, self.at_bound) {
+            (true, false) => "",
+            (true, true) => "at its bound",
+            (false, false) => "undetermined",
+            (false, true) => "undetermined, at its bound",
+        }
+    }
+}
+
 impl Shown {
     /// The run's own calibration.
     pub fn of_run(run: &Run, basis: &Basis) -> Shown {
@@ -179,7 +191,8 @@ fn change(run: &Run, after: &Calibration) -> Option<Change> {
     })
 }
 
-fn parameter(e: &Estimate) -> ParameterRow {
+/// A parameter as pages show it.
+pub(crate) fn parameter(e: &Estimate) -> ParameterRow {
     let p = &e.parameter;
     let shown = |si| in_display_unit(p.unit, si);
     ParameterRow {

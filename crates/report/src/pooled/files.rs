@@ -3,6 +3,7 @@
 //! The names in `pool.json` are a contract (`armcal.pool/1`): fields are added, never renamed. Every number is finite or
 //! `null`.
 
+use super::page::pooled_html;
 use super::{PooledRecordingRun, PooledRun, RecordingErrors};
 use crate::ReportError;
 use crate::parameters::{Entry, FrameEntry, entry, frame_entry};
@@ -13,7 +14,7 @@ use crate::summary::{
     ErrorSummary, FitSummary, ParameterSummary, SideSummary, error_summary, fit, parameter, side,
 };
 use crate::text::conclusion;
-use crate::write::{commit_all, stage};
+use crate::write::{REPORT, commit_all, stage};
 use armcal_calibrate::Estimate;
 use armcal_core::{Pose, Warning};
 use serde::Serialize;
@@ -85,7 +86,7 @@ struct Parameters<'a> {
     frames: Vec<FrameEntry>,
 }
 
-/// Writes `pool.json`, `parameters.toml` and `model.json` into `out_dir`, which is made if need be; returns their paths.
+/// Writes `pool.json`, `parameters.toml`, `model.json` and `report.html` into `out_dir`, which is made if need be; returns their paths.
 /// Files of an earlier run are replaced, each at once.
 ///
 /// The model is the arm as it was last: what each recording has for itself is taken from the last one.
@@ -93,7 +94,7 @@ struct Parameters<'a> {
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn write_pooled(run: &PooledRun, out_dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let texts = [pooled_json(run)?, parameters_toml(run)?, model(run).json()?];
+    let texts = [pooled_json(run)?, parameters_toml(run)?, model(run).json()?, pooled_html(run)?];
     std::fs::create_dir_all(out_dir)
         .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
     let staged =
@@ -102,8 +103,8 @@ pub fn write_pooled(run: &PooledRun, out_dir: &Path) -> Result<Vec<PathBuf>, Rep
 }
 
 /// The files that [`write_pooled`] writes into `out_dir`.
-pub fn pooled_files(out_dir: &Path) -> [PathBuf; 3] {
-    ["pool.json", "parameters.toml", past_model::FILE].map(|name| out_dir.join(name))
+pub fn pooled_files(out_dir: &Path) -> [PathBuf; 4] {
+    ["pool.json", "parameters.toml", past_model::FILE, REPORT].map(|name| out_dir.join(name))
 }
 
 /// The summary of a pool: indented JSON with a final newline.

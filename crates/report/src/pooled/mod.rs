@@ -1,14 +1,18 @@
 //! Results of many recordings of one arm, pooled: what is shared, and what each recording has for itself.
 //!
-//! `PooledRun -> write_pooled -> files`: `pool.json` for programs, `parameters.toml`, and the calibrated model as `model.json`.
+//! `PooledRun -> write_pooled -> files`: `report.html` for people, `pool.json` for programs, `parameters.toml`, and the calibrated
+//! model as `model.json`.
 
 mod files;
+mod page;
+mod story;
 mod terminal;
 
 pub use files::{POOL_SCHEMA, pooled_files, pooled_json, write_pooled};
 pub use terminal::pooled_terminal;
 
 use crate::past_observations::ObservedFile;
+use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
 use armcal_calibrate::{Calibration, PooledModel, Residual};
 use armcal_core::{ErrorStats, Observation, Warning};
@@ -78,6 +82,11 @@ impl PooledRun {
     pub fn all_warnings(&self) -> Vec<&Warning> {
         let of_calibration = self.calibration.warnings.iter().chain(&self.calibration.fit.warnings);
         without_repeats(self.warnings.iter().chain(of_calibration))
+    }
+
+    /// Its recordings as sentences call them.
+    pub(crate) fn recording_names(&self) -> RecordingNames {
+        RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
     }
 
     /// Errors of every recording.

@@ -2,9 +2,10 @@
 
 use super::PooledRun;
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::{Status, VERSION};
-use crate::terminal::{errors, parameters_of, undetermined};
-use crate::text::{conclusion, millimetres, printable};
+use crate::run::VERSION;
+use crate::story::Story;
+use crate::terminal::{Detail, ending, errors, listed, parameters_of, undetermined};
+use crate::text::{millimetres, printable};
 use armcal_calibrate::Estimate;
 use comfy_table::Cell;
 
@@ -34,13 +35,9 @@ pub fn pooled_terminal(run: &PooledRun, style: TerminalStyle) -> String {
         sections.push(pen.section("Parameters of single recordings", text));
     }
     sections.extend(undetermined(&pen, &run.calibration));
-    let warnings = run.all_warnings();
-    if !warnings.is_empty() {
-        let texts = warnings.iter().map(|w| (w.severity.word(), printable(&w.to_string())));
-        sections.push(pen.section("Warnings", pen.list(texts)));
-    }
-    let verdict = format!("{}{}", conclusion(&run.calibration), transfer(run));
-    sections.push(pen.verdict(&verdict, run.status() == Status::Ok));
+    let story = Story::of_pool(run);
+    sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
+    sections.extend(ending(&pen, &story, Detail::Everything));
     sections.join("\n")
 }
 
@@ -65,15 +62,4 @@ fn more(count: usize) -> String {
         0 => String::new(),
         hidden => format!(" {hidden} more are in pool.json.\n"),
     }
-}
-
-/// What the calibration is worth on another day.
-fn transfer(run: &PooledRun) -> String {
-    let Some(transfer) = &run.transfer else { return String::new() };
-    let side = &transfer.holdout;
-    format!(
-        " On recordings that it never saw it is {} mm (nominal {} mm).",
-        millimetres(side.fitted.mean_m),
-        millimetres(side.nominal.mean_m)
-    )
 }

@@ -6,7 +6,10 @@ use super::terminal::conclusion;
 use super::{PathSample, Verification};
 use crate::ReportError;
 use crate::page::embed;
-use crate::run::VERSION;
+use crate::page::shell::Shell;
+use crate::recording_names::RecordingNames;
+use crate::story::status_sentence;
+use crate::told_warning::{ToldWarning, gravest_first};
 use armcal_verify::{Against, PathRow, PointsRow};
 use askama::Template;
 use nalgebra::Vector3;
@@ -21,17 +24,19 @@ const POINTS: usize = 400;
 /// # Errors
 /// A template or document that cannot be written.
 pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
-    let script = embed::script(&[embed::TEXT, embed::CHART, include_str!("../page/assets/verified.js")]);
+    let effects =
+        if v.effects.is_empty() { " alone".to_owned() } else { format!(", {}", v.effects.join(", ")) };
+    let names = (format!("{}, verified", v.pipeline), format!("{} · model: geometry{effects}", v.pipeline));
+    let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/verified.js")];
+    let document = Document { motions: motions(&v.samples) };
+    let shell = Shell::new("verification-page", names, &scripts, &document, "'none'")?;
+    let recordings = RecordingNames::new(v.recordings.iter().map(|r| r.name.clone()));
+    let told = v.warnings.iter().map(|w| ToldWarning::new(&recordings, None, w)).collect();
     let page = VerificationPage {
-        policy: embed::policy(&[embed::PLOTLY, &script], "'none'"),
-        style: embed::STYLE,
-        plotly: embed::PLOTLY,
-        data: embed::json_for_html(&Document { motions: motions(&v.samples) })?,
-        script: &script,
-        version: VERSION,
-        pipeline: &v.pipeline,
-        effects: v.effects.join(", "),
-        sentence: conclusion(v),
+        shell: Shell {
+            status: Some((v.status(), status_sentence(v.status()).to_owned())),
+            ..shell.saying(conclusion(v))
+        },
         tables: vec![
             ("Error at points", v.points.iter().map(point_row).collect()),
             ("Error along paths", v.paths.iter().map(path_row).collect()),
@@ -40,30 +45,21 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
         iso_header: iso::HEADER,
         iso_rows: iso::rows(&v.iso9283),
         iso_remarks: iso::remarks(&v.iso9283),
-        warnings: v.warnings.iter().map(|w| (w.severity.word(), w.to_string())).collect(),
+        warnings: gravest_first(told),
     };
     Ok(page.render()?)
 }
 
 #[derive(Template)]
 #[template(path = "verification.html")]
-struct VerificationPage<'a> {
-    policy: String,
-    style: &'a str,
-    plotly: &'a str,
-    data: String,
-    script: &'a str,
-    version: &'a str,
-    pipeline: &'a str,
-    effects: String,
-    sentence: String,
+struct VerificationPage {
+    shell: Shell,
     tables: Vec<(&'static str, Vec<Shown>)>,
     iso_none: &'static str,
     iso_header: [&'static str; 9],
     iso_rows: Vec<[String; 9]>,
     iso_remarks: Vec<String>,
-    /// Severity and text.
-    warnings: Vec<(&'static str, String)>,
+    warnings: Vec<ToldWarning>,
 }
 
 /// A row as the page shows it: a mean and its interval in one cell.

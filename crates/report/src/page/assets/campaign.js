@@ -25,6 +25,7 @@ function curveFigure() {
 }
 
 function start() {
+  document.querySelectorAll("#do-next li, #next li, #warnings-table td").forEach(markCommands);
   doc.curves.forEach((q, k) => {
     const option = element("option", q.name + (q.marks.length > 0 ? "  (changes)" : ""));
     option.value = String(k);

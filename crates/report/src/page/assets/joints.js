@@ -38,7 +38,10 @@ function channelFigure(k) {
 }
 
 function channelBoxes() {
+  const without = doc.drawn.flatMap((keys, k) => keys.length ? [] : [doc.channels[k].label]);
+  if (without.length) $("joints").append(element("p", "Not drawn, because " + (without.length > 1 ? "they hardly move" : "it hardly moves") + " the tip: " + without.join(", ") + ".", "caption"));
   doc.drawn.forEach((keys, k) => {
+    if (!keys.length) return;
     const box = element("div", undefined, "plot");
     box.dataset.channel = doc.channels[k].key;
     $("joints").append(box);
