@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, root, run_pipeline, shipped};
+use crate::support::{armcal, number, real_recordings, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::Path;
 
@@ -62,4 +62,58 @@ fn what_cannot_judge_is_refused() {
     std::fs::write(&path, other).expect("pipeline");
     // The setup of that session contradicts its data, or the arms differ by name: no sentence about effects.
     refused(&normal, &path, "", 1, &[]);
+}
+
+/// A shipped pipeline on some of its recordings, in order.
+fn on_some(pipeline: &str, wanted: impl Fn(usize) -> bool, path: &Path) {
+    let text = shipped(pipeline);
+    let mut blocks = text.split("[[recordings]]\n");
+    let mut own = blocks.next().expect("a head").to_owned();
+    let count = blocks.clone().count();
+    for (at, block) in blocks.enumerate() {
+        // Behind the last recording comes the rest of the pipeline.
+        let (recording, rest) = block.split_once("\n\n").expect("a blank line behind a recording");
+        if wanted(at) {
+            own += &format!("[[recordings]]\n{recording}\n\n");
+        }
+        if at + 1 == count {
+            own += rest;
+        }
+    }
+    if (0..count).filter(|at| wanted(*at)).count() < 2 {
+        own = own.replace("kind = \"each-recording\"", "kind = \"none\"");
+    }
+    std::fs::write(path, own).expect("pipeline");
+}
+
+/// What two placements of the fixture name, with the hold-out that they have, does no harm in the third; on the iiwa14
+/// it is the same compliance from any two placements, and it helps in the third (docs/real-robots.md).
+#[test]
+fn what_two_placements_name_holds_in_the_third() {
+    for (robot, always) in [("panda4", None), ("iiwa14", Some("arm_compliance")), ("panda", None)] {
+        if robot != "panda4" && real_recordings().is_none() {
+            continue;
+        }
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let [two, third] = ["two.toml", "third.toml"].map(|name| folder.path().join(name));
+        for judge in 0..3 {
+            on_some(&format!("mukca-{robot}.toml"), |at| at != judge, &two);
+            on_some(&format!("mukca-{robot}.toml"), |at| at == judge, &third);
+            let seen = transfer(&two, &third, &[], 0);
+            let effects = seen["effects"].as_array().expect("effects");
+            for effect in effects {
+                let [before, after] =
+                    ["before", "after"].map(|at| number(effect, &format!("/held_out/{at}")));
+                let (name, verdict) = (&effect["effect"], &effect["verdict"]);
+                println!("{robot}, placement {judge}: {name} {before:.3} -> {after:.3} mm, {verdict}");
+                assert!(after < before && verdict != "it does harm there", "{robot} {judge}: {effect}");
+            }
+            if let Some(name) = always {
+                assert!(
+                    effects.iter().any(|e| e["effect"] == name && e["verdict"] == "it helps there"),
+                    "{robot} {judge}: {effects:?}"
+                );
+            }
+        }
+    }
 }

@@ -168,6 +168,7 @@ fn gathered(
             warnings.push(warning.clone());
         }
     }
+    let turn_sigma_ratio = if holdout.in_turn { sigma_ratios(turns, &last) } else { Vec::new() };
     let mut calibration = Calibration {
         fit: last.fit,
         nominal_values: last.nominal_values,
@@ -176,10 +177,19 @@ fn gathered(
         holdout: holdout_errors,
         noise_floor_m,
         prediction_factor,
+        turn_sigma_ratio,
         warnings,
     };
     calibration.warnings.extend(fit_warnings::above_floor(&calibration));
     Ok(calibration)
+}
+
+/// As [`Calibration::turn_sigma_ratio`]; 1 of a fixed parameter.
+fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
+    let ratio = |k: usize, turn: &Turn| turn.fit.estimates[k].sigma / last.fit.estimates[k].sigma;
+    let free = |k: &usize| last.fit.estimates[*k].sigma > 0.0;
+    let largest = |k: usize| turns.iter().map(|turn| ratio(k, turn)).fold(0.0, f64::max);
+    (0..last.fit.estimates.len()).map(|k| if free(&k) { largest(k) } else { 1.0 }).collect()
 }
 
 struct Judge<'a> {

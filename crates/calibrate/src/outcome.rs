@@ -132,6 +132,9 @@ pub struct Calibration {
     /// rows do not determine p parameters exactly: `sqrt(1 + p/n)` (Akaike, Ann. Inst. Stat. Math. 22, 1970: the final
     /// prediction error), mean over the turns. 1 where nothing was held out.
     pub prediction_factor: f64,
+    /// How much less certain each parameter is in the turn of the hold-out that says the least of it, in the order of
+    /// `fit.estimates`: its standard deviation there over that of `fit`; empty where nothing was held out in turns.
+    pub turn_sigma_ratio: Vec<f64>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }

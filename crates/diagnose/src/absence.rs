@@ -4,13 +4,17 @@
 //! comes the less is left for it, and the more of that is chance: refitted together with all others, each must lower the
 //! errors of held-out points by itself, as in a backward elimination.
 
-use crate::compare::compare_heldout;
-use crate::conclude::{ShownBy, shown_by};
+use crate::compare::{compare_heldout, held_out_errors_m};
+use crate::conclude::{ShownBy, learnt, shown_by};
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Diagnosis, Refitted};
 use crate::observed::Calibrated;
 use armcal_calibrate::Calibration;
 use armcal_core::{Severity, Stage, Warning};
+
+/// So few dwells show an effect that the mean of all is not clear of chance however much they change: with k alike among
+/// many, Student's t is about sqrt(k).
+const FEW: f64 = 10.0;
 
 impl Diagnosis {
     /// The calibration with those of the names without each of which it errs more; the others are taken back, the one with
@@ -22,25 +26,31 @@ impl Diagnosis {
         config: &DiagnosisConfig,
     ) -> Refitted {
         let mut found = found;
-        while found.effects.len() > 1 {
-            let mut weakest: Option<(usize, Refitted)> = None;
-            for (k, effect) in self.effects.iter().enumerate() {
-                let own = |spec: &String| *spec == effect.name;
-                let others = found.effects.iter().filter(|e| !own(&e.to_string())).cloned().collect();
-                let weaker = |k: usize| {
-                    effect.log_evidence < self.effects.get(k).map_or(f64::INFINITY, |e| e.log_evidence)
-                };
-                let Some(without) = calibrated.with(others) else { continue };
-                let needed = needed(&without.calibration, &found.calibration, calibrated, config);
-                if !needed && weakest.as_ref().is_none_or(|(k, _)| weaker(*k)) {
-                    weakest = Some((k, without));
-                }
-            }
-            let Some((k, without)) = weakest else { break };
+        while let Some((k, without)) = self.superfluous(calibrated, &found, config) {
             self.take_back_one(k, (&without.calibration, &found.calibration), calibrated, config);
             found = without;
         }
         found
+    }
+
+    /// The name with the least evidence of those without which the model errs no more, and the model without it; none of a
+    /// single effect.
+    fn superfluous(
+        &self,
+        calibrated: &Calibrated<'_>,
+        found: &Refitted,
+        config: &DiagnosisConfig,
+    ) -> Option<(usize, Refitted)> {
+        let mut by_evidence: Vec<usize> = (0..self.effects.len()).collect();
+        by_evidence.sort_by(|a, b| self.effects[*a].log_evidence.total_cmp(&self.effects[*b].log_evidence));
+        by_evidence.into_iter().filter(|_| found.effects.len() > 1).find_map(|k| {
+            let mut others = found.effects.clone();
+            let own = others.iter().position(|e| e.to_string() == self.effects[k].name)?;
+            others.remove(own);
+            let without = calibrated.with(others)?;
+            let needed = needed(&without.calibration, &found.calibration, calibrated, config);
+            (!needed).then_some((k, without))
+        })
     }
 
     fn take_back_one(
@@ -62,20 +72,32 @@ impl Diagnosis {
     }
 }
 
-/// Whether the model errs more without an effect: as a name alone must show it, and on held-out points that see it so clearly
-/// as is asked of the best of many.
+/// Whether the model errs more without an effect: on held-out points so clearly as is asked of the best of many; where these
+/// cannot tell, on fitted ones.
 fn needed(
     without: &Calibration,
     with: &Calibration,
     calibrated: &Calibrated<'_>,
     config: &DiagnosisConfig,
 ) -> bool {
+    let clear = || {
+        compare_heldout(without, with, calibrated.observations, config)
+            .is_none_or(|held| held.p <= config.max_p_adjusted)
+    };
     match shown_by(without, with, calibrated.observations, config) {
         ShownBy::Nothing => false,
-        ShownBy::Fitted => true,
-        ShownBy::Judged => compare_heldout(without, with, calibrated.observations, config)
-            .is_none_or(|held| held.p <= config.max_p_adjusted),
+        ShownBy::Judged => clear(),
+        ShownBy::Fitted => !learnt(without, with) || carried_by(without, with) < FEW,
     }
+}
+
+/// How many held-out dwells carry the change of their errors: `(sum |c|)^2 / sum c^2`, the number of them if all changed alike.
+fn carried_by(without: &Calibration, with: &Calibration) -> f64 {
+    let (before, after) = (held_out_errors_m(without), held_out_errors_m(with));
+    let changes: Vec<f64> =
+        before.iter().filter_map(|(dwell, b)| after.get(dwell).map(|a| (a - b).abs())).collect();
+    let square: f64 = changes.iter().map(|c| c * c).sum();
+    changes.iter().sum::<f64>().powi(2) / square.max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]

@@ -19,8 +19,11 @@ use armcal_core::{Observation, Severity, Stage, Warning, listed};
 const CONFIRMED_SHARE: f64 = 0.95;
 /// Mean errors that fall by less than this share of the floor are not worth a name.
 const WORTH_NAMING: f64 = 0.02;
-/// Held-out points whose mean error changes by less than this share of the floor, with 95 %, do not see an effect.
-const UNSEEN: f64 = 0.1;
+/// Held-out points are no worse for an effect where the 95 % interval of the change of their mean error ends below this share
+/// of the floor (a test of non-inferiority).
+const NO_WORSE: f64 = 0.1;
+/// A turn of the hold-out that is this many times less certain of a parameter than the whole fit has not learnt it.
+const LEARNT: f64 = 3.0;
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
 const SPREAD_OF_NORM: f64 = 0.422;
@@ -181,15 +184,16 @@ fn noise_alone(calibration: &Calibration, share: f64) -> bool {
 pub(crate) enum ShownBy {
     /// By those that are judged: held out, or all where nothing is.
     Judged,
-    /// By those that were fitted, where the held-out ones do not see what the effects do.
+    /// By those that were fitted, the held-out ones being no worse.
     Fitted,
     /// By none.
     Nothing,
 }
 
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
-/// or, where these do not see what an effect does (each turn leaves out what it acts in, and cannot learn it), clearly less on
-/// those that were fitted. An effect that changes held-out errors, and does not clearly lower them, is refuted.
+/// or clearly less on those that were fitted, where few held-out ones show an effect, so that their mean falls not clear of
+/// chance, or is certainly no worse, or where a turn leaves out what it acts in and cannot learn it. Held-out points that a
+/// turn has learnt to predict and that may be worse refute what the fitted ones show.
 pub(crate) fn shown_by(
     before: &Calibration,
     after: &Calibration,
@@ -199,13 +203,23 @@ pub(crate) fn shown_by(
     let floor_mm = before.noise_floor_m * 1e3;
     let worth = error_mm(before) - error_mm(after) > WORTH_NAMING * floor_mm;
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
-    let unseen = |change_mm: &f64| change_mm.abs() < UNSEEN * floor_mm;
     match compare_heldout(before, after, observations, config) {
         Some(held) if worth && held.helps() => ShownBy::Judged,
-        Some(held) if fitted && !held.harms() && held.change_ci95.iter().all(unseen) => ShownBy::Fitted,
+        Some(held) if fitted && !held.harms() => {
+            let no_worse = worth || held.change_ci95[1] < NO_WORSE * floor_mm;
+            if no_worse || !learnt(before, after) { ShownBy::Fitted } else { ShownBy::Nothing }
+        }
         None if worth => ShownBy::Judged,
         _ => ShownBy::Nothing,
     }
+}
+
+/// Whether every turn of the hold-out knows the parameters that only the model with more effects has.
+pub(crate) fn learnt(before: &Calibration, after: &Calibration) -> bool {
+    let old = |name: &str| before.fit.estimates.iter().any(|e| e.parameter.name == name);
+    let new =
+        after.fit.estimates.iter().zip(&after.turn_sigma_ratio).filter(|(e, _)| !old(&e.parameter.name));
+    new.into_iter().all(|(_, ratio)| *ratio <= LEARNT)
 }
 
 /// What was named by the fit alone, in words.

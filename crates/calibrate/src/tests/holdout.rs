@@ -101,6 +101,35 @@ fn what_few_dwells_do_not_tell_is_expected_of_the_held_out_ones() {
     assert_eq!(run(&model, &observations, "kind = \"none\"").unwrap().prediction_factor, 1.0);
 }
 
+/// A turn that leaves out the only poses in which a joint moves knows its length no more than the prior does; of parts that are
+/// alike each turn knows as much as the share of the poses that it has.
+#[test]
+fn what_a_turn_leaves_out_it_is_less_certain_of() {
+    let model = rig::tracked_model();
+    let mut rng = rig::rng(7);
+    let truth = rig::planted(&model, &mut rng, 0.9);
+    let mut observations = rig::tracked(&model, &truth, 80, &mut rng);
+    let of = |observations: &[Observation], holdout: &str| {
+        let c = run(&model, observations, holdout).unwrap();
+        let of_elbow = |e: &crate::Estimate| e.parameter.name == "joint2.a";
+        let at = c.fit.estimates.iter().position(of_elbow).unwrap();
+        c.turn_sigma_ratio.get(at).copied()
+    };
+    let alike = of(&observations, "kind = \"cavity-folds\"\nk = 5").unwrap();
+    assert!((alike / (1.0f64 / 0.8).sqrt() - 1.0).abs() < 0.1, "{alike}");
+    assert_eq!(of(&observations, "kind = \"none\""), None);
+    // All but the first twenty in one posture: without these nobody tells the upper arm from the base.
+    let still = observations[20].clone();
+    for (k, o) in observations.iter_mut().enumerate() {
+        o.dwell.recording = usize::from(k >= 20);
+        if k >= 20 {
+            (o.joint_rad, o.reference) = (still.joint_rad.clone(), still.reference.clone());
+        }
+    }
+    let alone = of(&observations, "kind = \"each-recording\"").unwrap();
+    assert!(alone > 3.0, "{alone}");
+}
+
 /// Whether few dwells err by much or all by a little more than declared: above twice the floor the model is inadequate, and
 /// that is one warning.
 #[test]

@@ -28,7 +28,7 @@ fn observed(hidden: &[&str]) -> Vec<Observation> {
         Observation {
             time_ns: dwell as i64,
             covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
-            arrival: vec![side(dwell % 2 == 0), side(dwell % 3 == 0), side(dwell % 5 < 2)],
+            arrival: vec![side(dwell.is_multiple_of(2)), side(dwell.is_multiple_of(3)), side(dwell % 5 < 2)],
             ..Observation::bare(id, joint_rad, Reference::position(Vector3::zeros()))
         }
     };

@@ -278,9 +278,21 @@ fn the_fit_decides_where_the_held_out_points_cannot_and_says_so() {
     };
     let d = concluded(found(Identified), &erring(1.2, 1.2), Some(changed(20, [1.5, 0.9])));
     assert_eq!((d.verdict, codes(&d)), (Identified, vec!["judged-by-fit", "of-refit"]));
-    // Held-out points that see what the effect does, and are no better for it, refute what the fitted ones show.
-    let d = concluded(found(Identified), &erring(1.2, 1.2), Some(changed(2, [0.6, 1.45])));
-    assert_eq!((d.verdict, d.names.len()), (NothingMissing, 0));
+    // Clearly less in few of them, where the mean is not clear of zero for it.
+    let mut few = erring(1.2, 1.1);
+    few.residuals.iter_mut().step_by(20).for_each(|r| r.fitted_m *= 0.2);
+    few.holdout.fitted = of_residuals(&few);
+    let d = concluded(found(Identified), &erring(1.2, 1.2), Some(few));
+    assert_eq!((d.verdict, codes(&d)), (Identified, vec!["judged-by-fit", "of-refit"]));
+    // Many changed, better and worse, so that they may be worse on the whole: refuted, unless a turn of the hold-out knows
+    // nothing of what was added.
+    for (ratio, verdict) in [(1.5, NothingMissing), (3.1, Identified)] {
+        let mut after = changed(2, [0.6, 1.45]);
+        after.turn_sigma_ratio = vec![1.0; after.fit.estimates.len()];
+        *after.turn_sigma_ratio.last_mut().unwrap() = ratio;
+        after.fit.estimates.last_mut().unwrap().parameter.name = "backlash:1.width".to_owned();
+        assert_eq!(concluded(found(Identified), &erring(1.2, 1.2), Some(after)).verdict, verdict);
+    }
     // Without a hold-out the fitted points are the judged ones.
     let d = concluded(found(Identified), &fitted_only(1.4), Some(fitted_only(1.37)));
     assert_eq!((d.verdict, d.judged, codes(&d)), (Identified, JudgedOn::Fitted, vec!["of-refit"]));

@@ -322,6 +322,8 @@ fn calibration(model: &Model, observations: &[Observation], fitted: &[f64]) -> C
         holdout,
         noise_floor_m: 1.8e-4,
         prediction_factor: 1.1,
+        turn_sigma_ratio: Vec::new(),
+        turn_sigma_ratio: Vec::new(),
         warnings: Vec::new(),
     }
 }
