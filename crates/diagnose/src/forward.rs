@@ -139,10 +139,11 @@ fn confirm(
     cells: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Vec<Accepted>, DiagnoseError> {
-    // Together the steps must say more than one unlisted shape; else only those count that did so alone.
-    if !beats_a_cell(&steps, config) {
-        steps.retain(|s| s.named_at_once);
-    }
+    // Together the steps must say more than one unlisted shape: as many of the first as do, and those that did so alone. A
+    // later step that says less than it costs does not take a name from an earlier one.
+    let together = (0..=steps.len()).rev().find(|n| beats_a_cell(&steps[..*n], config)).unwrap_or(0);
+    let mut at = 0..;
+    steps.retain(|s| at.next().is_some_and(|k| k < together) || s.named_at_once);
     loop {
         let mut judged = Vec::new();
         let mut weakest: Option<(f64, usize)> = None;
@@ -192,8 +193,12 @@ fn something(room: &Room, config: &DiagnosisConfig) -> bool {
 fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
     let exact = weighed.entries.iter().position(|e| e.candidate.spec == candidate.spec);
     exact.or_else(|| {
-        let alike = |c: &Candidate| c.family == candidate.family && c.target == candidate.target;
-        let entry = weighed.entries.iter().position(|e| alike(&e.candidate));
+        // A shape that was searched has moved; without it the name stands in the catalogue too.
+        let alike = |k: &usize| {
+            let other = &weighed.entries[*k].candidate;
+            other.family == candidate.family && other.target == candidate.target
+        };
+        let entry = weighed.ranking().into_iter().find(alike);
         entry.or_else(|| weighed.entries.iter().position(|e| moved(&candidate.spec, &e.candidate.spec)))
     })
 }

@@ -161,6 +161,10 @@ fn steps_are_confirmed_among_each_other() {
         |ln| vec![Step::known(own(&p, "backlash:1"), 1.0), step(own(&p, "zero_drift:2"), ln, false)];
     assert_eq!(confirmed(&p, doubtful([90.0, 95.0, 0.0]), &[]), both[..1]);
     assert_eq!(confirmed(&p, doubtful([90.0, 1.0, 0.0]), &[]), both);
+    // More than a cell by itself: what comes later and says less than it costs takes no name from it.
+    let first = step(own(&p, "backlash:1"), [10.0, 5.0, 0.0], false);
+    let weak = step(own(&p, "zero_drift:2"), [3.0, 5.0, -9.0], false);
+    assert_eq!(confirmed(&p, vec![first, weak], &[]), both[..1]);
 }
 
 #[test]
