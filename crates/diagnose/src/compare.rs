@@ -8,7 +8,8 @@ use armcal_core::{DwellId, Observation};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Of fewer places than this no interval can be told: what a change does to an error differs with the posture in which the
-/// arm reaches a place, so each pose counts by itself there.
+/// arm reaches a place, so each pose counts by itself there. With seven the smallest p of a sign flip, 2^-7, is below the 0.01
+/// that is asked of a name.
 const FEWEST_PLACES: usize = 7;
 
 /// Errors on held-out dwells of two calibrations of the same observations, paired by dwell, in groups of one place
