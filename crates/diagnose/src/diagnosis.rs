@@ -229,13 +229,13 @@ pub struct FoundEffect {
     pub name: String,
     /// All names that are the same answer, the most probable first.
     pub set: Vec<String>,
-    /// Probability of the set.
+    /// Probability of the set, of unlisted explanations with the shape of its best too.
     pub probability: f64,
     /// Family-wise p-value.
     pub p_adjusted: f64,
     /// ln Bayes factor against its absence, the other effects in the model.
     pub log_evidence: f64,
-    /// ln Bayes factor against the best unlisted explanation.
+    /// ln Bayes factor against the best unlisted explanation of another shape.
     pub margin_nats: f64,
     /// Size.
     pub parameters: Vec<ParameterReport>,
@@ -292,7 +292,7 @@ pub struct CandidateReport {
     pub parameters: Vec<ParameterReport>,
     /// ln Bayes factor against nothing.
     pub log_evidence: f64,
-    /// Posterior probability.
+    /// Posterior probability; of the best, with that of unlisted explanations of its shape.
     pub probability: f64,
     /// Bootstrap p-value against the best of all candidates.
     pub p_adjusted: f64,

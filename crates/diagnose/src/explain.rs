@@ -137,7 +137,7 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
     say(
         &format!("{}.probability", e.name),
         format!(
-            "given the other effects found, {} is the cause with probability {:.3}",
+            "given the other effects found, {} is the cause with probability {:.3}, in its listed shape or one like it",
             e.set.join(" or "),
             e.probability
         ),

@@ -123,7 +123,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     };
     let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l) || holds(*l, *k));
     let meant = (0..weighed.entries.len()).filter(meant);
-    let probability = meant.map(|k| weighed.entries[k].probability).sum::<f64>();
+    let probability = judged.p_same + meant.map(|k| weighed.entries[k].probability).sum::<f64>();
     let (parameters, combination) = parameters(judged, weighed);
     FoundEffect {
         name: name(&judged.entry),
@@ -131,8 +131,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
         probability: probability.min(1.0),
         p_adjusted: judged.own().p_adjusted,
         log_evidence: weighed.entries[judged.entry].ln_evidence,
-        margin_nats: weighed.entries[judged.entry].ln_evidence
-            - weighed.best_cell().map_or(0.0, |u| u.ln_evidence),
+        margin_nats: judged.above_other,
         parameters,
         combination,
         places: judged.places,

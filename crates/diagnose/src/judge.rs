@@ -41,6 +41,10 @@ pub(crate) struct Judged {
     pub margin: f64,
     /// Probability of unlisted explanations whose fitted shape is another one.
     pub p_other: f64,
+    /// Probability of those whose fitted shape is the entry's: the same answer without the name.
+    pub p_same: f64,
+    /// ln B(entry) - ln B(best unlisted explanation of another shape).
+    pub above_other: f64,
     /// Paired contrast, where the design has one.
     pub contrast: Option<Contrast>,
     /// Amplitudes that are negative and cannot be.
@@ -128,8 +132,23 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     let base = &problem.residual - &problem.geometry * base_fit(problem);
     let contrast =
         contrast(problem, &base, &weighed.entries[entry].candidate, &effect, theta, theta_sigma, config);
-    let (margin, p_other) = against_unlisted(problem, weighed, metric, entry, config);
-    Judged { entry, gram, significance, places, recordings, set, margin, p_other, contrast, impossible }
+    let Unlisted { margin, p_other, p_same, best_other } =
+        against_unlisted(problem, weighed, metric, entry, config);
+    let above_other = weighed.entries[entry].ln_evidence - best_other;
+    Judged {
+        entry,
+        gram,
+        significance,
+        places,
+        recordings,
+        set,
+        margin,
+        p_other,
+        p_same,
+        above_other,
+        contrast,
+        impossible,
+    }
 }
 
 /// Standard deviation of an estimate along itself, in units of its size.
@@ -237,7 +256,16 @@ fn answer(
     set
 }
 
-/// Margin of an entry over the cells, and the probability of unlisted explanations of another shape.
+/// What unlisted explanations leave of a name.
+struct Unlisted {
+    margin: f64,
+    p_other: f64,
+    p_same: f64,
+    /// ln B of the best of another shape; of nothing, 0, where there is none.
+    best_other: f64,
+}
+
+/// Margin of an entry over the cells, and the probabilities of unlisted explanations of another shape and of its own.
 ///
 /// A cell holds many shapes, often the entry's own. Where its fitted shape is the entry's, it is no rival but the same
 /// answer without the name, and needs no margin over it; the entry must still be more probable, unless all that the cell
@@ -248,15 +276,16 @@ fn against_unlisted(
     metric: &Metric,
     entry: usize,
     config: &DiagnosisConfig,
-) -> (f64, f64) {
+) -> Unlisted {
     let projection = &metric.projection;
     let own_ln = weighed.entries[entry].ln_evidence;
     let own = metric.whitened(weighed.dense(&weighed.entries[entry].candidate.columns, problem));
-    let (mut margin, mut p_other) = (f64::INFINITY, 0.0);
+    let mut told = Unlisted { margin: f64::INFINITY, p_other: 0.0, p_same: 0.0, best_other: 0.0 };
     for u in &weighed.unlisted {
         let close = u.ln_evidence > own_ln - config.margin_nats;
         if !close && u.probability < NEGLIGIBLE {
-            margin = margin.min(own_ln - u.ln_evidence - config.margin_nats);
+            told.margin = told.margin.min(own_ln - u.ln_evidence - config.margin_nats);
+            told.best_other = told.best_other.max(u.ln_evidence);
             continue;
         }
         let columns = metric.whitened(weighed.dense(&u.what.columns, problem));
@@ -268,13 +297,16 @@ fn against_unlisted(
         let asked = if same { 0.0 } else { config.margin_nats };
         let detail = 1.0 - cosine * cosine <= config.leftover_share;
         if u.what.channel.is_some() && !detail {
-            margin = margin.min(own_ln - u.ln_evidence - asked);
+            told.margin = told.margin.min(own_ln - u.ln_evidence - asked);
         }
-        if !same {
-            p_other += u.probability;
+        if same {
+            told.p_same += u.probability;
+        } else {
+            told.p_other += u.probability;
+            told.best_other = told.best_other.max(u.ln_evidence);
         }
     }
-    (margin, p_other)
+    told
 }
 
 /// Penalised linear fit of the geometry alone.

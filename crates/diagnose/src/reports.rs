@@ -100,7 +100,7 @@ pub(crate) fn candidate_reports(
             target: c.target.clone(),
             parameters: sizes(&c.amplitudes, &fitted.estimate, &(&fitted.covariance * own_variance)),
             log_evidence: entry.ln_evidence,
-            probability: entry.probability,
+            probability: top.filter(|t| t.entry == k).map_or(0.0, |t| t.p_same) + entry.probability,
             p_adjusted: significance.p_adjusted,
             p_raw: significance.p_raw,
             holdout_mm: held.map(|h| BeforeAfter { before: h.before, after: h.after }),

@@ -123,11 +123,12 @@ fn an_effects_probability_is_that_of_all_that_its_set_means() {
     (r.weighed.entries[k].probability, r.weighed.entries[l].probability) = (0.5, 0.3);
     a.room = Rc::new(r);
     a.judged.set = vec![k];
+    a.judged.p_same = 0.04;
     let found = found_effect(&a, &config);
-    assert!((found.probability - 0.9).abs() < 1e-12, "{}", found.probability);
+    assert!((found.probability - 0.94).abs() < 1e-12, "{}", found.probability);
     let w = &a.room.weighed;
     assert_eq!(found.log_evidence, w.entries[k].ln_evidence);
-    assert_eq!(found.margin_nats, w.entries[k].ln_evidence - w.best_cell().unwrap().ln_evidence);
+    assert_eq!(found.margin_nats, a.judged.above_other);
     a.grade = Grade::OrUnlisted;
     assert_eq!(found_effect(&a, &config).set, ["backlash:1", NOT_LISTED]);
     a.grade = Grade::Named;

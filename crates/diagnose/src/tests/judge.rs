@@ -262,8 +262,8 @@ fn a_rival_that_the_data_hardly_tell_apart_is_in_the_answer_while_it_is_as_likel
     assert!(!set(2.9, 1e-9));
 }
 
-/// Margin and probability of what else may be, with these unlisted: columns, cell or not, ln evidence, probability.
-fn against(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> (f64, f64) {
+/// What these unlisted leave of a name: columns, cell or not, ln evidence, probability.
+fn told(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> super::Unlisted {
     let p = with_twin(0.05);
     let mut weighed = weigh(&p, config);
     let own_entry = entry(&weighed, "backlash:1");
@@ -271,6 +271,24 @@ fn against(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> (f6
     weighed.unlisted =
         unlisted.iter().map(|(s, cell, ln, share)| outside(&p, s, *cell, *ln, *share)).collect();
     against_unlisted(&p, &weighed, &weighed.metrics[0], own_entry, config)
+}
+
+/// Margin and probability of what else may be.
+fn against(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> (f64, f64) {
+    let told = told(unlisted, config);
+    (told.margin, told.p_other)
+}
+
+#[test]
+fn what_has_the_shape_of_a_name_counts_for_it_and_is_not_what_it_is_compared_with() {
+    let config = DiagnosisConfig { leftover_share: 1e-9, ..quick() };
+    let of = |unlisted: &[(&str, bool, f64, f64)]| {
+        let told = told(unlisted, &config);
+        (told.p_same, told.p_other, told.best_other)
+    };
+    assert_eq!(of(&[]), (0.0, 0.0, 0.0));
+    assert_eq!(of(&[("twin", true, 90.0, 0.7), ("scale:3", true, 38.0, 0.2)]), (0.7, 0.2, 38.0));
+    assert_eq!(of(&[("twin", true, 90.0, 0.7), ("scale:3", true, 20.0, 1e-9)]), (0.7, 0.0, 20.0));
 }
 
 #[test]

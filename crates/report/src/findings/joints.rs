@@ -22,6 +22,30 @@ pub(crate) fn moves_tip(unit: &str, errors: impl IntoIterator<Item = f64>) -> bo
     !sizes.is_empty() && (unit != DEGREES || median(&sizes) < SMALL_ANGLE_DEG)
 }
 
+/// A joint whose gravity torque moves by less than this share of the one that moves most hardly feels gravity.
+const SMALLEST_TORQUE: f64 = 0.03;
+
+/// Whether gravity's torque on each joint moves enough over the dwells for page and layouts to draw errors over it: a
+/// compliance shows where the torque differs, not where it is large.
+pub(crate) fn feels_gravity(torques_nm: &[Vec<f64>]) -> Vec<bool> {
+    let spread = |torque_nm: &Vec<f64>| {
+        let known = torque_nm.iter().filter(|t| t.is_finite());
+        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+        (high - low).max(0.0)
+    };
+    let spreads_nm: Vec<f64> = torques_nm.iter().map(spread).collect();
+    let largest_nm = spreads_nm.iter().copied().fold(0.0, f64::max);
+    spreads_nm.iter().map(|&s| s > SMALLEST_TORQUE * largest_nm).collect()
+}
+
+/// Gravity's torque on every joint, `[joint][observation]` [N m].
+pub(crate) fn torques_nm(run: &Run) -> Vec<Vec<f64>> {
+    let of = |o| run.model.drivers(&run.session, o).torque;
+    let driven: Vec<_> = run.observations.iter().map(of).collect();
+    let joints = 0..run.model.joint_count();
+    joints.map(|j| driven.iter().map(|torque| torque[j].total_nm()).collect()).collect()
+}
+
 /// What one dwell says about all joints.
 struct Seen {
     before: Vec<Option<ImpliedError>>,
@@ -124,7 +148,16 @@ fn effort_nm(o: &Observation, j: usize) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::moves_tip;
+    use super::{feels_gravity, moves_tip};
+
+    #[test]
+    fn a_large_torque_that_stays_the_same_shows_no_compliance() {
+        let still = vec![40.0, 40.2, f64::NAN];
+        let moving = vec![-5.0, 5.0, 1.0];
+        let vertical = vec![0.0; 3];
+        assert_eq!(feels_gravity(&[still, moving, vertical]), [false, true, false]);
+        assert_eq!(feels_gravity(&[vec![], vec![0.0, 0.0]]), [false, false]);
+    }
 
     #[test]
     fn a_joint_with_large_implied_errors_has_no_leverage_and_a_slide_has() {

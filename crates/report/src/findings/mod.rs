@@ -13,7 +13,7 @@ mod steps;
 
 pub(crate) use boards::round_factor;
 pub(crate) use curves::error_curve;
-pub(crate) use joints::moves_tip;
+pub(crate) use joints::{feels_gravity, moves_tip, torques_nm};
 
 use crate::points::Point;
 use crate::proto;
@@ -27,6 +27,8 @@ const IMPROBABLE: f64 = 0.05;
 pub(crate) struct Findings {
     /// One entry a joint of the model.
     pub joints: Vec<proto::JointErrors>,
+    /// Whether each joint's errors are drawn over its gravity torque.
+    pub feels_gravity: Vec<bool>,
     /// One entry a recording with a board that was visited.
     pub boards: Vec<proto::BoardErrors>,
     /// Errors over recorded time.
@@ -49,6 +51,7 @@ impl Findings {
         let in_time = in_time(points);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
+            feels_gravity: feels_gravity(&torques_nm(run)),
             boards: boards::board_errors(run, points, &in_time),
             course: course::course(run, points, &in_time),
             steps: steps::steps(run),

@@ -9,8 +9,6 @@ use crate::proto::JointErrors;
 use crate::text::printable;
 use armcal_core::robust::percentile;
 
-/// A joint that gravity loads by less than this share of the most loaded one is not drawn over its torque.
-const UNLOADED: f64 = 0.05;
 /// A joint on which the effects found act by less than this share of the largest is not drawn again.
 const MOVED: f64 = 0.3;
 /// Nor is one on which they act by less than this many times what is left.
@@ -68,13 +66,12 @@ pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
     joint_plot(m, &title, ("reading", "reading", &m.unit), what, range(f, m, what))
 }
 
-/// Over its torque, where compliance shows; none where gravity hardly loads it.
+/// Over its torque, where compliance shows; none where gravity's torque hardly moves.
 pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<Content> {
-    let span = |m: &JointErrors| m.torque_nm.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
-    let largest = f.joints.iter().map(span).fold(0.0, f64::max);
+    let felt = f.joints.iter().zip(&f.feels_gravity).any(|(joint, felt)| joint.number == m.number && *felt);
     let title = format!("{}{}", printable(&m.joint), what.words());
     let torque = ("torque_nm", "gravity torque", "N m");
-    (span(m) > UNLOADED * largest).then(|| joint_plot(m, &title, torque, what, range(f, m, what)))
+    felt.then(|| joint_plot(m, &title, torque, what, range(f, m, what)))
 }
 
 /// Implied error by direction of arrival against one of the arrays: field, name and unit.

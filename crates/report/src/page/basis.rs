@@ -2,6 +2,7 @@
 
 use super::levers::Levers;
 use super::numbers::Column;
+use crate::findings::{feels_gravity, torques_nm};
 use crate::run::Run;
 use armcal_core::Unit;
 use nalgebra::Vector3;
@@ -9,8 +10,6 @@ use serde::Serialize;
 
 /// A driver that moves by less than this share of its largest size, or not at all, drives nothing.
 const SMALLEST_SPREAD: f64 = 1e-6;
-/// A joint whose gravity torque moves by less than this share of the largest torque hardly feels gravity.
-const SMALLEST_TORQUE: f64 = 0.03;
 
 /// The part of a run's page that no refit changes.
 ///
@@ -95,12 +94,14 @@ fn drivers(run: &Run) -> Vec<Driver> {
         });
     }
     let masses = if run.model.has_link_masses() { "links as in the URDF" } else { "links of 2.5 kg/m" };
-    for (j, name) in names.iter().enumerate() {
+    let torques_nm = torques_nm(run);
+    let felt = feels_gravity(&torques_nm);
+    for (j, name) in names.iter().enumerate().filter(|(j, _)| felt[*j]) {
         all.push(Driver {
             key: format!("tau{}", j + 1),
             label: format!("gravity torque on {name}, {masses} [N m]"),
             joint: Some(j),
-            values: Column::of_all(driven.iter().map(|d| d.torque[j].total_nm())),
+            values: Column::of_all(torques_nm[j].iter().copied()),
         });
     }
     let whole =
@@ -118,8 +119,7 @@ fn drivers(run: &Run) -> Vec<Driver> {
         "load at the tip [kg]",
         Column::of_all(run.observations.iter().map(|o| o.load_kg)),
     ));
-    let largest = all.iter().filter(|d| d.key.starts_with("tau")).map(spread).fold(0.0, f64::max);
-    all.retain(|d| varies(d) && (!d.key.starts_with("tau") || spread(d) > SMALLEST_TORQUE * largest));
+    all.retain(varies);
     all
 }
 
