@@ -18,8 +18,9 @@ use std::f64::consts::PI;
 const A_HALF_WAVE: f64 = 4.0;
 const FEWEST_HARMONICS: f64 = 16.0;
 const MOST_HARMONICS: f64 = 60.0;
-/// Points of a shape.
-const POINTS: usize = 41;
+/// Points of a shape: at least, and for each function of its basis, so that the quickest wave is drawn as one.
+const FEWEST_POINTS: usize = 41;
+const POINTS_A_FUNCTION: usize = 4;
 
 /// Describes the best unlisted explanation of a weighed problem.
 pub(crate) fn unknown_report(
@@ -145,8 +146,9 @@ fn points(
     let high = driver.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     match (&driver.kernel, driver.kind) {
         (Some(kernel), _) => {
-            let x = |k: usize| low + (high - low) * k as f64 / (POINTS - 1) as f64;
-            (0..POINTS).map(|k| at(x(k), kernel.at(x(k)))).collect()
+            let points = FEWEST_POINTS.max(POINTS_A_FUNCTION * per + 1);
+            let x = |k: usize| low + (high - low) * k as f64 / (points - 1) as f64;
+            (0..points).map(|k| at(x(k), kernel.at(x(k)))).collect()
         }
         (None, DriverKind::Recording) => {
             let mut first: Vec<(usize, usize)> = Vec::new();
