@@ -2,6 +2,7 @@
 
 use crate::dh_toml::DhTable;
 use crate::segment::{Motion, Segment};
+use crate::tree::{SegmentId, Tree};
 use crate::urdf::UrdfJoint;
 use armcal_core::{Parameter, Unit};
 
@@ -11,7 +12,10 @@ use armcal_core::{Parameter, Unit};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
     pub(crate) name: String,
+    /// Parents before their children; those without a parent hang on the base.
     pub(crate) segments: Vec<Segment>,
+    /// The one that carries the tip; none where the base does.
+    pub(crate) end: Option<SegmentId>,
     pub(crate) parameters: Vec<Parameter>,
     pub(crate) joint_names: Vec<String>,
     pub(crate) joint_limits: Vec<Option<[f64; 2]>>,
@@ -55,6 +59,18 @@ impl Chain {
     /// The geometric parameters, in the order of the chain.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
+    }
+
+    /// The tree of this arm between a base and a tip.
+    pub(crate) fn on(&self, base: Segment, tip: Segment) -> Tree {
+        let hung = |segment: &Segment| Segment {
+            parent: Some(segment.parent.map_or(0, |parent| parent + 1)),
+            ..segment.clone()
+        };
+        let mut segments = vec![base];
+        segments.extend(self.segments.iter().map(hung));
+        segments.push(Segment { parent: Some(self.end.map_or(0, |end| end + 1)), ..tip });
+        Tree(segments)
     }
 
     /// Whether the chain came from a URDF and can be written back into one.

@@ -184,7 +184,7 @@ impl DhTable {
                 JointKind::Prismatic => Some(Motion::Prismatic),
                 JointKind::Fixed => None,
             };
-            let joint = motion.map(|motion| Joint { index: joint_names.len(), motion });
+            let joint = motion.map(|motion| Joint::read(joint_names.len(), motion));
             if joint.is_some() {
                 joint_names.push(row.name.clone());
                 joint_limits.push(row.limits());
@@ -197,10 +197,12 @@ impl DhTable {
             let first = parameters.len();
             parameters.extend(row.fields().map(|field| field.parameter(row, self.deviation)));
             let parameters = first..parameters.len();
-            segments.push(Segment { frame: Some(row.name.clone()), geometry, joint, parameters, body: None });
+            let parent = segments.len().checked_sub(1);
+            let frame = Some(row.name.clone());
+            segments.push(Segment { parent, frame, geometry, joint, parameters, body: None });
         }
-        let name = self.name.clone();
-        Chain { name, segments, parameters, joint_names, joint_limits, source: Source::Dh(self) }
+        let (name, end) = (self.name.clone(), segments.len().checked_sub(1));
+        Chain { name, segments, end, parameters, joint_names, joint_limits, source: Source::Dh(self) }
     }
 
     /// Replaces the nominal number of every entry whose value has changed, so that the others keep every digit.

@@ -83,6 +83,7 @@ impl Frame {
         let freedom = if self.free_rotation { Freedom::Full } else { Freedom::Position };
         let parameters = self.parameters(freedom);
         let segment = Segment {
+            parent: None,
             frame: Some(self.name.clone()),
             geometry: Geometry::Origin { nominal, freedom },
             joint: None,

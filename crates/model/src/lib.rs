@@ -12,7 +12,7 @@
 //! * what makes the arm differ from these rigid frames (play, compliance, ...): [`catalogue`], in `effects`;
 //! * `r` and its exact Jacobian: [`Model::residual`], [`Model::residual_with_jacobian`].
 //!
-//! Each segment's small transform is differentiated by dual numbers; the product rule in `path`
+//! Each segment's small transform is differentiated by dual numbers; the product rule in `tree`
 //! carries these derivatives to the tip, so that nothing is differentiated numerically and no
 //! derivative is written by hand.
 
@@ -23,10 +23,10 @@ mod effects;
 mod error;
 mod frames;
 mod model;
-mod path;
 mod residual;
 mod rigid;
 mod segment;
+mod tree;
 mod twist;
 mod urdf;
 mod urdf_write;

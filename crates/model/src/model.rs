@@ -4,10 +4,10 @@ mod linearisation;
 
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
-use crate::path::{follow, joint_twists};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
+use crate::tree::{Route, SegmentId, Tree};
 use crate::twist::Twist;
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
@@ -26,8 +26,10 @@ use std::sync::Arc;
 pub struct Model {
     chain: Chain,
     parameters: Vec<Parameter>,
-    /// World to tip: base, the rows of the chain, tip.
-    path: Vec<Segment>,
+    /// Base, the segments of the chain, tip.
+    tree: Tree,
+    /// The way to the tip.
+    tip: Route,
     /// World to board, by recording.
     boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
@@ -35,6 +37,9 @@ pub struct Model {
     /// What is known of the parameters of effects, of those that are not in the model too.
     pub(crate) declared: Arc<[Declared]>,
 }
+
+/// The segment that ends at the base: the root of the tree.
+const BASE: SegmentId = 0;
 
 /// What is measured and what is predicted of one observation.
 struct Sides {
@@ -58,8 +63,9 @@ impl Model {
         let boards =
             frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         check_names(&parameters)?;
-        let path = [base].into_iter().chain(chain.segments.iter().cloned()).chain([tip]).collect();
-        Ok(Model { chain, parameters, path, boards, effects: None, declared: Arc::default() })
+        let tree = chain.on(base, tip);
+        let tip = tree.route(tree.0.len() - 1);
+        Ok(Model { chain, parameters, tree, tip, boards, effects: None, declared: Arc::default() })
     }
 
     /// The arm.
@@ -118,13 +124,13 @@ impl Model {
     /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base, such as the
     /// one that brings the tips of two arms together. Effects that are placed already keep the old one.
     pub fn set_base_start(&mut self, base_in_world: Pose) {
-        restart(&mut self.path[0], &mut self.parameters, base_in_world);
+        restart(&mut self.tree.0[BASE], &mut self.parameters, base_in_world);
     }
 
     /// The same model for the observations of one recording, without the boards of the others; and the index that each
     /// of its parameters has in this model. With many boards it is evaluated in the time that one takes.
     pub fn in_recording(&self, recording: usize) -> (Model, Vec<usize>) {
-        let first = self.path.iter().map(|segment| segment.parameters.end).max().unwrap_or(0);
+        let first = self.tree.0.iter().map(|segment| segment.parameters.end).max().unwrap_or(0);
         let own = self.boards.get(&recording).map_or(first..first, |board| board.parameters.clone());
         let behind = first + self.boards.values().map(|board| board.parameters.len()).sum::<usize>();
         let index: Vec<usize> = (0..first).chain(own.clone()).chain(behind..self.parameters.len()).collect();
@@ -133,9 +139,10 @@ impl Model {
         let model = Model {
             chain: self.chain.clone(),
             parameters: index.iter().map(|&i| self.parameters[i].clone()).collect(),
-            path: self.path.clone(),
+            tree: self.tree.clone(),
+            tip: self.tip.clone(),
             boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
-            effects: self.effects.as_ref().map(|e| e.moved(behind - end, &self.path, index.len())),
+            effects: self.effects.as_ref().map(|e| e.moved(behind - end, self, index.len())),
             declared: self.declared.clone(),
         };
         (model, index)
@@ -162,26 +169,29 @@ impl Model {
 
     /// The tip in the base frame.
     pub fn tip_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Pose {
-        Pose::from(&follow(&self.path[1..], p, joint_rad))
+        Pose::from(&self.tree.follow(&self.tip[1..], p, joint_rad))
     }
 
     /// Every frame of the arm in the base frame, for drawing: base, the end of each segment (a DH row, or
     /// a link of the URDF, fixed ones included), tip.
     pub fn link_frames_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Vec<(String, Pose)> {
-        let mut end = Rigid::identity();
-        let mut frames = Vec::with_capacity(self.path.len());
-        for (index, segment) in self.path.iter().enumerate() {
-            if index > 0 {
-                end = end.then(&segment.transform(p, joint_rad));
-            }
+        let mut ends: Vec<Rigid<f64>> = Vec::with_capacity(self.tree.0.len());
+        let mut frames = Vec::with_capacity(self.tree.0.len());
+        for segment in &self.tree.0 {
+            // In the base frame the base is where it is.
+            let end = match segment.parent {
+                None => Rigid::identity(),
+                Some(parent) => ends[parent].then(&segment.transform(p, joint_rad)),
+            };
             frames.extend(segment.frame.iter().map(|name| (name.clone(), Pose::from(&end))));
+            ends.push(end);
         }
         frames
     }
 
     /// world_from_base.
     pub fn base_in_world(&self, p: &[f64]) -> Pose {
-        Pose::from(&self.path[0].transform(p, &[]))
+        Pose::from(&self.tree.0[BASE].transform(p, &[]))
     }
 
     /// last link_from_tip.
@@ -244,7 +254,9 @@ impl Model {
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
         for (column, twist) in self.joint_twists(p, o) {
-            jacobian.set_column(column, &twist.translation_m);
+            // A reading that moves two joints on the way has two parts.
+            let mut own = jacobian.column_mut(column);
+            own += twist.translation_m;
         }
         jacobian
     }
@@ -285,7 +297,7 @@ impl Model {
 
     fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
-            None => joint_twists(&self.path, p, &o.joint_rad).1,
+            None => self.tree.joint_twists(&self.tip, p, &o.joint_rad).1,
             Some(effects) => effects.joint_twists(p, &effects.drivers(self, o)),
         }
     }
@@ -301,12 +313,22 @@ impl Model {
     }
 
     pub(crate) fn tip_segment(&self) -> &Segment {
-        &self.path[self.path.len() - 1]
+        &self.tree.0[self.tip_end()]
     }
 
-    /// The segment that ends at a slot of the path.
-    pub(crate) fn segment_before(&self, slot: usize) -> Option<&Segment> {
-        self.path.get(slot.checked_sub(1)?)
+    /// The tree of the arm.
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// The segment that ends at the tip.
+    pub(crate) fn tip_end(&self) -> SegmentId {
+        self.tip.last().copied().unwrap_or(BASE)
+    }
+
+    /// The segment that another hangs on.
+    pub(crate) fn segment_before(&self, segment: SegmentId) -> Option<&Segment> {
+        Some(&self.tree.0[self.tree.0.get(segment)?.parent?])
     }
 
     /// The effects, if there are any.
@@ -314,14 +336,14 @@ impl Model {
         self.effects.as_ref()
     }
 
-    /// The parameters of the path (chain, base, tip), which effects may act on.
+    /// The parameters of the tree (chain, base, tip), which effects may act on.
     pub(crate) fn is_on_path(&self, index: usize) -> bool {
-        self.path.iter().any(|segment| segment.parameters.contains(&index))
+        self.tree.0.iter().any(|segment| segment.parameters.contains(&index))
     }
 
     /// The nominal arm in a pose.
     pub(crate) fn nominal_pose(&self, nominal: &[f64], joint_rad: &[f64]) -> NominalPose {
-        NominalPose::of(&self.path, nominal, joint_rad)
+        NominalPose::of(&self.tree, self.tip_end(), nominal, joint_rad)
     }
 
     /// The nominal arm with all joints at zero.
@@ -331,7 +353,7 @@ impl Model {
 
     /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
     pub fn has_link_masses(&self) -> bool {
-        self.zero_pose().declared(&self.path).is_some()
+        self.zero_pose().declared
     }
 
     /// The same model with these effects; `parameters` are all of its parameters.
@@ -342,13 +364,13 @@ impl Model {
         parameters: Vec<Parameter>,
     ) -> Result<Model, ModelError> {
         check_names(&parameters)?;
-        let effects = Some(Effects::new(placed, session.into(), &self.path, parameters.len()));
+        let effects = Some(Effects::new(placed, session.into(), self, parameters.len()));
         Ok(Model { parameters, effects, ..self.clone() })
     }
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
         let (predicted, in_board_m) = match &self.effects {
-            None => (follow(&self.path, p, &o.joint_rad), seated_m(o)),
+            None => (self.tree.follow(&self.tip, p, &o.joint_rad), seated_m(o)),
             Some(effects) => {
                 let at = effects.evaluate(p, &effects.drivers(self, o));
                 (at.tip, at.in_board_m)

@@ -1,4 +1,4 @@
-//! One link of the path from world to tip: a few parameters, at most one joint, one small transform.
+//! One piece of the tree from the world to what is measured: a few parameters, at most one joint, one small transform.
 //!
 //! This is the only place where kinematic formulas stand. They are generic over the scalar, so the
 //! derivative of a segment with respect to each of its parameters and its joint comes from the same
@@ -27,12 +27,38 @@ pub(crate) enum Motion {
 }
 
 /// The joint of a segment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Joint {
-    /// Index in the joint vector.
+    /// Index of its reading in the joint vector.
     pub index: usize,
     /// How it moves.
     pub motion: Motion,
+    /// How its angle follows a reading that is another joint's; none where the reading is its own.
+    pub mimic: Option<Mimic>,
+}
+
+/// A joint without an encoder: `q = ratio * reading + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mimic {
+    /// Change of the joint per change of the reading.
+    pub ratio: f64,
+    /// Where the joint is when the reading is zero [rad] (prismatic: [m]).
+    pub offset: f64,
+}
+
+impl Joint {
+    /// A joint with a reading of its own.
+    pub fn read(index: usize, motion: Motion) -> Joint {
+        Joint { index, motion, mimic: None }
+    }
+
+    /// Where the joint is at a reading.
+    pub fn at<D: Scalar>(&self, reading: D) -> D {
+        match self.mimic {
+            None => reading,
+            Some(mimic) => reading * mimic.ratio + mimic.offset,
+        }
+    }
 }
 
 /// Shape of a segment's transform, and the meaning of its parameters in order.
@@ -79,9 +105,25 @@ pub(crate) struct Body {
     pub centre_m: Vector3<f64>,
 }
 
-/// One segment of the path.
+impl Body {
+    /// Adds another body; both centres in one frame.
+    pub fn add(&mut self, other: &Body) {
+        let mass_kg = self.mass_kg + other.mass_kg;
+        // The first one is taken as it is, to the bit.
+        let share = if self.mass_kg == 0.0 { 1.0 } else { other.mass_kg / mass_kg };
+        match share == 1.0 {
+            true => self.centre_m = other.centre_m,
+            false => self.centre_m += (other.centre_m - self.centre_m) * share,
+        }
+        self.mass_kg = mass_kg;
+    }
+}
+
+/// One segment of the tree.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segment {
+    /// The segment at whose end it begins; none for one that begins in the world.
+    pub parent: Option<usize>,
     /// Name of the frame at its end, for drawing; none where the next segment ends the link.
     pub frame: Option<String>,
     /// Its formula.
@@ -108,7 +150,7 @@ impl Segment {
     ///
     /// `p` is the whole parameter vector and `joints` the whole joint vector; a joint that is missing is NaN.
     pub fn transform(&self, p: &[f64], joints: &[f64]) -> Rigid<f64> {
-        self.local(&p[self.parameters.clone()], self.joint_value(joints))
+        self.local(&p[self.parameters.clone()], self.reading(joints))
     }
 
     /// [`Segment::transform`] and its derivatives, in one pass.
@@ -119,20 +161,21 @@ impl Segment {
             *lane = Lanes::from(value).derivative(k);
         }
         // Only a segment with at most five parameters has a joint: there is a lane left for it.
-        let q = Lanes::from(self.joint_value(joints));
+        let q = Lanes::from(self.reading(joints));
         let q = if self.joint.is_some() { q.derivative(own.len()) } else { q };
         LinearisedSegment::from(&self.local(&lanes[..own.len()], q))
     }
 
-    fn joint_value(&self, joints: &[f64]) -> f64 {
+    fn reading(&self, joints: &[f64]) -> f64 {
         match self.joint {
             Some(joint) => joints.get(joint.index).copied().unwrap_or(f64::NAN),
             None => 0.0,
         }
     }
 
-    fn local<D: Scalar>(&self, own: &[D], q: D) -> Rigid<D> {
+    fn local<D: Scalar>(&self, own: &[D], reading: D) -> Rigid<D> {
         let motion = self.joint.map(|joint| joint.motion);
+        let q = self.joint.map_or(reading, |joint| joint.at(reading));
         match &self.geometry {
             Geometry::StandardDh { hayati } => {
                 let (theta, d) = joined(own, q, motion);

@@ -46,6 +46,7 @@ impl Chain {
         let mut chain = Chain {
             name,
             segments: Vec::new(),
+            end: None,
             parameters: Vec::new(),
             joint_names: Vec::new(),
             joint_limits: Vec::new(),
@@ -55,6 +56,7 @@ impl Chain {
         for joint in joints {
             sources.push(reader.push(robot, joint, &mut chain)?);
         }
+        chain.end = chain.segments.len().checked_sub(1);
         chain.source = Source::Urdf(sources);
         if chain.joint_names.is_empty() {
             return Err(ModelError::NoJoint { path: path.to_owned() });
@@ -199,7 +201,9 @@ impl<'a, 'x> Reader<'a, 'x> {
             UrdfJoint { name: name.to_owned(), segment: chain.segments.len(), moves: motion.is_some() };
         let first = chain.parameters.len();
         let Some(motion) = motion else {
+            let parent = chain.segments.len().checked_sub(1);
             chain.segments.push(Segment {
+                parent,
                 frame: Some(link.to_owned()),
                 geometry: Geometry::Origin { nominal: Rigid::from(&nominal), freedom: Freedom::Constant },
                 joint: None,
@@ -211,7 +215,9 @@ impl<'a, 'x> Reader<'a, 'x> {
         let axis = self.axis(joint, &subject)?;
         chain.parameters.extend(origin_parameters(name, &nominal, (motion, &axis)));
         let end = chain.parameters.len();
+        let parent = chain.segments.len().checked_sub(1);
         chain.segments.push(Segment {
+            parent,
             frame: None,
             geometry: Geometry::Origin { nominal: Rigid::from(&nominal), freedom: Freedom::Full },
             joint: None,
@@ -219,9 +225,10 @@ impl<'a, 'x> Reader<'a, 'x> {
             body: None,
         });
         chain.segments.push(Segment {
+            parent: chain.segments.len().checked_sub(1),
             frame: Some(link.to_owned()),
             geometry: Geometry::Axis(axis),
-            joint: Some(Joint { index: chain.joint_names.len(), motion }),
+            joint: Some(Joint::read(chain.joint_names.len(), motion)),
             parameters: end..end,
             body: self.body(robot, link)?,
         });

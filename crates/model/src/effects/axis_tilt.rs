@@ -22,7 +22,7 @@
 
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::{Placing, amplitude};
 use crate::rigid::Scalar;
 use crate::segment::Geometry;
@@ -45,7 +45,7 @@ pub(super) static KIND: EffectKind = EffectKind {
 
 #[derive(Debug)]
 struct AxisTilt {
-    slot: usize,
+    slot: Slot,
 }
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
@@ -53,8 +53,9 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing
         .parallel_to_previous(joint)
         .ok_or("its axis is not parallel to the one before it, so the chain describes every small tilt")?;
-    let slot = placing.zero.joints[joint].slot;
-    let described = match placing.model.segment_before(slot).map(|segment| &segment.geometry) {
+    let segment = placing.zero.joints[joint].segment;
+    let slot = Slot::Before(segment);
+    let described = match placing.model.segment_before(segment).map(|segment| &segment.geometry) {
         Some(Geometry::StandardDh { hayati } | Geometry::ModifiedDh { hayati }) => *hayati,
         Some(Geometry::Origin { .. } | Geometry::Axis(_)) | None => true,
     };

@@ -23,10 +23,10 @@
 //! # Source
 //! Notes of the project; ISO 9283 asks for a rigid mounting.
 
-use super::drivers::{BASE, Drivers};
+use super::drivers::Drivers;
 use super::frame_shift::about;
 use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::Placing;
 use super::shares::Shares;
 use super::state::SEATED;
@@ -77,30 +77,29 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let unit = Unit::RadianPerNewtonMetre;
     let amplitudes =
         shares.amplitudes("compliance", unit, 0.3 * per_deg, 6.0 * per_deg, "tilt per overturning moment");
-    Ok(Placement::twisting(BASE, amplitudes, BaseCompliance { shares }))
+    Ok(Placement::twisting(Slot::BASE, amplitudes, BaseCompliance { shares }))
 }
 
 /// Between the foot and the axis of the second joint.
 fn heights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let (Some(base), Some(second)) = (placing.zero.slots.get(BASE), placing.zero.joints.get(1)) else {
-        return Vec::new();
-    };
+    let Some(second) = placing.zero.joints.get(1) else { return Vec::new() };
+    let base = &placing.zero.base;
     let height_m = base.rotation.column(2).dot(&(second.origin_m - base.translation_m));
     [0.5, 1.0].iter().map(|part| part * height_m).filter(|height| *height > 0.0).collect()
 }
 
 impl Physics for BaseCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let base = &x.pose.slots[BASE];
+        let base = &x.pose.base;
         let gravity = &x.gravity_mps2;
-        let links = x.pose.moment_nm(&base.translation_m, 0, gravity);
-        let outer = x.pose.moment_nm(&base.translation_m, OUTER, gravity);
+        let links = x.pose.moment_nm(&base.translation_m, x.pose.links_from(0), gravity);
+        let outer = x.pose.moment_nm(&base.translation_m, x.pose.links_from(OUTER), gravity);
         let load = (x.pose.tip_m - base.translation_m).cross(gravity) * x.observation.load_kg;
         let turn = [0, 1, 2].map(|k| {
             let axis = base.rotation.column(k);
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
         });
         let pivot_m = Vector3::new(D::from(0.0), D::from(0.0), theta[self.shares.count()]);
-        change.twist(BASE, about(&pivot_m, turn), turn);
+        change.twist(Slot::BASE, about(&pivot_m, turn), turn);
     }
 }

@@ -26,7 +26,7 @@
 use super::drivers::Drivers;
 use super::frame_shift::about;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::Placing;
 use super::shares::Shares;
 use crate::rigid::Scalar;
@@ -64,7 +64,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let unit = Unit::RadianPerNewtonMetre;
     let meaning = "tilt per moment across the axis";
     let amplitudes = shares.amplitudes("tilt", unit, 0.3 * per_deg, 6.0 * per_deg, meaning);
-    let slot = placing.zero.joints[joint].slot;
+    let slot = Slot::Before(placing.zero.joints[joint].segment);
     Ok(Placement::twisting(slot, amplitudes, BearingCompliance { joint, shares }))
 }
 
@@ -73,15 +73,15 @@ impl Physics for BearingCompliance {
         let (pose, gravity) = (&x.pose, &x.gravity_mps2);
         let joint = &pose.joints[self.joint];
         let across = |moment: Vector3<f64>| moment - joint.axis * joint.axis.dot(&moment);
-        let links = across(pose.moment_nm(&joint.origin_m, self.joint, gravity));
-        let outer = across(pose.moment_nm(&joint.origin_m, self.joint + 1, gravity));
+        let links = across(pose.moment_nm(&joint.origin_m, joint.links.clone(), gravity));
+        let outer = across(pose.moment_nm(&joint.origin_m, pose.outer(self.joint), gravity));
         let load = across((pose.tip_m - joint.origin_m).cross(gravity) * x.observation.load_kg);
-        let slot = &pose.slots[joint.slot];
+        let slot = &joint.before;
         let turn = [0, 1, 2].map(|k| {
             let axis = slot.rotation.column(k);
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
         });
         let pivot_m = slot.rotation.tr_mul(&(joint.origin_m - slot.translation_m));
-        change.twist(joint.slot, about(&pivot_m.map(D::from), turn), turn);
+        change.twist(Slot::Before(joint.segment), about(&pivot_m.map(D::from), turn), turn);
     }
 }

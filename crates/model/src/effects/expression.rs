@@ -27,7 +27,7 @@ use super::drivers::Drivers;
 use super::formula::{Formula, Number};
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::measure::{Dimension, Measure, dimension, symbol};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::{Placing, amplitude};
 use super::spec::joint_index;
 use super::table::unit_of;
@@ -162,7 +162,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let in_world = matches!(acts, Acts::World(_));
     let physics = UserEffect { formula, variables, acts };
     Ok(match in_world {
-        true => Placement::twisting(0, amplitudes, physics),
+        true => Placement::twisting(Slot::WORLD, amplitudes, physics),
         false => Placement::new(amplitudes, physics),
     })
 }
@@ -319,7 +319,7 @@ impl Physics for UserEffect {
             Acts::World(axis) => {
                 let mut moved = [D::from(0.0); 3];
                 moved[*axis] = sum;
-                change.twist(0, moved, [D::from(0.0); 3]);
+                change.twist(Slot::WORLD, moved, [D::from(0.0); 3]);
             }
         }
     }

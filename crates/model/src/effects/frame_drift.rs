@@ -20,7 +20,7 @@
 
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::{Placing, amplitudes_xyz};
 use crate::rigid::Scalar;
 use armcal_core::Unit;
@@ -46,12 +46,12 @@ struct FrameDrift;
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.lasting()?;
     let amplitudes = amplitudes_xyz("", Unit::Metre, 0.8e-3, 0.03, "drift over the whole session along");
-    Ok(Placement::twisting(0, amplitudes, FrameDrift))
+    Ok(Placement::twisting(Slot::WORLD, amplitudes, FrameDrift))
 }
 
 impl Physics for FrameDrift {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let moved = [0, 1, 2].map(|axis| theta[axis] * x.session_fraction);
-        change.twist(0, moved, [D::from(0.0); 3]);
+        change.twist(Slot::WORLD, moved, [D::from(0.0); 3]);
     }
 }

@@ -23,7 +23,7 @@
 
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::{Placing, amplitudes_xyz};
 use crate::rigid::{Scalar, rotation_of_vector};
 use armcal_core::{Parameter, Unit};
@@ -53,14 +53,14 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
     let amplitudes = rigid_motion("");
     let physics = FrameShift { centre_m: placing.volume_centre_m() };
-    Ok(Placement::twisting(0, amplitudes, physics))
+    Ok(Placement::twisting(Slot::WORLD, amplitudes, physics))
 }
 
 impl Physics for FrameShift {
     fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
         let turn = [theta[3], theta[4], theta[5]];
         let move_m = about(&self.centre_m.map(D::from), turn);
-        change.twist(0, [theta[0] + move_m[0], theta[1] + move_m[1], theta[2] + move_m[2]], turn);
+        change.twist(Slot::WORLD, [theta[0] + move_m[0], theta[1] + move_m[1], theta[2] + move_m[2]], turn);
     }
 }
 

@@ -111,7 +111,9 @@ fn sharp(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
 /// The last joint has no outer links.
 fn weights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
     match placing.spec.target {
-        Some(joint) if joint + 1 < placing.zero.joints.len() => vec![0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 3.0],
+        Some(joint) if placing.zero.joints.get(joint).is_some_and(|j| j.links.len() > 1) => {
+            vec![0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 3.0]
+        }
         _ => Vec::new(),
     }
 }

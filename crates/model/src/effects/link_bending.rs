@@ -27,7 +27,7 @@
 use super::drivers::Drivers;
 use super::frame_shift::about;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
+use super::physics::{Deformation, Physics, Slot};
 use super::placing::Placing;
 use super::shares::Shares;
 use super::state::SEATED;
@@ -57,7 +57,9 @@ const OWN_SHARE: f64 = 3.0 / 8.0;
 
 #[derive(Debug)]
 struct LinkBending {
+    /// The joint of the link, and the one at its end.
     link: usize,
+    next: usize,
     shares: Shares,
     /// Inverse of EI for a sag of 1 m under the nominal masses, and under 1 kg at the tip.
     per_sag: f64,
@@ -66,46 +68,50 @@ struct LinkBending {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let link = placing.joint()?;
-    if link + 1 >= placing.zero.joints.len() {
+    let zero = placing.zero;
+    if zero.outer(link).is_empty() {
         return Err("bending of the last link is the same as compliance of its joint; use that".to_owned());
     }
-    let (from, to) = placing.zero.link_m(link);
+    let (next, (from, to)) = zero
+        .next_joint(link)
+        .zip(zero.beam_m(zero.joints[link].links.start))
+        .ok_or("its link branches, and each branch bends it in its own way; use compliance of its joint")?;
     let length_m = (to - from).norm();
     if length_m < SHORTEST_M {
         return Err(format!("its link is only {:.0} mm long", length_m * 1e3));
     }
     let gravity = placing.gravity_mps2();
-    let outer_kg: f64 = (link + 1..placing.zero.joints.len()).map(|k| placing.zero.link_mass_kg(k)).sum();
-    let force_n = (outer_kg + OWN_SHARE * placing.zero.link_mass_kg(link)) * gravity;
+    let outer_kg: f64 = zero.outer(link).map(|k| zero.link_mass_kg(k)).sum();
+    let own_kg = zero.link_mass_kg(zero.joints[link].links.start);
+    let force_n = (outer_kg + OWN_SHARE * own_kg) * gravity;
     let sag =
         |force_n: f64, moment_nm: f64| force_n * length_m.powi(3) / 3.0 + moment_nm * length_m.powi(2) / 2.0;
     let shares = Shares::of(placing, link);
     let amplitudes = shares.amplitudes("sag", Unit::Metre, 1.2e-3, 0.03, "sag of the link held out level");
-    let per_sag = 1.0 / sag(force_n, placing.reference_torque_nm(link + 1));
-    let per_load_sag = 1.0 / sag(gravity, gravity * placing.reach_m(link + 1));
-    Ok(Placement::twisting(
-        placing.zero.joints[link + 1].slot,
-        amplitudes,
-        LinkBending { link, shares, per_sag, per_load_sag },
-    ))
+    let per_sag = 1.0 / sag(force_n, placing.reference_torque_nm(next));
+    let per_load_sag = 1.0 / sag(gravity, gravity * placing.reach_m(next));
+    let slot = Slot::Before(zero.joints[next].segment);
+    Ok(Placement::twisting(slot, amplitudes, LinkBending { link, next, shares, per_sag, per_load_sag }))
 }
 
 impl Physics for LinkBending {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let pose = &x.pose;
-        let (from, end) = pose.link_m(self.link);
+        let own = pose.joints[self.link].links.start;
+        // Where it was placed, it has one end.
+        let Some((from, end)) = pose.beam_m(own) else { return };
         let beam = end - from;
         let gravity = &x.gravity_mps2;
-        let outer_kg: f64 = (self.link + 1..pose.joints.len()).map(|k| pose.link_mass_kg(k)).sum();
-        let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(self.link));
-        let links_nm = pose.moment_nm(&end, self.link + 1, gravity);
+        let outer_kg: f64 = pose.outer(self.link).map(|k| pose.link_mass_kg(k)).sum();
+        let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(own));
+        let links_nm = pose.moment_nm(&end, pose.outer(self.link), gravity);
         let load_n = gravity * x.observation.load_kg;
         let load_nm = (pose.tip_m - end).cross(&load_n);
         let links = bend(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
         let outer = bend(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
         let load = bend(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);
-        let joint = &pose.joints[self.link + 1];
-        let slot = &pose.slots[joint.slot];
+        let joint = &pose.joints[self.next];
+        let slot = &joint.before;
         let part = |k: usize, axis: usize| {
             let axis = slot.rotation.column(axis);
             self.shares.sum(theta, axis.dot(&links[k]), axis.dot(&outer[k]), axis.dot(&load[k]))
@@ -113,7 +119,11 @@ impl Physics for LinkBending {
         let turn = [part(1, 0), part(1, 1), part(1, 2)];
         let pivot_m = slot.rotation.tr_mul(&(end - slot.translation_m));
         let back = about(&pivot_m.map(D::from), turn);
-        change.twist(joint.slot, [part(0, 0) + back[0], part(0, 1) + back[1], part(0, 2) + back[2]], turn);
+        change.twist(
+            Slot::Before(joint.segment),
+            [part(0, 0) + back[0], part(0, 1) + back[1], part(0, 2) + back[2]],
+            turn,
+        );
     }
 }
 

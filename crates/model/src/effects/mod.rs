@@ -43,6 +43,7 @@ mod in_model;
 mod kind;
 mod link_bending;
 mod measure;
+mod nominal_pose;
 mod periodic;
 mod physics;
 mod placed;
@@ -79,7 +80,7 @@ pub use spec::{EffectSpec, Since, place_and_moment};
 pub use table::{EffectTable, Extra, Override, Word, effects_toml};
 
 pub(crate) use declared::Declared;
-pub(crate) use drivers::NominalPose;
+pub(crate) use nominal_pose::NominalPose;
 pub(crate) use placed::Effects;
 
 /// Every kind of effect, in the order in which people read about them.

@@ -2,14 +2,27 @@
 
 use super::drivers::Drivers;
 use crate::rigid::Scalar;
+use crate::tree::SegmentId;
 use nalgebra::Vector3;
 use num_dual::Dual64;
 use std::fmt::Debug;
 use std::ops::Range;
 
-/// A place on the path from world to tip where a small twist can act: 0 is the world's side of the base,
-/// `k` the end of the k-th segment of the path (base, rows of the chain, tip).
-pub(crate) type Slot = usize;
+/// A place on the tree where a small twist can act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Slot {
+    /// Right before a segment: what hangs beside it stays where it is.
+    Before(SegmentId),
+    /// At its end: all that hangs on it moves.
+    Behind(SegmentId),
+}
+
+impl Slot {
+    /// The world's side of the base: the whole arm moves.
+    pub const WORLD: Slot = Slot::Before(0);
+    /// The base frame itself.
+    pub const BASE: Slot = Slot::Behind(0);
+}
 
 /// The sum of what the effects change, in sparse lists.
 #[derive(Debug, Clone)]

@@ -1,16 +1,17 @@
 //! The effects of a model: placing them and evaluating them together.
 
-use super::drivers::{Drivers, NominalPose};
+use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Placement};
+use super::nominal_pose::NominalPose;
 use super::physics::{AnyPhysics, Deformation, Slot};
 use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
 use super::state;
 use crate::error::nearest;
-use crate::path::{PathAt, joint_twists};
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
+use crate::tree::{Route, Tree, TreeAt};
 use crate::twist::Twist;
 use crate::{Model, ModelError};
 use armcal_core::{DwellId, Parameter, Reference, Role};
@@ -67,8 +68,10 @@ impl PlacedEffect {
 pub(crate) struct Effects {
     pub placed: Vec<PlacedEffect>,
     pub session: Arc<Session>,
-    /// World to tip with a twist, the identity at rest, at every slot in use.
-    path: Vec<Segment>,
+    /// The model's tree with a twist, the identity at rest, at every slot in use.
+    tree: Tree,
+    /// The way to the tip in it.
+    tip: Route,
     /// The slots in use, ascending.
     slots: Vec<Slot>,
 }
@@ -174,64 +177,52 @@ fn check_words(placing: &Placing<'_>) -> Result<(), String> {
 }
 
 impl Effects {
-    /// Puts placed effects on the path of a model whose parameter vector then has `count` entries.
-    pub fn new(placed: Vec<PlacedEffect>, session: Arc<Session>, rigid: &[Segment], count: usize) -> Effects {
+    /// Puts placed effects on the tree of a model whose parameter vector then has `count` entries.
+    pub fn new(placed: Vec<PlacedEffect>, session: Arc<Session>, model: &Model, count: usize) -> Effects {
         let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
         slots.sort_unstable();
         slots.dedup();
-        let mut path = Vec::with_capacity(rigid.len() + slots.len());
-        for slot in 0..=rigid.len() {
-            if let Ok(index) = slots.binary_search(&slot) {
-                let first = count + 6 * index;
-                path.push(Segment {
-                    frame: None,
-                    geometry: Geometry::Origin { nominal: Rigid::identity(), freedom: Freedom::Full },
-                    joint: None,
-                    parameters: first..first + 6,
-                    body: None,
-                });
-            }
-            path.extend(rigid.get(slot).cloned());
-        }
-        Effects { placed, session, path, slots }
+        let (tree, ends) = twisted(model.tree(), &slots, count);
+        let tip = tree.route(ends[model.tip_end()]);
+        Effects { placed, session, tree, tip, slots }
     }
 
-    /// The same effects on a path whose model lacks `fewer` parameters before theirs and has `count` in all.
-    pub fn moved(&self, fewer: usize, rigid: &[Segment], count: usize) -> Effects {
+    /// The same effects in a model that lacks `fewer` parameters before theirs and has `count` in all.
+    pub fn moved(&self, fewer: usize, model: &Model, count: usize) -> Effects {
         let mut placed = self.placed.clone();
         for effect in &mut placed {
             effect.parameters = effect.parameters.start - fewer..effect.parameters.end - fewer;
         }
-        Effects::new(placed, self.session.clone(), rigid, count)
+        Effects::new(placed, self.session.clone(), model, count)
     }
 
     /// The deformed arm, predicted.
     pub fn evaluate(&self, p: &[f64], x: &Drivers<'_>) -> Evaluated {
         let (p, q, in_board_m) = self.deformed(p, x);
-        let mut tip = crate::path::follow(&self.path, &p, &q);
+        let mut tip = self.tree.follow(&self.tip, &p, &q);
         tip.translation_m += self.seen_m(&p, x, &tip.translation_m);
         Evaluated { tip, in_board_m }
     }
 
-    /// The path before a pose deforms it.
-    pub fn path_at(&self, p: &[f64]) -> PathAt<'_> {
-        PathAt::of(&self.path, self.extended(p))
+    /// The tree before a pose deforms it.
+    pub fn tree_at(&self, p: &[f64]) -> TreeAt<'_> {
+        TreeAt::of(&self.tree, self.extended(p))
     }
 
-    /// The deformed arm and its derivatives by every parameter; `path` is that of [`Effects::path_at`].
-    pub fn linearise(&self, path: &PathAt<'_>, p: &[f64], x: &Drivers<'_>) -> Linearised {
+    /// The deformed arm and its derivatives by every parameter; `tree` is that of [`Effects::tree_at`].
+    pub fn linearise(&self, tree: &TreeAt<'_>, p: &[f64], x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let path = path.with(&p, &q);
+        let tip = tree.with(&self.tip, &p, &q);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
-            path.parameters.into_iter().partition(|(index, _)| *index < count);
+            tip.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];
         for (index, twist) in parameters.iter().chain(&twists) {
             motions[*index] = *twist;
         }
         let mut joint_motions = vec![Twist::none(); q.len()];
-        for (index, twist) in &path.joints {
-            joint_motions[*index] = *twist;
+        for (index, twist) in &tip.joints {
+            joint_motions[*index].add(twist, 1.0);
         }
         let mut seats = Vec::new();
         let mut change = Deformation::none();
@@ -268,7 +259,7 @@ impl Effects {
                 }
             }
         }
-        let mut at = Evaluated { tip: path.tip, in_board_m };
+        let mut at = Evaluated { tip: tip.at, in_board_m };
         self.distort(&p, x, &mut at.tip, &mut parameters, &mut []);
         Linearised { at, parameters, seats }
     }
@@ -276,7 +267,7 @@ impl Effects {
     /// Motion of the tip per unit of each joint reading.
     pub fn joint_twists(&self, p: &[f64], x: &Drivers<'_>) -> Vec<(usize, Twist)> {
         let (p, q, _) = self.deformed(p, x);
-        let (mut tip, mut joints) = joint_twists(&self.path, &p, &q);
+        let (mut tip, mut joints) = self.tree.joint_twists(&self.tip, &p, &q);
         self.distort(&p, x, &mut tip, &mut [], &mut joints);
         joints
     }
@@ -409,6 +400,34 @@ impl Effects {
         }
         tip.translation_m += self.seen_m(p, x, &tip.translation_m);
     }
+}
+
+/// A tree with six parameters of a twist, behind `count` others, at every slot; and where each of its segments is now.
+fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
+    let mut tree = Tree(Vec::with_capacity(rigid.0.len() + slots.len()));
+    // Where each segment is in it, and where what hangs on it begins.
+    let (mut places, mut ends): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
+    let twist = |tree: &mut Tree, slot: Slot, parent: Option<usize>| {
+        let Ok(index) = slots.binary_search(&slot) else { return parent };
+        let first = count + 6 * index;
+        tree.0.push(Segment {
+            parent,
+            frame: None,
+            geometry: Geometry::Origin { nominal: Rigid::identity(), freedom: Freedom::Full },
+            joint: None,
+            parameters: first..first + 6,
+            body: None,
+        });
+        Some(tree.0.len() - 1)
+    };
+    for (id, segment) in rigid.0.iter().enumerate() {
+        let parent = twist(&mut tree, Slot::Before(id), segment.parent.map(|parent| ends[parent]));
+        tree.0.push(Segment { parent, ..segment.clone() });
+        let place = tree.0.len() - 1;
+        places.push(place);
+        ends.push(twist(&mut tree, Slot::Behind(id), Some(place)).unwrap_or(place));
+    }
+    (tree, places)
 }
 
 /// The point the sensor measured in the world [m]: the tip, or the board it is seated in.

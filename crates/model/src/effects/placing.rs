@@ -1,7 +1,8 @@
 //! Putting an effect in its place on a given arm: what its kind may ask about the arm and the session.
 
-use super::drivers::{NominalPose, gravity_in_world};
+use super::drivers::gravity_in_world;
 use super::kind::EffectKind;
+use super::nominal_pose::NominalPose;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::Model;
@@ -111,14 +112,11 @@ impl Placing<'_> {
     /// weight [N]): the scale of everything that torque drives. Never zero.
     pub fn reference_torque_nm(&self, joint: usize) -> f64 {
         let gravity = self.gravity_mps2();
-        let (mut reach_m, mut torque_nm, mut weight_n) = (0.0, 0.0, 0.0);
-        for k in joint..self.zero.joints.len() {
-            let (from, to) = self.zero.link_m(k);
-            let length_m = (to - from).norm();
+        let (mut torque_nm, mut weight_n): (f64, f64) = (0.0, 0.0);
+        for (k, begins_m) in self.zero.joints[joint].links.clone().zip(self.zero.stretched_m(joint)) {
             let link_n = self.zero.link_mass_kg(k) * gravity;
-            torque_nm += link_n * (reach_m + 0.5 * length_m);
+            torque_nm += link_n * (begins_m + 0.5 * self.zero.length_m(k));
             weight_n += link_n;
-            reach_m += length_m;
         }
         let scale = match self.motion(joint) {
             Motion::Revolute => torque_nm,
@@ -127,13 +125,11 @@ impl Placing<'_> {
         scale.max(1e-3)
     }
 
-    /// Length of the links from `first` on, stretched out [m].
-    pub fn reach_m(&self, first: usize) -> f64 {
-        let length = |k| {
-            let (from, to) = self.zero.link_m(k);
-            (to - from).norm()
-        };
-        (first..self.zero.joints.len()).map(length).sum()
+    /// How far the links of a joint reach, stretched out [m].
+    pub fn reach_m(&self, joint: usize) -> f64 {
+        let links = self.zero.joints[joint].links.clone();
+        let ends = links.zip(self.zero.stretched_m(joint)).map(|(k, from_m)| from_m + self.zero.length_m(k));
+        ends.fold(0.0, f64::max)
     }
 
     /// Size of gravity [m/s^2].

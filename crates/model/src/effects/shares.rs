@@ -19,7 +19,7 @@ pub(crate) struct Shares {
 impl Shares {
     /// The shares of a joint: the outer links where there are any, the load where the session has one.
     pub fn of(placing: &Placing<'_>, joint: usize) -> Shares {
-        Shares { outer: joint + 1 < placing.zero.joints.len(), load: placing.session.load }
+        Shares { outer: !placing.zero.outer(joint).is_empty(), load: placing.session.load }
     }
 
     /// The amplitudes: `quantity`, `quantity_outer`, `quantity_load`.

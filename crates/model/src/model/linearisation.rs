@@ -2,9 +2,9 @@
 
 use super::{Model, Sides, measured_m, seated_m};
 use crate::effects::Effects;
-use crate::path::PathAt;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::segment::{LinearisedSegment, Segment};
+use crate::tree::TreeAt;
 use armcal_core::Observation;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -19,17 +19,17 @@ pub(crate) struct Linearisation<'a> {
 }
 
 enum Arm<'a> {
-    Rigid(PathAt<'a>),
+    Rigid(TreeAt<'a>),
     /// With every pose other parameters.
-    Deformed(&'a Effects, PathAt<'a>),
+    Deformed(&'a Effects, TreeAt<'a>),
 }
 
 impl<'a> Linearisation<'a> {
     /// For these observations.
     pub fn of(model: &'a Model, p: &'a [f64], observations: &[&Observation]) -> Linearisation<'a> {
         let arm = match &model.effects {
-            None => Arm::Rigid(PathAt::of(&model.path, p)),
-            Some(effects) => Arm::Deformed(effects, effects.path_at(p)),
+            None => Arm::Rigid(TreeAt::of(&model.tree, p)),
+            Some(effects) => Arm::Deformed(effects, effects.tree_at(p)),
         };
         let seated = observations.iter().filter_map(|o| Some((o.dwell.recording, model.board_under(o)?)));
         let boards: BTreeMap<usize, &Segment> = seated.collect();
@@ -40,12 +40,12 @@ impl<'a> Linearisation<'a> {
     /// The residual of one of them and d residual / d p.
     pub fn residual_with_jacobian(&self, o: &Observation) -> (ModelResidual, DMatrix<f64>) {
         let (predicted, in_board_m, columns, seats) = match &self.arm {
-            Arm::Rigid(path) => {
-                let path = path.linearised(&o.joint_rad);
-                (path.tip, seated_m(o), path.parameters, Vec::new())
+            Arm::Rigid(tree) => {
+                let tip = tree.linearised(&self.model.tip, &o.joint_rad);
+                (tip.at, seated_m(o), tip.parameters, Vec::new())
             }
-            Arm::Deformed(effects, path) => {
-                let arm = effects.linearise(path, self.p, &effects.drivers(self.model, o));
+            Arm::Deformed(effects, tree) => {
+                let arm = effects.linearise(tree, self.p, &effects.drivers(self.model, o));
                 (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
             }
         };

@@ -1,0 +1,276 @@
+//! The nominal arm in one pose: its axes, and what its links weigh where.
+//!
+//! Links have the masses and centres of their URDF, where it gives all of them; else each weighs 2.5 kg for every metre
+//! from its joint to the next ones (the last: to the tip), evenly spread. A joint carries its own link and all behind it,
+//! on every branch. Only the proportions matter, because the amplitude of an effect absorbs the scale and a second amplitude
+//! the share of the outer links.
+
+use crate::rigid::Rigid;
+use crate::segment::{Body, Geometry, Motion, Segment};
+use crate::tree::{SegmentId, Tree};
+use nalgebra::Vector3;
+use std::ops::Range;
+
+/// Mass of a link per length between its joints [kg/m].
+const LINK_DENSITY_KGPM: f64 = 2.5;
+
+/// The axis of a joint at the nominal arm, in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct JointAxis {
+    /// A point on the axis that the joint itself does not move [m]: the link before it ends here.
+    pub origin_m: Vector3<f64>,
+    /// Where its own link begins [m]: there too, unless it slides.
+    pub start_m: Vector3<f64>,
+    /// Unit vector.
+    pub axis: Vector3<f64>,
+    /// How the joint moves.
+    pub motion: Motion,
+    /// The segment that holds the joint.
+    pub segment: SegmentId,
+    /// The frame right before that segment.
+    pub before: Rigid<f64>,
+    /// The links it moves: its own, then those behind it.
+    pub links: Range<usize>,
+    /// Whether it moves the tip.
+    pub moves_tip: bool,
+}
+
+/// A link: what one joint moves and no other joint behind it.
+#[derive(Debug, Clone, PartialEq)]
+struct Link {
+    body: Body,
+    /// The link that carries it; none for one that hangs on the base.
+    parent: Option<usize>,
+    /// Where its joint is and where it ends [m]: at the next joints and the tip.
+    from_m: Vector3<f64>,
+    to_m: Vec<Vector3<f64>>,
+}
+
+/// The nominal arm in one pose.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NominalPose {
+    /// The frame of the base, in the world.
+    pub base: Rigid<f64>,
+    /// The joints, in the order of the joint vector.
+    pub joints: Vec<JointAxis>,
+    /// Joints that follow the reading of another: that reading, the change per change of it, and the joint.
+    mimics: Vec<(usize, f64, JointAxis)>,
+    /// The tip [m].
+    pub tip_m: Vector3<f64>,
+    /// What each joint moves, branch after branch.
+    links: Vec<Link>,
+    /// Whether the links weigh what the file of the arm declares.
+    pub declared: bool,
+}
+
+impl NominalPose {
+    /// Of a tree whose first segment ends at the base, and its tip.
+    pub fn of(tree: &Tree, tip: SegmentId, p: &[f64], joint_rad: &[f64]) -> NominalPose {
+        let ends = tree.ends(p, joint_rad);
+        let tip_m = ends[tip].translation_m;
+        let base = ends.first().copied().unwrap_or_else(Rigid::identity);
+        let mut pose = NominalPose {
+            base,
+            joints: Vec::new(),
+            mimics: Vec::new(),
+            tip_m,
+            links: Vec::new(),
+            declared: false,
+        };
+        // The link that each segment is part of.
+        let mut part_of: Vec<Option<usize>> = Vec::with_capacity(ends.len());
+        for (id, segment) in tree.0.iter().enumerate() {
+            let parent = segment.parent.and_then(|parent| part_of[parent]);
+            let Some(joint) = segment.joint else {
+                part_of.push(parent);
+                continue;
+            };
+            let before = segment.parent.map_or_else(Rigid::identity, |parent| ends[parent]);
+            let value = joint.at(joint_rad.get(joint.index).copied().unwrap_or(f64::NAN));
+            let link = pose.links.len();
+            let axis =
+                JointAxis { links: link..link + 1, ..axis(id, segment, before, &ends[id], (p, value)) };
+            pose.begin_link(parent, &axis);
+            part_of.push(Some(link));
+            match joint.mimic {
+                None => pose.joints.push(axis),
+                Some(mimic) => pose.mimics.push((joint.index, mimic.ratio, axis)),
+            }
+        }
+        pose.end_links(part_of[tip], tip_m);
+        let bodies = pose.bodies(tree, &ends, &part_of);
+        pose.declared = bodies.is_some();
+        let bodies = bodies.unwrap_or_else(|| pose.links.iter().map(spread).collect());
+        pose.links.iter_mut().zip(bodies).for_each(|(link, body)| link.body = body);
+        pose
+    }
+
+    /// Adds a link that hangs on another, which ends where the joint of this one is.
+    fn begin_link(&mut self, parent: Option<usize>, joint: &JointAxis) {
+        if let Some(parent) = parent {
+            self.links[parent].to_m.push(joint.origin_m);
+        }
+        let body = Body { mass_kg: 0.0, centre_m: Vector3::zeros() };
+        self.links.push(Link { body, parent, from_m: joint.start_m, to_m: Vec::new() });
+    }
+
+    /// Ends the link of the tip at the tip, and lets every joint know what it moves.
+    fn end_links(&mut self, of_tip: Option<usize>, tip_m: Vector3<f64>) {
+        let mut ends: Vec<usize> = (1..=self.links.len()).collect();
+        for k in (0..self.links.len()).rev() {
+            if let Some(parent) = self.links[k].parent {
+                ends[parent] = ends[parent].max(ends[k]);
+            }
+        }
+        if let Some(link) = of_tip {
+            self.links[link].to_m.push(tip_m);
+        }
+        for joint in self.joints.iter_mut().chain(self.mimics.iter_mut().map(|(_, _, joint)| joint)) {
+            joint.links.end = ends[joint.links.start];
+            joint.moves_tip = of_tip.is_some_and(|link| joint.links.contains(&link));
+        }
+    }
+
+    /// The links as the file of the arm declares them; none where it leaves one without a mass.
+    fn bodies(&self, tree: &Tree, ends: &[Rigid<f64>], part_of: &[Option<usize>]) -> Option<Vec<Body>> {
+        let mut links: Vec<Body> = self.links.iter().map(|link| link.body).collect();
+        for ((segment, end), link) in tree.0.iter().zip(ends).zip(part_of) {
+            // What no joint moves bears no part.
+            let Some((body, k)) = segment.body.as_ref().zip(*link) else { continue };
+            links[k].add(&Body { centre_m: end.point(&body.centre_m), ..*body });
+        }
+        links.iter().all(|link| link.mass_kg > 0.0).then_some(links)
+    }
+
+    /// Where link `k` begins, and where it ends if it does not branch [m].
+    pub fn beam_m(&self, k: usize) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        match self.links[k].to_m.as_slice() {
+            [to] => Some((self.links[k].from_m, *to)),
+            _ => None,
+        }
+    }
+
+    /// Length of link `k` to the farthest of its ends [m].
+    pub fn length_m(&self, k: usize) -> f64 {
+        let link = &self.links[k];
+        link.to_m.iter().map(|to| (to - link.from_m).norm()).fold(0.0, f64::max)
+    }
+
+    /// How far from a joint each of its links begins with the arm stretched out [m], in their order.
+    pub fn stretched_m(&self, joint: usize) -> Vec<f64> {
+        let links = self.joints[joint].links.clone();
+        let mut begins_m = vec![0.0; links.len()];
+        for k in links.clone().skip(1) {
+            let Some(parent) = self.links[k].parent.filter(|parent| links.contains(parent)) else { continue };
+            begins_m[k - links.start] = begins_m[parent - links.start] + self.length_m(parent);
+        }
+        begins_m
+    }
+
+    /// Mass of link `k` [kg].
+    pub fn link_mass_kg(&self, k: usize) -> f64 {
+        self.links[k].body.mass_kg
+    }
+
+    /// Centre of mass of link `k` [m].
+    pub fn link_centre_m(&self, k: usize) -> Vector3<f64> {
+        self.links[k].body.centre_m
+    }
+
+    /// All links from one on.
+    pub fn links_from(&self, first: usize) -> Range<usize> {
+        first.min(self.links.len())..self.links.len()
+    }
+
+    /// The links behind a joint's own.
+    pub fn outer(&self, joint: usize) -> Range<usize> {
+        let links = &self.joints[joint].links;
+        links.start + 1..links.end
+    }
+
+    /// The joint on which a link's only neighbour hangs; none where it branches or ends.
+    pub fn next_joint(&self, joint: usize) -> Option<usize> {
+        let own = self.joints[joint].links.start;
+        let mut next =
+            (0..self.joints.len()).filter(|k| self.links[self.joints[*k].links.start].parent == Some(own));
+        next.next().filter(|_| self.links[own].to_m.len() == 1 && next.next().is_none())
+    }
+
+    /// Moment about `pivot` of the weights of some links [N m].
+    pub fn moment_nm(
+        &self,
+        pivot: &Vector3<f64>,
+        links: Range<usize>,
+        gravity: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        let weight = |k| (self.link_centre_m(k) - pivot).cross(gravity) * self.link_mass_kg(k);
+        links.map(weight).sum()
+    }
+
+    /// Generalised force on a reading of the weights of all links its joints move, or of those behind their own links,
+    /// positive towards +q [N m] (prismatic: [N]).
+    pub fn torque_nm(&self, joint: usize, outer: bool, gravity: &Vector3<f64>) -> f64 {
+        let of = |j: &JointAxis| {
+            let links = j.links.start + usize::from(outer)..j.links.end;
+            match j.motion {
+                Motion::Revolute => j.axis.dot(&self.moment_nm(&j.origin_m, links, gravity)),
+                Motion::Prismatic => {
+                    let mass: f64 = links.map(|k| self.link_mass_kg(k)).sum();
+                    j.axis.dot(gravity) * mass
+                }
+            }
+        };
+        self.over_joints(joint, of)
+    }
+
+    /// Generalised force on a reading of one kilogram at the tip.
+    pub fn tip_torque_nm(&self, joint: usize, gravity: &Vector3<f64>) -> f64 {
+        self.over_joints(joint, |j| match j.motion {
+            _ if !j.moves_tip => 0.0,
+            Motion::Revolute => j.axis.dot(&(self.tip_m - j.origin_m).cross(gravity)),
+            Motion::Prismatic => j.axis.dot(gravity),
+        })
+    }
+
+    /// The joint of a reading, and those that follow it by their ratios.
+    fn over_joints(&self, joint: usize, of: impl Fn(&JointAxis) -> f64) -> f64 {
+        let following = self.mimics.iter().filter(|(reading, ..)| *reading == joint);
+        following.fold(of(&self.joints[joint]), |sum, (_, ratio, mimic)| sum + ratio * of(mimic))
+    }
+}
+
+/// The axis of the joint that a segment holds, at `value` [rad] (prismatic: [m]).
+fn axis(
+    id: SegmentId,
+    segment: &Segment,
+    before: Rigid<f64>,
+    end: &Rigid<f64>,
+    (p, value): (&[f64], f64),
+) -> JointAxis {
+    let (origin_m, axis) = match &segment.geometry {
+        Geometry::ModifiedDh { .. } => {
+            // Rx(alpha) Tx(a) stands before the axis.
+            let a_m = p.get(segment.parameters.start + 2).copied().unwrap_or_default();
+            let origin_m = before.translation_m + before.rotation.column(0) * a_m;
+            (origin_m, end.rotation.column(2).into_owned())
+        }
+        Geometry::Axis(axis) => (before.translation_m, before.rotation * axis),
+        Geometry::StandardDh { .. } | Geometry::Origin { .. } => {
+            (before.translation_m, before.rotation.column(2).into_owned())
+        }
+    };
+    let motion = segment.joint.map_or(Motion::Revolute, |joint| joint.motion);
+    let slid_m = if motion == Motion::Prismatic { value } else { 0.0 };
+    let start_m = origin_m + axis * slid_m;
+    JointAxis { origin_m, start_m, axis, motion, segment: id, before, links: 0..0, moves_tip: false }
+}
+
+/// What a link weighs that weighs as much as it is long.
+fn spread(link: &Link) -> Body {
+    let mut all = Body { mass_kg: 0.0, centre_m: Vector3::zeros() };
+    for to_m in &link.to_m {
+        let mass_kg = LINK_DENSITY_KGPM * (to_m - link.from_m).norm();
+        all.add(&Body { mass_kg, centre_m: (link.from_m + to_m) * 0.5 });
+    }
+    all
+}

@@ -1,0 +1,131 @@
+//! The tree of segments from the world to every feature, and the product rule along each of its paths.
+//!
+//! With `feature = P_i A_i S_i` (everything before segment i, the segment, everything after it), a small change of segment i
+//! moves everything behind it by `P_i (dA_i A_i^-1) P_i^-1`, whatever stands there: a rotation `w` and a velocity, the
+//! twist (Lynch and Park, Modern Robotics, 2017, section 5.1). Where the segment ends the velocity is `v_i`, at a feature it is
+//! `v_i + w_i x (feature - end_i)`, so that one forward pass with the segments' derivatives gives the Jacobians of all features.
+
+use crate::rigid::Rigid;
+use crate::segment::{LinearisedSegment, Segment};
+use crate::twist::{Twist, Twists};
+use std::borrow::Cow;
+
+/// A segment by its place in the tree.
+pub(crate) type SegmentId = usize;
+
+/// Segments, parents before their children, branch after branch.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Tree(pub Vec<Segment>);
+
+/// The segments from the world to a feature, in this order; the last one ends there.
+pub(crate) type Route = Box<[SegmentId]>;
+
+/// A feature at one parameter vector and one pose: where it is and how that changes.
+pub(crate) struct LinearisedFeature {
+    /// The feature in the world.
+    pub at: Rigid<f64>,
+    /// (index in the parameter vector, motion of the feature), in the order of its route.
+    pub parameters: Vec<(usize, Twist)>,
+    /// (index in the joint vector, motion of the feature), in the order of its route; a reading that moves two joints of
+    /// it is there twice.
+    pub joints: Vec<(usize, Twist)>,
+}
+
+impl Tree {
+    /// The segments from the world to the end of one.
+    pub fn route(&self, end: SegmentId) -> Route {
+        let mut route: Vec<SegmentId> = std::iter::successors(Some(end), |id| self.0[*id].parent).collect();
+        route.reverse();
+        route.into()
+    }
+
+    /// The frame at the end of every segment.
+    pub fn ends(&self, p: &[f64], joints: &[f64]) -> Vec<Rigid<f64>> {
+        let mut ends: Vec<Rigid<f64>> = Vec::with_capacity(self.0.len());
+        for segment in &self.0 {
+            let before = segment.parent.map_or_else(Rigid::identity, |parent| ends[parent]);
+            ends.push(before.then(&segment.transform(p, joints)));
+        }
+        ends
+    }
+
+    /// The end of a route.
+    pub fn follow(&self, route: &[SegmentId], p: &[f64], joints: &[f64]) -> Rigid<f64> {
+        let along = |before: Rigid<f64>, id: &SegmentId| before.then(&self.0[*id].transform(p, joints));
+        route.iter().fold(Rigid::identity(), along)
+    }
+
+    /// The end of a route and its motion per unit of each joint, in the order of the route.
+    pub fn joint_twists(
+        &self,
+        route: &[SegmentId],
+        p: &[f64],
+        joints: &[f64],
+    ) -> (Rigid<f64>, Vec<(usize, Twist)>) {
+        let (mut at, mut moving) = (Rigid::identity(), Vec::new());
+        for segment in route.iter().map(|id| &self.0[*id]) {
+            let before = at;
+            at = before.then(&segment.transform(p, joints));
+            let Some(joint) = segment.joint else { continue };
+            let motions = segment.linearised(p, joints).motions.turned(&before.rotation);
+            moving.push((joint.index, segment.parameters.len(), motions, at.translation_m));
+        }
+        let twist = |(index, last, mut motions, end_m): (usize, usize, Twists<_>, _)| {
+            motions.shift(&(at.translation_m - end_m));
+            (index, motions.by(last))
+        };
+        (at, moving.into_iter().map(twist).collect())
+    }
+}
+
+/// A tree at or about one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
+pub(crate) struct TreeAt<'a> {
+    tree: &'a Tree,
+    p: Cow<'a, [f64]>,
+    /// By segment; `None` where a joint moves it.
+    still: Vec<Option<LinearisedSegment>>,
+}
+
+impl<'a> TreeAt<'a> {
+    pub fn of(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>) -> TreeAt<'a> {
+        let p = p.into();
+        let still = |segment: &Segment| segment.joint.is_none().then(|| segment.linearised(&p, &[]));
+        let still = tree.0.iter().map(still).collect();
+        TreeAt { tree, p, still }
+    }
+
+    /// The end of a route and its derivatives with respect to every parameter and joint on it.
+    pub fn linearised(&self, route: &[SegmentId], joints: &[f64]) -> LinearisedFeature {
+        self.with(route, &self.p, joints)
+    }
+
+    /// The same with parameters of the pose's own: a segment whose parameters it leaves alone is as it was.
+    pub fn with(&self, route: &[SegmentId], p: &[f64], joints: &[f64]) -> LinearisedFeature {
+        let mut at = Rigid::identity();
+        let mut motions = Vec::with_capacity(route.len());
+        for &id in route {
+            let segment = &self.tree.0[id];
+            let own = segment.parameters.clone();
+            let moved;
+            let linearised = match &self.still[id] {
+                Some(still) if p[own.clone()] == self.p[own] => still,
+                _ => {
+                    moved = segment.linearised(p, joints);
+                    &moved
+                }
+            };
+            let before = at;
+            at = before.then(&linearised.transform);
+            motions.push((segment, linearised.motions.turned(&before.rotation), at.translation_m));
+        }
+        let mut parameters = Vec::with_capacity(p.len());
+        let mut of_joints = Vec::with_capacity(joints.len());
+        for (segment, motions, end_m) in &mut motions {
+            motions.shift(&(at.translation_m - *end_m));
+            let own = segment.parameters.clone();
+            of_joints.extend(segment.joint.map(|joint| (joint.index, motions.by(own.len()))));
+            parameters.extend(own.enumerate().map(|(k, index)| (index, motions.by(k))));
+        }
+        LinearisedFeature { at, parameters, joints: of_joints }
+    }
+}
