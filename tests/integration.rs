@@ -44,6 +44,9 @@ mod python_agrees;
 /// Does the same input give the same bytes, whatever the number of threads?
 mod deterministic;
 
+/// Are trees of links, joints that follow others, and what all of it weighs what an independent library makes of them?
+mod urdf_trees;
+
 /// Are all dwells of fresh simulated rigs associated rightly, and intervals honest?
 mod many_rigs;
 

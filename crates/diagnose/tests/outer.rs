@@ -22,8 +22,11 @@ const ARM: &str = include_str!("../../../pipelines/models/right_arm.toml");
 fn model() -> Model {
     let chain = Chain::from_dh_toml(ARM, Path::new("arm.toml")).unwrap();
     let tip = Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) };
-    Model::new(chain, Frames { base: Frame::given("base", Pose::identity()), tip, boards: Vec::new() })
-        .unwrap()
+    Model::new(
+        chain,
+        Frames { base: Frame::given("base", Pose::identity()), tip, markers: Vec::new(), boards: Vec::new() },
+    )
+    .unwrap()
 }
 
 /// `n` tracked poses, arrival directions at random.

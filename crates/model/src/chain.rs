@@ -1,6 +1,8 @@
 //! A serial arm: its segments, its joints, its parameters.
 
+use crate::ModelError;
 use crate::dh_toml::DhTable;
+use crate::error::nearest;
 use crate::segment::{Motion, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::urdf::UrdfJoint;
@@ -61,16 +63,32 @@ impl Chain {
         &self.parameters
     }
 
-    /// The tree of this arm between a base and a tip.
-    pub(crate) fn on(&self, base: Segment, tip: Segment) -> Tree {
-        let hung = |segment: &Segment| Segment {
-            parent: Some(segment.parent.map_or(0, |parent| parent + 1)),
-            ..segment.clone()
+    /// The tree of this arm on its base.
+    pub(crate) fn on(&self, base: Segment) -> Tree {
+        let hung = |segment: &Segment| {
+            let parent = segment.parent.map_or(0, |parent| parent + 1);
+            Segment { parent: Some(parent), ..segment.clone() }
         };
         let mut segments = vec![base];
         segments.extend(self.segments.iter().map(hung));
-        segments.push(Segment { parent: Some(self.end.map_or(0, |end| end + 1)), ..tip });
         Tree(segments)
+    }
+
+    /// Where, in that tree, the link of the tip ends.
+    pub(crate) fn end(&self) -> SegmentId {
+        self.end.map_or(0, |end| end + 1)
+    }
+
+    /// Where, in that tree, a link or row ends.
+    ///
+    /// Errors when there is none of this name, naming the nearest.
+    pub(crate) fn end_of(&self, link: &str) -> Result<SegmentId, ModelError> {
+        let named = |segment: &Segment| segment.frame.as_deref() == Some(link);
+        let end = self.segments.iter().position(named).map(|at| at + 1);
+        end.ok_or_else(|| {
+            let links = self.segments.iter().filter_map(|segment| segment.frame.as_deref());
+            ModelError::NoSuchLink { link: link.to_owned(), nearest: nearest(link, links) }
+        })
     }
 
     /// Whether the chain came from a URDF and can be written back into one.

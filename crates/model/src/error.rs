@@ -81,6 +81,14 @@ pub enum ModelError {
         /// The most similar link.
         nearest: Option<String>,
     },
+    /// A marker is on a link that the arm does not have.
+    #[error("there is no link \"{link}\" among those of the arm{}", did_you_mean(nearest))]
+    NoSuchLink {
+        /// What was asked for.
+        link: String,
+        /// The most similar link.
+        nearest: Option<String>,
+    },
     /// The tip does not hang on the base.
     #[error("{}: the link \"{tip}\" does not descend from \"{base}\"; its ancestors are: {ancestors}", path.display())]
     NoPath {

@@ -50,8 +50,19 @@ pub struct Frames {
     pub base: Frame,
     /// last link_from_tip.
     pub tip: Frame,
+    /// What else is measured of the arm, by the links it is on.
+    pub markers: Vec<Marker>,
     /// world_from_board, one a recording: index = `DwellId.recording`. Empty without boards.
     pub boards: Vec<Frame>,
+}
+
+/// A marker on a link of the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// The link of a URDF, or the row of a DH table, that it is on.
+    pub link: String,
+    /// link_from_marker.
+    pub frame: Frame,
 }
 
 impl Frames {
@@ -60,6 +71,7 @@ impl Frames {
         Frames {
             base: Frame::given("base", Pose::identity()),
             tip: Frame::given("tip", Pose::identity()),
+            markers: Vec::new(),
             boards: Vec::new(),
         }
     }

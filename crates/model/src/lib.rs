@@ -29,7 +29,6 @@ mod segment;
 mod tree;
 mod twist;
 mod urdf;
-mod urdf_write;
 
 #[cfg(test)]
 mod tests;
@@ -42,6 +41,6 @@ pub use effects::{
     least_dwells, place_and_moment,
 };
 pub use error::ModelError;
-pub use frames::{Frame, Frames, Knowledge};
-pub use model::Model;
+pub use frames::{Frame, Frames, Knowledge, Marker};
+pub use model::{FeatureId, Model};
 pub use residual::ModelResidual;

@@ -12,7 +12,7 @@ use crate::twist::Twist;
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
 use linearisation::Linearisation;
-use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ pub struct Model {
     parameters: Vec<Parameter>,
     /// Base, the segments of the chain, tip.
     tree: Tree,
-    /// The way to the tip.
-    tip: Route,
+    /// What can be measured of the arm: the tip first, then the markers.
+    features: Vec<Feature>,
     /// World to board, by recording.
     boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
@@ -41,6 +41,26 @@ pub struct Model {
 /// The segment that ends at the base: the root of the tree.
 const BASE: SegmentId = 0;
 
+/// A point of the arm that can be measured, by its place among [`Model::features`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FeatureId(usize);
+
+impl FeatureId {
+    /// The tip, which every model has.
+    pub const TIP: FeatureId = FeatureId(0);
+
+    pub(crate) fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// The name of a feature and the way to it.
+#[derive(Debug, Clone, PartialEq)]
+struct Feature {
+    name: String,
+    route: Route,
+}
+
 /// What is measured and what is predicted of one observation.
 struct Sides {
     measured_m: Vector3<f64>,
@@ -50,7 +70,8 @@ struct Sides {
 impl Model {
     /// Puts a chain between its frames.
     ///
-    /// Errors when two parameters share a name or a frame's pose or standard error is not a number.
+    /// Errors when two parameters share a name, a marker is on a link that the chain does not have, or a frame's pose or standard
+    /// error is not a number.
     pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
         let mut parameters = chain.parameters.clone();
         let mut place = |frame: &crate::Frame| -> Result<Segment, ModelError> {
@@ -59,13 +80,20 @@ impl Model {
             Ok(segment)
         };
         let base = place(&frames.base)?;
-        let tip = place(&frames.tip)?;
+        let mut hung = vec![(frames.tip.name.clone(), chain.end(), place(&frames.tip)?)];
+        for marker in &frames.markers {
+            hung.push((marker.frame.name.clone(), chain.end_of(&marker.link)?, place(&marker.frame)?));
+        }
         let boards =
             frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         check_names(&parameters)?;
-        let tree = chain.on(base, tip);
-        let tip = tree.route(tree.0.len() - 1);
-        Ok(Model { chain, parameters, tree, tip, boards, effects: None, declared: Arc::default() })
+        let mut tree = chain.on(base);
+        let mut features = Vec::with_capacity(hung.len());
+        for (name, end, segment) in hung {
+            tree.0.push(Segment { parent: Some(end), ..segment });
+            features.push(Feature { name, route: tree.route(tree.0.len() - 1) });
+        }
+        Ok(Model { chain, parameters, tree, features, boards, effects: None, declared: Arc::default() })
     }
 
     /// The arm.
@@ -140,7 +168,7 @@ impl Model {
             chain: self.chain.clone(),
             parameters: index.iter().map(|&i| self.parameters[i].clone()).collect(),
             tree: self.tree.clone(),
-            tip: self.tip.clone(),
+            features: self.features.clone(),
             boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
             effects: self.effects.as_ref().map(|e| e.moved(behind - end, self, index.len())),
             declared: self.declared.clone(),
@@ -169,7 +197,7 @@ impl Model {
 
     /// The tip in the base frame.
     pub fn tip_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Pose {
-        Pose::from(&self.tree.follow(&self.tip[1..], p, joint_rad))
+        Pose::from(&self.tree.follow(&self.route(FeatureId::TIP)[1..], p, joint_rad))
     }
 
     /// Every frame of the arm in the base frame, for drawing: base, the end of each segment (a DH row, or
@@ -253,7 +281,7 @@ impl Model {
     /// encoders' noise to the tip.
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
-        for (column, twist) in self.joint_twists(p, o) {
+        for (column, twist) in self.joint_twists(p, FeatureId::TIP, o) {
             // A reading that moves two joints on the way has two parts.
             let mut own = jacobian.column_mut(column);
             own += twist.translation_m;
@@ -267,7 +295,7 @@ impl Model {
         let residual = self.residual(p, o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.joint_count());
         let rate = residual.rotation_rad.as_ref().map(rotation_error_rate);
-        for (column, twist) in self.joint_twists(p, o) {
+        for (column, twist) in self.joint_twists(p, FeatureId::TIP, o) {
             add_to_column(&mut jacobian, 0, column, &-twist.translation_m);
             if let Some(rate) = &rate {
                 add_to_column(&mut jacobian, 3, column, &(rate * twist.rotation_rad));
@@ -295,11 +323,48 @@ impl Model {
         self.effects.as_ref().is_some_and(|effects| effects.has_gaps(&self.nominal()))
     }
 
-    fn joint_twists(&self, p: &[f64], o: &Observation) -> Vec<(usize, Twist)> {
+    fn joint_twists(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Vec<(usize, Twist)> {
         match &self.effects {
-            None => self.tree.joint_twists(&self.tip, p, &o.joint_rad).1,
-            Some(effects) => effects.joint_twists(p, &effects.drivers(self, o)),
+            None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
+            Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
         }
+    }
+
+    /// The names of what can be measured of the arm: its tip, then its markers.
+    pub fn features(&self) -> impl Iterator<Item = (FeatureId, &str)> {
+        self.features.iter().enumerate().map(|(k, feature)| (FeatureId(k), feature.name.as_str()))
+    }
+
+    /// Where the model puts a feature, in the world, effects included.
+    pub fn feature_in_world(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Pose {
+        let at = match &self.effects {
+            None => self.tree.follow(self.route(feature), p, &o.joint_rad),
+            Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,
+        };
+        Pose::from(&at)
+    }
+
+    /// d position [m] and d rotation vector [rad] of a feature, in the world, per unit of each joint reading: 6 rows, one
+    /// column a reading.
+    pub fn feature_jacobian(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Matrix6xX<f64> {
+        let mut jacobian = Matrix6xX::zeros(self.joint_count());
+        for (column, twist) in self.joint_twists(p, feature, o) {
+            let mut moved = jacobian.fixed_view_mut::<3, 1>(0, column);
+            moved += twist.translation_m;
+            let mut turned = jacobian.fixed_view_mut::<3, 1>(3, column);
+            turned += twist.rotation_rad;
+        }
+        jacobian
+    }
+
+    /// The segments from the world to a feature.
+    pub(crate) fn route(&self, feature: FeatureId) -> &[SegmentId] {
+        &self.features[feature.0].route
+    }
+
+    /// The ways to all features.
+    pub(crate) fn routes(&self) -> impl Iterator<Item = &Route> {
+        self.features.iter().map(|feature| &feature.route)
     }
 
     /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].
@@ -323,7 +388,7 @@ impl Model {
 
     /// The segment that ends at the tip.
     pub(crate) fn tip_end(&self) -> SegmentId {
-        self.tip.last().copied().unwrap_or(BASE)
+        self.route(FeatureId::TIP).last().copied().unwrap_or(BASE)
     }
 
     /// The segment that another hangs on.
@@ -370,9 +435,9 @@ impl Model {
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
         let (predicted, in_board_m) = match &self.effects {
-            None => (self.tree.follow(&self.tip, p, &o.joint_rad), seated_m(o)),
+            None => (self.tree.follow(self.route(FeatureId::TIP), p, &o.joint_rad), seated_m(o)),
             Some(effects) => {
-                let at = effects.evaluate(p, &effects.drivers(self, o));
+                let at = effects.evaluate(p, FeatureId::TIP, &effects.drivers(self, o));
                 (at.tip, at.in_board_m)
             }
         };

@@ -106,6 +106,9 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// Nothing.
+    pub const NONE: Body = Body { mass_kg: 0.0, centre_m: Vector3::new(0.0, 0.0, 0.0) };
+
     /// Adds another body; both centres in one frame.
     pub fn add(&mut self, other: &Body) {
         let mass_kg = self.mass_kg + other.mass_kg;

@@ -230,6 +230,7 @@ impl PastModel {
         let frames = Frames {
             base: self.base.frame(),
             tip: self.tip.frame(),
+            markers: Vec::new(),
             boards: self.boards.iter().map(FrameFacts::frame).collect(),
         };
         let geometry = Model::new(chain, frames)?;

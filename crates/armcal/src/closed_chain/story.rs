@@ -75,7 +75,7 @@ fn nominal_arm(pipeline: &ClosedPipeline, arm: &ArmSection) -> Result<(ChainArm,
     let (text, chain) = frames::chain_of(&arm.model, &pipeline.folder)?;
     let base = frames::frame("base", &arm.base, true);
     let tip = frames::frame("tip", &arm.tip, false);
-    let mut model = Model::new(chain, Frames { base, tip, boards: Vec::new() })?;
+    let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards: Vec::new() })?;
     frames::override_parameters(&mut model, &arm.parameters)?;
     Ok((ChainArm { name: arm.name.clone(), model }, text))
 }

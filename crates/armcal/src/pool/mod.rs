@@ -77,7 +77,7 @@ fn pooled_model(
     };
     let tip = frames::frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation);
     let boards = collected.recordings.iter().filter_map(board).collect();
-    let mut model = Model::new(chain, Frames { base, tip, boards })?;
+    let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
     frames::declare(&mut model, pipeline)?;
     model.check_declared(session)?;
     let effects = frames::effect_specs(pipeline, &model)?;

@@ -154,6 +154,7 @@ pub fn nominal_model(nominal: &Nominal) -> Result<Model, Error> {
     let frames = Frames {
         base: Frame { free_rotation: true, ..base },
         tip: frame("tip", nominal.link_from_tip, Knowledge::Given),
+        markers: Vec::new(),
         boards: boards.collect(),
     };
     let chain = Chain::from_dh_toml(&nominal.dh_toml, Path::new("arm.toml"))?;

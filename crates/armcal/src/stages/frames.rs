@@ -67,6 +67,7 @@ pub fn nominal_model(
     let frames = Frames {
         base: base_frame(&pipeline.frames.base, seen),
         tip: frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation),
+        markers: Vec::new(),
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?;

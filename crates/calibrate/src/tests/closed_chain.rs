@@ -29,7 +29,7 @@ fn lab(seed: u64, poses: usize, length_mm: Option<f64>) -> ObservedPair {
 fn arm(name: &str, dh: &str, base: Frame) -> ChainArm {
     let chain = Chain::from_dh_toml(dh, Path::new(name)).unwrap();
     let tip = Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) };
-    let model = Model::new(chain, Frames { base, tip, boards: Vec::new() }).unwrap();
+    let model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards: Vec::new() }).unwrap();
     ChainArm { name: name.into(), model }
 }
 

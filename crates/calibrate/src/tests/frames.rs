@@ -28,7 +28,12 @@ fn rms_mm(model: &Model, p: &[f64], observations: &[Observation]) -> f64 {
 fn base_metres_and_half_turns_off_and_an_unknown_tool_are_found() {
     let given = rig::tracked_model();
     let tip = Frame { free_rotation: false, ..Frame::estimated("tip", Pose::identity()) };
-    let frames = Frames { base: Frame::estimated("base", Pose::identity()), tip, boards: Vec::new() };
+    let frames = Frames {
+        base: Frame::estimated("base", Pose::identity()),
+        tip,
+        markers: Vec::new(),
+        boards: Vec::new(),
+    };
     let model = Model::new(given.chain().clone(), frames).unwrap();
     let mut rng = rig::rng(21);
     let mut truth = rig::planted(&model, &mut rng, 0.0);

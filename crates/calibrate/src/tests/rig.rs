@@ -19,7 +19,7 @@ pub fn rng(seed: u64) -> ChaCha8Rng {
 pub fn model(base: Frame, boards: Vec<Frame>) -> Model {
     let chain = Chain::from_dh_toml(PAPER_ARM, Path::new("paper.toml")).unwrap();
     let tip = Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) };
-    Model::new(chain, Frames { base, tip, boards }).unwrap()
+    Model::new(chain, Frames { base, tip, markers: Vec::new(), boards }).unwrap()
 }
 
 /// Base known, no board: tracked observations only.

@@ -110,7 +110,7 @@ impl NominalPose {
         if let Some(parent) = parent {
             self.links[parent].to_m.push(joint.origin_m);
         }
-        let body = Body { mass_kg: 0.0, centre_m: Vector3::zeros() };
+        let body = Body::NONE;
         self.links.push(Link { body, parent, from_m: joint.start_m, to_m: Vec::new() });
     }
 
@@ -267,7 +267,7 @@ fn axis(
 
 /// What a link weighs that weighs as much as it is long.
 fn spread(link: &Link) -> Body {
-    let mut all = Body { mass_kg: 0.0, centre_m: Vector3::zeros() };
+    let mut all = Body::NONE;
     for to_m in &link.to_m {
         let mass_kg = LINK_DENSITY_KGPM * (to_m - link.from_m).norm();
         all.add(&Body { mass_kg, centre_m: (link.from_m + to_m) * 0.5 });

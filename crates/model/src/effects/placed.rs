@@ -13,7 +13,7 @@ use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::tree::{Route, Tree, TreeAt};
 use crate::twist::Twist;
-use crate::{Model, ModelError};
+use crate::{FeatureId, Model, ModelError};
 use armcal_core::{DwellId, Parameter, Reference, Role};
 use nalgebra::{Matrix3, Vector3};
 use num_dual::Dual64;
@@ -70,8 +70,8 @@ pub(crate) struct Effects {
     pub session: Arc<Session>,
     /// The model's tree with a twist, the identity at rest, at every slot in use.
     tree: Tree,
-    /// The way to the tip in it.
-    tip: Route,
+    /// The ways to the model's features in it.
+    routes: Vec<Route>,
     /// The slots in use, ascending.
     slots: Vec<Slot>,
 }
@@ -182,9 +182,10 @@ impl Effects {
         let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
         slots.sort_unstable();
         slots.dedup();
-        let (tree, ends) = twisted(model.tree(), &slots, count);
-        let tip = tree.route(ends[model.tip_end()]);
-        Effects { placed, session, tree, tip, slots }
+        let (tree, places) = twisted(model.tree(), &slots, count);
+        let route = |rigid: &Route| tree.route(rigid.last().map_or(0, |end| places[*end]));
+        let routes = model.routes().map(route).collect();
+        Effects { placed, session, tree, routes, slots }
     }
 
     /// The same effects in a model that lacks `fewer` parameters before theirs and has `count` in all.
@@ -196,10 +197,10 @@ impl Effects {
         Effects::new(placed, self.session.clone(), model, count)
     }
 
-    /// The deformed arm, predicted.
-    pub fn evaluate(&self, p: &[f64], x: &Drivers<'_>) -> Evaluated {
+    /// A feature of the deformed arm, predicted.
+    pub fn evaluate(&self, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Evaluated {
         let (p, q, in_board_m) = self.deformed(p, x);
-        let mut tip = self.tree.follow(&self.tip, &p, &q);
+        let mut tip = self.tree.follow(&self.routes[feature.index()], &p, &q);
         tip.translation_m += self.seen_m(&p, x, &tip.translation_m);
         Evaluated { tip, in_board_m }
     }
@@ -209,11 +210,11 @@ impl Effects {
         TreeAt::of(&self.tree, self.extended(p))
     }
 
-    /// The deformed arm and its derivatives by every parameter; `tree` is that of [`Effects::tree_at`].
-    pub fn linearise(&self, tree: &TreeAt<'_>, p: &[f64], x: &Drivers<'_>) -> Linearised {
+    /// A feature of the deformed arm and its derivatives by every parameter; `tree` is that of [`Effects::tree_at`].
+    pub fn linearise(&self, tree: &TreeAt<'_>, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let tip = tree.with(&self.tip, &p, &q);
+        let tip = tree.with(&self.routes[feature.index()], &p, &q);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
             tip.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];
@@ -264,10 +265,10 @@ impl Effects {
         Linearised { at, parameters, seats }
     }
 
-    /// Motion of the tip per unit of each joint reading.
-    pub fn joint_twists(&self, p: &[f64], x: &Drivers<'_>) -> Vec<(usize, Twist)> {
+    /// Motion of a feature per unit of each joint reading.
+    pub fn joint_twists(&self, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Vec<(usize, Twist)> {
         let (p, q, _) = self.deformed(p, x);
-        let (mut tip, mut joints) = self.tree.joint_twists(&self.tip, &p, &q);
+        let (mut tip, mut joints) = self.tree.joint_twists(&self.routes[feature.index()], &p, &q);
         self.distort(&p, x, &mut tip, &mut [], &mut joints);
         joints
     }

@@ -117,6 +117,9 @@ fn faulty_tables_are_refused_with_line_or_key() {
 #[test]
 fn faulty_urdfs_are_refused_with_their_line() {
     let mixed = oracles::MIXED;
+    let follows = |leader: &str| {
+        mixed.replace("child link=\"slide\"/>", &format!("child link=\"slide\"/><mimic joint=\"{leader}\"/>"))
+    };
     for (xml, says) in [
         (mixed.replace("</robot>", ""), "not well-formed"),
         ("<sdf/>".to_owned(), "arm.urdf:1: <sdf>: a URDF begins with <robot>"),
@@ -133,7 +136,10 @@ fn faulty_urdfs_are_refused_with_their_line() {
         (mixed.replace("xyz=\"0 0.6 0.8\"", "xyz=\"0 0 0\""), "its axis has no direction"),
         (mixed.replace("<parent link=\"bracket\"/>", ""), "it has no <parent link="),
         (mixed.replace("<child link=\"hand\"/>", ""), "does not descend from \"base\""),
-        (mixed.replace("child link=\"slide\"/>", "child link=\"slide\"/><mimic joint=\"turn\"/>"), "it mimics another joint"),
+        (follows("toe"), "it mimics \"toe\", and there is no such joint"),
+        (follows("mount"), "it mimics \"mount\", which does not move"),
+        (follows("slide"), "which mimics another joint itself"),
+        (follows("turn").replace("<mimic joint", "<mimic multiplier=\"x\" joint"), "multiplier = \"x\" is not a finite number"),
         (mixed.replace("child link=\"bracket\"", "child link=\"slide\""), "does not descend"),
         (mixed.replace("</robot>", "<joint name=\"two\" type=\"fixed\"><parent link=\"base\"/><child link=\"hand\"/></joint></robot>"), "more than one parent"),
         (mixed.replace("continuous", "fixed").replace("prismatic", "fixed").replace("revolute", "fixed"), "no moving joint"),

@@ -84,7 +84,8 @@ fn random_case() -> impl Strategy<Value = (Model, Vec<f64>, Vec<f64>)> {
     let off = prop::collection::vec(-0.3..0.3f64, 60);
     (random_chain(), frames, off, prop::collection::vec(-2.0..2.0f64, 6)).prop_map(
         |(chain, (base, tip, board), off, joints)| {
-            let model = Model::new(chain, Frames { base, tip, boards: vec![board] }).expect("valid");
+            let model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards: vec![board] })
+                .expect("valid");
             let p: Vec<f64> = model.nominal().iter().zip(&off).map(|(value, off)| value + off).collect();
             let joints = joints[..model.joint_count()].to_vec();
             (model, p, joints)

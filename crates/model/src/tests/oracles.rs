@@ -134,3 +134,20 @@ fn a_urdf_with_every_kind_of_joint() {
     assert!(frames.iter().any(|(name, _)| name == "bracket"));
     assert!(model.index("mount.x").is_none() && model.index("slide.rz").is_some());
 }
+
+#[test]
+fn a_joint_without_an_encoder_follows_its_leader_on_another_branch() {
+    let xml = r#"<robot name="grip"><link name="base"/><link name="thumb"/><link name="wrist"/><link name="finger"/>
+      <joint name="wrist" type="revolute"><parent link="base"/><child link="wrist"/><axis xyz="0 0 1"/></joint>
+      <joint name="thumb" type="prismatic"><parent link="wrist"/><child link="thumb"/><axis xyz="0 1 0"/></joint>
+      <joint name="finger" type="prismatic"><parent link="wrist"/><child link="finger"/><axis xyz="0 1 0"/>
+        <mimic joint="thumb" multiplier="-2" offset="0.1"/></joint></robot>"#;
+    let model = bare(urdf(xml, "base", "finger"));
+    // The leader is read although the tip does not hang on it.
+    assert_eq!(model.chain().joint_names(), ["wrist", "thumb"]);
+    let at = model.tip_in_base(&model.nominal(), &[std::f64::consts::FRAC_PI_2, 0.03]).translation.vector;
+    assert!((at - Vector3::new(-0.04, 0.0, 0.0)).norm() < 1e-15, "{at}");
+    let o = observation(&[0.0, 0.03], Reference::position(Vector3::zeros()));
+    let by_reading = model.joint_jacobian(&model.nominal(), &o);
+    assert!((by_reading.column(1) - Vector3::new(0.0, -2.0, 0.0)).norm() < 1e-15);
+}

@@ -13,6 +13,7 @@ fn on_the_rig(base: Knowledge, board: Knowledge) -> Model {
     let frames = Frames {
         base: Frame { knowledge: base, ..Frame::given("base", pose(1.0, 2.0, 3.0, 0.5)) },
         tip: Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) },
+        markers: Vec::new(),
         boards: vec![
             Frame { knowledge: board, ..Frame::given("board.normal", pose(0.4, 0.0, 0.1, 0.0)) },
             Frame { knowledge: board, ..Frame::given("board.roll", pose(0.4, 0.0, 0.2, 0.1)) },

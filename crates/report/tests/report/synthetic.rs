@@ -126,6 +126,7 @@ fn model() -> Model {
     let frames = Frames {
         base: Frame::given("base", Pose::identity()),
         tip: Frame::given("tip", Pose::identity()),
+        markers: Vec::new(),
         boards: boards.collect(),
     };
     Model::new(chain, frames).unwrap()

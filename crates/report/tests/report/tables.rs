@@ -107,8 +107,11 @@ fn with_urdf(tip: Frame) -> Synthetic {
     let mut s = synthetic();
     let chain = Chain::from_urdf(URDF, "base_link", "l3", Path::new("arm.urdf")).unwrap();
     let boards = (0..3).map(|i| Frame::given(format!("board.{i}"), Pose::identity())).collect();
-    let model =
-        Model::new(chain, Frames { base: Frame::given("base", Pose::identity()), tip, boards }).unwrap();
+    let model = Model::new(
+        chain,
+        Frames { base: Frame::given("base", Pose::identity()), tip, markers: Vec::new(), boards },
+    )
+    .unwrap();
     let template = s.run.calibration.fit.estimates[0].clone();
     let estimates = model.parameters().iter().enumerate().map(|(i, parameter)| {
         let slip = if parameter.free { 1e-3 * (1.0 + i as f64) } else { 0.0 };

@@ -39,6 +39,7 @@ fn framed(chain: crate::Chain, tool_m: [f64; 3]) -> Model {
     let frames = Frames {
         base: Frame::estimated("base", pose([0.03, -0.02, 0.01], [0.02, -0.03, 0.4])),
         tip: Frame { free_rotation: false, ..Frame::estimated("tip", pose(tool_m, [0.0; 3])) },
+        markers: Vec::new(),
         boards: (0..3).map(board).collect(),
     };
     Model::new(chain, frames).expect("frames without a fault")

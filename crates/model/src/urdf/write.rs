@@ -1,7 +1,7 @@
 //! Writing a calibrated chain back into its URDF: only the numbers that changed are replaced.
 
+use super::reader::{Reader, child, parse};
 use crate::chain::Source;
-use crate::urdf::{Reader, child, parse};
 use crate::{Model, ModelError};
 use armcal_core::{Pose, Severity, Stage, Warning};
 use nalgebra::{Matrix3, Vector3};
@@ -38,8 +38,10 @@ impl Model {
         let mut warnings = Vec::new();
         let tip_is_calibrated =
             self.parameters()[self.tip_segment().parameters.clone()].iter().any(|parameter| parameter.free);
-        for (index, joint) in joints.iter().enumerate() {
-            let carries_tip = tip_is_calibrated && index + 1 == joints.len();
+        for joint in joints {
+            // A moving joint is two segments: its origin and its motion.
+            let carries_tip =
+                tip_is_calibrated && chain.end == Some(joint.segment + usize::from(joint.moves));
             if carries_tip && joint.moves {
                 warnings.push(tip_not_written(&joint.name));
             }
