@@ -1,6 +1,6 @@
 use crate::support::{python_with, root};
-use armcal_core::{DwellId, Observation, Pose, Reference};
-use armcal_model::{Chain, FeatureId, Frame, Frames, Marker, Model, Session};
+use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
+use armcal_model::{Chain, Frame, Frames, Marker, Model, Session};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

@@ -45,8 +45,7 @@ pub fn holdout_turns(
     observations: &[Observation],
     holdout: &HoldoutConfig,
 ) -> Result<Vec<Vec<usize>>, CalibrateError> {
-    let frame_names = frames::frame_names(model);
-    Ok(holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?.turns)
+    Ok(holdout::resolve(holdout, observations, &frames::board_names(model))?.turns)
 }
 
 /// The same for a model or a pool.
@@ -60,8 +59,7 @@ pub(crate) fn calibrate_scene(
     if observations.is_empty() {
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
-    let frame_names = frames::frame_names(scene.model());
-    let holdout = holdout::resolve(holdout, observations, frame_names.get(2..).unwrap_or_default())?;
+    let holdout = holdout::resolve(holdout, observations, &frames::board_names(scene.model()))?;
     judged(&Judge { scene, observations, config }, &holdout, config)
 }
 

@@ -112,6 +112,9 @@ fn fit_from(
         Some(_) => vec![1.0; white.blocks()],
         None => cost.weights(residual),
     };
+    // All that was measured in a dwell is trusted alike.
+    let each = |(block, weight): (usize, f64)| std::iter::repeat_n(weight, problem.observations_of(block));
+    let weights = weights.into_iter().enumerate().flat_map(each).collect();
     let undetermined = match near {
         Some(_) => Vec::new(),
         None => undetermined::directions(

@@ -70,10 +70,9 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
         add(severity, ABOVE_NOISE, "fit", message);
     }
-    let outliers: Vec<String> = (0..fit.weights.len())
-        .filter(|&j| fit.weights[j] < OUTLIER_WEIGHT)
-        .map(|j| white.problem.name(j))
-        .collect();
+    let blocks = (0..white.blocks()).flat_map(|b| std::iter::repeat_n(b, white.problem.observations_of(b)));
+    let outliers = blocks.zip(&fit.weights).filter(|(_, weight)| **weight < OUTLIER_WEIGHT);
+    let mut outliers: Vec<String> = outliers.map(|(block, _)| white.problem.name(block)).collect();
     if !outliers.is_empty() {
         let of_all = format!("{} of {} observations", outliers.len(), fit.weights.len());
         let mut message = format!("{of_all} weigh less than {OUTLIER_WEIGHT} in the fit");
@@ -83,6 +82,8 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
                         whether something moved during a recording";
         }
         let severity = if many { Severity::Inadequate } else { Severity::Notice };
+        // Several observations of one dwell have one name.
+        outliers.dedup();
         add(severity, "outliers", &listed(&outliers), message);
     }
     warnings

@@ -1,7 +1,7 @@
 //! Frames that nobody could know: closed-form start, then a fit of these alone.
 //!
-//! Alternates, with the arm at nominal: base and boards by the weighted Kabsch rotation, the tip's orientation by the
-//! mean of what the sensor saw, the tip's offset by the linear least squares it enters with. Each step is robust
+//! Alternates, with the arm at nominal: base and boards by the weighted Kabsch rotation, the orientation of tip and markers by
+//! the mean of what the sensor saw, their offsets by the linear least squares they enter with. Each step is robust
 //! (Huber weights on the distances, scale by their median) and closed-form, so the start values may be metres and half
 //! turns off. What remains is left to the solver, over these parameters alone.
 
@@ -10,7 +10,7 @@ use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, Scene, fit};
-use armcal_core::{Observation, Parameter, Pose, Reference, Role};
+use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Role};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -110,20 +110,32 @@ fn aligned(
     p
 }
 
-/// Names of the frames the observations say something about: the base, the tip, and the boards with seated dwells;
-/// then what else the observed recordings of a pool have for themselves.
+/// Names of the frames the observations say something about: the base, the tip, the markers that were measured, and the
+/// boards with seated dwells; then what else the observed recordings of a pool have for themselves.
 pub(crate) fn touched_frames(scene: Scene<'_>, observations: &[&Observation]) -> Vec<String> {
     let names = frame_names(scene.model());
-    let mut touched: Vec<String> = names.iter().take(2).cloned().collect();
+    let measured: BTreeSet<usize> = observations.iter().map(|o| 1 + o.feature.0).collect();
+    let known = |k: &usize| *k < TIP_FRAME + 1 || measured.contains(k);
+    let features = TIP_FRAME + scene.model().features().count();
+    let arm = names.iter().enumerate().take(features).filter(|(k, _)| known(k));
+    let mut touched: Vec<String> = arm.map(|(_, name)| name.clone()).collect();
     let seated: BTreeSet<usize> =
         observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
-    let boards = names.iter().skip(2).enumerate();
+    let boards = names.iter().skip(features).enumerate();
     touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
     touched.extend(scene.own_parts(observations));
     touched
 }
 
-/// Frames of the model in its documented order: base, tip, then one board a recording.
+/// Where among [`frame_names`] that of the tip is; those of the markers are behind it.
+const TIP_FRAME: usize = 1;
+
+/// The names of the recordings' boards.
+pub(crate) fn board_names(model: &Model) -> Vec<String> {
+    frame_names(model).into_iter().skip(TIP_FRAME + model.features().count()).collect()
+}
+
+/// Frames of the model in its documented order: base, tip, markers, then one board a recording.
 pub(crate) fn frame_names(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for p in model.parameters().iter().filter(|p| matches!(p.role, Role::EstimatedFrame | Role::KnownFrame)) {
@@ -187,21 +199,29 @@ impl<'a> Alignment<'a> {
     fn run(&self, mut p: Vec<f64>, which: &dyn Fn(&Parameter) -> bool) -> Vec<f64> {
         let nominal = self.model.nominal();
         let place = |name: &str, pose: &Pose| Place::new(self.model, name, pose, which);
-        let [base_name, tip_name, boards @ ..] = self.names.as_slice() else {
+        let features: Vec<FeatureId> = self.model.features().map(|(feature, _)| feature).collect();
+        let Some((base_name, names)) = self.names.split_first().filter(|(_, n)| n.len() >= features.len())
+        else {
             return p;
         };
+        let (of_features, boards) = names.split_at(features.len());
         let base = place(base_name, &self.model.base_in_world(&nominal));
-        let tip = place(tip_name, &self.model.tip_in_last_link(&nominal));
+        let on_arm = features.iter().zip(of_features);
+        let on_arm: Vec<(FeatureId, Place)> = on_arm
+            .map(|(feature, name)| (*feature, place(name, &self.model.feature_in_link(&nominal, *feature))))
+            .filter(|(_, place)| place.position.is_some() || place.rotation.is_some())
+            .collect();
         let boards: Vec<(usize, Place)> = boards
             .iter()
             .enumerate()
             .filter_map(|(r, name)| Some((r, place(name, &self.model.board_in_world(&nominal, r)?))))
             .filter(|(_, place)| place.position.is_some())
             .collect();
-        if base.position.is_none() && tip.position.is_none() && boards.is_empty() {
+        let nowhere = on_arm.iter().all(|(_, place)| place.position.is_none());
+        if base.position.is_none() && nowhere && boards.is_empty() {
             return p;
         }
-        let links = self.last_links_in_base(&p);
+        let links = self.links_in_base(&p);
         let mut seated: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (at, o) in self.observations.iter().enumerate().filter(|(_, o)| o.cavity().is_some()) {
             seated.entry(o.dwell.recording).or_default().push(at);
@@ -213,7 +233,9 @@ impl<'a> Alignment<'a> {
                 let own = seated.get(recording).map_or(&[][..], Vec::as_slice);
                 self.place_board(&mut p, *recording, board, own, &links);
             }
-            self.place_tip(&mut p, &tip, &links);
+            for (feature, place) in &on_arm {
+                self.place_feature(&mut p, *feature, place, &links);
+            }
             if p.iter().zip(&before).all(|(a, b)| (a - b).abs() < SETTLED) {
                 break;
             }
@@ -221,10 +243,12 @@ impl<'a> Alignment<'a> {
         p
     }
 
-    /// base_from_last_link of every observation: the part of the arm that stays at nominal.
-    fn last_links_in_base(&self, p: &[f64]) -> Vec<Pose> {
-        let link_from_tip = self.model.tip_in_last_link(p);
-        let link = |o: &&Observation| self.model.tip_in_base(p, &o.joint_rad) * link_from_tip.inverse();
+    /// base_from_link of what carries the feature of every observation: the part of the arm that stays at nominal.
+    fn links_in_base(&self, p: &[f64]) -> Vec<Pose> {
+        let link = |o: &&Observation| {
+            let in_base = self.model.feature_in_base(p, o.feature, &o.joint_rad);
+            in_base * self.model.feature_in_link(p, o.feature).inverse()
+        };
         self.observations.iter().map(link).collect()
     }
 
@@ -233,7 +257,7 @@ impl<'a> Alignment<'a> {
         if base.position.is_none() {
             return;
         }
-        let tip = self.model.tip_in_last_link(p);
+        let in_link = self.in_links(p);
         let placed: BTreeSet<usize> = boards.iter().map(|(recording, _)| *recording).collect();
         let anchored = |o: &Observation| o.cavity().is_none() || !placed.contains(&o.dwell.recording);
         let pairs: Vec<Pair> = self
@@ -242,7 +266,7 @@ impl<'a> Alignment<'a> {
             .zip(links)
             .filter(|(o, _)| anchored(o))
             .map(|(o, link)| Pair {
-                from: (link * tip).translation.vector,
+                from: (link * in_link[o.feature.0]).translation.vector,
                 to: self.model.measured_tip_in_world(p, o),
             })
             .collect();
@@ -255,32 +279,35 @@ impl<'a> Alignment<'a> {
         let Some(current) = self.model.board_in_world(p, recording) else {
             return;
         };
-        let (base, tip) = (self.model.base_in_world(p), self.model.tip_in_last_link(p));
+        let (base, in_link) = (self.model.base_in_world(p), self.in_links(p));
         let mut pairs = Vec::new();
         for &at in seated {
-            if let Reference::Seated { in_board_m, .. } = &self.observations[at].reference {
-                pairs.push(Pair { from: *in_board_m, to: (base * links[at] * tip).translation.vector });
+            let o = self.observations[at];
+            if let Reference::Seated { in_board_m, .. } = &o.reference {
+                let to = (base * links[at] * in_link[o.feature.0]).translation.vector;
+                pairs.push(Pair { from: *in_board_m, to });
             }
         }
         board.put(p, &rigid_fit(&pairs, &current, board.rotation.is_some()));
     }
 
-    /// last link_from_tip: the offset t of `y = A (L t)` by weighted linear least squares (A world_from_base, L
-    /// base_from_last_link), the orientation by the mean of `(A L)^-1 R_measured`.
-    fn place_tip(&self, p: &mut [f64], tip: &Place, links: &[Pose]) {
-        if tip.position.is_none() && tip.rotation.is_none() {
-            return;
-        }
+    /// Every feature in the link that carries it.
+    fn in_links(&self, p: &[f64]) -> Vec<Pose> {
+        self.model.features().map(|(feature, _)| self.model.feature_in_link(p, feature)).collect()
+    }
+
+    /// link_from_feature: the offset t of `y = A (L t)` by weighted linear least squares (A world_from_base, L
+    /// base_from_link), the orientation by the mean of `(A L)^-1 R_measured`.
+    fn place_feature(&self, p: &mut [f64], feature: FeatureId, place: &Place, links: &[Pose]) {
         let base = self.model.base_in_world(p);
-        let mut pose = self.model.tip_in_last_link(p);
-        let frames: Vec<Pose> = links.iter().map(|link| base * link).collect();
-        let errors: Vec<Vector3<f64>> = self
-            .observations
-            .iter()
-            .zip(&frames)
-            .map(|(o, frame)| self.model.measured_tip_in_world(p, o) - (frame * pose).translation.vector)
-            .collect();
-        if tip.position.is_some() {
+        let mut pose = self.model.feature_in_link(p, feature);
+        let own = self.observations.iter().zip(links).filter(|(o, _)| o.feature == feature);
+        let (own, frames): (Vec<&Observation>, Vec<Pose>) = own.map(|(o, link)| (*o, base * link)).unzip();
+        let error = |(o, frame): (&&Observation, &Pose)| {
+            self.model.measured_tip_in_world(p, o) - (frame * pose).translation.vector
+        };
+        let errors: Vec<Vector3<f64>> = own.iter().zip(&frames).map(error).collect();
+        if place.position.is_some() {
             // Rotations leave the normal matrix a multiple of the identity: the solution is the weighted mean.
             let weights = weights_of(&errors);
             let sum: Vector3<f64> =
@@ -290,23 +317,27 @@ impl<'a> Alignment<'a> {
                 pose.translation.vector += sum / total;
             }
         }
-        if tip.rotation.is_some() && self.use_orientation {
-            pose.rotation = self.mean_orientation(&frames, &pose.rotation);
+        if place.rotation.is_some() && self.use_orientation {
+            pose.rotation = mean_orientation(&own, &frames, &pose.rotation);
         }
-        tip.put(p, &pose);
+        place.put(p, &pose);
     }
+}
 
-    /// Chordal mean of the tip's orientation in the last link.
-    fn mean_orientation(&self, frames: &[Pose], current: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-        let mut sum = Matrix3::zeros();
-        for (o, frame) in self.observations.iter().zip(frames) {
-            if let Reference::Tracked { orientation: Some(measured), .. } = &o.reference {
-                sum += (frame.rotation.inverse() * measured).to_rotation_matrix().into_inner();
-            }
+/// Chordal mean of a feature's orientation in its link.
+fn mean_orientation(
+    observations: &[&Observation],
+    frames: &[Pose],
+    current: &UnitQuaternion<f64>,
+) -> UnitQuaternion<f64> {
+    let mut sum = Matrix3::zeros();
+    for (o, frame) in observations.iter().zip(frames) {
+        if let Reference::Tracked { orientation: Some(measured), .. } = &o.reference {
+            sum += (frame.rotation.inverse() * measured).to_rotation_matrix().into_inner();
         }
-        if sum == Matrix3::zeros() {
-            return *current;
-        }
-        crate::rigid_fit::nearest_rotation(&sum, current)
     }
+    if sum == Matrix3::zeros() {
+        return *current;
+    }
+    crate::rigid_fit::nearest_rotation(&sum, current)
 }

@@ -2,7 +2,7 @@
 
 use crate::poses::{Sets, pairs, pose_groups};
 use crate::{CalibrateError, HoldoutConfig, RecordingKey};
-use armcal_core::{Observation, Severity, Stage, Warning};
+use armcal_core::{DwellId, Observation, Severity, Stage, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The hold-out of a calibration.
@@ -145,13 +145,16 @@ fn by_recordings(
 fn by_dwells(dwells: &[[usize; 2]], observations: &[Observation]) -> Result<BTreeSet<usize>, CalibrateError> {
     let mut held = BTreeSet::new();
     for &[recording, dwell] in dwells {
-        let found =
-            observations.iter().position(|o| o.dwell.recording == recording && o.dwell.dwell == dwell);
-        held.insert(found.ok_or_else(|| CalibrateError::UnknownHoldout {
-            kind: "dwell",
-            name: format!("[{recording}, {dwell}]"),
-            hint: " (it may have been rejected or not associated)".to_string(),
-        })?);
+        let id = DwellId { recording, dwell };
+        let own: Vec<usize> = (0..observations.len()).filter(|i| observations[*i].dwell == id).collect();
+        if own.is_empty() {
+            return Err(CalibrateError::UnknownHoldout {
+                kind: "dwell",
+                name: format!("[{recording}, {dwell}]"),
+                hint: " (it may have been rejected or not associated)".to_string(),
+            });
+        }
+        held.extend(own);
     }
     Ok(held)
 }

@@ -44,6 +44,7 @@ pub fn linearise(
     config: &FitConfig,
 ) -> Result<Linearisation, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
+    let rows = problem.rows_of_each();
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
     let at = white.at(white.start())?;
     let axis = |(a, x): (&crate::whitened::Axis, &f64)| LinearAxis {
@@ -54,7 +55,7 @@ pub fn linearise(
     };
     Ok(Linearisation {
         axes: white.axes.iter().zip(at.x.iter()).map(axis).collect(),
-        rows: white.offsets.windows(2).map(|pair| pair[0]..pair[1]).collect(),
+        rows,
         jacobian: white.jacobian(&at),
         residual: at.residual,
         whitener: white.into_whitener(),

@@ -2,11 +2,11 @@
 //!
 //! The covariance of an observation is what was measured plus what the encoders add:
 //! `Sigma = Sigma_measured + J_q diag(sigma_q^2) J_q'`, with J_q = d tip / d joint reading; to sigma_q^2 comes the slack of
-//! joints that rest anywhere in their gaps. Cross-covariance between
-//! position and orientation enters through the encoders only.
+//! joints that rest anywhere in their gaps. Cross-covariance between position and orientation, and between the features that
+//! were measured in one dwell, enters through the encoders only: a block is all that was measured in a dwell.
 
 use crate::problem::{Known, Linearised, Problem};
-use crate::{CalibrateError, FitConfig, Scene};
+use crate::{CalibrateError, FitConfig, Objective, Scene};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::{Model, ModelResidual};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
@@ -38,6 +38,8 @@ fn joint_sigma_rad(model: &Model, p: &[f64], o: &Observation) -> Vec<f64> {
 pub struct ModelProblem<'a> {
     scene: Scene<'a>,
     observations: Vec<&'a Observation>,
+    /// The observations of each block: those of one dwell that stand behind each other, each of another feature.
+    blocks: Vec<Range<usize>>,
     use_orientation: bool,
 }
 
@@ -54,7 +56,10 @@ impl<'a> ModelProblem<'a> {
             scene.check(o)?;
             check_complete(o)?;
         }
-        Ok(ModelProblem { scene, observations, use_orientation: config.use_orientation })
+        // The paper's objective counts distances, one by one.
+        let together = config.objective != Objective::Paper;
+        let blocks = blocks(&observations, together);
+        Ok(ModelProblem { scene, observations, blocks, use_orientation: config.use_orientation })
     }
 
     /// The observations, in the order of the blocks.
@@ -66,14 +71,9 @@ impl<'a> ModelProblem<'a> {
         self.scene
     }
 
-    /// Covariance of measured minus predicted position of a block at parameters `p` [m^2].
-    pub fn position_covariance_m2(&self, block: usize, p: &[f64]) -> Matrix3<f64> {
-        let (model, p) = self.scene.seen(self.observations[block], p);
-        position_covariance_m2(model, &p, self.observations[block])
-    }
-
-    fn rows(&self, block: usize) -> usize {
-        match &self.observations[block].reference {
+    /// The rows of an observation that are used.
+    fn rows(&self, o: &Observation) -> usize {
+        match &o.reference {
             Reference::Tracked { orientation: Some(_), orientation_sigma_rad, .. }
                 if self.use_orientation && *orientation_sigma_rad > 0.0 =>
             {
@@ -83,29 +83,101 @@ impl<'a> ModelProblem<'a> {
         }
     }
 
+    /// The rows of each observation among those of all, in the order given.
+    pub(crate) fn rows_of_each(&self) -> Vec<Range<usize>> {
+        let mut end = 0;
+        let rows = self.observations.iter().map(|o| {
+            let first = end;
+            end += self.rows(o);
+            first..end
+        });
+        rows.collect()
+    }
+
     /// The rows that are used.
-    fn used(&self, block: usize, (residual, jacobian): (ModelResidual, DMatrix<f64>)) -> Linearised {
-        let rows = self.rows(block);
+    fn used(&self, o: &Observation, (residual, jacobian): (ModelResidual, DMatrix<f64>)) -> Linearised {
+        let rows = self.rows(o);
         let jacobian = if jacobian.nrows() == rows { jacobian } else { jacobian.rows(0, rows).into_owned() };
         (DVector::from_iterator(rows, residual.rows().take(rows)), jacobian)
     }
 
-    /// d orientation of the tip in world axes / d joint reading, by central differences.
-    fn turning_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
-        let (model, p) = self.scene.seen(o, p);
-        let base = model.base_in_world(&p).rotation;
-        let mut jacobian = Matrix3xX::zeros(o.joint_rad.len());
-        for joint in 0..o.joint_rad.len() {
-            let at = |step: f64| {
-                let mut q = o.joint_rad.clone();
-                q[joint] += step;
-                base * model.tip_in_base(&p, &q).rotation
-            };
-            let turn = (at(JOINT_STEP_RAD) * at(-JOINT_STEP_RAD).inverse()).scaled_axis();
-            jacobian.set_column(joint, &(turn / (2.0 * JOINT_STEP_RAD)));
+    /// Columns of the readings' standard errors: what they do to the rows of an observation.
+    fn spread(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
+        let (rows, (model, p)) = (self.rows(o), self.scene.seen(o, p));
+        let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
+        spread.rows_mut(0, 3).copy_from(&model.joint_jacobian(&p, o));
+        if rows == 6 {
+            spread.rows_mut(3, 3).copy_from(&turning_jacobian(model, &p, o));
         }
-        jacobian
+        for (mut column, sigma) in spread.column_iter_mut().zip(joint_sigma_rad(model, &p, o)) {
+            column *= sigma;
+        }
+        spread
     }
+
+    /// What was measured of an observation is known to.
+    fn measured(&self, o: &Observation) -> DMatrix<f64> {
+        let rows = self.rows(o);
+        let mut covariance = DMatrix::zeros(rows, rows);
+        covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
+        if let Reference::Tracked { orientation_sigma_rad, .. } = &o.reference {
+            (3..rows).for_each(|k| covariance[(k, k)] = orientation_sigma_rad.powi(2));
+        }
+        covariance
+    }
+
+    fn of_block(&self, block: usize) -> &[&'a Observation] {
+        &self.observations[self.blocks[block].clone()]
+    }
+}
+
+/// d orientation of a feature in world axes / d joint reading, by central differences.
+fn turning_jacobian(model: &Model, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
+    let base = model.base_in_world(p).rotation;
+    let mut jacobian = Matrix3xX::zeros(o.joint_rad.len());
+    for joint in 0..o.joint_rad.len() {
+        let at = |step: f64| {
+            let mut q = o.joint_rad.clone();
+            q[joint] += step;
+            base * model.feature_in_base(p, o.feature, &q).rotation
+        };
+        let turn = (at(JOINT_STEP_RAD) * at(-JOINT_STEP_RAD).inverse()).scaled_axis();
+        jacobian.set_column(joint, &(turn / (2.0 * JOINT_STEP_RAD)));
+    }
+    jacobian
+}
+
+/// Runs of observations of one dwell, each of another feature; each by itself where they are not taken together.
+fn blocks(observations: &[&Observation], together: bool) -> Vec<Range<usize>> {
+    let mut blocks: Vec<Range<usize>> = Vec::with_capacity(observations.len());
+    for (i, o) in observations.iter().enumerate() {
+        let joins = |run: &Range<usize>| {
+            let run = &observations[run.clone()];
+            run[0].dwell == o.dwell && run.iter().all(|other| other.feature != o.feature)
+        };
+        match blocks.last_mut().filter(|run| together && joins(run)) {
+            Some(run) => run.end = i + 1,
+            None => blocks.push(i..i + 1),
+        }
+    }
+    blocks
+}
+
+/// Linearised rows one below the other.
+fn stacked(mut parts: Vec<Linearised>) -> Linearised {
+    if parts.len() == 1 {
+        return parts.swap_remove(0);
+    }
+    let rows = parts.iter().map(|(residual, _)| residual.len()).sum();
+    let columns = parts.first().map_or(0, |(_, jacobian)| jacobian.ncols());
+    let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
+    let mut at = 0;
+    for (part, of_part) in parts {
+        residual.rows_mut(at, part.len()).copy_from(&part);
+        jacobian.rows_mut(at, part.len()).copy_from(&of_part);
+        at += part.len();
+    }
+    (residual, jacobian)
 }
 
 impl Problem for ModelProblem<'_> {
@@ -114,59 +186,75 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn blocks(&self) -> usize {
-        self.observations.len()
+        self.blocks.len()
+    }
+
+    fn observations_of(&self, block: usize) -> usize {
+        self.blocks[block].len()
     }
 
     fn name(&self, block: usize) -> String {
-        describe(self.observations[block])
+        describe(self.of_block(block)[0])
     }
 
     fn joint_rad(&self, block: usize) -> &[f64] {
-        &self.observations[block].joint_rad
+        &self.of_block(block)[0].joint_rad
     }
 
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        let (model, p) = self.scene.seen(self.observations[block], p);
-        let residual = model.residual(&p, self.observations[block]);
-        DVector::from_iterator(self.rows(block), residual.rows().take(self.rows(block)))
+        let rows = self.of_block(block).iter().flat_map(|o| {
+            let (model, p) = self.scene.seen(o, p);
+            model.residual(&p, o).rows().take(self.rows(o)).collect::<Vec<f64>>()
+        });
+        DVector::from_vec(rows.collect())
     }
 
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
-        let (model, p) = self.scene.seen(self.observations[block], p);
-        self.used(block, model.residual_with_jacobian(&p, self.observations[block]))
+        let of = |o: &&Observation| {
+            let (model, p) = self.scene.seen(o, p);
+            self.used(o, model.residual_with_jacobian(&p, o))
+        };
+        stacked(self.of_block(block).iter().map(of).collect())
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
-        let runs = self.scene.alike(&self.observations[blocks.clone()]);
-        let linearised = runs.flat_map(|run| {
+        let Some(first) = self.blocks.get(blocks.start).filter(|_| !blocks.is_empty()) else {
+            return Vec::new();
+        };
+        let of_blocks = first.start..self.blocks[blocks.end - 1].end;
+        let runs = self.scene.alike(&self.observations[of_blocks]);
+        let mut linearised = runs.flat_map(|run| {
             let (model, p) = self.scene.seen(run[0], p);
             model.residuals_with_jacobians(&p, run)
         });
-        let mut all = Vec::with_capacity(blocks.len());
-        all.extend(blocks.zip(linearised).map(|(block, linearised)| self.used(block, linearised)));
-        all
+        let mut of = |block: usize| {
+            let parts = self.of_block(block).iter().zip(&mut linearised);
+            stacked(parts.map(|(o, linearised)| self.used(o, linearised)).collect())
+        };
+        blocks.map(&mut of).collect()
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
-        let o = self.observations[block];
-        let rows = self.rows(block);
+        let all = self.of_block(block);
+        let spreads: Vec<DMatrix<f64>> = all.iter().map(|o| self.spread(o, p)).collect();
+        let rows = spreads.iter().map(DMatrix::nrows).sum();
         let mut covariance = DMatrix::zeros(rows, rows);
-        let Reference::Tracked { orientation_sigma_rad, .. } = o.reference else {
-            covariance.copy_from(&self.position_covariance_m2(block, p));
-            return covariance;
-        };
-        let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
-        let (model, own) = self.scene.seen(o, p);
-        spread.rows_mut(0, 3).copy_from(&model.joint_jacobian(&own, o));
-        covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
-        if rows == 6 {
-            spread.rows_mut(3, 3).copy_from(&self.turning_jacobian(p, o));
-            (3..6).for_each(|k| covariance[(k, k)] = orientation_sigma_rad.powi(2));
+        let mut at = 0;
+        for (o, spread) in all.iter().zip(&spreads) {
+            let own = self.measured(o) + spread * spread.transpose();
+            covariance.view_mut((at, at), own.shape()).copy_from(&own);
+            let mut before = 0;
+            for other in spreads.iter().take_while(|other| !std::ptr::eq(*other, spread)) {
+                let shared = spread * other.transpose();
+                covariance
+                    .view_mut((before, at), (shared.ncols(), shared.nrows()))
+                    .copy_from(&shared.transpose());
+                covariance.view_mut((at, before), shared.shape()).copy_from(&shared);
+                before += other.nrows();
+            }
+            at += own.nrows();
         }
-        for (mut column, sigma) in spread.column_iter_mut().zip(joint_sigma_rad(model, &own, o)) {
-            column *= sigma;
-        }
-        covariance + &spread * spread.transpose()
+        covariance
     }
 
     fn noise_depends(&self) -> bool {
@@ -174,7 +262,11 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn known(&self) -> Vec<Known> {
-        self.scene.known(&self.observations)
+        let mut known = self.scene.known(&self.observations);
+        // The blocks of a recording hold its observations, and no others.
+        let block = |observation: usize| self.blocks.partition_point(|run| run.start < observation);
+        known.iter_mut().for_each(|k| k.blocks = block(k.blocks.start)..block(k.blocks.end));
+        known
     }
 }
 

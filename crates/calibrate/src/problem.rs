@@ -28,12 +28,17 @@ pub struct Known {
 
 /// A weighted nonlinear least-squares problem in blocks.
 ///
-/// Row order within a block: three position rows [m], then, where used, three orientation rows [rad].
+/// Row order within a block: of one observation after the other three position rows [m], then, where used, three orientation
+/// rows [rad].
 pub trait Problem: Sync {
     /// All parameters, fixed ones included, in the order of every parameter vector.
     fn parameters(&self) -> &[Parameter];
-    /// Number of observations.
+    /// Number of blocks: what was measured in one dwell is one.
     fn blocks(&self) -> usize;
+    /// Number of observations in a block.
+    fn observations_of(&self, _block: usize) -> usize {
+        1
+    }
     /// The observation in words, for messages.
     fn name(&self, block: usize) -> String;
     /// Joint readings of the observation [rad], for messages; empty when there are none.
@@ -74,6 +79,10 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn blocks(&self) -> usize {
         (**self).blocks()
+    }
+
+    fn observations_of(&self, block: usize) -> usize {
+        (**self).observations_of(block)
     }
 
     fn name(&self, block: usize) -> String {

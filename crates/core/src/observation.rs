@@ -27,11 +27,32 @@ pub enum Reference {
     },
 }
 
+/// A point of the arm that is measured, by its place among the model's: the tip first, then the markers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct FeatureId(pub usize);
+
+impl FeatureId {
+    /// The tip, which every model has.
+    pub const TIP: FeatureId = FeatureId(0);
+
+    /// Whether it is the tip.
+    pub fn is_tip(&self) -> bool {
+        *self == FeatureId::TIP
+    }
+}
+
 /// One row of the calibration: `measured - predicted` [m] with its covariance and provenance.
+///
+/// A pose in which several features were measured is as many observations of one dwell, one behind the other: they share the
+/// joint readings, and with them the encoders' noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// The dwell it comes from.
     pub dwell: DwellId,
+    /// What was measured of the arm.
+    #[serde(default, skip_serializing_if = "FeatureId::is_tip")]
+    pub feature: FeatureId,
     /// Middle of the dwell [ns], robot clock.
     pub time_ns: i64,
     /// Joint readings [rad].
@@ -77,6 +98,7 @@ impl Observation {
     pub fn bare(dwell: DwellId, joint_rad: Vec<f64>, reference: Reference) -> Observation {
         Observation {
             dwell,
+            feature: FeatureId::TIP,
             time_ns: 0,
             joint_sigma_rad: vec![0.0; joint_rad.len()],
             arrival: vec![Arrival::Unknown; joint_rad.len()],

@@ -19,7 +19,7 @@ use crate::sensors::SensorClock;
 use crate::session::Session;
 use crate::trace::{Rest, RestKind};
 use crate::{LabError, RecordingTruth, Truth, hidden_in};
-use armcal_core::{DwellId, Observation, Reference};
+use armcal_core::{DwellId, FeatureId, Observation, Reference};
 use nalgebra::Matrix3;
 use reading::Camera;
 use std::path::Path;
@@ -96,6 +96,7 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
         let mid_s = (span_s[0] + span_s[1]) / 2.0;
         let temperature = session.trace.temperature_c[rest.last];
         observations.push(Observation {
+            feature: FeatureId::TIP,
             dwell: DwellId { recording, dwell: observations.len() },
             time_ns: config.start_ns(recording) + (mid_s * 1e9).round() as i64,
             arrival: past::arrivals(since, &readings.mean_rad, config.joints.count_rad()),

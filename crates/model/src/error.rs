@@ -81,6 +81,18 @@ pub enum ModelError {
         /// The most similar link.
         nearest: Option<String>,
     },
+    /// An observation is of a feature that the model does not have.
+    #[error(
+        "{dwell}: feature {feature} was measured, and the model has {features}: give every marker its place on the arm"
+    )]
+    NoFeature {
+        /// The observation.
+        dwell: armcal_core::DwellId,
+        /// What it is of.
+        feature: usize,
+        /// How many the model has.
+        features: usize,
+    },
     /// A marker is on a link that the arm does not have.
     #[error("there is no link \"{link}\" among those of the arm{}", did_you_mean(nearest))]
     NoSuchLink {

@@ -42,5 +42,5 @@ pub use effects::{
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge, Marker};
-pub use model::{FeatureId, Model};
+pub use model::Model;
 pub use residual::ModelResidual;

@@ -10,7 +10,7 @@ use crate::segment::{Geometry, Segment};
 use crate::tree::{Route, SegmentId, Tree};
 use crate::twist::Twist;
 use crate::{Chain, Frames, ModelError};
-use armcal_core::{Observation, Parameter, Pose, Reference, Unit};
+use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Unit};
 use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,19 +40,6 @@ pub struct Model {
 
 /// The segment that ends at the base: the root of the tree.
 const BASE: SegmentId = 0;
-
-/// A point of the arm that can be measured, by its place among [`Model::features`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct FeatureId(usize);
-
-impl FeatureId {
-    /// The tip, which every model has.
-    pub const TIP: FeatureId = FeatureId(0);
-
-    pub(crate) fn index(self) -> usize {
-        self.0
-    }
-}
 
 /// The name of a feature and the way to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,12 +168,16 @@ impl Model {
         self.boards.get(&recording).map_or(0..0, |board| board.parameters.clone())
     }
 
-    /// Checks that every observation has a reading for each joint, and a board where it needs one.
+    /// Checks that every observation has a reading for each joint, is of a feature of the arm, and has a board where it needs one.
     pub fn check(&self, observations: &[Observation]) -> Result<(), ModelError> {
         for o in observations {
             let (actual, expected) = (o.joint_rad.len(), self.joint_count());
             if actual != expected {
                 return Err(ModelError::JointCount { dwell: o.dwell, actual, expected });
+            }
+            if o.feature.0 >= self.features.len() {
+                let (feature, features) = (o.feature.0, self.features.len());
+                return Err(ModelError::NoFeature { dwell: o.dwell, feature, features });
             }
             if o.cavity().is_some() && !self.boards.contains_key(&o.dwell.recording) {
                 return Err(ModelError::NoBoard { dwell: o.dwell });
@@ -197,7 +188,7 @@ impl Model {
 
     /// The tip in the base frame.
     pub fn tip_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Pose {
-        Pose::from(&self.tree.follow(&self.route(FeatureId::TIP)[1..], p, joint_rad))
+        self.feature_in_base(p, FeatureId::TIP, joint_rad)
     }
 
     /// Every frame of the arm in the base frame, for drawing: base, the end of each segment (a DH row, or
@@ -224,7 +215,18 @@ impl Model {
 
     /// last link_from_tip.
     pub fn tip_in_last_link(&self, p: &[f64]) -> Pose {
-        Pose::from(&self.tip_segment().transform(p, &[]))
+        self.feature_in_link(p, FeatureId::TIP)
+    }
+
+    /// A feature in the link that carries it.
+    pub fn feature_in_link(&self, p: &[f64], feature: FeatureId) -> Pose {
+        let own = self.route(feature).last().map(|end| self.tree.0[*end].transform(p, &[]));
+        own.map_or_else(Pose::identity, |own| Pose::from(&own))
+    }
+
+    /// A feature in the base frame, effects left out.
+    pub fn feature_in_base(&self, p: &[f64], feature: FeatureId, joint_rad: &[f64]) -> Pose {
+        Pose::from(&self.tree.follow(&self.route(feature)[1..], p, joint_rad))
     }
 
     /// Whether the pose of a recording's board is found by the fit, with nothing else known of it.
@@ -251,7 +253,7 @@ impl Model {
         }
     }
 
-    /// Where the model puts the tip, in the world [m], effects included.
+    /// Where the model puts what the observation is of, its tip or a marker, in the world [m], effects included.
     pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
         self.sides(p, o).predicted.translation_m
     }
@@ -281,7 +283,7 @@ impl Model {
     /// encoders' noise to the tip.
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
-        for (column, twist) in self.joint_twists(p, FeatureId::TIP, o) {
+        for (column, twist) in self.joint_twists(p, o.feature, o) {
             // A reading that moves two joints on the way has two parts.
             let mut own = jacobian.column_mut(column);
             own += twist.translation_m;
@@ -295,7 +297,7 @@ impl Model {
         let residual = self.residual(p, o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.joint_count());
         let rate = residual.rotation_rad.as_ref().map(rotation_error_rate);
-        for (column, twist) in self.joint_twists(p, FeatureId::TIP, o) {
+        for (column, twist) in self.joint_twists(p, o.feature, o) {
             add_to_column(&mut jacobian, 0, column, &-twist.translation_m);
             if let Some(rate) = &rate {
                 add_to_column(&mut jacobian, 3, column, &(rate * twist.rotation_rad));
@@ -435,9 +437,9 @@ impl Model {
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
         let (predicted, in_board_m) = match &self.effects {
-            None => (self.tree.follow(self.route(FeatureId::TIP), p, &o.joint_rad), seated_m(o)),
+            None => (self.tree.follow(self.route(o.feature), p, &o.joint_rad), seated_m(o)),
             Some(effects) => {
-                let at = effects.evaluate(p, FeatureId::TIP, &effects.drivers(self, o));
+                let at = effects.evaluate(p, o.feature, &effects.drivers(self, o));
                 (at.tip, at.in_board_m)
             }
         };

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story;
-use armcal_calibrate::{FitConfig, ModelProblem};
+use armcal_calibrate::position_covariance_m2;
 use armcal_core::{Observation, Parameter, Pose, Reference};
 use armcal_recording::atomic;
 use armcal_report::Run;
@@ -21,7 +21,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let settled = story::settle(&pipeline, &progress)?;
     let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
     progress.finish();
-    let text = format!("{:#}\n", problem(&run, &pipeline.fit)?);
+    let text = format!("{:#}\n", problem(&run));
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;
     print(&format!("{}\n", out.display()))?;
     Ok(Outcome::Done)
@@ -29,24 +29,22 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
 
 /// Everything a solver needs that does not share armcal's code: the nominal arm, the observations with the
 /// covariances that whiten their residuals, the parameters with bounds and priors, and which of them the fit saw.
-fn problem(run: &Run, config: &FitConfig) -> Result<Value, Error> {
+fn problem(run: &Run) -> Value {
     let model = &run.model;
     let fit = &run.calibration.fit;
-    let whitened = ModelProblem::new(model, &run.observations, config)?;
     // Held out in turn, every observation takes part in the fit whose parameters are written.
     let in_turn = run.calibration.train.fitted.n == run.observations.len();
     let rows = run.observations.iter().zip(&run.calibration.residuals);
     let observations: Vec<Value> = rows
-        .enumerate()
-        .map(|(block, (o, residual))| {
+        .map(|(o, residual)| {
             let mut row = observation(o);
             row["covariance_m2"] =
-                json!(square(&whitened.position_covariance_m2(block, &run.calibration.nominal_values)));
+                json!(square(&position_covariance_m2(model, &run.calibration.nominal_values, o)));
             row["in_fit"] = json!(!residual.held_out || in_turn);
             row
         })
         .collect();
-    Ok(json!({
+    json!({
         "schema": "armcal.problem/1",
         "pipeline": run.pipeline_name,
         "model": run.model_text,
@@ -55,7 +53,7 @@ fn problem(run: &Run, config: &FitConfig) -> Result<Value, Error> {
         "frames": frames(run),
         "board_names": run.recordings.iter().map(|r| format!("board.{}", r.name)).collect::<Vec<String>>(),
         "observations": observations,
-    }))
+    })
 }
 
 fn frames(run: &Run) -> Value {

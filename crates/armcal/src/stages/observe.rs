@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
 use crate::stages::perceive::Seen;
-use armcal_core::{Dwell, DwellId, Observation, Reference, Rejection};
+use armcal_core::{Dwell, DwellId, FeatureId, Observation, Reference, Rejection};
 use armcal_dwell::Moment;
 use armcal_model::Model;
 use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
@@ -104,6 +104,7 @@ pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, load_kg: f64,
     let sigma_m = pipeline.observations.sensor_sigma_mm * 1e-3;
     Observation {
         dwell: DwellId { recording, dwell: index },
+        feature: FeatureId::TIP,
         time_ns: m.time_ns,
         joint_rad: m.joint_rad.clone(),
         joint_sigma_rad: vec![0.0; m.joint_rad.len()],
@@ -195,6 +196,7 @@ pub fn observation(
 ) -> Observation {
     Observation {
         dwell: dwell.id,
+        feature: FeatureId::TIP,
         time_ns: dwell.mid_ns(),
         joint_rad: dwell.joint_rad.clone(),
         joint_sigma_rad: dwell.joint_sigma_rad.clone(),

@@ -13,8 +13,8 @@ use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::tree::{Route, Tree, TreeAt};
 use crate::twist::Twist;
-use crate::{FeatureId, Model, ModelError};
-use armcal_core::{DwellId, Parameter, Reference, Role};
+use crate::{Model, ModelError};
+use armcal_core::{DwellId, FeatureId, Parameter, Reference, Role};
 use nalgebra::{Matrix3, Vector3};
 use num_dual::Dual64;
 use std::ops::Range;
@@ -200,7 +200,7 @@ impl Effects {
     /// A feature of the deformed arm, predicted.
     pub fn evaluate(&self, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Evaluated {
         let (p, q, in_board_m) = self.deformed(p, x);
-        let mut tip = self.tree.follow(&self.routes[feature.index()], &p, &q);
+        let mut tip = self.tree.follow(&self.routes[feature.0], &p, &q);
         tip.translation_m += self.seen_m(&p, x, &tip.translation_m);
         Evaluated { tip, in_board_m }
     }
@@ -214,7 +214,7 @@ impl Effects {
     pub fn linearise(&self, tree: &TreeAt<'_>, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Linearised {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
-        let tip = tree.with(&self.routes[feature.index()], &p, &q);
+        let tip = tree.with(&self.routes[feature.0], &p, &q);
         let (mut parameters, twists): (Vec<_>, Vec<_>) =
             tip.parameters.into_iter().partition(|(index, _)| *index < count);
         let mut motions = vec![Twist::none(); p.len()];
@@ -268,7 +268,7 @@ impl Effects {
     /// Motion of a feature per unit of each joint reading.
     pub fn joint_twists(&self, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Vec<(usize, Twist)> {
         let (p, q, _) = self.deformed(p, x);
-        let (mut tip, mut joints) = self.tree.joint_twists(&self.routes[feature.index()], &p, &q);
+        let (mut tip, mut joints) = self.tree.joint_twists(&self.routes[feature.0], &p, &q);
         self.distort(&p, x, &mut tip, &mut [], &mut joints);
         joints
     }

@@ -1,6 +1,6 @@
 //! A model at one parameter vector: residual and exact Jacobian of as many observations as are asked for.
 
-use super::{FeatureId, Model, Sides, measured_m, seated_m};
+use super::{Model, Sides, measured_m, seated_m};
 use crate::effects::Effects;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::segment::{LinearisedSegment, Segment};
@@ -41,11 +41,11 @@ impl<'a> Linearisation<'a> {
     pub fn residual_with_jacobian(&self, o: &Observation) -> (ModelResidual, DMatrix<f64>) {
         let (predicted, in_board_m, columns, seats) = match &self.arm {
             Arm::Rigid(tree) => {
-                let tip = tree.linearised(self.model.route(FeatureId::TIP), &o.joint_rad);
+                let tip = tree.linearised(self.model.route(o.feature), &o.joint_rad);
                 (tip.at, seated_m(o), tip.parameters, Vec::new())
             }
             Arm::Deformed(effects, tree) => {
-                let arm = effects.linearise(tree, self.p, FeatureId::TIP, &effects.drivers(self.model, o));
+                let arm = effects.linearise(tree, self.p, o.feature, &effects.drivers(self.model, o));
                 (arm.at.tip, arm.at.in_board_m, arm.parameters, arm.seats)
             }
         };
