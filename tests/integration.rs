@@ -53,6 +53,9 @@ mod many_rigs;
 /// Does the tool learn from a recording which effect is missing, and does adding it help on unseen points?
 mod missing_effect;
 
+/// Does a change of the code move a number that it is not meant to move?
+mod goldens;
+
 /// Is nobody told that nothing is missing where a number of the pipeline, model or board is wrong?
 mod verdict_law;
 
