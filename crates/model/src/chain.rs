@@ -54,7 +54,8 @@ impl Chain {
 
     /// Unit of a joint's reading: radian, or metre where it slides.
     pub fn joint_unit(&self, joint: usize) -> Unit {
-        let slides = |s: &Segment| s.joint.is_some_and(|j| j.index == joint && j.motion == Motion::Prismatic);
+        let own = |s: &Segment| s.joint.filter(|j| j.index == joint && j.mimic.is_none());
+        let slides = |s: &Segment| own(s).is_some_and(|j| j.motion == Motion::Prismatic);
         if self.segments.iter().any(slides) { Unit::Metre } else { Unit::Radian }
     }
 

@@ -196,6 +196,12 @@ impl NominalPose {
         next.next().filter(|_| self.links[own].to_m.len() == 1 && next.next().is_none())
     }
 
+    /// The joint whose own link carries a joint; none where the base does, or one without a reading.
+    pub fn previous_joint(&self, joint: usize) -> Option<usize> {
+        let parent = self.links[self.joints.get(joint)?.links.start].parent?;
+        self.joints.iter().position(|j| j.links.start == parent)
+    }
+
     /// Moment about `pivot` of the weights of some links [N m].
     pub fn moment_nm(
         &self,

@@ -101,8 +101,9 @@ impl Placing<'_> {
     /// Whether a joint's axis is parallel to the one before it by design: +1, -1 where they point against
     /// each other, `None` where they are not parallel or one of them slides.
     pub fn parallel_to_previous(&self, joint: usize) -> Option<f64> {
-        let previous = self.zero.joints.get(joint.checked_sub(1)?)?;
-        let own = self.zero.joints.get(joint)?;
+        // A belt from the base passes the joint before it, which has the number before its own.
+        let before = self.zero.previous_joint(joint).filter(|before| before + 1 == joint)?;
+        let (previous, own) = (&self.zero.joints[before], &self.zero.joints[joint]);
         let cosine = previous.axis.dot(&own.axis);
         let turning = previous.motion == Motion::Revolute && own.motion == Motion::Revolute;
         (turning && cosine.abs() > PARALLEL_COSINE).then(|| cosine.signum())
