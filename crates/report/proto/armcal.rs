@@ -572,6 +572,12 @@ pub struct Story {
     /// Every warning with its severity and what it is about, the gravest first.
     #[prost(string, repeated, tag = "4")]
     pub warnings: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Everything to do next, one step an entry.
+    #[prost(string, repeated, tag = "5")]
+    pub next: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Everything that was found, one entry each; one that is too long for a line of a viewer goes on in the next entry.
+    #[prost(string, repeated, tag = "6")]
+    pub found: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// One step on the way from the nominal model to the one with everything found.
 #[derive(Clone, PartialEq, ::prost::Message)]

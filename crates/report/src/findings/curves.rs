@@ -11,11 +11,17 @@ const BAND: f64 = 1.96;
 /// The shape over its driver in the units that people read.
 pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
     let (driver_unit, driver_symbol) = driver_unit(&u.driver, chain);
+    // Shares of lengths are thousandths at most; axes of viewers have three decimals.
+    let (factor, unit) = match u.channel.as_str() {
+        "lengths" if u.unit == Unit::One => (1e6, "ppm"),
+        _ => (1.0, u.unit.display_symbol()),
+    };
+    let shown = |si: f64| factor * u.unit.to_display(si);
     let mut m = ErrorCurve {
         timestamp: None,
         channel: u.channel.clone(),
         driver: u.driver.clone(),
-        unit: u.unit.display_symbol().into(),
+        unit: unit.into(),
         driver_unit: driver_symbol.into(),
         formula: u.expression.as_ref().map(|e| e.formula.clone()).unwrap_or_default(),
         ..Default::default()
@@ -23,9 +29,9 @@ pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
     let points = u.shape.iter().filter(|p| [p.at, p.value, p.sigma].iter().all(|x| x.is_finite()));
     for p in points {
         m.at.push(driver_unit.to_display(p.at));
-        m.value.push(u.unit.to_display(p.value));
-        m.low.push(u.unit.to_display(p.value - BAND * p.sigma));
-        m.high.push(u.unit.to_display(p.value + BAND * p.sigma));
+        m.value.push(shown(p.value));
+        m.low.push(shown(p.value - BAND * p.sigma));
+        m.high.push(shown(p.value + BAND * p.sigma));
     }
     m
 }
