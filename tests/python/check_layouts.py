@@ -244,6 +244,9 @@ def main(out):
                 resolver.panel(kind, config, schemas, frames)
             except AssertionError as e:
                 raise AssertionError(f"{name}, {title}: {e}") from e
+    # What has a curve is among what was found.
+    found = [row.effect for m in messages["/armcal/effect_table"] for row in m.found]
+    assert found.count("not listed") == sum(t.startswith("/armcal/unlisted/") for t in messages), found
     new, old = panels.values()
     assert new == old, "the two formats show different things"
     size = {t: len(m) for t, m in messages.items()}

@@ -20,6 +20,8 @@ use serde_json::Value;
 const RANKED: usize = 8;
 /// Heading of errors that no calibration gave.
 const PREDICTED: &str = "linearised, left out [mm]";
+/// Amplitudes of an effect that are told where there is a line or two.
+const FEW_SIZES: usize = 2;
 /// Share of a curve [%] from which the multiples of a ripple are worth a word.
 const BENT_PERCENT: f64 = 5.0;
 /// Heading of the tables that add what is unlisted.
@@ -100,7 +102,11 @@ pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
 /// The same in a line or two each: names, sizes, and what they take of the error.
 pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised from {:.3} to {:.3} mm", h.before, h.after);
-    let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
+    let sizes = |e: &FoundEffect| match e.parameters.len() {
+        ..=FEW_SIZES => sizes_of(e),
+        _ => size_in_table(&e.parameters),
+    };
+    let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes(e), falls(&e.places)));
     let unlisted = shown_unlisted(d).map(|u| {
         format!(
             "unlisted, at {} over {}: {}",
@@ -252,7 +258,7 @@ pub fn driver_told(driver: &str) -> String {
     let sum = driver.split_once('+').and_then(|(a, b)| Some((joint(a, 'q')?, joint(b, 'q')?)));
     match (product, sum) {
         (Some((s, q)), _) if s == q => {
-            return format!("the angle of joint {q} with the sign of its arrival ({driver})");
+            return format!("the angle of joint {q}, with opposite signs by direction of arrival ({driver})");
         }
         (_, Some((a, b))) => return format!("the sum of the angles of joints {a} and {b} ({driver})"),
         _ => {}
@@ -515,7 +521,7 @@ mod tests {
                 "the gravity torque on joint 3 (tau3)",
                 "the direction in which joint 1 arrived (s1)",
                 "time (t)",
-                "the angle of joint 1 with the sign of its arrival (s1*q1)",
+                "the angle of joint 1, with opposite signs by direction of arrival (s1*q1)",
                 "the sum of the angles of joints 1 and 2 (q1+q2)",
                 "s1*q2",
                 "temperature",

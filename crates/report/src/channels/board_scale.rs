@@ -11,6 +11,9 @@ const TEXT_HEIGHT: f64 = 0.75;
 /// Width of a letter over its height.
 const LETTER: f64 = 0.62;
 
+/// Share of the width that the words above all may take: the viewers' buttons stand in the upper corner.
+const LEGEND_WIDTH: f64 = 0.84;
+
 /// Green is where the noise ends, and red the largest calibrated error.
 pub(super) struct Scale {
     pub small_m: f64,
@@ -31,7 +34,7 @@ impl Scale {
         let mut scale = Scale { small_m, large_m, width_m, text_m: TEXT_HEIGHT * grid.gap_m };
         let fits = |room_m: f64, line: &str| room_m / (LETTER * line.chars().count().max(1) as f64);
         let words = scale.words(findings.boards.first().map_or(1.0, |b| b.magnification));
-        let lines = words.lines().map(|line| fits(width_m, line));
+        let lines = words.lines().map(|line| fits(LEGEND_WIDTH * width_m, line));
         scale.text_m =
             titles.iter().map(|title| fits(grid.cell_m().x, title)).chain(lines).fold(scale.text_m, f64::min);
         scale

@@ -11,11 +11,7 @@ const BAND: f64 = 1.96;
 /// The shape over its driver in the units that people read.
 pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
     let (driver_unit, driver_symbol) = driver_unit(&u.driver, chain);
-    // Shares of lengths are thousandths at most; axes of viewers have three decimals.
-    let (factor, unit) = match u.channel.as_str() {
-        "lengths" if u.unit == Unit::One => (1e6, "ppm"),
-        _ => (1.0, u.unit.display_symbol()),
-    };
+    let (factor, unit) = value_unit(&u.channel, u.unit);
     let shown = |si: f64| factor * u.unit.to_display(si);
     let mut m = ErrorCurve {
         timestamp: None,
@@ -34,6 +30,15 @@ pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
         m.high.push(shown(p.value + BAND * p.sigma));
     }
     m
+}
+
+/// Factor and symbol of an error that enters there. Shares of lengths are thousandths at most, and axes of viewers have three
+/// decimals.
+fn value_unit(channel: &str, unit: Unit) -> (f64, &'static str) {
+    match channel {
+        "lengths" if unit == Unit::One => (1e6, "ppm"),
+        _ => (1.0, unit.display_symbol()),
+    }
 }
 
 /// Unit of a driver as formulas name it: `q2`, `q2+q3`, `s1*q1`, `tau1`, `t`, `temperature`, `load`, `s1`, `recording`.
@@ -59,6 +64,12 @@ mod tests {
     use super::*;
 
     const ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
+
+    #[test]
+    fn shares_of_lengths_are_shown_in_millionths() {
+        assert_eq!(value_unit("lengths", Unit::One), (1e6, "ppm"));
+        assert_eq!(value_unit("joint1", Unit::Radian), (1.0, "deg"));
+    }
 
     #[test]
     fn angles_are_shown_in_degrees_and_directions_as_they_are() {

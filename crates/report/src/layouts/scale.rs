@@ -32,10 +32,11 @@ pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2
     (large > 0.0).then_some([-large, large])
 }
 
-/// The next number that an axis may end in: of these, whatever the height of the panel, the viewers' steps (1, 2 or 5 and
-/// powers of ten, at most ten of them) meet zero and both ends. From -0.08 they would go -0.08, -0.05, 0, 0.05, 0.08.
+/// The next number that an axis may end in: of these, the viewers' steps (1, 2 or 5 and powers of ten, at most ten of them) meet
+/// zero and both ends, also where every second is left out for want of room. From -0.06 they would go -0.06, -0.05, 0, and
+/// from -0.1 there would be -0.1, -0.06, -0.02, 0.02.
 fn nice_up(value: f64) -> f64 {
-    const ENDS: [&str; 4] = ["1", "2", "4", "10"];
+    const ENDS: [&str; 4] = ["2", "4", "8", "20"];
     let exponent = value.log10().floor();
     if !exponent.is_finite() {
         return value;
@@ -53,22 +54,23 @@ mod tests {
     fn an_axis_ends_in_a_round_number_above_the_data() {
         assert_eq!(
             [0.12, 0.18, 2.0, 2.1, 9e-7, 81.0, 0.0].map(nice_up),
-            [0.2, 0.2, 2.0, 4.0, 1e-6, 100.0, 0.0]
+            [0.2, 0.2, 2.0, 4.0, 2e-6, 200.0, 0.0]
         );
     }
 
     #[test]
     fn steps_of_the_viewers_meet_zero_and_the_ends() {
-        for end in [0.1, 0.2, 0.4, 1.0] {
-            // Chart.js: the range by how many steps have room, up to the next of 1, 2, 5, 10.
-            for room in 2..=10 {
+        for end in [0.2, 0.4, 0.8] {
+            // Chart.js: the range by how many steps have room, up to the next of 1, 2, 5, 10. Four rows of plots on a laptop have
+            // room for eight.
+            for room in 8..=10 {
                 let rough: f64 = 2.0 * end / f64::from(room);
                 let power = 10_f64.powf(rough.log10().floor());
                 let step =
                     [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9));
                 let steps = end / step.unwrap();
-                // The ends are ticks themselves, so that a step longer than to zero does no harm.
-                assert!((steps - steps.round()).abs() < 1e-9 || steps < 1.0, "{end}, {room}: {step:?}");
+                assert!((steps - steps.round()).abs() < 1e-9, "{end}, {room}: {step:?}");
+                assert!(steps.round() as u32 % 2 == 0, "{end}, {room}: every second step leaves zero out");
             }
         }
     }

@@ -238,6 +238,9 @@ fn a_lamp_is_red_wherever_the_result_does_not_stand() {
         let colour = |word: &str| rules.iter().find(|r| r["rawValue"] == word).unwrap()["color"].clone();
         let red = colour("inadequate");
         assert!(["data_lost", "unexplained", "setup"].iter().all(|word| colour(word) == red));
+        // Where the result stands, the lamp says so.
+        let label = |r: &Value| r["label"].as_str().unwrap().starts_with("ok: ");
+        assert!(rules.iter().all(|r| label(r) != (r["color"] == red)), "{rules:?}");
         let like_success = rules.iter().filter(|r| r["color"] == colour("nothing_missing"));
         assert_eq!(like_success.count(), 1);
         let shown = run.at(lamp["path"].as_str().unwrap());
