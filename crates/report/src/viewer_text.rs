@@ -38,6 +38,6 @@ mod tests {
         assert!(shown.len() > 3 && shown.iter().all(|entry| entry.chars().count() < 512));
         let again: Vec<&str> = shown[..shown.len() - 1].iter().map(|e| e.trim_start_matches(ON)).collect();
         assert_eq!(again.join(" "), long);
-        assert_eq!(shown.last().unwrap(), "error 0.4 to 0.3 mm");
+        assert_eq!(shown[shown.len() - 1], "error 0.4 to 0.3 mm");
     }
 }

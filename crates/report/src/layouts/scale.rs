@@ -68,9 +68,12 @@ mod tests {
                 let power = 10_f64.powf(rough.log10().floor());
                 let step =
                     [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9));
-                let steps = end / step.unwrap();
+                let steps = end / step.expect("10 is enough");
                 assert!((steps - steps.round()).abs() < 1e-9, "{end}, {room}: {step:?}");
-                assert!(steps.round() as u32 % 2 == 0, "{end}, {room}: every second step leaves zero out");
+                assert!(
+                    (steps.round() as u32).is_multiple_of(2),
+                    "{end}, {room}: every second step leaves zero out"
+                );
             }
         }
     }

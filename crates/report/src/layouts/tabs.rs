@@ -144,7 +144,7 @@ fn numbers(f: &Findings) -> Option<Content> {
     if !d.not_testable.is_empty() {
         panels.push((2.5, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
     }
-    (!panels.is_empty()).then(|| Content::Split(Column, panels))
+    (!panels.is_empty()).then_some(Content::Split(Column, panels))
 }
 
 pub(super) fn parameters(calibration: &Calibration) -> Content {
