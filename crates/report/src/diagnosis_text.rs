@@ -104,6 +104,9 @@ pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised from {:.3} to {:.3} mm", h.before, h.after);
     let sizes = |e: &FoundEffect| match e.parameters.len() {
         ..=FEW_SIZES => sizes_of(e),
+        n if e.parameters.iter().all(|p| clear(p) < 1.0) => {
+            format!("none of its {n} sizes is determined by itself")
+        }
         _ => size_in_table(&e.parameters),
     };
     let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes(e), falls(&e.places)));
@@ -357,20 +360,28 @@ pub(crate) fn sizes(c: &CandidateReport) -> String {
     printable(&shown.join(", "))
 }
 
+/// How many times half its interval an amplitude is; below one it is not determined by itself.
+fn clear(p: &ParameterReport) -> f64 {
+    2.0 * (p.value / (p.ci95[1] - p.ci95[0])).abs()
+}
+
 /// The amplitude that the data determine best, for a table, and how many there are beside it.
 pub(crate) fn size_in_table(parameters: &[ParameterReport]) -> String {
     let half = |p: &ParameterReport| (p.ci95[1] - p.ci95[0]) / 2.0;
-    let clear = |p: &ParameterReport| (p.value / half(p)).abs();
-    let Some(p) = parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b))) else {
-        return String::new();
-    };
+    let best = parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b)));
+    let Some(p) = best else { return String::new() };
     let unit = p.unit.display_symbol();
-    let shown = match half(p) <= p.value.abs() {
+    let shown = match clear(p) >= 1.0 {
         true => format!("{} ± {}", supported(p.unit, p.value, half(p)), supported(p.unit, half(p), half(p))),
         false => format!("at most {}", supported(p.unit, p.upper_limit95, p.upper_limit95)),
     };
-    // The last part of its name is what it is; the first is in the row already.
+    // The last part of its name is what it is; the first is in the row already, but in a group for its joint: `width:2`.
     let name = p.name.rsplit('.').next().unwrap_or_default();
+    let joint = p
+        .name
+        .split_once(':')
+        .map_or("", |(_, rest)| &rest[..rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len())]);
+    let name = if joint.is_empty() { name.to_owned() } else { format!("{name}:{joint}") };
     let more = match parameters.len() - 1 {
         0 => String::new(),
         n => format!(", {n} more"),

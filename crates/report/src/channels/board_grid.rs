@@ -6,7 +6,7 @@ use nalgebra::{Vector2, Vector3};
 const GAP_M: f64 = 0.01;
 const GAP: f64 = 0.2;
 /// Lines of words above all.
-pub(super) const LEGEND_LINES: usize = 2;
+pub(super) const LEGEND_LINES: usize = 3;
 /// Width of the panel of the map over its height: between a laptop's with a sidebar open and with none.
 pub(crate) const PANEL: f64 = 1.4;
 
@@ -88,7 +88,9 @@ mod tests {
         // From half a cell left of the first to half a cell right of the last; the words are the highest, and nothing is lower
         // than the last drawing.
         assert!((x - width_m / 2.0 + 0.072).abs() < 1e-12);
-        assert!((y + height_m / 2.0 - grid.legend_m().y - grid.gap_m).abs() < 1e-12);
+        assert!(
+            (y + height_m / 2.0 - grid.legend_m().y - LEGEND_LINES as f64 / 2.0 * grid.gap_m).abs() < 1e-12
+        );
         assert!((y - height_m / 2.0 - (grid.centre_m(3, 0).y - 0.01)).abs() < 1e-12);
         // A title is above its own drawing and below the one above it.
         assert!((grid.title_m(3, 0).y - (grid.centre_m(3, 0).y + 0.01 + grid.gap_m / 2.0)).abs() < 1e-12);

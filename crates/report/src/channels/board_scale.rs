@@ -42,8 +42,11 @@ impl Scale {
 
     /// The scale in words, in as many lines as the grid has room for: the longest says how large they can be.
     pub fn words(&self, magnification: f64) -> String {
+        // In two lines, so that its letters can be large.
+        let (from, to) = POINTS.split_once(" to ").unwrap_or((POINTS, ""));
         format!(
-            "errors x {magnification}, {POINTS}\n\
+            "errors x {magnification}, {from}\n\
+             to {to}\n\
              green {} mm, red {} mm and more",
             millimetres(self.small_m),
             millimetres(self.large_m)
