@@ -41,11 +41,13 @@ DRAWN = {"foxglove.SceneUpdate", "foxglove.PosesInFrame", "foxglove.PoseInFrame"
 
 
 def read(path):
-    """Messages, schema names, attachments, texts of robots, and the time of the first message, by topic."""
+    """Messages, schema names, attachments, texts of robots, and the time of the first message, by topic and ("") of all."""
     messages, texts, times = defaultdict(list), {}, {}
     with open(path, "rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory(), Ros2DecoderFactory()], validate_crcs=True)
         schemas = {c.topic: reader.get_summary().schemas.get(c.schema_id) for c in reader.get_summary().channels.values()}
+        # Where a viewer opens the file: at the first message of all, also of the recording itself.
+        times[""] = reader.get_summary().statistics.message_start_time
         for _, channel, message, decoded in reader.iter_decoded_messages(topics=[t for t in schemas if t.startswith("/armcal/")]):
             times.setdefault(channel.topic, message.log_time)
             if channel.topic.endswith("/robot_description"):
@@ -69,6 +71,8 @@ class Resolver:
         if topic.startswith('"'):
             topic = re.sub(r"\\(.)", r"\1", topic[1:-1])
         assert self.messages.get(topic), f"{path}: no message on {topic}"
+        # Nothing would be drawn until somebody plays the file.
+        assert self.times[topic] == self.times[""], f"{path}: nothing at the first instant"
         self.used[path] += 1
         descriptor, many, kind = self.messages[topic][0].DESCRIPTOR, False, None
         values = [[m] for m in self.messages[topic]]
@@ -166,8 +170,9 @@ class Resolver:
                     assert {"x", "y", "z", "red", "green", "blue", "alpha"} <= fields, fields
                 # The measured tip is not there before it was seen.
                 if settings["visible"] and schemas[topic] != "foxglove.PoseInFrame":
-                    first = min(self.times[t] for t in self.times)
-                    assert self.times[topic] == first, f"{topic}: nothing at the first instant"
+                    assert self.times[topic] == self.times[""], f"{topic}: nothing at the first instant"
+                if schemas[topic] == "foxglove.SceneUpdate":
+                    assert settings["showOutlines"] is False, f"{topic}: black edges bury small arrows"
             for layer in config["layers"].values():
                 assert layer["layerId"] == "foxglove.Urdf" and layer["sourceType"] == "topic", layer
                 links = {link.get("name") for link in ElementTree.fromstring(self.texts[layer["topic"]]).findall("link")}
@@ -239,6 +244,9 @@ def main(out):
                 resolver.panel(kind, config, schemas, frames)
             except AssertionError as e:
                 raise AssertionError(f"{name}, {title}: {e}") from e
+    # What has a curve is among what was found.
+    found = [row.effect for m in messages["/armcal/effect_table"] for row in m.found]
+    assert found.count("not listed") == sum(t.startswith("/armcal/unlisted/") for t in messages), found
     new, old = panels.values()
     assert new == old, "the two formats show different things"
     size = {t: len(m) for t, m in messages.items()}

@@ -283,7 +283,7 @@ pub struct Parameters {
     #[prost(string, repeated, tag = "3")]
     pub undetermined: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
-/// A free parameter as people read it: in display units, with the digits that count.
+/// A free parameter as people read it: in display units, with the digits that the interval supports.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct ParameterRow {
     #[prost(string, tag = "1")]
@@ -305,7 +305,8 @@ pub struct ParameterRow {
     #[prost(string, tag = "8")]
     pub meaning: ::prost::alloc::string::String,
 }
-/// The parameters that the fit could change (topic /armcal/parameter_table), one message a run.
+/// The parameters that the fit could change (topic /armcal/parameter_table), one message a run: those that the data determine before
+/// the others, and the most changed first.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ParameterTable {
     #[prost(message, optional, tag = "1")]
@@ -566,12 +567,18 @@ pub struct Story {
     /// setup); otherwise the verdict (nothing_missing, identified, ambiguous, unknown, not_diagnosed).
     #[prost(string, tag = "2")]
     pub lamp: ::prost::alloc::string::String,
-    /// What the calibration reached, what is missing, the status, what to do next; one sentence each.
+    /// What is missing, what the calibration reached, the status, the first things to do, what was found briefly; one sentence each.
     #[prost(string, repeated, tag = "3")]
     pub lines: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Every warning with its severity and what it is about, the gravest first.
     #[prost(string, repeated, tag = "4")]
     pub warnings: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Everything to do next, one step an entry.
+    #[prost(string, repeated, tag = "5")]
+    pub next: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Everything that was found, one entry each; one that is too long for a line of a viewer goes on in the next entry.
+    #[prost(string, repeated, tag = "6")]
+    pub found: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// One step on the way from the nominal model to the one with everything found.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -740,14 +747,16 @@ pub struct EffectRow {
     pub probability: ::prost::alloc::string::String,
     #[prost(string, tag = "4")]
     pub r#where: ::prost::alloc::string::String,
-    /// With its 95 % interval.
+    /// The amplitude that is best determined, with its 95 % interval, and how many there are beside it; of what is not listed, how far
+    /// its shape goes.
     #[prost(string, tag = "5")]
     pub size: ::prost::alloc::string::String,
     /// As `armcal add` takes it; of what was found, all names that these data leave.
     #[prost(string, tag = "6")]
     pub name: ::prost::alloc::string::String,
 }
-/// What was found, and all candidates, best first (topic /armcal/effect_table), one message a run that was diagnosed.
+/// What was found (listed, then not listed), and all candidates, best first (topic /armcal/effect_table), one message a run that was
+/// diagnosed.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct EffectTable {
     #[prost(message, optional, tag = "1")]

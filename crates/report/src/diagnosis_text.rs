@@ -6,7 +6,7 @@ use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::recording_names::RecordingNames;
 use crate::run::Run;
-use crate::text::{in_display_unit, printable};
+use crate::text::{in_display_unit, printable, supported};
 use armcal_core::SetupReport;
 use armcal_diagnose::{
     CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
@@ -20,6 +20,8 @@ use serde_json::Value;
 const RANKED: usize = 8;
 /// Heading of errors that no calibration gave.
 const PREDICTED: &str = "linearised, left out [mm]";
+/// Amplitudes of an effect that are told where there is a line or two.
+const FEW_SIZES: usize = 2;
 /// Share of a curve [%] from which the multiples of a ripple are worth a word.
 const BENT_PERCENT: f64 = 5.0;
 /// Heading of the tables that add what is unlisted.
@@ -99,8 +101,15 @@ pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
 
 /// The same in a line or two each: names, sizes, and what they take of the error.
 pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
-    let falls = |h: &HeldOut| format!("linearised {:.3} -> {:.3} mm", h.before, h.after);
-    let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes_of(e), falls(&e.places)));
+    let falls = |h: &HeldOut| format!("linearised from {:.3} to {:.3} mm", h.before, h.after);
+    let sizes = |e: &FoundEffect| match e.parameters.len() {
+        ..=FEW_SIZES => sizes_of(e),
+        n if e.parameters.iter().all(|p| clear(p) < 1.0) => {
+            format!("none of its {n} sizes is determined by itself")
+        }
+        _ => size_in_table(&e.parameters),
+    };
+    let named = d.effects.iter().map(|e| format!("{}: {}; {}", e.name, sizes(e), falls(&e.places)));
     let unlisted = shown_unlisted(d).map(|u| {
         format!(
             "unlisted, at {} over {}: {}",
@@ -245,8 +254,18 @@ pub fn channel_told(channel: &str) -> String {
     }
 }
 
-/// What an error depends on, in words before its spelling in formulas; a product or a sum of drivers as it is spelt.
+/// What an error depends on, in words before its spelling in formulas; other products and sums of drivers as they are spelt.
 pub fn driver_told(driver: &str) -> String {
+    let joint = |text: &str, kind: char| text.strip_prefix(kind)?.parse::<usize>().ok();
+    let product = driver.split_once('*').and_then(|(s, q)| Some((joint(s, 's')?, joint(q, 'q')?)));
+    let sum = driver.split_once('+').and_then(|(a, b)| Some((joint(a, 'q')?, joint(b, 'q')?)));
+    match (product, sum) {
+        (Some((s, q)), _) if s == q => {
+            return format!("the angle of joint {q}, with opposite signs by direction of arrival ({driver})");
+        }
+        (_, Some((a, b))) => return format!("the sum of the angles of joints {a} and {b} ({driver})"),
+        _ => {}
+    }
     let (kind, joint) = driver.split_at(driver.find(|c: char| c.is_ascii_digit()).unwrap_or(driver.len()));
     let words = match (kind, joint.parse::<usize>()) {
         ("q", Ok(joint)) => format!("the angle of joint {joint}"),
@@ -341,6 +360,35 @@ pub(crate) fn sizes(c: &CandidateReport) -> String {
     printable(&shown.join(", "))
 }
 
+/// How many times half its interval an amplitude is; below one it is not determined by itself.
+fn clear(p: &ParameterReport) -> f64 {
+    2.0 * (p.value / (p.ci95[1] - p.ci95[0])).abs()
+}
+
+/// The amplitude that the data determine best, for a table, and how many there are beside it.
+pub(crate) fn size_in_table(parameters: &[ParameterReport]) -> String {
+    let half = |p: &ParameterReport| (p.ci95[1] - p.ci95[0]) / 2.0;
+    let best = parameters.iter().max_by(|a, b| clear(a).total_cmp(&clear(b)));
+    let Some(p) = best else { return String::new() };
+    let unit = p.unit.display_symbol();
+    let shown = match clear(p) >= 1.0 {
+        true => format!("{} ± {}", supported(p.unit, p.value, half(p)), supported(p.unit, half(p), half(p))),
+        false => format!("at most {}", supported(p.unit, p.upper_limit95, p.upper_limit95)),
+    };
+    // The last part of its name is what it is; the first is in the row already, but in a group for its joint: `width:2`.
+    let name = p.name.rsplit('.').next().unwrap_or_default();
+    let joint = p
+        .name
+        .split_once(':')
+        .map_or("", |(_, rest)| &rest[..rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len())]);
+    let name = if joint.is_empty() { name.to_owned() } else { format!("{name}:{joint}") };
+    let more = match parameters.len() - 1 {
+        0 => String::new(),
+        n => format!(", {n} more"),
+    };
+    printable(format!("{name} {shown} {unit}").trim_end()) + &more
+}
+
 /// `width 0.052 ± 0.004 deg`. An interval wider than the value is no size: it says how large the value can be at most.
 pub fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
@@ -403,7 +451,7 @@ pub(crate) fn found(e: &FoundEffect) -> String {
         format!("; the next listed explanation, {}, would leave {:.3} mm", r.name, r.places.after)
     });
     printable(&format!(
-        "{}{set}: {}; linearised, each place left out in turn: {:.3} -> {:.3} mm (change {:.3} to {:.3}, 95 \
+        "{}{set}: {}; linearised, each place left out in turn: from {:.3} to {:.3} mm (change {:.3} to {:.3}, 95 \
          %){rival}{contrast}",
         e.name,
         sizes_of(e),
@@ -421,7 +469,10 @@ pub(crate) fn pasted(u: &UnknownReport) -> String {
 
 pub(crate) fn unlisted(u: &UnknownReport) -> String {
     let range = match (u.shape.first(), u.shape.last()) {
-        (Some(from), Some(to)) if u.driver.starts_with('q') => {
+        // An angle that counts with the direction of arrival is an angle.
+        (Some(from), Some(to))
+            if u.driver.rsplit('*').next().is_some_and(|driver| driver.starts_with('q')) =>
+        {
             let deg = |at: f64| at.to_degrees();
             format!(", known for {} from {:.0} to {:.0} deg", u.driver, deg(from.at), deg(to.at))
         }
@@ -443,8 +494,8 @@ pub(crate) fn unlisted(u: &UnknownReport) -> String {
         .as_ref()
         .map_or(String::new(), |e| format!("; as a formula on {}: {}", e.acts_on, e.formula));
     printable(&format!(
-        "unlisted, at {} over {}: linearised, each place left out in turn: {:.3} -> {:.3} mm with its \
-         shape{range}{ripple}{formula}",
+        "unlisted, at {} over {}: linearised, each place left out in turn: from {:.3} to {:.3} mm with \
+         its shape{range}{ripple}{formula}",
         channel_told(&u.channel),
         driver_told(&u.driver),
         u.places.before,
@@ -472,7 +523,8 @@ mod tests {
 
     #[test]
     fn drivers_are_told_in_words_before_their_spelling() {
-        let told = ["q2", "tau3", "s1", "t", "s1*q1", "q1+q2", "temperature", "recording"].map(driver_told);
+        let told =
+            ["q2", "tau3", "s1", "t", "s1*q1", "q1+q2", "s1*q2", "temperature", "recording"].map(driver_told);
         assert_eq!(
             told,
             [
@@ -480,8 +532,9 @@ mod tests {
                 "the gravity torque on joint 3 (tau3)",
                 "the direction in which joint 1 arrived (s1)",
                 "time (t)",
-                "s1*q1",
-                "q1+q2",
+                "the angle of joint 1, with opposite signs by direction of arrival (s1*q1)",
+                "the sum of the angles of joints 1 and 2 (q1+q2)",
+                "s1*q2",
                 "temperature",
                 "recording"
             ]

@@ -47,6 +47,7 @@ mod terminal;
 mod text;
 mod told_warning;
 mod verification;
+mod viewer_text;
 mod write;
 
 pub use campaign::{

@@ -206,10 +206,9 @@ impl Run {
     }
 
     /// What each of the steps adds to the one before.
-    pub(crate) fn step_names(&self) -> Vec<String> {
+    pub(crate) fn step_effects(&self) -> Vec<Vec<String>> {
         let before = std::iter::once(0).chain(self.steps.iter().map(|step| step.effects.len()));
-        let added =
-            |(step, before): (&Refit, usize)| step.effects[before.min(step.effects.len())..].join(" + ");
+        let added = |(step, before): (&Refit, usize)| step.effects[before.min(step.effects.len())..].to_vec();
         self.steps.iter().zip(before).map(added).collect()
     }
 

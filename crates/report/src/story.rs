@@ -76,11 +76,18 @@ impl Story {
         }
     }
 
-    /// All of it, a sentence an entry, what a reader needs first first.
+    /// What a reader needs, a sentence an entry, the first first: as much as the terminal prints last, which is what a panel
+    /// shows without being scrolled.
     pub fn lines(&self) -> Vec<String> {
         let label = if self.missing.is_empty() { "" } else { "found: " };
-        let found = self.found.iter().map(|f| format!("{label}{f}"));
-        let next = self.next.iter().map(|n| format!("next: {n}"));
+        let shown = |entries: &[String], label: &str, tab: &str| {
+            let more = entries.len().saturating_sub(SHOWN);
+            let first = entries.iter().take(SHOWN).map(|entry| format!("{label}{entry}"));
+            let rest = (more > 0).then(|| format!("{label}and {more} more, on the tab {tab}"));
+            first.chain(rest).collect::<Vec<_>>()
+        };
+        let (next, found) =
+            (shown(&self.next, "next: ", "Missing"), shown(&self.found_briefly, label, "Numbers"));
         let status = format!("Status: {}", self.status_sentence());
         let head =
             [self.missing.clone(), self.calibration.clone()].into_iter().filter(|line| !line.is_empty());

@@ -92,6 +92,22 @@ pub(crate) fn estimate_shown(e: &Estimate) -> [String; 4] {
     [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half].map(shown)
 }
 
+/// An SI value in the unit shown to people, with the digits that half the width of its interval supports: two of its own.
+pub(crate) fn supported(unit: Unit, si: f64, half_si: f64) -> String {
+    let (shown, exponent) = (unit.to_display(si), unit.to_display(half_si).abs().log10().floor());
+    // Below five places, and where there is no interval, the usual way.
+    if !(shown.is_finite() && exponent.is_finite() && exponent >= -4.0) {
+        return in_display_unit(unit, si);
+    }
+    let places = usize::try_from(1 - exponent as i64).unwrap_or(0);
+    let text = format!("{shown:.places$}");
+    // Minus nothing is nothing.
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| c == '0' || c == '.') => digits.to_owned(),
+        _ => text,
+    }
+}
+
 /// What is to be known of an estimate beside its numbers.
 pub(crate) fn remark(e: &Estimate) -> &'static str {
     match (e.determined, e.at_bound) {
@@ -130,6 +146,16 @@ mod tests {
         assert_eq!(change(&side(3, 0.001, 0.001)), "stays at 1.00 mm");
         assert_eq!(change(&side(3, 0.0, 0.001)), "rises from 0.00 to 1.00 mm");
         assert_eq!(change(&side(3, f64::NAN, 0.001)), "is not a number");
+    }
+
+    #[test]
+    fn numbers_have_the_digits_that_their_interval_supports() {
+        let mm = |si, half| [supported(Unit::Metre, si, half), supported(Unit::Metre, half, half)];
+        assert_eq!(mm(0.074_074, 0.000_588), ["74.07", "0.59"]);
+        assert_eq!(mm(0.074_074, 0.0123), ["74", "12"]);
+        assert_eq!(mm(-1e-6, 0.000_588), ["0.00", "0.59"]);
+        assert_eq!(mm(0.5, f64::NAN), ["500.0000", "-"]);
+        assert_eq!(mm(0.5, 1e-9), ["500.0000", "1.0e-6"]);
     }
 
     #[test]

@@ -9,6 +9,9 @@ use crate::run::Run;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 
+/// Which way every arrow of an error points, here, on the map of the boards and on the page.
+pub(super) const POINTS: &str = "from where the model puts the tip to where it was";
+
 pub(super) const INK: Rgba = [0.25, 0.25, 0.25, 1.0];
 
 /// Longest arrow worth drawing beside an arm [m]; the 95th percentile of a set is kept below.
@@ -54,7 +57,7 @@ pub(super) fn put(run: &Run, recording: usize, own: &[&Point], drawing: &Drawing
         entity.metadata.push(note("exaggeration", factor));
         entity.arrows.extend(own.iter().filter_map(|p| {
             let (measured_m, error_m) = error(p);
-            arrow(&measured_m, &(-error_m * factor), THICKNESS_M, drawing.ramp(error_m.norm()))
+            arrow(&measured_m, &(error_m * factor), THICKNESS_M, drawing.ramp(error_m.norm()))
         }));
         out.put(topic, time_ns, &fox::SceneUpdate { deletions: vec![all(time_ns)], entities: vec![entity] });
     }
@@ -95,10 +98,9 @@ impl Drawing {
     /// The scale in words, above everything; short lines, because a panel cuts what is wider.
     pub fn legend(&self, time_ns: i64) -> Option<fox::SceneEntity> {
         let words = format!(
-            "arrows from the measured tip to the predicted one:\n\
-             nominal errors x {}, calibrated errors x {}\n\
-             green {} mm, red {} mm and more\n\
-             blue spheres: held out",
+            "errors {POINTS}\n\
+             nominal x {}, calibrated x {}\n\
+             green {} mm, red {} mm and more",
             self.nominal_factor,
             self.fitted_factor,
             crate::text::millimetres(self.small_m),
@@ -119,6 +121,14 @@ pub(super) fn ramp(small_m: f64, large_m: f64, error_m: f64) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn arrows_point_one_way_here_on_the_page_and_in_the_guide() {
+        let page = include_str!("../page/assets/where.js");
+        let guide =
+            include_str!("../../../../docs/foxglove.md").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(page.contains(POINTS) && guide.contains(POINTS));
+    }
 
     #[test]
     fn colours_go_from_green_to_red() {

@@ -39,7 +39,7 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
     let Some(first) = findings.boards.first() else { return };
     let time_ns = run_start_ns(run);
     let grid = grid(findings);
-    let (middle_m, [width_m, height_m]) = grid.middle_and_size_m();
+    let (_, [width_m, height_m]) = grid.middle_and_size_m();
     let titles: Vec<String> =
         findings.boards.iter().flat_map(|b| rows(b).into_iter().map(|v| title(b, &v))).collect();
     let scale = Scale::of(run, findings, width_m.max(PANEL * height_m), (&titles, &grid));
@@ -50,16 +50,14 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
             entities.push(map(
                 board,
                 &vectors,
-                &grid.centre_m(index, row),
-                grid.cell_m.y / 2.0,
+                (&grid.centre_m(index, row), &grid.title_m(index, row)),
                 &scale,
                 time_ns,
             ));
         }
     }
     let mut legend = entity("scale", time_ns);
-    let at_m = Vector3::new(middle_m[0], (grid.cell_m.y + grid.gap_m) / 2.0, 0.0);
-    legend.texts.push(text(&at_m, scale.text_m, INK, words));
+    legend.texts.push(text(&grid.legend_m(), scale.text_m, INK, words));
     entities.push(legend);
     for entity in &mut entities {
         entity.frame_id = FRAME.into();
@@ -77,7 +75,7 @@ fn grid(findings: &Findings) -> Grid {
     Grid::of(findings.boards.len(), each, extent_m(findings))
 }
 
-/// Width and height that one board and its arrows take [m]; the largest few arrows may reach into the gap.
+/// Width and height that one board and its arrows take [m]; the largest few arrows may reach beyond.
 fn extent_m(findings: &Findings) -> Vector2<f64> {
     let half_mm = |place: fn(&BoardErrors) -> &[f64], error: for<'b> fn(&Vectors<'b>) -> &'b [f64]| {
         let mut most: f64 = 0.0;
@@ -116,8 +114,7 @@ fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
 fn map(
     board: &BoardErrors,
     v: &Vectors,
-    centre_m: &Vector3<f64>,
-    half_height_m: f64,
+    (centre_m, title_m): (&Vector3<f64>, &Vector3<f64>),
     scale: &Scale,
     time_ns: i64,
 ) -> fox::SceneEntity {
@@ -141,8 +138,7 @@ fn map(
             ramp(scale.small_m, scale.large_m, error_m),
         ));
     }
-    let title_m = centre_m + Vector3::new(0.0, half_height_m - scale.text_m, 0.0);
-    map.texts.push(text(&title_m, scale.text_m, INK, title(board, v)));
+    map.texts.push(text(title_m, scale.text_m, INK, title(board, v)));
     map
 }
 

@@ -18,7 +18,7 @@ use super::shapes::{Rgba, arrow, entity, label, note};
 use super::{Messages, ResultMessage, closed_arms, closed_story, facts, log};
 use crate::closed_chain::ClosedRun;
 use crate::findings::round_factor;
-use crate::text::conclusion_about;
+use crate::text::{conclusion_about, printable};
 use armcal_core::Dwell;
 use armcal_core::robust::percentile;
 use foxglove::messages as fox;
@@ -73,7 +73,12 @@ pub(crate) fn closed_messages(run: &ClosedRun) -> Vec<ResultMessage> {
 /// How much the arrows are exaggerated.
 fn scale(run: &ClosedRun, factor: f64) -> fox::SceneUpdate {
     let mut scale = entity("scale", run.start_ns());
-    let words = format!("arrow: closing error x {factor}");
+    let [first, second] = run.chain.arms();
+    let words = format!(
+        "arrow: closing error x {factor}, from where {} puts\nthe joined point to where {} puts it",
+        printable(&second.name),
+        printable(&first.name)
+    );
     scale.texts.extend(closed_arms::closed_places_m(run).last().map(|m| label(m, INK, words)));
     fox::SceneUpdate { deletions: Vec::new(), entities: vec![scale] }
 }
@@ -93,7 +98,7 @@ fn put_error(run: &ClosedRun, recording: &str, dwell: &Dwell, factor: f64, out: 
         (message.measured_m, message.predicted_m) =
             (Some(facts::vector(&measured_m)), Some(facts::vector(&predicted_m)));
         out.put("/armcal/residuals", time_ns, &message);
-        drawn.arrows.extend(arrow(&measured_m, &(-r.fitted_m * factor), 0.0015, ARROW));
+        drawn.arrows.extend(arrow(&measured_m, &(r.fitted_m * factor), 0.0015, ARROW));
     }
     let update = fox::SceneUpdate { deletions: vec![all(time_ns)], entities: vec![drawn] };
     out.put("/armcal/arrows_calibrated", time_ns, &update);

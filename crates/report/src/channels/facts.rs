@@ -5,7 +5,7 @@ use crate::points::Point;
 use crate::proto;
 use crate::recording_names::RecordingNames;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
-use crate::text::{conclusion, estimate_shown, remark};
+use crate::text::{conclusion, remark, supported};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
@@ -186,10 +186,13 @@ fn parameter(e: &Estimate) -> proto::Parameter {
     }
 }
 
-/// The free parameters of a fit as people read them.
+/// The free parameters of a fit as people read them, in the order in which they tell something, because a viewer shows ten rows
+/// at a time: those that the data determine before the others, and the most changed first, counted in standard deviations.
 pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -> proto::ParameterTable {
     let row = |e: &Estimate| {
-        let [nominal, calibrated, change, half] = estimate_shown(e);
+        let (p, half) = (&e.parameter, (e.ci95[1] - e.ci95[0]) / 2.0);
+        let [nominal, calibrated, change, half] =
+            [p.nominal, e.value, e.value - p.nominal, half].map(|si| supported(p.unit, si, half));
         proto::ParameterRow {
             parameter: names.label(&e.parameter.name),
             nominal,
@@ -201,8 +204,13 @@ pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -
             meaning: e.parameter.meaning.clone(),
         }
     };
-    let free = fit.estimates.iter().filter(|e| e.parameter.free);
-    proto::ParameterTable { timestamp: time(time_ns), rows: free.map(row).collect() }
+    let changed = |e: &Estimate| {
+        let sigmas = ((e.value - e.parameter.nominal) / e.sigma).abs();
+        if sigmas.is_finite() { sigmas } else { 0.0 }
+    };
+    let mut free: Vec<&Estimate> = fit.estimates.iter().filter(|e| e.parameter.free).collect();
+    free.sort_by(|a, b| b.determined.cmp(&a.determined).then(changed(b).total_cmp(&changed(a))));
+    proto::ParameterTable { timestamp: time(time_ns), rows: free.into_iter().map(row).collect() }
 }
 
 /// The calibration of the pipeline of this name, and what it comes to in a sentence.

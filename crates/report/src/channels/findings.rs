@@ -6,6 +6,7 @@ use crate::findings::Findings;
 use crate::run::Run;
 use crate::story::Story;
 use crate::told_warning::ToldWarning;
+use crate::viewer_text::for_viewer;
 
 pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
@@ -41,8 +42,10 @@ pub(super) fn story(s: &Story, time_ns: i64) -> crate::proto::Story {
     crate::proto::Story {
         timestamp: time(time_ns),
         lamp: s.lamp.into(),
-        lines: s.lines(),
-        warnings: s.warnings.iter().map(ToldWarning::line).collect(),
+        lines: for_viewer(s.lines()),
+        warnings: for_viewer(s.warnings.iter().map(ToldWarning::line)),
+        next: for_viewer(s.next.iter().cloned()),
+        found: for_viewer(s.found.iter().cloned()),
     }
 }
 

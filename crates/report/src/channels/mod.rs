@@ -63,7 +63,9 @@ pub(crate) use scene::places_m;
 use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::{RecordingRun, Run};
+use armcal_core::Dwell;
 use armcal_dwell::ClockAlignment;
+use armcal_recording::RecordingReport;
 use foxglove::messages::Timestamp;
 use foxglove::{Encode, Schema};
 
@@ -114,8 +116,13 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
 /// When a recording begins [ns]: its first message or dwell, so that a viewer that opens the file has at once what is
 /// true of all of it.
 pub(crate) fn start_ns(recording: &RecordingRun) -> i64 {
-    let messages = recording.report.channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns);
-    recording.dwells.iter().map(|d| d.start_ns).chain(messages).min().unwrap_or(0)
+    first_ns(&recording.report, &recording.dwells).unwrap_or(0)
+}
+
+/// The same of what was read and found of any recording; none where it is empty.
+pub(crate) fn first_ns(report: &RecordingReport, dwells: &[Dwell]) -> Option<i64> {
+    let messages = report.channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns);
+    dwells.iter().map(|d| d.start_ns).chain(messages).min()
 }
 
 /// When the first recording begins [ns].

@@ -11,6 +11,7 @@ mod terminal;
 pub use files::{CLOSED_SCHEMA, closed_files, closed_summary_json, write_closed};
 pub use terminal::closed_terminal;
 
+use crate::channels::first_ns;
 use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
 use armcal_calibrate::{Calibration, ClosedChain, ClosedObservation};
@@ -82,9 +83,9 @@ impl ClosedRun {
         if arm == 0 { &joint_rad[..first] } else { &joint_rad[first..] }
     }
 
-    /// When the first dwell begins [ns].
+    /// When the first recording begins [ns]: a viewer opens the file there, and draws nothing that comes later.
     pub(crate) fn start_ns(&self) -> i64 {
-        self.recordings.iter().flat_map(|r| &r.dwells).map(|d| d.start_ns).min().unwrap_or(0)
+        self.recordings.iter().filter_map(|r| first_ns(&r.report, &r.dwells)).min().unwrap_or(0)
     }
 
     /// When the last dwell ends [ns].

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// shows all boards.
 const REACH: f64 = 1.5;
 /// Or this share of the board, where cavities are so close that arrows would be dots beside it.
-const ACROSS: f64 = 0.12;
+const ACROSS: f64 = 0.2;
 
 pub(super) fn board_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<BoardErrors> {
     let magnification = magnification(run, points);
@@ -67,11 +67,15 @@ fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnificatio
     m
 }
 
-/// The largest round factor at which the 95th percentile of the calibrated errors stays within [`REACH`] of the
-/// distance between neighbouring cavities or [`ACROSS`] of the board.
+/// The largest round factor at which the 95th percentile of the calibrated errors along the board, which is what is drawn,
+/// stays within [`REACH`] of the distance between neighbouring cavities or [`ACROSS`] of the board.
 fn magnification(run: &Run, points: &[Point]) -> f64 {
-    let errors_m: Vec<f64> =
-        points.iter().filter(|p| drawable(p)).map(|p| p.residual.fitted_m.norm()).collect();
+    let fitted = run.calibration.fit.values();
+    let along_m = |p: &Point| {
+        let board = run.model.board_in_world(&fitted, p.observation.dwell.recording)?;
+        Some((board.rotation.inverse() * p.residual.fitted_m).xy().norm())
+    };
+    let errors_m: Vec<f64> = points.iter().filter(|p| drawable(p)).filter_map(along_m).collect();
     let cavities = run.board.iter().flat_map(|b| &b.cavities);
     let places: Vec<Vector3<f64>> = cavities.map(|c| c.in_board_m).collect();
     let nearest = |i: usize| {

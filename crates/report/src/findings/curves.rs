@@ -11,11 +11,13 @@ const BAND: f64 = 1.96;
 /// The shape over its driver in the units that people read.
 pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
     let (driver_unit, driver_symbol) = driver_unit(&u.driver, chain);
+    let (factor, unit) = value_unit(&u.channel, u.unit);
+    let shown = |si: f64| factor * u.unit.to_display(si);
     let mut m = ErrorCurve {
         timestamp: None,
         channel: u.channel.clone(),
         driver: u.driver.clone(),
-        unit: u.unit.display_symbol().into(),
+        unit: unit.into(),
         driver_unit: driver_symbol.into(),
         formula: u.expression.as_ref().map(|e| e.formula.clone()).unwrap_or_default(),
         ..Default::default()
@@ -23,11 +25,20 @@ pub(crate) fn error_curve(u: &UnknownReport, chain: &Chain) -> ErrorCurve {
     let points = u.shape.iter().filter(|p| [p.at, p.value, p.sigma].iter().all(|x| x.is_finite()));
     for p in points {
         m.at.push(driver_unit.to_display(p.at));
-        m.value.push(u.unit.to_display(p.value));
-        m.low.push(u.unit.to_display(p.value - BAND * p.sigma));
-        m.high.push(u.unit.to_display(p.value + BAND * p.sigma));
+        m.value.push(shown(p.value));
+        m.low.push(shown(p.value - BAND * p.sigma));
+        m.high.push(shown(p.value + BAND * p.sigma));
     }
     m
+}
+
+/// Factor and symbol of an error that enters there. Shares of lengths are thousandths at most, and axes of viewers have three
+/// decimals.
+fn value_unit(channel: &str, unit: Unit) -> (f64, &'static str) {
+    match channel {
+        "lengths" if unit == Unit::One => (1e6, "ppm"),
+        _ => (1.0, unit.display_symbol()),
+    }
 }
 
 /// Unit of a driver as formulas name it: `q2`, `q2+q3`, `s1*q1`, `tau1`, `t`, `temperature`, `load`, `s1`, `recording`.
@@ -53,6 +64,12 @@ mod tests {
     use super::*;
 
     const ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
+
+    #[test]
+    fn shares_of_lengths_are_shown_in_millionths() {
+        assert_eq!(value_unit("lengths", Unit::One), (1e6, "ppm"));
+        assert_eq!(value_unit("joint1", Unit::Radian), (1.0, "deg"));
+    }
 
     #[test]
     fn angles_are_shown_in_degrees_and_directions_as_they_are() {

@@ -1,10 +1,12 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
-use super::{finite, or_zero, short};
-use crate::diagnosis_text::{headline, sizes, sizes_of};
+use super::{error_curve, finite, or_zero, short, shown_unlisted, steps};
+use crate::diagnosis_text::{channel_told, driver_told, headline, size_in_table, sizes, sizes_of};
 use crate::proto;
 use crate::run::{Answer, Run};
-use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect};
+use crate::text::printable;
+use crate::viewer_text::for_viewer;
+use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, UnknownReport};
 
 pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
     let names = run.recording_names();
@@ -27,13 +29,13 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         p_adjusted: finite(d.p_adjusted),
         p_nothing: or_zero(d.p_nothing),
         effects: d.effects.iter().map(found).collect(),
-        record_next: d.record_next.iter().map(|r| run.in_words(r)).collect(),
+        record_next: for_viewer(d.record_next.iter().map(|r| run.in_words(r))),
         not_testable: not_testable.collect(),
-        told: d
-            .explanations
-            .iter()
-            .map(|e| format!("{}: {}", names.number_label(&e.number), run.in_words(&e.sentence)))
-            .collect(),
+        told: for_viewer(
+            d.explanations
+                .iter()
+                .map(|e| format!("{}: {}", names.number_label(&e.number), run.in_words(&e.sentence))),
+        ),
         explanations: explanations.collect(),
         cannot_tell_apart: (d.cannot_tell_apart.iter())
             .map(|[a, b]| format!("{} and {}", names.label(a), names.label(b)))
@@ -91,7 +93,7 @@ pub(super) fn table(run: &Run, d: &Diagnosis) -> proto::EffectTable {
         left_out_mm: c.holdout_mm.map_or_else(String::new, |h| fall(h.before, h.after)),
         probability: probability(c.probability),
         r#where: run.in_words(&c.target),
-        size: sizes(c),
+        size: size_in_table(&c.parameters),
         name: names.label(&c.spec),
     });
     let found = d.effects.iter().map(|e| proto::EffectRow {
@@ -104,10 +106,27 @@ pub(super) fn table(run: &Run, d: &Diagnosis) -> proto::EffectTable {
             .find(|c| c.spec == e.name)
             .map(|c| run.in_words(&c.target))
             .unwrap_or_default(),
-        size: sizes_of(e),
+        size: size_in_table(&e.parameters),
         name: e.set.iter().map(|name| names.label(name)).collect::<Vec<_>>().join(" or "),
     });
+    let found = found.chain(shown_unlisted(d).map(|u| unlisted(run, u)));
     proto::EffectTable { timestamp: None, found: found.collect(), candidates: candidates.collect() }
+}
+
+/// An error without a name: what it depends on, and how far its shape goes.
+fn unlisted(run: &Run, u: &UnknownReport) -> proto::EffectRow {
+    let curve = error_curve(u, run.model.chain());
+    let most = curve.value.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    proto::EffectRow {
+        effect: "not listed".into(),
+        left_out_mm: fall(u.places.before, u.places.after),
+        probability: probability(u.probability),
+        r#where: printable(&format!("{}, over {}", channel_told(&u.channel), driver_told(&u.driver))),
+        size: format!("up to {} {}", short(most), curve.unit).trim_end().to_owned(),
+        name: u
+            .effect()
+            .map_or_else(String::new, |effect| steps::told(&run.recording_names(), &[effect.to_string()])),
+    }
 }
 
 /// The kinds of effects, each once: the names of a group are wider than a panel.
@@ -129,7 +148,7 @@ fn kinds<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
 
 fn fall(before_mm: f64, after_mm: f64) -> String {
     match before_mm.is_finite() && after_mm.is_finite() {
-        true => format!("{before_mm:.3} -> {after_mm:.3}"),
+        true => format!("{before_mm:.3} to {after_mm:.3}"),
         false => String::new(),
     }
 }

@@ -18,6 +18,7 @@ pub(crate) use joints::{feels_gravity, moves_tip, torques_nm};
 use crate::points::Point;
 use crate::proto;
 use crate::run::{Run, Undiagnosed};
+use crate::story::Story;
 use armcal_diagnose::{Diagnosis, UnknownReport, Verdict};
 
 /// What is less probable than this is not drawn as if it were there.
@@ -41,6 +42,9 @@ pub(crate) struct Findings {
     pub effects: proto::EffectTable,
     /// What no name explains, unless that anything does not have one is improbable.
     pub curves: Vec<proto::ErrorCurve>,
+    /// Steps of what to do next, and entries of what was found, in words.
+    pub next: usize,
+    pub told_found: usize,
     /// What the data are like.
     pub quality: proto::Quality,
 }
@@ -49,6 +53,7 @@ impl Findings {
     /// Works everything out. `points` are those of the run.
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
+        let story = Story::of(run);
         Findings {
             joints: joints::joint_errors(run, points, &in_time),
             feels_gravity: feels_gravity(&torques_nm(run)),
@@ -62,6 +67,8 @@ impl Findings {
             },
             effects: run.diagnosis.as_ref().map(|d| diagnosis::table(run, d)).unwrap_or_default(),
             curves: unlisted_curves(run),
+            next: story.next.len(),
+            told_found: story.found.len(),
             quality: quality::quality(run),
         }
     }

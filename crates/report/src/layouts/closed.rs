@@ -17,9 +17,9 @@ pub(super) fn content(run: &ClosedRun) -> Content {
 }
 
 fn overview(run: &ClosedRun) -> Content {
-    let mut right = vec![(1.0, lamp()), (2.2, raw("What came out", "/armcal/story.lines"))];
+    let mut right = vec![(1.0, lamp()), (3.2, raw("What came out", "/armcal/story.lines"))];
     if !run.observations.is_empty() {
-        right.extend(closing_over_recorded_time().into_iter().map(|plot| (2.5, plot)));
+        right.extend(closing_over_recorded_time().into_iter().map(|plot| (2.2, plot)));
     }
     let title = "Nominal arms grey, calibrated arms green; arrow: closing error";
     let scene = Content::panel(title, Kind::View(both_arms(run)));

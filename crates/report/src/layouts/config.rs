@@ -67,7 +67,8 @@ fn view_config(view: &View) -> Value {
             }),
             // Axes of a metre otherwise.
             "/armcal/tip_measured" => json!({ "visible": visible, "axisScale": 0.03 }),
-            _ => json!({ "visible": visible }),
+            // Otherwise the black edges of a small arrow hide its colour.
+            _ => json!({ "visible": visible, "showOutlines": false }),
         };
         ((*topic).to_owned(), settings)
     };

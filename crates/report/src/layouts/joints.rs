@@ -86,24 +86,27 @@ fn joint_plot(
     let arrivals =
         [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
-    let dots_of = |(k, (field, _, label, colour)): (usize, (&str, i32, &str, Colour))| {
-        let label =
-            if k == 0 && matches!(what, What::Error) { format!("arrived {label}") } else { label.to_owned() };
+    let dots_of = |(field, _, label, colour): (&str, i32, &str, Colour)| {
         dots(path(&format!("{field}{}", what.suffix())), label, colour)
     };
+    let outside =
+        |[least, most]: [f64; 2]| what.whole(m).iter().filter(|e| **e < least || **e > most).count();
     let plot = Plot {
         x_path: path(x),
         x_label: format!("{x_name} [{x_unit}]"),
-        y_label: format!("implied error [{}]", m.unit),
+        y_label: format!("error [{}]", m.unit),
         y_range,
-        series: seen.enumerate().map(dots_of).collect(),
+        beyond: y_range.map_or(0, outside),
+        series: seen.map(dots_of).collect(),
     };
     Content::plot(title, plot)
 }
 
 /// The joints the effects found act on most, each with what they do and what is left. Sizes are counted in the standard
 /// deviations of the dwells, so that joints which hardly move the tip do not lead.
-pub(super) fn what_effects_do(f: &Findings) -> Option<Content> {
+/// A joint alone is drawn over its angle and over its torque; two have room for one of them, which is the torque where the
+/// effects are `of_load`.
+pub(super) fn what_effects_do(f: &Findings, of_load: bool) -> Option<Content> {
     let size = |m: &JointErrors, what: What| {
         let sigmas: Vec<f64> = what.whole(m).iter().zip(&m.sigma).map(|(e, s)| (e / s).abs()).collect();
         percentile(&sigmas, 0.9)
@@ -114,12 +117,17 @@ pub(super) fn what_effects_do(f: &Findings) -> Option<Content> {
         .filter(|m| effect(m) >= MOVED * largest && effect(m) > ABOVE_REST * size(m, What::After))
         .collect();
     moved.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
-    let column = |m: &JointErrors| {
-        let mut column = vec![over_angle(f, m, What::Effect)];
-        column.extend(over_torque(f, m, What::Effect));
-        column.push(over_angle(f, m, What::After));
-        Content::even(Direction::Column, column)
-    };
     moved.truncate(SHOWN);
+    let alone = moved.len() == 1;
+    let column = |m: &JointErrors| {
+        let (angle, torque) = (over_angle(f, m, What::Effect), over_torque(f, m, What::Effect));
+        let effects = match torque {
+            Some(torque) if alone => vec![angle, torque],
+            Some(torque) if of_load => vec![torque],
+            _ => vec![angle],
+        };
+        let rest = over_angle(f, m, What::After);
+        Content::even(Direction::Column, effects.into_iter().chain([rest]).collect())
+    };
     (!moved.is_empty()).then(|| Content::even(Direction::Row, moved.into_iter().map(column).collect()))
 }

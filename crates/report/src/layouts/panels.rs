@@ -28,7 +28,7 @@ pub(super) fn lamp() -> Content {
         ("identified", BLUE, "ok: the missing effect has a name"),
         ("ambiguous", ORANGE, "ok: an effect is missing, several names fit"),
         ("unknown", ORANGE, "ok: an effect is missing that is not listed"),
-        ("not_diagnosed", GREY, "what is missing was not looked for"),
+        ("not_diagnosed", BLUE, "ok: what is missing was not looked for"),
     ];
     Content::panel("Status", Kind::Indicator("/armcal/story.lamp".into(), rules))
 }
@@ -49,40 +49,27 @@ pub(super) fn dots(path: impl Into<String>, label: impl Into<String>, colour: Co
     Series { line: false, ..line(path, label, colour) }
 }
 
-/// The mean error after each step, without the nominal one, which would hide the others; none where nothing was added.
-pub(super) fn falling_error(f: &Findings) -> Option<Content> {
-    let path = |field: &str| format!("/armcal/steps.steps[1:].{field}");
-    let series = vec![
-        line(path("mean_mm"), "mean", ORANGE),
-        line(f.steps.noise_floor_mm.to_string(), "noise floor", PURPLE),
-    ];
-    let added = f.steps.steps.get(2..).filter(|added| !added.is_empty())?;
-    let shown =
-        added.iter().map(|step| step.mean_mm).chain([f.steps.steps[1].mean_mm, f.steps.noise_floor_mm]);
-    let plot = Plot {
-        x_path: path("number"),
-        x_label: "1: calibrated; then one effect more each".into(),
-        y_label: "error [mm]".into(),
-        y_range: Some([0.0, 1.1 * shown.fold(1e-6, f64::max)]),
-        series,
-    };
-    let title = if f.steps.held_out { "Held-out error, step by step" } else { "Error, step by step" };
-    Some(Content::plot(title, plot))
-}
-
-/// Without the gaps between recordings; the nominal errors dwarf the others, so they are shown only where asked for.
-pub(super) fn over_recorded_time(f: &Findings, nominal: bool) -> Content {
+/// Without the gaps between recordings; without the nominal errors, which dwarf the others.
+pub(super) fn over_recorded_time(f: &Findings) -> Content {
     let path = |field: &str| format!("/armcal/course.{field}[:]");
-    let mut series = Vec::new();
-    if nominal {
-        series.push(dots(path("nominal_mm"), "nominal", GREY));
-    }
-    series.push(dots(path("fitted_mm"), "calibrated", ORANGE));
+    let mut series = vec![dots(path("fitted_mm"), "calibrated", ORANGE)];
     if !f.course.after_mm.is_empty() {
         series.push(dots(path("after_mm"), "with effects", GREEN));
     }
     series.push(dots(path("expected_mm"), "noise", PURPLE));
     Content::plot("Error", course(path("time_min"), series))
+}
+
+/// Those of the nominal model, on a scale of their own.
+pub(super) fn nominal_over_recorded_time() -> Content {
+    let path = |field: &str| format!("/armcal/course.{field}[:]");
+    Content::plot("Nominal error", course(path("time_min"), vec![dots(path("nominal_mm"), "nominal", GREY)]))
+}
+
+/// The falling error, from the nominal model to the one with everything found. A table, and on the first tab: Lichtblick loads its
+/// tables when the first one is shown, and one that is first seen on another tab waits for a message that has long been there.
+pub(super) fn steps() -> Content {
+    table("Error, step by step", "/armcal/steps.steps")
 }
 
 /// Errors away from the base: growing lengths climb through zero.
@@ -109,7 +96,7 @@ pub(super) fn closing_over_recorded_time() -> Vec<Content> {
 
 fn course(x_path: String, series: Vec<Series>) -> Plot {
     let (x_label, y_label) = ("recorded time [min]".into(), "error [mm]".into());
-    Plot { x_path, x_label, y_label, y_range: None, series }
+    Plot { x_path, x_label, y_label, y_range: None, beyond: 0, series }
 }
 
 /// An error without a name and its band.
@@ -126,6 +113,7 @@ pub(super) fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
         x_label: format!("{}{}", printable(&driver_told(&curve.driver)), unit(&curve.driver_unit)),
         y_label: format!("error{}", unit(&curve.unit)),
         y_range: None,
+        beyond: 0,
         series,
     };
     Content::plot(&format!("Unlisted, {}", printable(&channel_told(&curve.channel))), plot)

@@ -11,7 +11,7 @@ const BLUNT: f64 = 2.5;
 const MOST: f64 = 0.95;
 const MOST_OF_EFFECTS: f64 = 0.98;
 /// How much further it goes.
-const ROOM: f64 = 1.3;
+const ROOM: f64 = 1.1;
 
 /// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
 /// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
@@ -32,9 +32,11 @@ pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2
     (large > 0.0).then_some([-large, large])
 }
 
-/// The next number that an axis ends in without a crowd at its end.
+/// The next number that an axis may end in: of these, the viewers' steps (1, 2 or 5 and powers of ten, at most ten of them) meet
+/// zero and both ends, also where every second is left out for want of room. From -0.06 they would go -0.06, -0.05, 0, and
+/// from -0.1 there would be -0.1, -0.06, -0.02, 0.02.
 fn nice_up(value: f64) -> f64 {
-    const ENDS: [&str; 9] = ["1", "1.5", "2", "3", "4", "5", "6", "8", "10"];
+    const ENDS: [&str; 4] = ["2", "4", "8", "20"];
     let exponent = value.log10().floor();
     if !exponent.is_finite() {
         return value;
@@ -52,7 +54,27 @@ mod tests {
     fn an_axis_ends_in_a_round_number_above_the_data() {
         assert_eq!(
             [0.12, 0.18, 2.0, 2.1, 9e-7, 81.0, 0.0].map(nice_up),
-            [0.15, 0.2, 2.0, 3.0, 1e-6, 100.0, 0.0]
+            [0.2, 0.2, 2.0, 4.0, 2e-6, 200.0, 0.0]
         );
+    }
+
+    #[test]
+    fn steps_of_the_viewers_meet_zero_and_the_ends() {
+        for end in [0.2, 0.4, 0.8] {
+            // Chart.js: the range by how many steps have room, up to the next of 1, 2, 5, 10. Four rows of plots on a laptop have
+            // room for eight.
+            for room in 8..=10 {
+                let rough: f64 = 2.0 * end / f64::from(room);
+                let power = 10_f64.powf(rough.log10().floor());
+                let step =
+                    [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9));
+                let steps = end / step.expect("10 is enough");
+                assert!((steps - steps.round()).abs() < 1e-9, "{end}, {room}: {step:?}");
+                assert!(
+                    (steps.round() as u32).is_multiple_of(2),
+                    "{end}, {room}: every second step leaves zero out"
+                );
+            }
+        }
     }
 }

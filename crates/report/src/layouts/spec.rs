@@ -47,6 +47,8 @@ pub(super) struct Plot {
     pub y_label: String,
     /// Where panels are compared: their common range. Otherwise that of the data.
     pub y_range: Option<[f64; 2]>,
+    /// How many points lie outside of it.
+    pub beyond: usize,
     pub series: Vec<Series>,
 }
 
@@ -84,12 +86,17 @@ impl Content {
         Content::Panel(Panel { title: title.into(), kind })
     }
 
-    /// A plot; its title says which colour is what, because a legend lies over the data or takes their place.
+    /// A plot; its title says which colour is what, because a legend lies over the data or takes their place, and what is not
+    /// in the picture.
     pub fn plot(title: &str, plot: Plot) -> Content {
         let mut named: Vec<String> =
             plot.series.iter().map(|s| format!("{} {}", s.label, s.colour.name)).collect();
         named.dedup();
-        let title = if named.len() > 1 { format!("{title}: {}", named.join(", ")) } else { title.to_owned() };
+        let mut title =
+            if named.len() > 1 { format!("{title}: {}", named.join(", ")) } else { title.to_owned() };
+        if plot.beyond > 0 {
+            title += &format!("; {} beyond", plot.beyond);
+        }
         Content::panel(title, Kind::Plot(plot))
     }
 

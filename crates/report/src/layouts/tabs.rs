@@ -1,7 +1,9 @@
 //! What is shown where: what came out, where it fails, what is missing, whether the data can be trusted.
 
 use super::joints::{What, drawn, over_angle, over_torque, what_effects_do};
-use super::panels::{curve_plot, falling_error, lamp, outward, over_recorded_time, raw, table};
+use super::panels::{
+    curve_plot, lamp, nominal_over_recorded_time, outward, over_recorded_time, raw, steps, table,
+};
 use super::spec::{Content, Direction, Kind};
 use super::views::{map, world};
 use crate::findings::Findings;
@@ -12,42 +14,50 @@ use armcal_calibrate::Calibration;
 
 /// Joints of which angle and torque fit side by side in one tab; with more, each has a tab of its own.
 const FEW: usize = 3;
+/// Unlisted errors that are drawn beside the answer; more have a tab of their own, and the first is drawn there too.
+const CURVES: usize = 2;
 
 pub(super) fn content(run: &Run, points: &[Point], f: &Findings) -> Content {
     let mut tabs = vec![("Overview", overview(run, points, f)), ("Where it fails", where_it_fails(f))];
     tabs.extend(over_torques(f).map(|panels| ("Over torque", panels)));
     if f.diagnosis.as_ref().is_some_and(|(d, c)| !d.effects.is_empty() || !c.candidates.is_empty()) {
-        tabs.push(("What is missing", what_is_missing(f)));
+        tabs.push(("Missing", what_is_missing(f)));
     }
-    let curves = (1..).zip(&f.curves).map(|(number, curve)| curve_plot(number, curve));
-    tabs.extend(grid(curves.collect()).map(|panels| ("Unlisted errors", panels)));
+    if f.curves.len() > CURVES {
+        tabs.extend(grid(curves(f, f.curves.len())).map(|panels| ("Unlisted", panels)));
+    }
     tabs.extend(numbers(f).map(|panels| ("Numbers", panels)));
     tabs.push(("Parameters", parameters(&run.calibration)));
     tabs.push(("Data quality", data_quality(run, f)));
     Content::Tabs(tabs)
 }
 
+fn curves(f: &Findings, most: usize) -> Vec<Content> {
+    (1..).zip(f.curves.iter().take(most)).map(|(number, curve)| curve_plot(number, curve)).collect()
+}
+
 /// What came out and what to do, beside the arm.
 fn overview(run: &Run, points: &[Point], f: &Findings) -> Content {
-    let mut right = vec![
-        (1.0, lamp()),
-        (4.6, raw("What came out", "/armcal/story.lines")),
-        (3.0, over_recorded_time(f, true)),
-    ];
-    right.extend(falling_error(f).map(|panel| (2.3, panel)));
     let title = "Nominal arm grey, calibrated arm green; arrows: calibrated errors";
     let scene = Content::panel(title, Kind::View(world(run, points, f)));
-    Content::Split(Row, vec![(1.0, scene), (1.0, Content::Split(Column, right))])
+    let left = Content::Split(Column, vec![(3.0, scene), (1.0, steps())]);
+    let errors = vec![(1.0, nominal_over_recorded_time()), (2.0, over_recorded_time(f))];
+    let right = vec![
+        (1.2, lamp()),
+        (5.8, raw("What came out", "/armcal/story.lines")),
+        (3.0, Content::Split(Row, errors)),
+    ];
+    Content::Split(Row, vec![(1.0, left), (1.0, Content::Split(Column, right))])
 }
 
 /// One plot a joint, all on one scale, so that the joint that errs stands out.
 fn where_it_fails(f: &Findings) -> Content {
-    let mut left = Vec::new();
-    if !f.boards.is_empty() {
-        left.push((3.0, Content::panel("Errors on the boards, from above", Kind::View(map(f)))));
-    }
-    left.push((2.0, over_recorded_time(f, false)));
-    left.push((2.0, outward(f)));
+    // The error over time is on the first tab too, and the map is the larger without it.
+    let above = match f.boards.is_empty() {
+        true => (1.0, over_recorded_time(f)),
+        false => (2.2, Content::panel("Errors on the boards, from above", Kind::View(map(f)))),
+    };
+    let left = vec![above, (1.0, outward(f))];
     let left = Content::Split(Column, left);
     let joints = match drawn(f).count() {
         n if n > FEW => grid(drawn(f).map(|m| over_angle(f, m, What::Error)).collect()),
@@ -83,46 +93,58 @@ fn grid(panels: Vec<Content>) -> Option<Content> {
     (!rows.is_empty()).then(|| Content::even(Column, rows))
 }
 
-/// The answer in words and tables, beside pictures of what is not on other tabs already.
+/// The answer in words and tables, beside pictures of it.
 fn what_is_missing(f: &Findings) -> Content {
     let some = |n: usize, share: f64, panel: Content| (n > 0).then_some((share, panel));
-    let next = f.diagnosis.as_ref().map_or(0, |(d, _)| d.record_next.len());
     let (found, candidates) = (f.effects.found.len(), f.effects.candidates.len());
     let answer = [
-        Some((2.0, raw("The answer", "/armcal/diagnosis.sentence"))),
+        Some((1.6, raw("The answer", "/armcal/diagnosis.sentence"))),
         some(found, 2.4, table("What was found", "/armcal/effect_table.found")),
         some(
             candidates,
-            4.6,
+            4.2,
             table("Candidates, each on its own, best first", "/armcal/effect_table.candidates"),
         ),
-        some(next, 2.6, raw("What to record next", "/armcal/diagnosis.record_next")),
+        some(f.next, 2.4, raw("What to do next", "/armcal/story.next")),
     ];
     let answer = Content::Split(Column, answer.into_iter().flatten().collect());
-    let mut pictures = vec![(1.0, over_recorded_time(f, false))];
+    let pictures = pictures(f);
+    match found > 0 && !pictures.is_empty() {
+        true => Content::Split(Row, vec![(1.0, answer), (1.0, Content::Split(Column, pictures))]),
+        false => answer,
+    }
+}
+
+/// What was found: what is unlisted over what it depends on, what lasts by the joints, what happened by the time.
+fn pictures(f: &Findings) -> Vec<(f64, Content)> {
+    let named = || f.diagnosis.iter().flat_map(|(d, _)| &d.effects);
+    let most = if f.curves.len() > CURVES { 1 } else { CURVES };
+    let mut pictures: Vec<(f64, Content)> = curves(f, most).into_iter().map(|curve| (1.0, curve)).collect();
     // An event shows over time; a joint may follow it, but has no part in it.
-    let lasting = f.diagnosis.iter().flat_map(|(d, _)| &d.effects).any(|e| !e.effect.contains('@'));
-    match what_effects_do(f).filter(|_| lasting) {
-        Some(joints) => pictures.push((3.0, joints)),
-        None => pictures.extend(falling_error(f).map(|panel| (1.0, panel))),
+    if named().any(|e| !e.effect.contains('@')) {
+        let of_load = named().any(|e| e.effect.contains("compliance") || e.effect.contains("windup"));
+        pictures.extend(what_effects_do(f, of_load).map(|joints| (2.0, joints)));
     }
-    match found {
-        0 => answer,
-        _ => Content::Split(Row, vec![(1.0, answer), (1.0, Content::Split(Column, pictures))]),
+    if pictures.is_empty() || named().any(|e| e.effect.contains('@')) {
+        pictures.push((1.0, over_recorded_time(f)));
     }
+    pictures
 }
 
 /// The numbers behind the answer; none where nothing was diagnosed.
 fn numbers(f: &Findings) -> Option<Content> {
     let (d, _) = f.diagnosis.as_ref()?;
-    let mut panels = vec![(2.0, table("Step by step", "/armcal/steps.steps"))];
+    let mut panels = Vec::new();
+    if f.told_found > 0 {
+        panels.push((2.0, raw("What was found, in full", "/armcal/story.found")));
+    }
     if !d.explanations.is_empty() {
         panels.push((3.5, raw("The numbers, one by one", "/armcal/diagnosis.told")));
     }
     if !d.not_testable.is_empty() {
-        panels.push((2.0, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
+        panels.push((2.5, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
     }
-    Some(Content::Split(Column, panels))
+    (!panels.is_empty()).then_some(Content::Split(Column, panels))
 }
 
 pub(super) fn parameters(calibration: &Calibration) -> Content {

@@ -8,21 +8,25 @@ use crate::points::{Point, extent};
 use crate::run::Run;
 use nalgebra::{Matrix3, Vector3};
 
-/// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides.
-const PANEL: f64 = 0.8;
+/// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides. The
+/// one of two arms is higher.
+const PANEL: f64 = 1.2;
+const PANEL_OF_TWO: f64 = 0.8;
 /// Opening of the camera from top to bottom [deg].
 pub(super) const OPENING_DEG: f64 = 45.0;
 /// Nearer than this the camera does not go [m].
 const NEAREST_M: f64 = 0.5;
 /// Around what is there: half of it is what the lines of a legend need above its place.
 const MARGIN: f64 = 1.14;
+/// Around the map, whose size is known to the line.
+const EDGE: f64 = 1.04;
 /// Where the camera stands: its angle from the vertical, and its direction about it [deg].
 const ANGLES_DEG: [f64; 2] = [60.0, 45.0];
 
 /// The arm and the points it visited.
 pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
     let places = places_m(run, points);
-    let (target_m, distance_m) = sight(&places);
+    let (target_m, distance_m) = sight(&places, PANEL);
     let mut topics = vec![
         ("/armcal/scene", true),
         ("/armcal/arms", true),
@@ -55,14 +59,14 @@ pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
 
 /// Two arms in a closed chain.
 pub(super) fn both_arms(run: &ClosedRun) -> View {
-    let (target_m, distance_m) = sight(&closed_places_m(run));
+    let (target_m, distance_m) = sight(&closed_places_m(run), PANEL_OF_TWO);
     let topics = vec![("/armcal/scene", true), ("/armcal/arms", true), ("/armcal/arrows_calibrated", true)];
     let (target_m, angles_deg) = (target_m.into(), Some(ANGLES_DEG));
     View { frame: "world", target_m, distance_m, angles_deg, topics, robots: Vec::new() }
 }
 
 /// Where the camera looks, and from how far all places are just in the picture [m].
-fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
+fn sight(places: &[Vector3<f64>], panel: f64) -> (Vector3<f64>, f64) {
     let [phi, theta] = ANGLES_DEG.map(f64::to_radians);
     // The viewers' camera stands in -x and -y for an angle of 45 degrees about the vertical.
     let towards = Vector3::new(-phi.sin() * theta.sin(), -phi.sin() * theta.cos(), phi.cos());
@@ -74,7 +78,7 @@ fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     let half_height = (OPENING_DEG.to_radians() / 2.0).tan() / MARGIN;
     let from = |m: &Vector3<f64>| {
         let off = m - middle;
-        off.z + (off.x.abs() / PANEL).max(off.y.abs()) / half_height
+        off.z + (off.x.abs() / panel).max(off.y.abs()) / half_height
     };
     let distance_m = seen.iter().map(from).fold(NEAREST_M, f64::max);
     (axes * middle, distance_m)
@@ -87,7 +91,7 @@ pub(super) fn map(f: &Findings) -> View {
     View {
         frame: board_map::FRAME,
         target_m,
-        distance_m: MARGIN * height_m.max(width_m / board_grid::PANEL),
+        distance_m: EDGE * height_m.max(width_m / board_grid::PANEL),
         angles_deg: None,
         topics,
         robots: Vec::new(),

@@ -138,7 +138,10 @@ fn the_map_of_boards_draws_them_at_the_stated_scale() {
     for recording in 0..3 {
         let board = &own(&messages, &format!("/armcal/board/{recording}"))[0];
         let factor = number(board, "magnification");
-        assert!(factor >= 1.0 && legend.contains(&format!("x {factor}\n")), "{legend}");
+        assert!(
+            factor >= 1.0 && legend.contains(&format!("x {factor}, from where the model puts")),
+            "{legend}"
+        );
         let entity = entities.iter().find(|e| string(e, "id") == format!("calibrated/{recording}")).unwrap();
         assert_eq!(string(entity, "frame_id"), "board_map");
         let (x_mm, y_mm) = (numbers(board, "fitted_x_mm"), numbers(board, "fitted_y_mm"));
@@ -150,6 +153,23 @@ fn the_map_of_boards_draws_them_at_the_stated_scale() {
             assert_eq!(vector(arrow, "pose.position").z, 0.0);
         }
     }
+}
+
+#[test]
+fn the_map_is_as_large_as_what_it_draws() {
+    let magnification = |s: &Synthetic, folder: &str| {
+        let messages = read(&write(s, InputMessages::Reference, folder).join("run.mcap"));
+        number(&own(&messages, "/armcal/board/0")[0], "magnification")
+    };
+    let mut s = synthetic();
+    let plain = magnification(&s, "plain");
+    // Errors across the boards are not drawn, so they make no arrow shorter.
+    let p = s.run.calibration.fit.values();
+    for r in &mut s.run.calibration.residuals {
+        let board = s.run.model.board_in_world(&p, r.dwell.recording).unwrap();
+        r.fitted_m += board.rotation * Vector3::new(0.0, 0.0, 0.5);
+    }
+    assert_eq!(magnification(&s, "across"), plain);
 }
 
 #[test]

@@ -83,7 +83,40 @@ fn a_tab_fits_a_laptop() {
     }
     for run in opened() {
         for tab in run.of("Tab")[0]["tabs"].as_array().unwrap() {
-            assert!(panels(&tab["layout"]) <= 10, "{}", tab["title"]);
+            assert!(panels(&tab["layout"]) <= 9, "{}", tab["title"]);
+            // A longer title is cut.
+            assert!(tab["title"].as_str().unwrap().len() <= 14, "{}", tab["title"]);
+        }
+    }
+}
+
+#[test]
+fn a_table_is_on_the_first_tab() {
+    fn names(tree: &Value, found: &mut Vec<String>) {
+        match tree {
+            Value::String(name) => found.push(name.clone()),
+            split => ["first", "second"].iter().for_each(|part| names(&split[*part], found)),
+        }
+    }
+    for run in opened() {
+        // Lichtblick 1.28 loads its table panel when the first one is shown: one that is first shown on another tab waits for a
+        // message until somebody plays or seeks.
+        let mut first = Vec::new();
+        names(&run.of("Tab")[0]["tabs"][0]["layout"], &mut first);
+        assert!(first.iter().any(|name| name.starts_with("Table!")), "{first:?}");
+    }
+}
+
+#[test]
+fn texts_are_shown_whole_and_not_as_changes() {
+    for run in opened() {
+        let paths = run.of("RawMessages").into_iter().map(|config| config["topicPath"].as_str().unwrap());
+        for path in paths.filter(|path| *path != "/armcal/diagnosis.sentence") {
+            for line in run.at(path).as_list().unwrap() {
+                let line = line.as_str().unwrap();
+                // From 512 characters on the rest is behind a button; an arrow is drawn as a change from one message to the next.
+                assert!(line.chars().count() < 512 && !line.contains(" -> "), "{path}: {line}");
+            }
         }
     }
 }
@@ -126,9 +159,31 @@ fn parameters_have_the_digits_that_count() {
         let rows = run.at("/armcal/parameter_table.rows");
         for row in rows.as_list().unwrap().iter().map(|row| row.as_message().unwrap()) {
             let powers = |field: &str| string(row, field).contains("e-");
+            let (half, value) = (string(row, "interval95"), string(row, "calibrated"));
+            let places = |number: &str| number.split_once('.').map_or(0, |(_, places)| places.len());
+            assert!(half.contains('e') || half == "± -" || places(&half) == places(&value), "{row:?}");
             // A power of ten beside an interval that has none would be nothing, told to nine decimals.
             assert!(powers("interval95") || !(powers("calibrated") || powers("change")), "{row:?}");
         }
+    }
+}
+
+#[test]
+fn what_the_data_determine_and_change_most_is_first() {
+    for run in opened() {
+        let (rows, all) = (run.at("/armcal/parameter_table.rows"), run.at("/armcal/parameters.parameters"));
+        let of = |name: &str| {
+            let all = all.as_list().unwrap().iter().map(|p| p.as_message().unwrap());
+            let p = all.into_iter().find(|p| string(p, "name") == name).unwrap_or_else(|| panic!("{name}"));
+            let sigmas = (number(p, "value") - number(p, "nominal")).abs() / number(p, "sigma");
+            (get(p, "determined").as_bool().unwrap(), if sigmas.is_finite() { sigmas } else { 0.0 })
+        };
+        let rows = rows.as_list().unwrap().iter().map(|row| string(row.as_message().unwrap(), "parameter"));
+        let order: Vec<(bool, f64)> = rows.map(|name| of(&name)).collect();
+        assert!(
+            order.windows(2).all(|w| (w[0].0 && !w[1].0) || (w[0].0 == w[1].0 && w[0].1 >= w[1].1)),
+            "{order:?}"
+        );
     }
 }
 
@@ -138,6 +193,7 @@ fn plots_have_points_on_their_scale_and_no_legend_over_them() {
         for config in run.of("Plot") {
             assert_eq!((&config["showLegend"], &config["legendDisplay"]), (&false.into(), &"none".into()));
             let x = run.numbers(config["xAxisPath"]["value"].as_str().unwrap());
+            let mut beyond = 0;
             for series in config["paths"].as_array().unwrap() {
                 let path = series["value"].as_str().unwrap();
                 if path.parse::<f64>().is_ok() {
@@ -149,8 +205,13 @@ fn plots_have_points_on_their_scale_and_no_legend_over_them() {
                 assert!(!y.is_empty(), "{path} draws nothing");
                 let Some(most) = config["maxYValue"].as_f64() else { continue };
                 let inside = y.iter().filter(|y| y.abs() <= most).count();
+                beyond += y.len() - inside;
                 assert!(10 * inside >= 8 * y.len(), "{path}: {y:?} up to {most}");
             }
+            let title = config["foxglovePanelTitle"].as_str().unwrap();
+            let told =
+                title.split_once("; ").and_then(|(_, rest)| rest.strip_suffix(" beyond")?.parse().ok());
+            assert_eq!(told.unwrap_or(0), beyond, "{title}");
         }
     }
 }
@@ -177,6 +238,9 @@ fn a_lamp_is_red_wherever_the_result_does_not_stand() {
         let colour = |word: &str| rules.iter().find(|r| r["rawValue"] == word).unwrap()["color"].clone();
         let red = colour("inadequate");
         assert!(["data_lost", "unexplained", "setup"].iter().all(|word| colour(word) == red));
+        // Where the result stands, the lamp says so.
+        let label = |r: &Value| r["label"].as_str().unwrap().starts_with("ok: ");
+        assert!(rules.iter().all(|r| label(r) != (r["color"] == red)), "{rules:?}");
         let like_success = rules.iter().filter(|r| r["color"] == colour("nothing_missing"));
         assert_eq!(like_success.count(), 1);
         let shown = run.at(lamp["path"].as_str().unwrap());
@@ -224,7 +288,7 @@ fn the_arm_and_all_points_are_in_the_picture_and_fill_it() {
         // Nothing is hidden where the nominal arm reaches a little further.
         let seen = seen(&view["cameraState"], &places);
         let most = |f: fn(&(f64, f64, bool)) -> f64| seen.iter().map(f).fold(0.0, f64::max);
-        let (across, up) = (most(|s| s.0.abs() / 0.8), most(|s| s.1.abs()));
+        let (across, up) = (most(|s| s.0.abs() / 1.2), most(|s| s.1.abs()));
         assert!(seen.iter().all(|s| s.2) && across < 1.0 && up < 1.0, "{across} {up}");
         assert!(across.max(up) > 0.7, "{across} {up}");
     }
@@ -247,6 +311,11 @@ fn three_dimensional_panels_are_free_of_frames() {
             assert!(frames.iter().any(|f| view["followTf"] == f.as_str()), "{frames:?}");
             for (topic, settings) in view["topics"].as_object().unwrap() {
                 assert!(settings["visible"].is_boolean(), "{topic}");
+                // The black edges of small arrows hide their colour.
+                let drawn = ["arms", "scene", "board_map"].iter().any(|name| topic.ends_with(name));
+                if drawn || topic.contains("arrows_") {
+                    assert_eq!(settings["showOutlines"], false, "{topic}");
+                }
             }
         }
         // Axes of a metre otherwise.
@@ -274,18 +343,25 @@ fn the_map_of_boards_fills_its_panel_and_its_words_do_not_overlap() {
             camera["targetOffset"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
         let map = &own(&run.messages, "/armcal/board_map")[0];
         let mut words: Vec<[f64; 4]> = Vec::new();
+        let discs = list(map, "entities").into_iter().flat_map(|entity| list(&entity, "cylinders"));
+        let places: Vec<Vector3<f64>> = discs.map(|disc| vector(&disc, "pose.position")).collect();
         for entity in list(map, "entities") {
             for text in list(&entity, "texts") {
                 let (at, tall) = (vector(&text, "pose.position"), number(&text, "font_size"));
                 let lines: Vec<usize> = string(&text, "text").lines().map(|l| l.chars().count()).collect();
                 let wide = 0.62 * tall * *lines.iter().max().unwrap() as f64;
                 let half = [wide / 2.0, tall * lines.len() as f64 / 2.0];
-                assert!((at.x - middle[0]).abs() + half[0] <= 1.5 * height / 2.0, "{text:?}");
+                assert!((at.x - middle[0]).abs() + half[0] <= 1.4 * height / 2.0, "{text:?}");
                 assert!((at.y - middle[1]).abs() + half[1] <= height / 2.0, "{text:?}");
                 let own = [at.x - half[0], at.x + half[0], at.y - half[1], at.y + half[1]];
                 let apart =
                     |w: &[f64; 4]| w[1] <= own[0] || own[1] <= w[0] || w[3] <= own[2] || own[3] <= w[2];
                 assert!(words.iter().all(apart), "{own:?} {words:?}");
+                // No word lies on a cavity.
+                for place in &places {
+                    let on = (place.x - at.x).abs() < half[0] && (place.y - at.y).abs() < half[1];
+                    assert!(!on, "{text:?} on {place}");
+                }
                 words.push(own);
             }
             for arrow in list(&entity, "arrows") {
@@ -302,7 +378,7 @@ fn the_map_of_boards_fills_its_panel_and_its_words_do_not_overlap() {
                 - words.iter().map(|w| w[from]).fold(f64::MAX, f64::min)
         };
         assert!(
-            used(0) > 0.45 * 1.5 * height || used(2) > 0.45 * height,
+            used(0) > 0.45 * 1.4 * height || used(2) > 0.45 * height,
             "{} {} of {height}",
             used(0),
             used(2)
