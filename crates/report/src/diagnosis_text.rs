@@ -6,7 +6,7 @@ use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::recording_names::RecordingNames;
 use crate::run::Run;
-use crate::text::{in_display_unit, printable, supported};
+use crate::text::{printable, supported};
 use armcal_core::SetupReport;
 use armcal_diagnose::{
     CandidateReport, Combination, Diagnosis, FoundEffect, HeldOut, ParameterReport, Term, UnknownReport,
@@ -392,17 +392,14 @@ pub(crate) fn size_in_table(parameters: &[ParameterReport]) -> String {
 /// `width 0.052 ± 0.004 deg`. An interval wider than the value is no size: it says how large the value can be at most.
 pub fn size(p: &ParameterReport) -> String {
     let half = (p.ci95[1] - p.ci95[0]) / 2.0;
-    let shown = |si| in_display_unit(p.unit, si);
+    let symbol = p.unit.display_symbol();
     if half > p.value.abs() {
-        let text = format!(
-            "{} not determined by itself (at most {} {})",
-            p.name,
-            shown(p.upper_limit95),
-            p.unit.display_symbol()
-        );
+        let most = supported(p.unit, p.upper_limit95, p.upper_limit95);
+        let text = format!("{} not determined by itself (at most {most} {symbol})", p.name);
         return text.replace(" )", ")");
     }
-    let text = format!("{} {} ± {} {}", p.name, shown(p.value), shown(half), p.unit.display_symbol());
+    let shown = |si| supported(p.unit, si, half);
+    let text = format!("{} {} ± {} {symbol}", p.name, shown(p.value), shown(half));
     text.trim_end().to_owned()
 }
 
@@ -433,7 +430,7 @@ fn combination(c: &Combination) -> String {
     };
     let terms: String = c.terms.iter().enumerate().map(term).collect();
     let half = (c.ci95[1] - c.ci95[0]) / 2.0;
-    let shown = |si| in_display_unit(c.unit, si);
+    let shown = |si| supported(c.unit, si, half);
     let symbol = if mixed { "" } else { c.unit.display_symbol() };
     format!("{terms} = {} ± {} {symbol}", shown(c.value), shown(half)).trim_end().to_owned()
 }

@@ -20,20 +20,50 @@ pub enum Detail {
 
 /// Names of parameters that stand for all that are not determined.
 const NAMED: usize = 4;
+/// Lines that the story may take, two less than forty: where the results went is said under it.
+const SCREEN: usize = 37;
+/// Recordings that are listed where all of them would take the screen.
+const FEW: usize = 4;
+
+/// How many entries of a list the story shows.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown {
+    recordings: usize,
+    next: usize,
+    found: usize,
+}
+
+impl Shown {
+    /// All recordings, and as many of the rest as fit beside them.
+    pub const USUAL: Shown = Shown { recordings: usize::MAX, next: SHOWN, found: SHOWN };
+}
 
 /// The summary of a run, ending in a newline. It ends with the verdict, the status and the next step.
 pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
+    let text = summary(run, style, detail, Shown::USUAL);
+    let few = Shown { recordings: FEW, ..Shown::USUAL };
+    let shorter = [few, Shown { next: 1, ..few }, Shown { next: 1, found: 1, ..few }];
+    let fits = |text: &String| detail == Detail::Everything || text.lines().count() <= SCREEN;
+    shorter.into_iter().fold(
+        text,
+        |text, shown| {
+            if fits(&text) { text } else { summary(run, style, detail, shown) }
+        },
+    )
+}
+
+fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> String {
     let pen = Pen { style };
     let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&run.pipeline_name))];
     let story = Story::of(run);
     let leads = matches!(story.lamp, "setup" | "unexplained");
     sections.extend(leads.then(|| pen.verdict(&story.missing, false)));
-    sections.push(pen.section("Recordings", recordings(&pen, run)));
-    let shown = match detail {
+    sections.push(pen.section("Recordings", recordings(&pen, run, shown.recordings)));
+    let errors = match detail {
         Detail::Story => errors_that_count(&pen, &run.calibration),
         Detail::Everything => errors(&pen, &run.calibration),
     };
-    sections.push(pen.section("Position errors [mm]", shown));
+    sections.push(pen.section("Position errors [mm]", errors));
     match detail {
         Detail::Everything => {
             sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
@@ -42,7 +72,7 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
         }
         Detail::Story => sections.extend(briefly(&pen, summarised(&run.calibration), &story)),
     }
-    sections.extend(ending(&pen, &story, detail));
+    sections.extend(ending(&pen, &story, detail, shown));
     sections.join("\n")
 }
 
@@ -63,25 +93,25 @@ pub(crate) fn briefly(pen: &Pen, parameters: Option<String>, story: &Story) -> V
 }
 
 /// What it came to, what is missing, the status and the next step.
-pub(crate) fn ending(pen: &Pen, story: &Story, detail: Detail) -> [String; 2] {
+pub(crate) fn ending(pen: &Pen, story: &Story, detail: Detail, shown: Shown) -> [String; 2] {
     let verdict = |text: &str| pen.verdict(text, story.status == Status::Ok);
-    let list = |label, entries: &[String]| match detail {
+    let list = |label, entries: &[String], most: usize| match detail {
         Detail::Everything => pen.list(entries.iter().map(|e| (label, e.clone()))),
-        Detail::Story => pen.list(first_ones(entries).into_iter().map(|e| (label, e))),
+        Detail::Story => pen.list(first_ones(entries, most).into_iter().map(|e| (label, e))),
     };
     let missing = if story.missing.is_empty() { String::new() } else { verdict(&story.missing) };
     let found = if detail == Detail::Story { &story.found_briefly } else { &story.found };
     [
-        verdict(&story.calibration) + &missing + &list("-", found),
-        verdict(&format!("Status: {}", story.status_sentence())) + &list("next:", &story.next),
+        verdict(&story.calibration) + &missing + &list("-", found, shown.found),
+        verdict(&format!("Status: {}", story.status_sentence())) + &list("next:", &story.next, shown.next),
     ]
 }
 
-/// As many as fit on a screen, and how many more there are.
-fn first_ones(entries: &[String]) -> Vec<String> {
-    let more = entries.len().saturating_sub(SHOWN);
+/// So many at most, and how many more there are.
+fn first_ones(entries: &[String], most: usize) -> Vec<String> {
+    let more = entries.len().saturating_sub(most);
     let rest = (more > 0).then(|| format!("and {more} more (`armcal run -v` lists them)"));
-    entries.iter().take(SHOWN).cloned().chain(rest).collect()
+    entries.iter().take(most).cloned().chain(rest).collect()
 }
 
 /// The parameters in one sentence; none where none is free.
@@ -101,10 +131,12 @@ fn counted(n: usize) -> Option<String> {
     (n > 0).then(|| if n == 1 { "1 notice".to_owned() } else { format!("{n} notices") })
 }
 
-fn recordings(pen: &Pen, run: &Run) -> String {
+fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
     let mut table =
         pen.table(&["recording", "dwells", "associated", "rejected", "clock offset [ms]", "drift [ppm]"]);
-    for recording in &run.recordings {
+    // One that is left out for a line that says so saves none.
+    let most = if run.recordings.len() == most.saturating_add(1) { most + 1 } else { most };
+    for recording in run.recordings.iter().take(most) {
         table.add_row(vec![
             Cell::new(printable(&recording.name)),
             number(recording.dwells.len()),
@@ -114,7 +146,10 @@ fn recordings(pen: &Pen, run: &Run) -> String {
             number(clock_drift(recording)),
         ]);
     }
-    pen.render(&table)
+    let more = run.recordings.len().saturating_sub(most);
+    let rest = format!("and {more} more (`armcal run -v` lists them)");
+    let rest = if more > 0 { pen.list([("-", rest)].into_iter()) } else { String::new() };
+    pen.render(&table) + &rest
 }
 
 fn clock_offset(recording: &RecordingRun) -> String {

@@ -83,13 +83,9 @@ pub(crate) fn in_display_unit(unit: Unit, si: f64) -> String {
 
 /// An estimate in the unit shown to people: nominal value, value, change, half the width of the 95 % interval.
 pub(crate) fn estimate_shown(e: &Estimate) -> [String; 4] {
-    let (unit, half) = (e.parameter.unit, (e.ci95[1] - e.ci95[0]) / 2.0);
-    let shown = |si: f64| {
-        // Powers of ten where the interval has none would be digits that do not count.
-        let nothing = unit.to_display(si).abs() < SMALLEST_SHOWN && unit.to_display(half) >= SMALLEST_SHOWN;
-        in_display_unit(unit, if nothing { 0.0 } else { si })
-    };
-    [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half].map(shown)
+    let half = (e.ci95[1] - e.ci95[0]) / 2.0;
+    [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half]
+        .map(|si| supported(e.parameter.unit, si, half))
 }
 
 /// An SI value in the unit shown to people, with the digits that half the width of its interval supports: two of its own.

@@ -6,7 +6,7 @@ use super::words::{meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::story::Story;
-use crate::terminal::{Detail, ending};
+use crate::terminal::{Detail, Shown, ending};
 use crate::text::{millimetres, printable};
 use armcal_campaign::{ErrorFigures, Row};
 use comfy_table::Cell;
@@ -43,7 +43,7 @@ pub fn campaign_text(campaign: &Campaign, style: TerminalStyle) -> String {
             .map(|f| ("failed", format!("{}: {}", printable(&f.recording), printable(&f.why))));
         sections.push(pen.section("Not calibrated", pen.list(failed)));
     }
-    sections.extend(ending(&pen, &Story::of_campaign(campaign), Detail::Everything));
+    sections.extend(ending(&pen, &Story::of_campaign(campaign), Detail::Everything, Shown::USUAL));
     sections.join("\n")
 }
 

@@ -5,7 +5,7 @@ use crate::points::Point;
 use crate::proto;
 use crate::recording_names::RecordingNames;
 use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
-use crate::text::{conclusion, remark, supported};
+use crate::text::{conclusion, estimate_shown, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
@@ -190,9 +190,7 @@ fn parameter(e: &Estimate) -> proto::Parameter {
 /// at a time: those that the data determine before the others, and the most changed first, counted in standard deviations.
 pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -> proto::ParameterTable {
     let row = |e: &Estimate| {
-        let (p, half) = (&e.parameter, (e.ci95[1] - e.ci95[0]) / 2.0);
-        let [nominal, calibrated, change, half] =
-            [p.nominal, e.value, e.value - p.nominal, half].map(|si| supported(p.unit, si, half));
+        let [nominal, calibrated, change, half] = estimate_shown(e);
         proto::ParameterRow {
             parameter: names.label(&e.parameter.name),
             nominal,

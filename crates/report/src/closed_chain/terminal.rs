@@ -4,7 +4,7 @@ use super::ClosedRun;
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::story::Story;
-use crate::terminal::{Detail, briefly, ending, errors, listed, parameters, undetermined};
+use crate::terminal::{Detail, Shown, briefly, ending, errors, listed, parameters, undetermined};
 use crate::text::{millimetres, printable};
 use comfy_table::Cell;
 
@@ -34,7 +34,7 @@ pub fn closed_terminal(run: &ClosedRun, style: TerminalStyle, detail: Detail) ->
         }
         Detail::Story => sections.extend(briefly(&pen, None, &story)),
     }
-    sections.extend(ending(&pen, &story, detail));
+    sections.extend(ending(&pen, &story, detail, Shown::USUAL));
     sections.join("\n")
 }
 

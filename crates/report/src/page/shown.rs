@@ -6,7 +6,7 @@ use super::groups::{Group, groups};
 use super::numbers::Column;
 use super::signature::{Signature, signatures};
 use crate::run::{Refit, Run, role_word};
-use crate::text::{conclusion, in_display_unit, millimetres};
+use crate::text::{conclusion, estimate_shown, millimetres};
 use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
 use armcal_core::ErrorStats;
 use armcal_model::Model;
@@ -194,15 +194,15 @@ fn change(run: &Run, after: &Calibration) -> Option<Change> {
 /// A parameter as pages show it.
 pub(crate) fn parameter(e: &Estimate) -> ParameterRow {
     let p = &e.parameter;
-    let shown = |si| in_display_unit(p.unit, si);
+    let [nominal, value, change, half] = estimate_shown(e);
     ParameterRow {
         name: p.name.clone(),
         meaning: p.meaning.clone(),
         unit: p.unit.display_symbol(),
-        nominal: shown(p.nominal),
-        value: shown(e.value),
-        change: shown(e.value - p.nominal),
-        half: if p.free { shown((e.ci95[1] - e.ci95[0]) / 2.0) } else { String::new() },
+        nominal,
+        value,
+        change,
+        half: if p.free { half } else { String::new() },
         role: role_word(p.role),
         free: p.free,
         determined: e.determined,

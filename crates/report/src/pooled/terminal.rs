@@ -4,7 +4,7 @@ use super::PooledRun;
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::story::Story;
-use crate::terminal::{Detail, ending, errors, listed, parameters_of, undetermined};
+use crate::terminal::{Detail, Shown, ending, errors, listed, parameters_of, undetermined};
 use crate::text::{millimetres, printable};
 use armcal_calibrate::Estimate;
 use comfy_table::Cell;
@@ -37,7 +37,7 @@ pub fn pooled_terminal(run: &PooledRun, style: TerminalStyle) -> String {
     sections.extend(undetermined(&pen, &run.calibration));
     let story = Story::of_pool(run);
     sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
-    sections.extend(ending(&pen, &story, Detail::Everything));
+    sections.extend(ending(&pen, &story, Detail::Everything, Shown::USUAL));
     sections.join("\n")
 }
 
