@@ -1,7 +1,7 @@
 use crate::support::{armcal, files_made, root};
 use armcal_lab::pair::{PairConfig, PairTruth, simulate};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
@@ -166,4 +166,24 @@ fn what_two_arms_cannot_show_is_told_in_words() {
     let output = armcal(["diagnose".as_ref(), shipped.as_os_str()]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("is about two arms"), "{said}");
+}
+
+#[test]
+fn the_input_of_two_arms_can_stay_where_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    simulate(&lab(), folder.path()).expect("simulated");
+    let topics = |bytes: &[u8]| -> BTreeSet<String> {
+        let messages = mcap::MessageStream::new(bytes).expect("an MCAP");
+        messages.map(|m| m.expect("a message").channel.topic.clone()).collect()
+    };
+    let path = pipeline(folder.path(), "kind = \"same-point\"");
+    let (_, copied) = run(&path, &folder.path().join("copied"));
+    let text = std::fs::read_to_string(&path).expect("pipeline") + "\n[output]\ninput = \"reference\"\n";
+    std::fs::write(&path, text).expect("writable");
+    let (_, referred) = run(&path, &folder.path().join("referred"));
+    assert_eq!(copied["summary.json"], referred["summary.json"]);
+    let own: BTreeSet<String> = ["/left/joint_states", "/right/joint_states"].map(str::to_owned).into();
+    let [all, results] = [&copied, &referred].map(|files| topics(&files["run.mcap"]));
+    assert!(own.is_subset(&all) && results.iter().all(|topic| topic.starts_with("/armcal/")), "{results:?}");
+    assert_eq!(&results | &own, all);
 }

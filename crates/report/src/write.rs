@@ -34,6 +34,16 @@ pub struct OutputConfig {
     pub input: InputMessages,
 }
 
+impl OutputConfig {
+    /// The recordings whose messages are copied into `run.mcap`.
+    pub fn copied<'r>(&self, recordings: &'r [Recording]) -> &'r [Recording] {
+        match self.input {
+            InputMessages::Copy => recordings,
+            InputMessages::Reference => &[],
+        }
+    }
+}
+
 /// What `run.mcap` holds of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -106,10 +116,7 @@ pub fn write_all(
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];
-    let to_copy = match config.input {
-        InputMessages::Copy => recordings,
-        InputMessages::Reference => &[],
-    };
+    let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);
     // The last to get its name: by what the old one holds, files of earlier versions are known.

@@ -6,6 +6,7 @@ use armcal_calibrate::{Closure, FitConfig, HoldoutConfig, LengthKnowledge};
 use armcal_dwell::DwellConfig;
 use armcal_model::EffectTable;
 use armcal_recording::{JointStream, input, resolve};
+use armcal_report::OutputConfig;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,9 @@ pub struct ClosedPipeline {
     /// What the fit must not see.
     #[serde(default)]
     pub holdout: HoldoutConfig,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputConfig,
     /// Folder of the pipeline file.
     #[serde(skip)]
     pub folder: PathBuf,

@@ -49,7 +49,7 @@ fn two_arms(pipeline: &ClosedPipeline, out: &Path, detail: Detail, json: bool) -
     let progress = Progress::new();
     let (run, recordings) = closed_chain::run(pipeline, &progress)?;
     progress.step("writing results");
-    let written = write_closed(&run, &recordings, out)?;
+    let written = write_closed(&run, pipeline.output.copied(&recordings), out)?;
     progress.finish();
     if json {
         print(&closed_summary_json(&run)?)?;

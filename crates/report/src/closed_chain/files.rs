@@ -95,7 +95,7 @@ struct Parameters<'a> {
     frames: Vec<FrameEntry>,
 }
 
-/// Writes `run.mcap` (the inputs' own messages and the result channels), `report.html`, `summary.json`, `parameters.toml`, Foxglove layouts
+/// Writes `run.mcap` (the messages of `recordings` and the result channels), `report.html`, `summary.json`, `parameters.toml`, Foxglove layouts
 /// and the calibrated model of each arm (`<arm>.toml` or `<arm>.urdf`) into `out_dir`, which is made if need be; returns their
 /// paths. Files of an earlier run are replaced, each at once.
 ///
