@@ -113,8 +113,7 @@ fn fit_from(
         None => cost.weights(residual),
     };
     // All that was measured in a dwell is trusted alike.
-    let each = |(block, weight): (usize, f64)| std::iter::repeat_n(weight, problem.observations_of(block));
-    let weights = weights.into_iter().enumerate().flat_map(each).collect();
+    let weights = problem.block_of_each().into_iter().map(|block| weights[block]).collect();
     let undetermined = match near {
         Some(_) => Vec::new(),
         None => undetermined::directions(

@@ -70,8 +70,8 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
         add(severity, ABOVE_NOISE, "fit", message);
     }
-    let blocks = (0..white.blocks()).flat_map(|b| std::iter::repeat_n(b, white.problem.observations_of(b)));
-    let outliers = blocks.zip(&fit.weights).filter(|(_, weight)| **weight < OUTLIER_WEIGHT);
+    let blocks = white.problem.block_of_each();
+    let outliers = blocks.into_iter().zip(&fit.weights).filter(|(_, weight)| **weight < OUTLIER_WEIGHT);
     let mut outliers: Vec<String> = outliers.map(|(block, _)| white.problem.name(block)).collect();
     if !outliers.is_empty() {
         let of_all = format!("{} of {} observations", outliers.len(), fit.weights.len());

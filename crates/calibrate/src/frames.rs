@@ -114,8 +114,8 @@ fn aligned(
 /// boards with seated dwells; then what else the observed recordings of a pool have for themselves.
 pub(crate) fn touched_frames(scene: Scene<'_>, observations: &[&Observation]) -> Vec<String> {
     let names = frame_names(scene.model());
-    let measured: BTreeSet<usize> = observations.iter().map(|o| 1 + o.feature.0).collect();
-    let known = |k: &usize| *k < TIP_FRAME + 1 || measured.contains(k);
+    let measured: BTreeSet<usize> = observations.iter().map(|o| TIP_FRAME + o.feature.0).collect();
+    let known = |k: &usize| *k <= TIP_FRAME || measured.contains(k);
     let features = TIP_FRAME + scene.model().features().count();
     let arm = names.iter().enumerate().take(features).filter(|(k, _)| known(k));
     let mut touched: Vec<String> = arm.map(|(_, name)| name.clone()).collect();
@@ -245,10 +245,9 @@ impl<'a> Alignment<'a> {
 
     /// base_from_link of what carries the feature of every observation: the part of the arm that stays at nominal.
     fn links_in_base(&self, p: &[f64]) -> Vec<Pose> {
-        let link = |o: &&Observation| {
-            let in_base = self.model.feature_in_base(p, o.feature, &o.joint_rad);
-            in_base * self.model.feature_in_link(p, o.feature).inverse()
-        };
+        let to_link: Vec<Pose> = self.in_links(p).iter().map(Pose::inverse).collect();
+        let in_base = |o: &Observation| self.model.feature_in_base(p, o.feature, &o.joint_rad);
+        let link = |o: &&Observation| in_base(o) * to_link[o.feature.0];
         self.observations.iter().map(link).collect()
     }
 

@@ -115,7 +115,7 @@ impl<'a> ModelProblem<'a> {
         spread
     }
 
-    /// What was measured of an observation is known to.
+    /// Covariance of what was measured of an observation, without what the encoders add.
     fn measured(&self, o: &Observation) -> DMatrix<f64> {
         let rows = self.rows(o);
         let mut covariance = DMatrix::zeros(rows, rows);

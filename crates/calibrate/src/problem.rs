@@ -39,6 +39,10 @@ pub trait Problem: Sync {
     fn observations_of(&self, _block: usize) -> usize {
         1
     }
+    /// The block of every observation, in order.
+    fn block_of_each(&self) -> Vec<usize> {
+        (0..self.blocks()).flat_map(|b| std::iter::repeat_n(b, self.observations_of(b))).collect()
+    }
     /// The observation in words, for messages.
     fn name(&self, block: usize) -> String;
     /// Joint readings of the observation [rad], for messages; empty when there are none.

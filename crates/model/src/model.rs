@@ -1,5 +1,6 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+mod features;
 mod linearisation;
 
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
@@ -7,12 +8,12 @@ use crate::error::nearest;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
-use crate::tree::{Route, SegmentId, Tree};
-use crate::twist::Twist;
+use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Unit};
+use features::Feature;
 use linearisation::Linearisation;
-use nalgebra::{DMatrix, Matrix3xX, Matrix6xX, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -40,13 +41,6 @@ pub struct Model {
 
 /// The segment that ends at the base: the root of the tree.
 const BASE: SegmentId = 0;
-
-/// The name of a feature and the way to it.
-#[derive(Debug, Clone, PartialEq)]
-struct Feature {
-    name: String,
-    route: Route,
-}
 
 /// What is measured and what is predicted of one observation.
 struct Sides {
@@ -218,17 +212,6 @@ impl Model {
         self.feature_in_link(p, FeatureId::TIP)
     }
 
-    /// A feature in the link that carries it.
-    pub fn feature_in_link(&self, p: &[f64], feature: FeatureId) -> Pose {
-        let own = self.route(feature).last().map(|end| self.tree.0[*end].transform(p, &[]));
-        own.map_or_else(Pose::identity, |own| Pose::from(&own))
-    }
-
-    /// A feature in the base frame, effects left out.
-    pub fn feature_in_base(&self, p: &[f64], feature: FeatureId, joint_rad: &[f64]) -> Pose {
-        Pose::from(&self.tree.follow(&self.route(feature)[1..], p, joint_rad))
-    }
-
     /// Whether the pose of a recording's board is found by the fit, with nothing else known of it.
     pub(crate) fn board_is_estimated(&self, recording: usize) -> bool {
         let own = &self.parameters[self.board_parameters(recording)];
@@ -323,50 +306,6 @@ impl Model {
     /// Whether [`Model::slack`] depends on what is estimated.
     pub fn has_gaps(&self) -> bool {
         self.effects.as_ref().is_some_and(|effects| effects.has_gaps(&self.nominal()))
-    }
-
-    fn joint_twists(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Vec<(usize, Twist)> {
-        match &self.effects {
-            None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
-            Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
-        }
-    }
-
-    /// The names of what can be measured of the arm: its tip, then its markers.
-    pub fn features(&self) -> impl Iterator<Item = (FeatureId, &str)> {
-        self.features.iter().enumerate().map(|(k, feature)| (FeatureId(k), feature.name.as_str()))
-    }
-
-    /// Where the model puts a feature, in the world, effects included.
-    pub fn feature_in_world(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Pose {
-        let at = match &self.effects {
-            None => self.tree.follow(self.route(feature), p, &o.joint_rad),
-            Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,
-        };
-        Pose::from(&at)
-    }
-
-    /// d position [m] and d rotation vector [rad] of a feature, in the world, per unit of each joint reading: 6 rows, one
-    /// column a reading.
-    pub fn feature_jacobian(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Matrix6xX<f64> {
-        let mut jacobian = Matrix6xX::zeros(self.joint_count());
-        for (column, twist) in self.joint_twists(p, feature, o) {
-            let mut moved = jacobian.fixed_view_mut::<3, 1>(0, column);
-            moved += twist.translation_m;
-            let mut turned = jacobian.fixed_view_mut::<3, 1>(3, column);
-            turned += twist.rotation_rad;
-        }
-        jacobian
-    }
-
-    /// The segments from the world to a feature.
-    pub(crate) fn route(&self, feature: FeatureId) -> &[SegmentId] {
-        &self.features[feature.0].route
-    }
-
-    /// The ways to all features.
-    pub(crate) fn routes(&self) -> impl Iterator<Item = &Route> {
-        self.features.iter().map(|feature| &feature.route)
     }
 
     /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].

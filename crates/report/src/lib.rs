@@ -40,6 +40,7 @@ mod recorded_time;
 mod recording_names;
 mod run;
 mod same_dwells;
+mod sizes;
 mod story;
 mod summary;
 mod tables;
@@ -59,7 +60,7 @@ pub use closed_chain::{
     write_closed,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis, size as amplitude_text};
+pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};
 pub use error::ReportError;
 pub use look_at::look_at;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
@@ -77,6 +78,7 @@ pub use pooled::{
 pub use recording_names::RecordingNames;
 pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
+pub use sizes::size as amplitude_text;
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{Detail, terminal};
 pub use text::{conclusion, millimetres, printable};

@@ -406,7 +406,7 @@ impl Effects {
 /// A tree with six parameters of a twist, behind `count` others, at every slot; and where each of its segments is now.
 fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
     let mut tree = Tree(Vec::with_capacity(rigid.0.len() + slots.len()));
-    // Where each segment is in it, and where what hangs on it begins.
+    // Where each segment is in it, and what its children hang on: itself, or the twist behind it.
     let (mut places, mut ends): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
     let twist = |tree: &mut Tree, slot: Slot, parent: Option<usize>| {
         let Ok(index) = slots.binary_search(&slot) else { return parent };

@@ -1,9 +1,10 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
 use super::{error_curve, finite, or_zero, short, shown_unlisted, steps};
-use crate::diagnosis_text::{channel_told, driver_told, headline, size_in_table, sizes, sizes_of};
+use crate::diagnosis_text::{channel_told, driver_told, headline};
 use crate::proto;
 use crate::run::{Answer, Run};
+use crate::sizes::{size_in_table, sizes, sizes_of};
 use crate::text::printable;
 use crate::viewer_text::for_viewer;
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, UnknownReport};

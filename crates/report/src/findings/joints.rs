@@ -39,7 +39,7 @@ pub(crate) fn feels_gravity(torques_nm: &[Vec<f64>]) -> Vec<bool> {
 }
 
 /// Gravity's torque on every joint, `[joint][observation]` [N m].
-pub(crate) fn torques_nm(run: &Run) -> Vec<Vec<f64>> {
+pub(super) fn torques_nm(run: &Run) -> Vec<Vec<f64>> {
     let of = |o| run.model.drivers(&run.session, o).torque;
     let driven: Vec<_> = run.observations.iter().map(of).collect();
     let joints = 0..run.model.joint_count();
@@ -53,10 +53,15 @@ struct Seen {
     after: Vec<Option<ImpliedError>>,
     /// What the effects found do; as `before` when nothing was.
     effect: Vec<Option<ImpliedError>>,
-    torque_nm: Vec<f64>,
 }
 
-pub(super) fn joint_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<JointErrors> {
+/// One entry a joint; `torques_nm` are those of [`torques_nm`].
+pub(super) fn joint_errors(
+    run: &Run,
+    points: &[Point],
+    in_time: &[usize],
+    torques_nm: &[Vec<f64>],
+) -> Vec<JointErrors> {
     let fitted = run.calibration.fit.values();
     let last = run
         .steps
@@ -76,12 +81,11 @@ pub(super) fn joint_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Ve
                 (Some((model, _, p)), Some(effect_m)) => implied(model, p, effect_m),
                 _ => before.clone(),
             };
-            let torque = run.model.drivers(&run.session, o).torque;
-            Seen { before, after, effect, torque_nm: torque.iter().map(|t| t.total_nm()).collect() }
+            Seen { before, after, effect }
         })
         .collect();
     let time_min = recorded_min(run, points);
-    let of_joint = |j: usize| joint(run, j, points, in_time, &seen, &time_min);
+    let of_joint = |j: usize| joint(run, j, points, in_time, &seen, (&time_min, &torques_nm[j]));
     (0..run.model.joint_count()).map(of_joint).collect()
 }
 
@@ -91,7 +95,7 @@ fn joint(
     points: &[Point],
     in_time: &[usize],
     seen: &[Seen],
-    time_min: &[f64],
+    (time_min, torque_nm): (&[f64], &[f64]),
 ) -> JointErrors {
     let sigmas: Vec<f64> = seen.iter().filter_map(|s| s.before[j].map(|e| e.sigma)).collect();
     let usual = median(&sigmas);
@@ -119,7 +123,7 @@ fn joint(
         m.recording_index.push(count(o.dwell.recording));
         m.dwell.push(count(o.dwell.dwell));
         m.reading.push(unit.to_display(o.joint_rad[j]));
-        m.torque_nm.push(super::or_zero(seen[i].torque_nm[j]));
+        m.torque_nm.push(super::or_zero(torque_nm[i]));
         m.time_min.push(time_min[i]);
         m.arrival.push(o.arrival.get(j).map_or(0, |a| a.sign() as i32));
         m.error.push(unit.to_display(before.error));

@@ -13,13 +13,14 @@ mod steps;
 
 pub(crate) use boards::round_factor;
 pub(crate) use curves::error_curve;
-pub(crate) use joints::{feels_gravity, moves_tip, torques_nm};
+pub(crate) use joints::{feels_gravity, moves_tip};
 
 use crate::points::Point;
 use crate::proto;
 use crate::run::{Run, Undiagnosed};
 use crate::story::Story;
 use armcal_diagnose::{Diagnosis, UnknownReport, Verdict};
+use joints::torques_nm;
 
 /// What is less probable than this is not drawn as if it were there.
 const IMPROBABLE: f64 = 0.05;
@@ -54,9 +55,10 @@ impl Findings {
     pub fn of(run: &Run, points: &[Point]) -> Findings {
         let in_time = in_time(points);
         let story = Story::of(run);
+        let torques_nm = torques_nm(run);
         Findings {
-            joints: joints::joint_errors(run, points, &in_time),
-            feels_gravity: feels_gravity(&torques_nm(run)),
+            joints: joints::joint_errors(run, points, &in_time, &torques_nm),
+            feels_gravity: feels_gravity(&torques_nm),
             boards: boards::board_errors(run, points, &in_time),
             course: course::course(run, points, &in_time),
             steps: steps::steps(run),

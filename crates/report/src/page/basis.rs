@@ -2,7 +2,7 @@
 
 use super::levers::Levers;
 use super::numbers::Column;
-use crate::findings::{feels_gravity, torques_nm};
+use crate::findings::feels_gravity;
 use crate::run::Run;
 use armcal_core::Unit;
 use nalgebra::Vector3;
@@ -94,7 +94,8 @@ fn drivers(run: &Run) -> Vec<Driver> {
         });
     }
     let masses = if run.model.has_link_masses() { "links as in the URDF" } else { "links of 2.5 kg/m" };
-    let torques_nm = torques_nm(run);
+    let of_joint = |j: usize| driven.iter().map(|d| d.torque[j].total_nm()).collect();
+    let torques_nm: Vec<Vec<f64>> = (0..names.len()).map(of_joint).collect();
     let felt = feels_gravity(&torques_nm);
     for (j, name) in names.iter().enumerate().filter(|(j, _)| felt[*j]) {
         all.push(Driver {

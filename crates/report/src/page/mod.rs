@@ -28,9 +28,10 @@ pub use compared::comparison_html;
 pub(crate) use numbers::Column;
 
 use crate::ReportError;
-use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, sizes_of, unlisted};
+use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, unlisted};
 use crate::findings::shown_unlisted;
 use crate::run::{Refit, Run};
+use crate::sizes::sizes_of;
 use crate::story::Story;
 use crate::text::millimetres;
 use crate::told_warning::ToldWarning;

@@ -1,0 +1,72 @@
+//! What can be measured of an arm: its tip, and markers on its links.
+
+use super::Model;
+use crate::tree::{Route, SegmentId};
+use crate::twist::Twist;
+use armcal_core::{FeatureId, Observation, Pose};
+use nalgebra::Matrix6xX;
+
+/// The name of a feature and the way to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Feature {
+    pub name: String,
+    pub route: Route,
+}
+
+impl Model {
+    /// A feature in the link that carries it.
+    pub fn feature_in_link(&self, p: &[f64], feature: FeatureId) -> Pose {
+        let own = self.route(feature).last().map(|end| self.tree.0[*end].transform(p, &[]));
+        own.map_or_else(Pose::identity, |own| Pose::from(&own))
+    }
+
+    /// A feature in the base frame, effects left out.
+    pub fn feature_in_base(&self, p: &[f64], feature: FeatureId, joint_rad: &[f64]) -> Pose {
+        Pose::from(&self.tree.follow(&self.route(feature)[1..], p, joint_rad))
+    }
+
+    /// Motion of a feature per unit of each joint reading, in the order of its route.
+    pub(super) fn joint_twists(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Vec<(usize, Twist)> {
+        match &self.effects {
+            None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
+            Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
+        }
+    }
+
+    /// The names of what can be measured of the arm: its tip, then its markers.
+    pub fn features(&self) -> impl Iterator<Item = (FeatureId, &str)> {
+        self.features.iter().enumerate().map(|(k, feature)| (FeatureId(k), feature.name.as_str()))
+    }
+
+    /// Where the model puts a feature, in the world, effects included.
+    pub fn feature_in_world(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Pose {
+        let at = match &self.effects {
+            None => self.tree.follow(self.route(feature), p, &o.joint_rad),
+            Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,
+        };
+        Pose::from(&at)
+    }
+
+    /// d position [m] and d rotation vector [rad] of a feature, in the world, per unit of each joint reading: 6 rows, one
+    /// column a reading.
+    pub fn feature_jacobian(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Matrix6xX<f64> {
+        let mut jacobian = Matrix6xX::zeros(self.joint_count());
+        for (column, twist) in self.joint_twists(p, feature, o) {
+            let mut moved = jacobian.fixed_view_mut::<3, 1>(0, column);
+            moved += twist.translation_m;
+            let mut turned = jacobian.fixed_view_mut::<3, 1>(3, column);
+            turned += twist.rotation_rad;
+        }
+        jacobian
+    }
+
+    /// The segments from the world to a feature.
+    pub(crate) fn route(&self, feature: FeatureId) -> &[SegmentId] {
+        &self.features[feature.0].route
+    }
+
+    /// The ways to all features.
+    pub(crate) fn routes(&self) -> impl Iterator<Item = &Route> {
+        self.features.iter().map(|feature| &feature.route)
+    }
+}
