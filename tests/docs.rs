@@ -34,7 +34,7 @@ fn every_shipped_pipeline_is_valid() {
     for entry in std::fs::read_dir(root().join("pipelines")).expect("pipelines") {
         let path = entry.expect("entry").path();
         if path.extension().is_some_and(|e| e == "toml") {
-            armcal::Job::load(&path).unwrap_or_else(|e| panic!("{e}"));
+            armcal::Pipeline::load(&path).unwrap_or_else(|e| panic!("{e}"));
         }
     }
 }

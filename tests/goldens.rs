@@ -7,7 +7,7 @@ use crate::support::root;
 use armcal::pipeline::Pipeline;
 use armcal::progress::Progress;
 use armcal::score::nominal_model;
-use armcal::{ClosedPipeline, closed_chain, story};
+use armcal::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_lab::scenario::{Design, Scenario};
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ const HIDDEN: [&str; 10] = [
     "sensor_scale",
     "outside:cable_drag",
 ];
-const PIPELINES: [&str; 4] = ["paper", "paper-normal", "paper-camera-free", "mukca-panda4"];
+const PIPELINES: [&str; 5] = ["paper", "paper-normal", "paper-camera-free", "mukca-panda4", "two-arms"];
 /// How far a parameter may be from what was written down, in its standard deviations; and an error in itself.
 const TOLERANCE: f64 = 1e-6;
 
@@ -76,15 +76,6 @@ fn of_pipeline(name: &str) -> Golden {
     Golden::of(&story::settle(&pipeline, &Progress::silent()).expect("a calibration").fitted.calibration)
 }
 
-fn of_two_arms() -> Golden {
-    let folder = root().join("pipelines");
-    let path = folder.join("two-arms.toml");
-    let text = std::fs::read_to_string(&path).expect("the shipped pipeline");
-    let pipeline = ClosedPipeline::parse(&path, text, &folder).expect("two arms");
-    let (run, _) = closed_chain::story::run(&pipeline, &Progress::silent()).expect("a calibration");
-    Golden::of(&run.calibration)
-}
-
 fn of_rig(scenario: &Scenario) -> Golden {
     let observed = scenario.observe().expect("a session");
     let model = nominal_model(&observed.nominal).expect("its nominal model");
@@ -105,7 +96,6 @@ fn no_number_moves_unless_it_is_meant_to() {
     let mut found: BTreeMap<String, Golden> =
         rigs.par_iter().map(|(name, scenario)| (name.clone(), of_rig(scenario))).collect();
     found.extend(PIPELINES.map(|name| (name.to_owned(), of_pipeline(name))));
-    found.insert("two-arms".to_owned(), of_two_arms());
 
     let path = root().join("fixtures/goldens.json");
     if std::env::var_os("ARMCAL_GOLDENS").is_some_and(|word| word == "write") {

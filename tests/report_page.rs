@@ -106,10 +106,6 @@ fn two_arms_have_the_page_and_it_says_what_the_terminal_says() {
     let output = armcal(arguments.map(Path::as_os_str));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     says_the_same(&out, &String::from_utf8_lossy(&output.stdout));
-    let Some(browser) = browser() else { return };
-    let files =
-        [out.join("report.html"), out.join("summary.json"), screenshots("overview"), "two-arms".into()];
-    println!("{}", scripted(&browser, "overview.mjs", &files.each_ref().map(PathBuf::as_path)));
 }
 
 /// One recording of the pool stands elsewhere than declared: geometry of three boards cannot explain it.

@@ -65,9 +65,9 @@ fn the_recording_of_two_arms_recovers_both_and_closes_dwells_it_never_saw() {
         // At home, before and after, the tips are apart: these two dwells are found out and told.
         let recording = &summary["recordings"][0];
         assert_eq!(recording["dwells"], 82, "seed {seed}");
-        let open: Vec<i64> = recording["open"]
+        let open: Vec<i64> = recording["rejected"]
             .as_array()
-            .expect("open dwells")
+            .expect("rejected dwells")
             .iter()
             .filter_map(|d| d["dwell"].as_i64())
             .collect();
@@ -112,17 +112,26 @@ fn the_shipped_recording_is_what_its_seed_gives_and_each_arm_gets_its_table_back
     let path = root().join("pipelines/two-arms.toml");
     let (summary, files) = run(&path, &folder.path().join("out"));
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
+    // As of one arm, with a model file an arm.
     let expected = [
+        "dwells.parquet",
         "foxglove-layout-legacy.json",
         "foxglove-layout.json",
         "left.toml",
+        "model.json",
+        "observations.json",
+        "observations.parquet",
+        "parameters.parquet",
         "parameters.toml",
         "report.html",
         "right.toml",
         "run.mcap",
         "summary.json",
+        "view.toml",
     ];
     assert_eq!(names, expected);
+    assert_eq!(summary["arms"], serde_json::json!(["right", "left"]));
+    assert_eq!(summary["closure"], "same point");
     assert_eq!(run(&path, &folder.path().join("again")).1, files, "the same input gives the same bytes");
     for arm in ["right", "left"] {
         let text = String::from_utf8(files[&format!("{arm}.toml")].clone()).expect("text");
@@ -163,7 +172,7 @@ fn what_two_arms_cannot_show_is_told_in_words() {
     assert!(lengthless.contains("length_mm") && lengthless.contains("is missing"), "{lengthless}");
 
     let shipped = root().join("pipelines/two-arms.toml");
-    let output = armcal(["diagnose".as_ref(), shipped.as_os_str()]);
+    let output = armcal(["pool".as_ref(), shipped.as_os_str(), folder.path().as_os_str()]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("is about two arms"), "{said}");
 }

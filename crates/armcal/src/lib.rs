@@ -1,14 +1,13 @@
 //! armcal calibrates a robot arm from MCAP recordings.
 //!
 //! The story is [`story::run`]; [`pipeline`] is what it is told, [`stages`] are its joints, [`commands`]
-//! are what a user types. Two arms have a pipeline and a story of their own in [`closed_chain`].
+//! are what a user types. What is particular to two arms is in [`two_arms`].
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod batch;
 pub mod check;
 pub mod cli;
-pub mod closed_chain;
 pub mod commands;
 pub mod compensate;
 pub mod error;
@@ -22,9 +21,9 @@ pub mod stages;
 pub mod stdout;
 pub mod story;
 pub mod transfer;
+pub mod two_arms;
 pub mod verify;
 pub mod view;
 
-pub use closed_chain::ClosedPipeline;
 pub use error::Error;
-pub use pipeline::{Job, Pipeline};
+pub use pipeline::Pipeline;

@@ -4,9 +4,9 @@
 //! this module only puts them side by side, so a key is documented where it is used.
 
 use crate::check::CheckSection;
-use crate::closed_chain::ClosedPipeline;
 use crate::error::Error;
 use crate::pool::PoolSection;
+use crate::two_arms::TwoArms;
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
@@ -78,6 +78,10 @@ pub struct Pipeline {
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,
+    /// The two arms whose tips are joined, of a pipeline with a `[closed_chain]`; `streams` and `model` are those of the first
+    /// then.
+    #[serde(skip)]
+    pub two_arms: Option<TwoArms>,
     /// Folder of the pipeline file.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -279,27 +283,6 @@ impl Default for ObservationsSection {
     }
 }
 
-/// What a pipeline file asks for.
-#[derive(Debug, Clone)]
-pub enum Job {
-    /// One arm.
-    OneArm(Box<Pipeline>),
-    /// Two arms whose tips are joined.
-    TwoArms(Box<ClosedPipeline>),
-}
-
-impl Job {
-    /// Reads and checks a pipeline file of either kind: one with a `[closed_chain]` is about two arms.
-    pub fn load(path: &Path) -> Result<Job, Error> {
-        let text = read(path)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        if is_of_two_arms(&text) {
-            return Ok(Job::TwoArms(Box::new(ClosedPipeline::parse(path, text, folder)?)));
-        }
-        Ok(Job::OneArm(Box::new(Pipeline::parse(path, text, folder)?)))
-    }
-}
-
 /// A pipeline's text.
 fn read(path: &Path) -> Result<String, Error> {
     read_text("pipeline", path)
@@ -370,13 +353,13 @@ impl Pipeline {
     }
 
     fn parse_unchecked(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
-        if is_of_two_arms(&text) {
-            let problem = "is about two arms, which only `armcal run` reads".into();
-            let key = "closed_chain".into();
-            return Err(Error::PipelineContradiction { path: path.to_owned(), key, problem });
-        }
-        let mut pipeline: Pipeline = toml::from_str(&text)
-            .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
+        let mut pipeline = match is_of_two_arms(&text) {
+            true => TwoArms::parse(path, &text)?,
+            false => toml::from_str(&text).map_err(|source| Error::PipelineSyntax {
+                path: path.to_owned(),
+                source: Box::new(source),
+            })?,
+        };
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
         pipeline.note_inputs();
@@ -385,7 +368,7 @@ impl Pipeline {
 
     /// Notes every file that the pipeline names, so that no output is begun in its place.
     fn note_inputs(&self) {
-        let model = [&self.model.dh, &self.model.urdf].into_iter().flatten();
+        let model = self.models().into_iter().flat_map(|model| [&model.dh, &model.urdf]).flatten();
         let board = self.table.iter().map(|table| &table.board);
         let recordings = self.recordings.iter().flat_map(|entry| &entry.paths);
         model.chain(board).chain(recordings).for_each(|path| input::note(&self.resolve(path)));
@@ -393,6 +376,32 @@ impl Pipeline {
             let reference = self.resolve(reference);
             let inside = ["summary.json", "run.mcap"].map(|name| reference.join(name));
             inside.iter().chain([&reference]).for_each(|path| input::note(path));
+        }
+    }
+
+    /// The nominal arm, or each of two.
+    pub fn models(&self) -> Vec<&ModelSection> {
+        match &self.two_arms {
+            Some(two) => two.arms.iter().map(|arm| &arm.model).collect(),
+            None => vec![&self.model],
+        }
+    }
+
+    /// The names of two arms, each with whether its file is a URDF; of one arm without a name.
+    pub fn arm_files(&self) -> Vec<(Option<&str>, bool)> {
+        let names = self.two_arms.iter().flat_map(|two| &two.arms).map(|arm| Some(arm.name.as_str()));
+        let names: Vec<Option<&str>> = names.chain([None]).collect();
+        names.into_iter().zip(self.models()).map(|(name, model)| (name, model.urdf.is_some())).collect()
+    }
+
+    /// Refuses a pipeline of two arms for a command that needs more than their joined tips.
+    ///
+    /// # Errors
+    /// Two arms, with why.
+    pub fn one_arm(&self, needs: &str) -> Result<(), Error> {
+        match &self.two_arms {
+            None => Ok(()),
+            Some(_) => Err(Error::TwoArms { problem: format!("`{}` is about two arms; {needs}", self.name) }),
         }
     }
 
@@ -446,16 +455,17 @@ impl Pipeline {
         if self.frames.base.pose == FramePose::Measured && self.streams.base.is_none() {
             return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
         }
-        if self.table.is_none() && self.streams.tip.is_none() {
+        if self.two_arms.is_none() && self.table.is_none() && self.streams.tip.is_none() {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
         }
         if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
             return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }
         self.pool.check(path)?;
-        match (&self.model.dh, &self.model.urdf) {
-            (Some(_), None) | (None, Some(_)) => Ok(()),
-            _ => fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into()),
+        let one_file = |model: &&ModelSection| model.dh.is_some() != model.urdf.is_some();
+        match self.models().iter().all(one_file) {
+            true => Ok(()),
+            false => fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into()),
         }
     }
 }

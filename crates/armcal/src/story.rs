@@ -5,6 +5,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::setup::{self, Inputs};
 use crate::stages::{frames, observe, perceive};
+use crate::two_arms;
 use armcal_calibrate::{Calibration, calibrate, holdout_turns};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, Verdict, diagnose, nested};
@@ -88,8 +89,8 @@ const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
 pub struct Settled {
     /// The opened recordings.
     pub recordings: Vec<Recording>,
-    /// Text of the nominal model file.
-    pub model_text: String,
+    /// Texts of the nominal model files: one an arm.
+    pub model_texts: Vec<String>,
     /// What it was calibrated from.
     pub inputs: Inputs,
     /// What contradicts the data about the setup.
@@ -108,9 +109,12 @@ pub struct Fitted {
     pub observations: Vec<Observation>,
     /// The calibration.
     pub calibration: Calibration,
-    places: Vec<Option<Association>>,
-    rejections: Vec<Rejection>,
-    rounds: usize,
+    /// Where every dwell is on the table, by recording.
+    pub places: Vec<Option<Association>>,
+    /// Dwells that are none, and why.
+    pub rejections: Vec<Rejection>,
+    /// Rounds of association and fit.
+    pub rounds: usize,
 }
 
 impl Fitted {
@@ -123,7 +127,7 @@ impl Fitted {
 /// Reads the recordings, associates and calibrates in turn until every dwell stays in its place, and looks for mistakes
 /// in the setup.
 pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
-    let (model_text, chain) = frames::nominal_chain(pipeline)?;
+    let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
     Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
     let board = frames::board(pipeline)?;
@@ -143,7 +147,7 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
     progress.step("checking the setup");
     let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
     let setup = setup::examine(&inputs, &fitted);
-    Ok(Settled { recordings, model_text, inputs, setup, fitted })
+    Ok(Settled { recordings, model_texts, inputs, setup, fitted })
 }
 
 /// The error of inputs that cannot be calibrated, with the mistake of the setup that would explain it.
@@ -159,6 +163,9 @@ fn without_setup(source: Error, inputs: &Inputs) -> Error {
 /// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
 pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
     let Inputs { pipeline, chain, board, seen, changes, .. } = inputs;
+    if let Some(two) = &pipeline.two_arms {
+        return two_arms::fit::fit_joined(inputs, two, told);
+    }
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
@@ -239,7 +246,7 @@ impl Settled {
         let run = Run {
             pipeline_name: pipeline.name.clone(),
             pipeline_text: pipeline.text.clone(),
-            model_text: self.model_text,
+            model_texts: self.model_texts,
             recordings: perceive::recording_runs(pipeline, self.inputs.seen, places, &rejections),
             board: self.inputs.board,
             model,

@@ -15,12 +15,12 @@ use crate::fit::{Near, fit_near};
 use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
-use crate::model_problem::{ModelProblem, describe, position_covariance_m2};
+use crate::model_problem::{ModelProblem, describe, position_covariance_m2, whitened};
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::priors::scales_of;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, Scene, fit_problem};
-use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
+use armcal_core::{ErrorStats, Observation, Parameter, Reference, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -103,22 +103,29 @@ pub(crate) struct Turn {
     pub values: Vec<f64>,
     /// Index into the fit's weights of every observation it saw.
     weight_of: Vec<Option<usize>>,
+    /// Rows of position that it saw.
+    rows: usize,
     pub warnings: Vec<Warning>,
 }
 
 impl Turn {
     /// A turn that fitted all of `observations` but those `held` (indices in rising order).
-    pub fn new(fit: Fit, nominal_values: Vec<f64>, held: &[usize], observations: usize) -> Turn {
+    pub fn new(fit: Fit, nominal_values: Vec<f64>, held: &[usize], observations: &[Observation]) -> Turn {
         let mut seen = 0..;
         let is_held = |i: usize| held.binary_search(&i).is_ok();
-        let weight_of = (0..observations).map(|i| if is_held(i) { None } else { seen.next() }).collect();
-        Turn { values: fit.values(), fit, nominal_values, weight_of, warnings: Vec::new() }
+        let all = 0..observations.len();
+        let weight_of = all.clone().map(|i| if is_held(i) { None } else { seen.next() }).collect();
+        let rows = |o: &Observation| match o.reference {
+            Reference::Joined { apart: true, .. } => 1,
+            _ => 3,
+        };
+        let rows = all.filter(|i| !is_held(*i)).map(|i| rows(&observations[i])).sum();
+        Turn { values: fit.values(), fit, nominal_values, weight_of, rows, warnings: Vec::new() }
     }
 
     /// As [`Calibration::prediction_factor`].
     fn prediction_factor(&self) -> f64 {
-        let rows = 3 * self.weight_of.iter().flatten().count();
-        (1.0 + self.fit.rank as f64 / rows.max(1) as f64).sqrt()
+        (1.0 + self.fit.rank as f64 / self.rows.max(1) as f64).sqrt()
     }
 
     /// Robust weight of an observation in the fit; 1 where it did not take part.
@@ -225,23 +232,21 @@ impl Judged for Judge<'_> {
             adopt(&mut fit, &frozen, &of_unseen);
             warnings.push(fitted_on_held_out(&unseen));
         }
-        Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations.len()) })
+        Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations) })
     }
 
     fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
         let o = &self.observations[i];
         let (model, values) = self.scene.seen(o, &turn.values);
         let covariance = position_covariance_m2(model, &values, o);
-        let fitted_m = model.residual(&values, o).position_m;
-        let whitened = covariance
-            .cholesky()
-            .and_then(|c| c.l().solve_lower_triangular(&fitted_m))
+        let fitted = model.residual(&values, o);
+        let whitened = whitened(&fitted, &covariance)
             .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
         Ok(Residual {
             dwell: o.dwell,
             held_out,
             nominal_m: model.residual(&self.scene.seen(o, &turn.nominal_values).1, o).position_m,
-            fitted_m,
+            fitted_m: fitted.position_m,
             whitened,
             weight: if held_out { 1.0 } else { turn.weight(i) },
             expected_norm_m: expected_norm_m(&covariance),

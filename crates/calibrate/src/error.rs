@@ -108,12 +108,6 @@ pub enum CalibrateError {
         /// Status of the solver.
         status: String,
     },
-    /// Two arms that cannot be calibrated against each other as described.
-    #[error("closed chain: {problem}")]
-    ClosedChain {
-        /// What is wrong, and what to do.
-        problem: String,
-    },
     /// A linear system that should be positive definite is not.
     #[error(
         "{doing}: the normal equations are not positive definite; give `{worst}` a smaller prior_sigma or fix it"

@@ -1,6 +1,6 @@
 //! Frames that nobody could know: closed-form start, then a fit of these alone.
 //!
-//! Alternates, with the arm at nominal: base and boards by the weighted Kabsch rotation, the orientation of tip and markers by
+//! Alternates, with the arm at nominal: bases and boards by the weighted Kabsch rotation, the orientation of tip and markers by
 //! the mean of what the sensor saw, their offsets by the linear least squares they enter with. Each step is robust
 //! (Huber weights on the distances, scale by their median) and closed-form, so the start values may be metres and half
 //! turns off. What remains is left to the solver, over these parameters alone.
@@ -114,28 +114,39 @@ fn aligned(
 /// boards with seated dwells; then what else the observed recordings of a pool have for themselves.
 pub(crate) fn touched_frames(scene: Scene<'_>, observations: &[&Observation]) -> Vec<String> {
     let names = frame_names(scene.model());
-    let measured: BTreeSet<usize> = observations.iter().map(|o| TIP_FRAME + o.feature.0).collect();
-    let known = |k: &usize| *k <= TIP_FRAME || measured.contains(k);
-    let features = TIP_FRAME + scene.model().features().count();
+    let tips = tips_at(scene.model());
+    let measured: BTreeSet<usize> = observations.iter().map(|o| tips + o.feature.0).collect();
+    let known = |k: &usize| *k < 2 * tips || measured.contains(k);
+    let features = tips + scene.model().features().count();
     let arm = names.iter().enumerate().take(features).filter(|(k, _)| known(k));
     let mut touched: Vec<String> = arm.map(|(_, name)| name.clone()).collect();
     let seated: BTreeSet<usize> =
         observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
-    let boards = names.iter().skip(features).enumerate();
+    let boards = names.iter().skip(features).take(scene.model().boards()).enumerate();
     touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
+    if observations.iter().any(|o| matches!(o.reference, Reference::Joined { apart: true, .. })) {
+        touched.extend(names.last().cloned());
+    }
     touched.extend(scene.own_parts(observations));
     touched
 }
 
-/// Where among [`frame_names`] that of the tip is; those of the markers are behind it.
-const TIP_FRAME: usize = 1;
+/// Where among [`frame_names`] those of the tips begin, one an arm as the bases before them; those of the markers are behind
+/// them.
+fn tips_at(model: &Model) -> usize {
+    model.chain().arms().len().max(1)
+}
 
 /// The names of the recordings' boards.
 pub(crate) fn board_names(model: &Model) -> Vec<String> {
-    frame_names(model).into_iter().skip(TIP_FRAME + model.features().count()).collect()
+    frame_names(model)
+        .into_iter()
+        .skip(tips_at(model) + model.features().count())
+        .take(model.boards())
+        .collect()
 }
 
-/// Frames of the model in its documented order: base, tip, markers, then one board a recording.
+/// Frames of the model in its documented order: bases, tips, markers, then one board a recording, and a link.
 pub(crate) fn frame_names(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for p in model.parameters().iter().filter(|p| matches!(p.role, Role::EstimatedFrame | Role::KnownFrame)) {
@@ -200,12 +211,15 @@ impl<'a> Alignment<'a> {
         let nominal = self.model.nominal();
         let place = |name: &str, pose: &Pose| Place::new(self.model, name, pose, which);
         let features: Vec<FeatureId> = self.model.features().map(|(feature, _)| feature).collect();
-        let Some((base_name, names)) = self.names.split_first().filter(|(_, n)| n.len() >= features.len())
-        else {
+        let tips = tips_at(self.model);
+        if self.names.len() < tips + features.len() {
             return p;
-        };
+        }
+        let (of_bases, names) = self.names.split_at(tips);
         let (of_features, boards) = names.split_at(features.len());
-        let base = place(base_name, &self.model.base_in_world(&nominal));
+        let boards = &boards[..self.model.boards().min(boards.len())];
+        let base = |(arm, name): (usize, &String)| place(name, &self.model.arm_base_in_world(&nominal, arm));
+        let bases: Vec<Place> = of_bases.iter().enumerate().map(base).collect();
         let on_arm = features.iter().zip(of_features);
         let on_arm: Vec<(FeatureId, Place)> = on_arm
             .map(|(feature, name)| (*feature, place(name, &self.model.feature_in_link(&nominal, *feature))))
@@ -218,7 +232,7 @@ impl<'a> Alignment<'a> {
             .filter(|(_, place)| place.position.is_some())
             .collect();
         let nowhere = on_arm.iter().all(|(_, place)| place.position.is_none());
-        if base.position.is_none() && nowhere && boards.is_empty() {
+        if bases.iter().all(|base| base.position.is_none()) && nowhere && boards.is_empty() {
             return p;
         }
         let links = self.links_in_base(&p);
@@ -228,7 +242,9 @@ impl<'a> Alignment<'a> {
         }
         for _ in 0..ROUNDS {
             let before = p.clone();
-            self.place_base(&mut p, &base, &boards, &links);
+            for (arm, base) in bases.iter().enumerate() {
+                self.place_base(&mut p, arm, base, &boards, &links);
+            }
             for (recording, board) in &boards {
                 let own = seated.get(recording).map_or(&[][..], Vec::as_slice);
                 self.place_board(&mut p, *recording, board, own, &links);
@@ -251,25 +267,32 @@ impl<'a> Alignment<'a> {
         self.observations.iter().map(link).collect()
     }
 
-    /// world_from_base from points known in the world.
-    fn place_base(&self, p: &mut [f64], base: &Place, boards: &[(usize, Place)], links: &[Pose]) {
+    /// world_from_base of an arm from points known in the world: where a sensor or a given board has them, or the arm that its
+    /// tip is joined to. The direction of a link between them is unknown, so that its length is ignored: the start is off by as
+    /// much, which the fit makes up for.
+    fn place_base(&self, p: &mut [f64], arm: usize, base: &Place, boards: &[(usize, Place)], links: &[Pose]) {
         if base.position.is_none() {
             return;
         }
         let in_link = self.in_links(p);
         let placed: BTreeSet<usize> = boards.iter().map(|(recording, _)| *recording).collect();
+        let is_own = |o: &Observation| o.is_joined() || self.model.arm_of(o.feature) == arm;
         let anchored = |o: &Observation| o.cavity().is_none() || !placed.contains(&o.dwell.recording);
-        let pairs: Vec<Pair> = self
-            .observations
-            .iter()
-            .zip(links)
-            .filter(|(o, _)| anchored(o))
-            .map(|(o, link)| Pair {
+        let in_world = |o: &Observation| self.model.feature_in_world(p, o.feature, o).translation.vector;
+        let pair = |(o, link): (&&Observation, &Pose)| match o.reference {
+            // The other arm's tip is that of this one.
+            Reference::Joined { to, .. } if to == FeatureId(arm) => {
+                let from = self.model.feature_in_base(p, to, &o.joint_rad).translation.vector;
+                Pair { from, to: in_world(o) }
+            }
+            _ => Pair {
                 from: (link * in_link[o.feature.0]).translation.vector,
                 to: self.model.measured_tip_in_world(p, o),
-            })
-            .collect();
-        let current = self.model.base_in_world(p);
+            },
+        };
+        let own = self.observations.iter().zip(links).filter(|(o, _)| is_own(o) && anchored(o));
+        let pairs: Vec<Pair> = own.map(pair).collect();
+        let current = self.model.arm_base_in_world(p, arm);
         base.put(p, &rigid_fit(&pairs, &current, base.rotation.is_some()));
     }
 
@@ -278,10 +301,11 @@ impl<'a> Alignment<'a> {
         let Some(current) = self.model.board_in_world(p, recording) else {
             return;
         };
-        let (base, in_link) = (self.model.base_in_world(p), self.in_links(p));
+        let in_link = self.in_links(p);
         let mut pairs = Vec::new();
         for &at in seated {
             let o = self.observations[at];
+            let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
             if let Reference::Seated { in_board_m, .. } = &o.reference {
                 let to = (base * links[at] * in_link[o.feature.0]).translation.vector;
                 pairs.push(Pair { from: *in_board_m, to });
@@ -298,9 +322,11 @@ impl<'a> Alignment<'a> {
     /// link_from_feature: the offset t of `y = A (L t)` by weighted linear least squares (A world_from_base, L
     /// base_from_link), the orientation by the mean of `(A L)^-1 R_measured`.
     fn place_feature(&self, p: &mut [f64], feature: FeatureId, place: &Place, links: &[Pose]) {
-        let base = self.model.base_in_world(p);
+        let base = self.model.arm_base_in_world(p, self.model.arm_of(feature));
         let mut pose = self.model.feature_in_link(p, feature);
-        let own = self.observations.iter().zip(links).filter(|(o, _)| o.feature == feature);
+        // Joined tips say where both are against each other, not where one is.
+        let of_feature = |o: &Observation| o.feature == feature && !o.is_joined();
+        let own = self.observations.iter().zip(links).filter(|(o, _)| of_feature(o));
         let (own, frames): (Vec<&Observation>, Vec<Pose>) = own.map(|(o, link)| (*o, base * link)).unzip();
         let error = |(o, frame): (&&Observation, &Pose)| {
             self.model.measured_tip_in_world(p, o) - (frame * pose).translation.vector

@@ -15,10 +15,9 @@
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
 //! * many recordings of one arm, each with parameters of its own: [`PooledModel`], [`calibrate_pooled`];
-//! * two arms whose tips are joined, each the other's reference: [`ClosedChain`], [`calibrate_closed_chain`].
+//! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
 mod calibration;
-mod closed_chain;
 mod config;
 mod covariance;
 mod error;
@@ -27,6 +26,7 @@ mod fit;
 mod fit_warnings;
 mod frames;
 mod holdout;
+mod joined;
 mod linearise;
 mod loss;
 mod model_problem;
@@ -55,10 +55,6 @@ mod words;
 mod tests;
 
 pub use calibration::{calibrate, holdout_turns};
-pub use closed_chain::{
-    ChainArm, ClosedChain, ClosedChainProblem, ClosedObservation, Closure, LengthKnowledge,
-    calibrate_closed_chain, closed_chain_nominal,
-};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use covariance::Covariance;
 pub use error::CalibrateError;

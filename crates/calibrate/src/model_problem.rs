@@ -5,24 +5,50 @@
 //! joints that rest anywhere in their gaps. Cross-covariance between position and orientation, and between the features that
 //! were measured in one dwell, enters through the encoders only: a block is all that was measured in a dwell.
 
-use crate::problem::{Known, Linearised, Problem};
+use crate::joined::scale;
+use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::{CalibrateError, FitConfig, Objective, Scene};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::{Model, ModelResidual};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use std::ops::Range;
 
 /// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
 /// the fit.
 const JOINT_STEP_RAD: f64 = 1e-6;
 
-/// Covariance of measured minus predicted position of an observation at parameters `p` [m^2].
+/// Covariance of measured minus predicted position of an observation at parameters `p` [m^2]; where only a distance is known,
+/// of what lies along it.
 pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matrix3<f64> {
     let mut jacobian = model.joint_jacobian(p, o);
     for (mut column, sigma) in jacobian.column_iter_mut().zip(joint_sigma_rad(model, p, o)) {
         column *= sigma;
     }
-    o.covariance_m2 + &jacobian * jacobian.transpose()
+    let covariance = o.covariance_m2 + &jacobian * jacobian.transpose();
+    match along(model, p, o) {
+        Some(along) => along * along.transpose() * along.dot(&(covariance * along)),
+        None => covariance,
+    }
+}
+
+/// Where only the distance of an observation is known, the unit vector along it.
+fn along(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
+    // Of all others it is known without following the arm.
+    if !matches!(o.reference, Reference::Joined { apart: true, .. }) {
+        return None;
+    }
+    model.residual(p, o).along
+}
+
+/// The position part of a residual in units of its standard deviations, one a row and zero in rows that it does not have;
+/// `None` where its covariance is none.
+pub(crate) fn whitened(residual: &ModelResidual, covariance_m2: &Matrix3<f64>) -> Option<Vector3<f64>> {
+    if let Some(along) = residual.along {
+        let variance_m2 = along.dot(&(covariance_m2 * along));
+        let white = along.dot(&residual.position_m) / variance_m2.sqrt();
+        return (variance_m2 > 0.0).then(|| Vector3::new(white, 0.0, 0.0));
+    }
+    covariance_m2.cholesky().and_then(|c| c.l().solve_lower_triangular(&residual.position_m))
 }
 
 /// How well the readings tell where the links stand: their own noise and the slack of the joints [rad].
@@ -74,6 +100,7 @@ impl<'a> ModelProblem<'a> {
     /// The rows of an observation that are used.
     fn rows(&self, o: &Observation) -> usize {
         match &o.reference {
+            Reference::Joined { apart: true, .. } => 1,
             Reference::Tracked { orientation: Some(_), orientation_sigma_rad, .. }
                 if self.use_orientation && *orientation_sigma_rad > 0.0 =>
             {
@@ -105,7 +132,11 @@ impl<'a> ModelProblem<'a> {
     fn spread(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
         let (rows, (model, p)) = (self.rows(o), self.scene.seen(o, p));
         let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
-        spread.rows_mut(0, 3).copy_from(&model.joint_jacobian(&p, o));
+        let moved = model.joint_jacobian(&p, o);
+        match along(model, &p, o) {
+            Some(along) => spread.row_mut(0).copy_from(&(along.transpose() * moved)),
+            None => spread.rows_mut(0, 3).copy_from(&moved),
+        }
         if rows == 6 {
             spread.rows_mut(3, 3).copy_from(&turning_jacobian(model, &p, o));
         }
@@ -116,8 +147,11 @@ impl<'a> ModelProblem<'a> {
     }
 
     /// Covariance of what was measured of an observation, without what the encoders add.
-    fn measured(&self, o: &Observation) -> DMatrix<f64> {
-        let rows = self.rows(o);
+    fn measured(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
+        let (rows, (model, p)) = (self.rows(o), self.scene.seen(o, p));
+        if let Some(along) = along(model, &p, o) {
+            return DMatrix::from_element(1, 1, along.dot(&(o.covariance_m2 * along)));
+        }
         let mut covariance = DMatrix::zeros(rows, rows);
         covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
         if let Reference::Tracked { orientation_sigma_rad, .. } = &o.reference {
@@ -241,7 +275,7 @@ impl Problem for ModelProblem<'_> {
         let mut covariance = DMatrix::zeros(rows, rows);
         let mut at = 0;
         for (o, spread) in all.iter().zip(&spreads) {
-            let own = self.measured(o) + spread * spread.transpose();
+            let own = self.measured(o, p) + spread * spread.transpose();
             covariance.view_mut((at, at), own.shape()).copy_from(&own);
             let mut before = 0;
             for other in spreads.iter().take_while(|other| !std::ptr::eq(*other, spread)) {
@@ -259,6 +293,13 @@ impl Problem for ModelProblem<'_> {
 
     fn noise_depends(&self) -> bool {
         self.scene.model().has_gaps()
+    }
+
+    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
+        if self.observations.iter().any(|o| !o.is_joined()) {
+            return Vec::new();
+        }
+        scale(self.scene.model(), p).into_iter().collect()
     }
 
     fn known(&self) -> Vec<Known> {
@@ -288,6 +329,7 @@ fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
         Reference::Tracked { position_m, .. } => {
             ("the measured position", position_m.iter().copied().collect())
         }
+        Reference::Joined { .. } => ("nothing", Vec::new()),
     };
     if !values.iter().all(|v| v.is_finite()) {
         return Err(not_finite(o, &observation, what));

@@ -1,11 +1,11 @@
 //! Tests of the whole crate, one question a file.
 
-mod closed_chain; // do two arms of the lab with joined tips recover what is planted in both?
 mod covariance; // is a covariance kept in parts the dense one?
 mod coverage; // do 95 % intervals hold 95 % of planted truths, and are parallel axes reported?
 mod frames; // are frames metres and half turns off found?
 mod holdout; // does the fit never see what is held out?
 mod holdout_turns; // which observations does each kind of hold-out mean?
+mod joined; // do two arms of the lab with joined tips recover what is planted in both?
 mod linear; // is the answer of a linear problem the textbook's?
 mod markers; // do several markers a pose share noise, hold-out and weight?
 mod paper; // is eq. 4 solved to its optimality conditions?

@@ -25,9 +25,16 @@ pub enum Reference {
         #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
         orientation_sigma_rad: f64,
     },
+    /// It is joined to another point of the arms: both in one place, or at the two ends of a rigid link.
+    Joined {
+        /// The other point.
+        to: FeatureId,
+        /// Whether a link keeps them apart, whose length is a parameter of the model: only their distance is known then.
+        apart: bool,
+    },
 }
 
-/// A point of the arm that is measured, by its place among the model's: the tip first, then the markers.
+/// A point of the arm that is measured, by its place among the model's: the tip first (one of each arm), then the markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct FeatureId(pub usize);
@@ -119,8 +126,18 @@ impl Observation {
     pub fn cavity(&self) -> Option<&str> {
         match &self.reference {
             Reference::Seated { cavity, .. } => Some(cavity),
-            Reference::Tracked { .. } => None,
+            Reference::Tracked { .. } | Reference::Joined { .. } => None,
         }
+    }
+
+    /// Whether a sensor saw where it was.
+    pub fn is_tracked(&self) -> bool {
+        matches!(self.reference, Reference::Tracked { .. })
+    }
+
+    /// Whether two points of the arms are each other's reference.
+    pub fn is_joined(&self) -> bool {
+        matches!(self.reference, Reference::Joined { .. })
     }
 }
 

@@ -44,7 +44,9 @@ pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names:
             )
         }));
     }
-    if matches!(d.verdict, Verdict::Unknown | Verdict::Unexplained) {
+    // A load between two arms is shared in a way that nobody knows.
+    let joined = observations.iter().any(Observation::is_joined);
+    if joined || matches!(d.verdict, Verdict::Unknown | Verdict::Unexplained) {
         d.record_next.retain(|next| next != WITH_A_LOAD);
     }
     d.record_next.splice(0..0, first);

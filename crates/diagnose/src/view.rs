@@ -13,8 +13,9 @@ use crate::stretches::stretches;
 use armcal_calibrate::{FitConfig, Linearisation, linearise};
 use armcal_core::{DwellId, Observation, Reference, Unit};
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A length of the nominal arm below this is not a way for the unknown to enter [m].
@@ -141,7 +142,12 @@ impl View<'_> {
             (Some(joint), None) => joint,
             (Some(joint), Some(since)) => format!("{joint} {}", words(since)),
             (None, Some(since)) => words(since),
-            (None, None) => "arm".to_owned(),
+            (None, None) => {
+                let number = spec.shape.iter().find(|(name, _)| name == "arm").map(|(_, number)| *number);
+                let arms = self.model.chain().arms().iter().enumerate();
+                let mut named = arms.filter(|(k, _)| Some((*k + 1) as f64) == number);
+                named.next().map_or_else(|| "arm".to_owned(), |(_, arm)| arm.name.clone())
+            }
         }
     }
 
@@ -290,24 +296,63 @@ impl View<'_> {
             unit: Unit::Metre,
             columns: self.displaced(linear, 3, |_, axis| Matrix3::identity().column(axis).into_owned()),
         };
-        // A base that gives rocks about its horizontal axes; a belt from the base keeps the forearm's direction.
-        let centre = self.model.base_in_world(self.values).translation.vector;
-        let tilt = Channel {
-            name: "tilt of the base".to_owned(),
-            axes: Vec::new(),
-            unit: Unit::Radian,
-            columns: self.displaced(linear, 2, |i, axis| {
-                let tip = self.model.predicted_tip_in_world(self.values, &self.observations[i]);
-                Matrix3::identity().column(axis).cross(&(tip - centre))
-            }),
+        let tilts = self.tilts(linear);
+        let belts = self.belts(&joints);
+        joints
+            .into_iter()
+            .chain(belts)
+            .chain(parameters)
+            .chain([lengths])
+            .chain(tilts)
+            .chain([world])
+            .collect()
+    }
+
+    /// A base that gives rocks about its horizontal axes.
+    fn tilts(&self, linear: &Linearisation) -> Vec<Channel> {
+        let arms = self.model.chain().arms();
+        let tilt = |arm: usize| {
+            let centre = self.model.arm_base_in_world(self.values, arm).translation.vector;
+            let rocked = |i: usize, axis: usize| {
+                let (o, axis) = (&self.observations[i], Matrix3::identity().column(axis).into_owned());
+                match o.reference {
+                    // The other tip is that of this arm: it moves away from where it was.
+                    Reference::Joined { to, .. } if self.model.arm_of(to) == arm => {
+                        axis.cross(&(centre - self.model.measured_tip_in_world(self.values, o)))
+                    }
+                    _ if self.model.arm_of(o.feature) == arm => {
+                        axis.cross(&(self.model.predicted_tip_in_world(self.values, o) - centre))
+                    }
+                    _ => Vector3::zeros(),
+                }
+            };
+            let of = arms.get(arm).map_or_else(String::new, |arm| format!(" of {}", arm.name));
+            Channel {
+                name: format!("tilt of the base{of}"),
+                axes: Vec::new(),
+                unit: Unit::Radian,
+                columns: self.displaced(linear, 2, rocked),
+            }
         };
-        let belt = (joints.len() > 2).then(|| Channel {
-            name: "joint2 with the direction of joint3 kept".to_owned(),
-            axes: Vec::new(),
-            unit: Unit::Radian,
-            columns: Arc::new(joints[1].columns.as_ref() - joints[2].columns.as_ref()),
-        });
-        joints.into_iter().chain(belt).chain(parameters).chain([lengths, tilt, world]).collect()
+        (0..arms.len().max(1)).map(tilt).collect()
+    }
+
+    /// A belt from the base keeps the forearm's direction.
+    fn belts(&self, joints: &[Channel]) -> Vec<Channel> {
+        let arms = self.model.chain().arms();
+        let one = [0..joints.len()];
+        let of_arms: Vec<_> = arms.iter().map(|arm| arm.joints.clone()).collect();
+        let all = if arms.is_empty() { &one[..] } else { &of_arms[..] };
+        let belt = |own: &Range<usize>| {
+            let (upper, fore) = (own.start + 1, own.start + 2);
+            Channel {
+                name: format!("joint{} with the direction of joint{} kept", upper + 1, fore + 1),
+                axes: Vec::new(),
+                unit: Unit::Radian,
+                columns: Arc::new(joints[upper].columns.as_ref() - joints[fore].columns.as_ref()),
+            }
+        };
+        all.iter().filter(|own| own.len() > 2).map(belt).collect()
     }
 
     fn each<T>(&self, of: impl Fn(&Observation) -> T) -> Vec<T> {
@@ -339,7 +384,7 @@ impl View<'_> {
             let sigma_m = (o.covariance_m2.trace() / 3.0).sqrt();
             let axes = match &o.reference {
                 Reference::Seated { .. } => self.model.board_in_world(self.values, o.dwell.recording),
-                Reference::Tracked { .. } => None,
+                Reference::Tracked { .. } | Reference::Joined { .. } => None,
             };
             let axes =
                 axes.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());

@@ -1,6 +1,7 @@
-//! A serial arm: its segments, its joints, its parameters.
+//! An arm, or several side by side: segments, joints, parameters.
 
 use crate::ModelError;
+use crate::arms::Arm;
 use crate::dh_toml::DhTable;
 use crate::error::nearest;
 use crate::segment::{Motion, Segment};
@@ -31,6 +32,8 @@ pub(crate) enum Source {
     Dh(DhTable),
     /// The joints of a URDF from base to tip, fixed ones included.
     Urdf(Vec<UrdfJoint>),
+    /// Chains of their own, side by side.
+    Arms(Vec<Arm>),
 }
 
 impl Chain {
@@ -64,20 +67,33 @@ impl Chain {
         &self.parameters
     }
 
-    /// The tree of this arm on its base.
-    pub(crate) fn on(&self, base: Segment) -> Tree {
-        let hung = |segment: &Segment| {
-            let parent = segment.parent.map_or(0, |parent| parent + 1);
+    /// The number of bases that it needs: one an arm.
+    pub(crate) fn bases(&self) -> usize {
+        self.arms().len().max(1)
+    }
+
+    /// The tree of this arm on its base; of several, each on its own.
+    pub(crate) fn on(&self, bases: Vec<Segment>) -> Tree {
+        let count = bases.len();
+        let base_of = |at: usize| self.arms().iter().position(|arm| arm.segments.contains(&at)).unwrap_or(0);
+        let hung = |(at, segment): (usize, &Segment)| {
+            let parent = segment.parent.map_or_else(|| base_of(at), |parent| parent + count);
             Segment { parent: Some(parent), ..segment.clone() }
         };
-        let mut segments = vec![base];
-        segments.extend(self.segments.iter().map(hung));
+        let mut segments = bases;
+        segments.extend(self.segments.iter().enumerate().map(hung));
         Tree(segments)
     }
 
-    /// Where, in that tree, the link of the tip ends.
-    pub(crate) fn end(&self) -> SegmentId {
-        self.end.map_or(0, |end| end + 1)
+    /// Where, in that tree, the link of each arm's tip ends.
+    pub(crate) fn ends(&self) -> Vec<SegmentId> {
+        let bases = self.bases();
+        if self.arms().is_empty() {
+            return vec![self.end.map_or(0, |end| end + bases)];
+        }
+        let end =
+            |(base, arm): (usize, &Arm)| arm.chain.end.map_or(base, |end| arm.segments.start + end + bases);
+        self.arms().iter().enumerate().map(end).collect()
     }
 
     /// Where, in that tree, a link or row ends.
@@ -85,7 +101,7 @@ impl Chain {
     /// Errors when there is none of this name, naming the nearest.
     pub(crate) fn end_of(&self, link: &str) -> Result<SegmentId, ModelError> {
         let named = |segment: &Segment| segment.frame.as_deref() == Some(link);
-        let end = self.segments.iter().position(named).map(|at| at + 1);
+        let end = self.segments.iter().position(named).map(|at| at + self.bases());
         end.ok_or_else(|| {
             let links = self.segments.iter().filter_map(|segment| segment.frame.as_deref());
             ModelError::NoSuchLink { link: link.to_owned(), nearest: nearest(link, links) }

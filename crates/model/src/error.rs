@@ -43,6 +43,18 @@ pub enum ModelError {
         /// Position of the row, from 1.
         index: usize,
     },
+    /// Arms that cannot be joined.
+    #[error("two arms: {problem}")]
+    BadArms {
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// Two points on a link, and the model has none.
+    #[error("{dwell} has its tips on a rigid link, but the model has no link: give closed_chain.length_mm")]
+    NoLink {
+        /// The dwell.
+        dwell: armcal_core::DwellId,
+    },
     /// Nothing moves.
     #[error("{}: the chain has no moving joint; give at least one row joint = \"revolute\" or \"prismatic\"", path.display())]
     NoJoint {

@@ -16,6 +16,7 @@
 //! carries these derivatives to the tip, so that nothing is differentiated numerically and no
 //! derivative is written by hand.
 
+mod arms;
 mod chain;
 mod deviation;
 mod dh_toml;
@@ -33,6 +34,7 @@ mod urdf;
 #[cfg(test)]
 mod tests;
 
+pub use arms::{Arm, ArmFrames, LengthKnowledge, RigidLink};
 pub use chain::Chain;
 pub use deviation::Deviation;
 pub use effects::{
@@ -42,5 +44,5 @@ pub use effects::{
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge, Marker};
-pub use model::Model;
+pub use model::{LinkFrame, Model};
 pub use residual::ModelResidual;

@@ -1,8 +1,10 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+mod alone;
 mod features;
 mod linearisation;
 
+use crate::arms::{self, ArmFrames, RigidLink};
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
@@ -12,6 +14,7 @@ use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frames, ModelError};
 use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Unit};
 use features::Feature;
+pub use features::LinkFrame;
 use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,17 +23,19 @@ use std::sync::Arc;
 /// A robot in its surroundings.
 ///
 /// The parameter vector `p` has one entry for each of [`Model::parameters`], in that order: the chain's,
-/// then base, tip and boards, then those of the effects; every method that takes it expects that length. Joint vectors are in the
+/// then bases, tips, markers and boards, a link between the tips, then those of the effects; every method that takes it expects that length. Joint vectors are in the
 /// order of [`Chain::joint_names`], [rad] (prismatic: [m]). What an observation lacks (a joint reading, a
 /// board) makes its numbers NaN; [`Model::check`] turns that into an error beforehand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     chain: Chain,
     parameters: Vec<Parameter>,
-    /// Base, the segments of the chain, tip.
+    /// The bases, one an arm; the segments of the chain; tips and markers.
     tree: Tree,
-    /// What can be measured of the arm: the tip first, then the markers.
+    /// What can be measured: the tip of each arm first, then the markers.
     features: Vec<Feature>,
+    /// Index of the length of the link between two tips, where there is one.
+    link: Option<usize>,
     /// World to board, by recording.
     boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
@@ -39,13 +44,20 @@ pub struct Model {
     pub(crate) declared: Arc<[Declared]>,
 }
 
-/// The segment that ends at the base: the root of the tree.
-const BASE: SegmentId = 0;
+/// What stands around the chain.
+struct Around {
+    arms: Vec<ArmFrames>,
+    markers: Vec<crate::Marker>,
+    boards: Vec<crate::Frame>,
+    link: Option<RigidLink>,
+}
 
 /// What is measured and what is predicted of one observation.
 struct Sides {
     measured_m: Vector3<f64>,
     predicted: Rigid<f64>,
+    /// How far apart a link keeps both [m].
+    apart_m: Option<f64>,
 }
 
 impl Model {
@@ -54,27 +66,53 @@ impl Model {
     /// Errors when two parameters share a name, a marker is on a link that the chain does not have, or a frame's pose or standard
     /// error is not a number.
     pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
+        let Frames { base, tip, markers, boards } = frames;
+        let around = Around { arms: vec![ArmFrames { base, tip }], markers, boards, link: None };
+        Model::between(chain, around)
+    }
+
+    /// Puts joined chains ([`Chain::joined`]), each between its own frames, into one world; a link may join two tips.
+    ///
+    /// # Errors
+    /// As for one arm; a number of frames that is not that of the arms, bases that are all free, a length that is no positive
+    /// number.
+    pub fn of_arms(chain: Chain, arms: Vec<ArmFrames>, link: Option<RigidLink>) -> Result<Model, ModelError> {
+        Model::between(chain, Around { arms, markers: Vec::new(), boards: Vec::new(), link })
+    }
+
+    fn between(chain: Chain, around: Around) -> Result<Model, ModelError> {
+        if around.arms.len() != chain.bases() {
+            let problem = format!("{} arms have frames, there are {}", around.arms.len(), chain.bases());
+            return Err(ModelError::BadArms { problem });
+        }
         let mut parameters = chain.parameters.clone();
         let mut place = |frame: &crate::Frame| -> Result<Segment, ModelError> {
             let (segment, own) = frame.segment(parameters.len())?;
             parameters.extend(own);
             Ok(segment)
         };
-        let base = place(&frames.base)?;
-        let mut hung = vec![(frames.tip.name.clone(), chain.end(), place(&frames.tip)?)];
-        for marker in &frames.markers {
+        let bases = around.arms.iter().map(|arm| place(&arm.base)).collect::<Result<Vec<_>, _>>()?;
+        let mut hung = Vec::with_capacity(around.arms.len() + around.markers.len());
+        for (ArmFrames { tip, .. }, end) in around.arms.iter().zip(chain.ends()) {
+            hung.push((tip.name.clone(), end, place(tip)?));
+        }
+        for marker in &around.markers {
             hung.push((marker.frame.name.clone(), chain.end_of(&marker.link)?, place(&marker.frame)?));
         }
         let boards =
-            frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
+            around.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
+        arms::check_bases(&bases, &parameters)?;
+        let length = around.link.map(|link| link.parameter()).transpose()?;
+        let link = length.as_ref().map(|_| parameters.len());
+        parameters.extend(length);
         check_names(&parameters)?;
-        let mut tree = chain.on(base);
+        let mut tree = chain.on(bases);
         let mut features = Vec::with_capacity(hung.len());
         for (name, end, segment) in hung {
             tree.0.push(Segment { parent: Some(end), ..segment });
             features.push(Feature { name, route: tree.route(tree.0.len() - 1) });
         }
-        Ok(Model { chain, parameters, tree, features, boards, effects: None, declared: Arc::default() })
+        Ok(Model { chain, parameters, tree, features, link, boards, effects: None, declared: Arc::default() })
     }
 
     /// The arm.
@@ -130,10 +168,15 @@ impl Model {
         true
     }
 
-    /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base, such as the
-    /// one that brings the tips of two arms together. Effects that are placed already keep the old one.
+    /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base. Effects that are
+    /// placed already keep the old one.
     pub fn set_base_start(&mut self, base_in_world: Pose) {
-        restart(&mut self.tree.0[BASE], &mut self.parameters, base_in_world);
+        self.set_arm_base_start(0, base_in_world);
+    }
+
+    /// The same of one of several arms, such as to the pose that brings the tips of two arms together.
+    pub fn set_arm_base_start(&mut self, arm: usize, base_in_world: Pose) {
+        restart(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
     }
 
     /// The same model for the observations of one recording, without the boards of the others; and the index that each
@@ -150,6 +193,7 @@ impl Model {
             parameters: index.iter().map(|&i| self.parameters[i].clone()).collect(),
             tree: self.tree.clone(),
             features: self.features.clone(),
+            link: self.link.map(|link| link - (behind - end)),
             boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
             effects: self.effects.as_ref().map(|e| e.moved(behind - end, self, index.len())),
             declared: self.declared.clone(),
@@ -169,9 +213,16 @@ impl Model {
             if actual != expected {
                 return Err(ModelError::JointCount { dwell: o.dwell, actual, expected });
             }
-            if o.feature.0 >= self.features.len() {
-                let (feature, features) = (o.feature.0, self.features.len());
-                return Err(ModelError::NoFeature { dwell: o.dwell, feature, features });
+            let other = match o.reference {
+                Reference::Joined { to, .. } => to,
+                _ => o.feature,
+            };
+            let features = self.features.len();
+            if let Some(unknown) = [o.feature, other].into_iter().find(|feature| feature.0 >= features) {
+                return Err(ModelError::NoFeature { dwell: o.dwell, feature: unknown.0, features });
+            }
+            if matches!(o.reference, Reference::Joined { apart: true, .. }) && self.link.is_none() {
+                return Err(ModelError::NoLink { dwell: o.dwell });
             }
             if o.cavity().is_some() && !self.boards.contains_key(&o.dwell.recording) {
                 return Err(ModelError::NoBoard { dwell: o.dwell });
@@ -185,31 +236,24 @@ impl Model {
         self.feature_in_base(p, FeatureId::TIP, joint_rad)
     }
 
-    /// Every frame of the arm in the base frame, for drawing: base, the end of each segment (a DH row, or
-    /// a link of the URDF, fixed ones included), tip.
-    pub fn link_frames_in_base(&self, p: &[f64], joint_rad: &[f64]) -> Vec<(String, Pose)> {
-        let mut ends: Vec<Rigid<f64>> = Vec::with_capacity(self.tree.0.len());
-        let mut frames = Vec::with_capacity(self.tree.0.len());
-        for segment in &self.tree.0 {
-            // In the base frame the base is where it is.
-            let end = match segment.parent {
-                None => Rigid::identity(),
-                Some(parent) => ends[parent].then(&segment.transform(p, joint_rad)),
-            };
-            frames.extend(segment.frame.iter().map(|name| (name.clone(), Pose::from(&end))));
-            ends.push(end);
-        }
-        frames
+    /// world_from_base; of several arms the first one's.
+    pub fn base_in_world(&self, p: &[f64]) -> Pose {
+        self.arm_base_in_world(p, 0)
     }
 
-    /// world_from_base.
-    pub fn base_in_world(&self, p: &[f64]) -> Pose {
-        Pose::from(&self.tree.0[BASE].transform(p, &[]))
+    /// world_from_base of one of several arms.
+    pub fn arm_base_in_world(&self, p: &[f64], arm: usize) -> Pose {
+        Pose::from(&self.tree.0[arm].transform(p, &[]))
     }
 
     /// last link_from_tip.
     pub fn tip_in_last_link(&self, p: &[f64]) -> Pose {
         self.feature_in_link(p, FeatureId::TIP)
+    }
+
+    /// Number of boards: one a recording, or none.
+    pub fn boards(&self) -> usize {
+        self.boards.len()
     }
 
     /// Whether the pose of a recording's board is found by the fit, with nothing else known of it.
@@ -223,7 +267,8 @@ impl Model {
         self.boards.get(&recording).map(|board| Pose::from(&board.transform(p, &[])))
     }
 
-    /// Where the tip was, in the world: as the sensor saw it, or the cavity of the board [m].
+    /// Where the tip was, in the world: as the sensor saw it, the cavity of the board, or where the tip of the arm is that it
+    /// was joined to [m].
     pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
         // Where the arm comes into it only through what effects do to the seat, it need not be followed.
         match (&o.reference, &self.effects) {
@@ -232,21 +277,24 @@ impl Model {
                 let board = self.board_under(o).map(|board| board.transform(p, &[]));
                 measured_m(o, board.as_ref(), &seated_m(o))
             }
-            (Reference::Seated { .. }, Some(_)) => self.sides(p, o).measured_m,
+            (Reference::Seated { .. }, Some(_)) | (Reference::Joined { .. }, _) => {
+                self.sides(p, o).measured_m
+            }
         }
     }
 
-    /// Where the model puts what the observation is of, its tip or a marker, in the world [m], effects included.
+    /// Where the model puts what the observation is of, a tip or a marker, in the world [m], effects included.
     pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
         self.sides(p, o).predicted.translation_m
     }
 
-    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation.
+    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of tips
+    /// on a rigid link one, along it.
     pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
         self.sides(p, o).residual(o)
     }
 
-    /// The residual and d residual / d p: 3 or 6 rows, one column for every parameter, free or not. Exact.
+    /// The residual and d residual / d p: its rows, one column for every parameter, free or not. Exact.
     pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
         Linearisation::of(self, p, &[o]).residual_with_jacobian(o)
     }
@@ -262,27 +310,38 @@ impl Model {
         observations.iter().map(|o| at.residual_with_jacobian(o)).collect()
     }
 
-    /// d predicted tip / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
+    /// d (predicted - measured) / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
     /// encoders' noise to the tip.
     pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
         let mut jacobian = Matrix3xX::zeros(self.joint_count());
-        for (column, twist) in self.joint_twists(p, o.feature, o) {
-            // A reading that moves two joints on the way has two parts.
+        // A reading that moves two joints on the way has two parts.
+        let mut add = |column: usize, part: Vector3<f64>| {
             let mut own = jacobian.column_mut(column);
-            own += twist.translation_m;
+            own += part;
+        };
+        for (column, twist) in self.joint_twists(p, o.feature, o) {
+            add(column, twist.translation_m);
+        }
+        if let Reference::Joined { to, .. } = o.reference {
+            for (column, twist) in self.joint_twists(p, to, o) {
+                add(column, -twist.translation_m);
+            }
         }
         jacobian
     }
 
-    /// The residual and d residual / d joint reading: 3 or 6 rows, one column a joint. Inverse kinematics iterates on
+    /// The residual and d residual / d joint reading: its rows, one column a joint. Inverse kinematics iterates on
     /// it. What drives the effects is held, so that their own slope over the joint angle, a few per cent, is left out.
     pub fn residual_with_joint_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
         let residual = self.residual(p, o);
+        let moved = self.joint_jacobian(p, o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.joint_count());
-        let rate = residual.rotation_rad.as_ref().map(rotation_error_rate);
-        for (column, twist) in self.joint_twists(p, o.feature, o) {
-            add_to_column(&mut jacobian, 0, column, &-twist.translation_m);
-            if let Some(rate) = &rate {
+        match residual.along {
+            Some(along) => jacobian.row_mut(0).copy_from(&-(along.transpose() * moved)),
+            None => jacobian.rows_mut(0, 3).copy_from(&-moved),
+        }
+        if let Some(rate) = residual.rotation_rad.as_ref().map(rotation_error_rate) {
+            for (column, twist) in self.joint_twists(p, o.feature, o) {
                 add_to_column(&mut jacobian, 3, column, &(rate * twist.rotation_rad));
             }
         }
@@ -308,28 +367,25 @@ impl Model {
         self.effects.as_ref().is_some_and(|effects| effects.has_gaps(&self.nominal()))
     }
 
-    /// Every length of the chain and of the tip that is not zero: index in the parameter vector, nominal [m].
+    /// Every length of the chain and of the tips that is not zero: index in the parameter vector, nominal [m].
     pub fn lengths_m(&self) -> Vec<(usize, f64)> {
-        let chain = 0..self.chain.parameters().len();
-        let all = chain.chain(self.tip_segment().parameters.clone());
-        all.map(|index| (index, &self.parameters[index]))
+        let tips = (0..self.chain.bases()).flat_map(|arm| self.tip_segment(arm).parameters.clone());
+        (0..self.chain.parameters().len())
+            .chain(tips)
+            .map(|index| (index, &self.parameters[index]))
             .filter(|(_, p)| p.unit == Unit::Metre && p.nominal != 0.0)
             .map(|(index, p)| (index, p.nominal))
             .collect()
     }
 
-    pub(crate) fn tip_segment(&self) -> &Segment {
-        &self.tree.0[self.tip_end()]
+    /// The segment of an arm's tip.
+    pub(crate) fn tip_segment(&self, arm: usize) -> &Segment {
+        &self.tree.0[self.route(FeatureId(arm)).last().copied().unwrap_or(arm)]
     }
 
     /// The tree of the arm.
     pub(crate) fn tree(&self) -> &Tree {
         &self.tree
-    }
-
-    /// The segment that ends at the tip.
-    pub(crate) fn tip_end(&self) -> SegmentId {
-        self.route(FeatureId::TIP).last().copied().unwrap_or(BASE)
     }
 
     /// The segment that another hangs on.
@@ -349,7 +405,8 @@ impl Model {
 
     /// The nominal arm in a pose.
     pub(crate) fn nominal_pose(&self, nominal: &[f64], joint_rad: &[f64]) -> NominalPose {
-        NominalPose::of(&self.tree, self.tip_end(), nominal, joint_rad)
+        let tips = self.features[..self.chain.bases()].iter().filter_map(|tip| tip.route.last().copied());
+        NominalPose::of(&self.tree, &tips.collect::<Vec<_>>(), nominal, joint_rad)
     }
 
     /// The nominal arm with all joints at zero.
@@ -359,7 +416,7 @@ impl Model {
 
     /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
     pub fn has_link_masses(&self) -> bool {
-        self.zero_pose().declared
+        self.zero_pose().declared.iter().all(|declared| *declared)
     }
 
     /// The same model with these effects; `parameters` are all of its parameters.
@@ -375,15 +432,37 @@ impl Model {
     }
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
-        let (predicted, in_board_m) = match &self.effects {
-            None => (self.tree.follow(self.route(o.feature), p, &o.joint_rad), seated_m(o)),
-            Some(effects) => {
-                let at = effects.evaluate(p, o.feature, &effects.drivers(self, o));
+        let drivers = self.effects.as_ref().map(|effects| effects.drivers(self, o));
+        let at = |feature: FeatureId| match (&self.effects, &drivers) {
+            (Some(effects), Some(drivers)) => {
+                let at = effects.evaluate(p, feature, drivers);
                 (at.tip, at.in_board_m)
             }
+            _ => (self.tree.follow(self.route(feature), p, &o.joint_rad), seated_m(o)),
+        };
+        let (predicted, in_board_m) = at(o.feature);
+        let other = match o.reference {
+            Reference::Joined { to, .. } => Some(at(to).0.translation_m),
+            _ => None,
         };
         let board = self.board_under(o).map(|board| board.transform(p, &[]));
-        Sides { measured_m: measured_m(o, board.as_ref(), &in_board_m), predicted }
+        let measured_m = other.unwrap_or_else(|| measured_m(o, board.as_ref(), &in_board_m));
+        Sides { measured_m, predicted, apart_m: self.apart_m(p, o) }
+    }
+
+    /// Index of the length of the link that keeps the joined points of an observation apart.
+    fn link_of(&self, o: &Observation) -> Option<usize> {
+        self.link.filter(|_| matches!(o.reference, Reference::Joined { apart: true, .. }))
+    }
+
+    /// How far apart they are [m].
+    fn apart_m(&self, p: &[f64], o: &Observation) -> Option<f64> {
+        self.link_of(o).map(|link| p[link])
+    }
+
+    /// The length of the link between two tips [m]; none without one.
+    pub fn link_length_m(&self, p: &[f64]) -> Option<f64> {
+        self.link.map(|link| p[link])
     }
 
     /// The board that the tip is seated in.
@@ -415,7 +494,13 @@ impl Model {
 
 impl Sides {
     fn residual(&self, o: &Observation) -> ModelResidual {
-        let position_m = self.measured_m - self.predicted.translation_m;
+        let gap_m = self.measured_m - self.predicted.translation_m;
+        if let Some(length_m) = self.apart_m {
+            // Any axis for no gap.
+            let along = gap_m.try_normalize(0.0).unwrap_or_else(Vector3::x);
+            let position_m = along * (gap_m.norm() - length_m);
+            return ModelResidual { position_m, rotation_rad: None, along: Some(along) };
+        }
         let rotation_rad = match &o.reference {
             Reference::Tracked { orientation: Some(measured), .. } => {
                 let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
@@ -423,23 +508,25 @@ impl Sides {
             }
             _ => None,
         };
-        ModelResidual { position_m, rotation_rad }
+        ModelResidual { position_m: gap_m, rotation_rad, along: None }
     }
 }
 
-/// Where the tip was, in the world [m]; NaN in a cavity of a board that the model does not have.
+/// Where the tip was, in the world [m]; NaN in a cavity of a board that the model does not have, and where another tip is the
+/// reference.
 fn measured_m(o: &Observation, board: Option<&Rigid<f64>>, in_board_m: &Vector3<f64>) -> Vector3<f64> {
     match &o.reference {
         Reference::Tracked { position_m, .. } => *position_m,
         Reference::Seated { .. } => board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m)),
+        Reference::Joined { .. } => Vector3::repeat(f64::NAN),
     }
 }
 
-/// The seated point as the board's file gives it [m]; zero for a tracked tip.
+/// The seated point as the board's file gives it [m]; zero for one that is not seated.
 fn seated_m(o: &Observation) -> Vector3<f64> {
     match &o.reference {
         Reference::Seated { in_board_m, .. } => *in_board_m,
-        Reference::Tracked { .. } => Vector3::zeros(),
+        Reference::Tracked { .. } | Reference::Joined { .. } => Vector3::zeros(),
     }
 }
 

@@ -15,12 +15,19 @@ pub struct ModelResidual {
     pub position_m: Vector3<f64>,
     /// Rotation vector from predicted to measured [rad], in world axes, where the observation has an orientation.
     pub rotation_rad: Option<Vector3<f64>>,
+    /// The unit vector along which alone the position is known: of the rigid link between two tips, whose position part lies
+    /// along it.
+    pub along: Option<Vector3<f64>>,
 }
 
 impl ModelResidual {
-    /// Number of rows: 3, or 6 with an orientation.
+    /// Number of rows: 3, or 6 with an orientation; 1 where only a distance is known.
     pub fn len(&self) -> usize {
-        if self.rotation_rad.is_some() { 6 } else { 3 }
+        match (self.along, self.rotation_rad) {
+            (Some(_), _) => 1,
+            (None, Some(_)) => 6,
+            (None, None) => 3,
+        }
     }
 
     /// Never: a residual has at least its position.
@@ -28,10 +35,12 @@ impl ModelResidual {
         false
     }
 
-    /// The rows in the order of the Jacobian's: x, y, z [m], then the rotation vector [rad].
+    /// The rows in the order of the Jacobian's: x, y, z [m], then the rotation vector [rad]; the error of a distance [m].
     pub fn rows(&self) -> impl Iterator<Item = f64> + '_ {
+        let along = self.along.map(|along| along.dot(&self.position_m));
+        let position = self.position_m.iter().copied().filter(move |_| along.is_none());
         let rotation = self.rotation_rad.iter().flat_map(|e| e.iter().copied());
-        self.position_m.iter().copied().chain(rotation)
+        along.into_iter().chain(position).chain(rotation)
     }
 }
 

@@ -7,8 +7,6 @@
 //!
 //! Many recordings, each with a run of its own, make a [`Campaign`].
 //!
-//! Two arms in a closed chain have a run and files of their own: [`ClosedRun`], [`write_closed`].
-//!
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
 
@@ -16,7 +14,6 @@
 
 mod campaign;
 mod channels;
-mod closed_chain;
 mod comparison;
 mod diagnosis_summary;
 mod diagnosis_text;
@@ -47,6 +44,7 @@ mod tables;
 mod terminal;
 mod text;
 mod told_warning;
+mod two_arms;
 mod verification;
 mod viewer_text;
 mod write;
@@ -54,10 +52,6 @@ mod write;
 pub use campaign::{
     Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text,
     write_campaign,
-};
-pub use closed_chain::{
-    CLOSED_SCHEMA, ClosedRecording, ClosedRun, closed_files, closed_summary_json, closed_terminal,
-    write_closed,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};

@@ -1,39 +1,58 @@
-//! The calibrated model, in the form the nominal one had: `calibrated.toml` (DH) or `calibrated.urdf`.
+//! The calibrated model, in the form the nominal one had: `calibrated.toml` (DH) or `calibrated.urdf`; of several arms one
+//! file each, by their names.
 
 use crate::{ReportError, Run};
 use armcal_core::Warning;
-use armcal_model::Model;
+use armcal_model::{Arm, Model};
 use std::path::Path;
 
 /// By this the file is known for armcal's own.
 const MARK: &str = "armcal.calibrated-model/1";
 /// Names of the file, by the form of the nominal model.
-pub(crate) const DH: &str = "calibrated.toml";
-pub(crate) const URDF: &str = "calibrated.urdf";
+const DH: &str = "calibrated.toml";
+const URDF: &str = "calibrated.urdf";
 
 /// A model file with its name in the output folder.
 pub(crate) struct ModelFile {
-    pub name: &'static str,
+    pub name: String,
     pub media_type: &'static str,
     pub text: String,
     /// What the form cannot express.
     pub warnings: Vec<Warning>,
 }
 
-/// The calibrated model of a run.
-pub(crate) fn model_file(run: &Run) -> Result<ModelFile, ReportError> {
-    calibrated(&run.model, &run.model_text, &run.calibration.fit.values())
+/// The calibrated model of a run; of several arms one each.
+pub(crate) fn model_files(run: &Run) -> Result<Vec<ModelFile>, ReportError> {
+    let values = run.calibration.fit.values();
+    if run.model.chain().arms().is_empty() {
+        let text = run.model_texts.first().map_or("", String::as_str);
+        return Ok(vec![calibrated(&run.model, text, &values)?]);
+    }
+    let arms = run.model.chain().arms().iter().zip(&run.model_texts).enumerate();
+    let of_arm = |(at, (arm, text)): (usize, (&Arm, &String))| {
+        let (alone, index) = run.model.arm_alone(at)?;
+        let p: Vec<f64> = index.iter().map(|&i| values[i]).collect();
+        let file = calibrated(&alone, text, &p);
+        Some(file.map(|file| ModelFile { name: name(Some(&arm.name), file.name == URDF), ..file }))
+    };
+    arms.filter_map(of_arm).collect()
+}
+
+/// Name of the file of an arm, of several by its own.
+pub(crate) fn name(arm: Option<&str>, urdf: bool) -> String {
+    let form = if urdf { "urdf" } else { "toml" };
+    format!("{}.{form}", arm.unwrap_or("calibrated"))
 }
 
 /// A model with the parameters `p`, in the form of the text that its nominal one was read from.
-pub(crate) fn calibrated(model: &Model, nominal_text: &str, p: &[f64]) -> Result<ModelFile, ReportError> {
+fn calibrated(model: &Model, nominal_text: &str, p: &[f64]) -> Result<ModelFile, ReportError> {
     if model.chain().is_urdf() {
         let (text, warnings) = model.to_urdf(nominal_text, Path::new("model_text of the run"), p)?;
         let text = marked_xml(text);
-        return Ok(ModelFile { name: URDF, media_type: "application/xml", text, warnings });
+        return Ok(ModelFile { name: URDF.into(), media_type: "application/xml", text, warnings });
     }
     let text = format!("# {MARK}\n\n{}", model.chain().to_dh_toml(p)?);
-    Ok(ModelFile { name: DH, media_type: "application/toml", text, warnings: Vec::new() })
+    Ok(ModelFile { name: DH.into(), media_type: "application/toml", text, warnings: Vec::new() })
 }
 
 /// The text with the mark as a comment behind the XML declaration, where it has none yet: the nominal model may itself be a

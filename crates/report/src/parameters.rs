@@ -3,7 +3,7 @@
 use crate::ReportError;
 use crate::run::{Run, VERSION, role_word};
 use armcal_calibrate::Estimate;
-use armcal_core::{Pose, RollPitchYaw};
+use armcal_core::{FeatureId, Pose, RollPitchYaw};
 use serde::Serialize;
 
 const HEADER: &str = "\
@@ -83,10 +83,15 @@ pub(crate) fn entry(e: &Estimate) -> Entry<'_> {
 /// Base, tip, and the board of every recording that has one, as calibrated.
 pub(crate) fn frames(run: &Run) -> Vec<FrameEntry> {
     let p = run.calibration.fit.values();
-    let mut frames = vec![
-        frame_entry("base".into(), "world", &run.model.base_in_world(&p)),
-        frame_entry("tip".into(), "last link", &run.model.tip_in_last_link(&p)),
-    ];
+    let arms: Vec<String> = run.model.chain().arms().iter().map(|arm| format!("{}.", arm.name)).collect();
+    let one = [String::new()];
+    let mut frames = Vec::new();
+    for (arm, prefix) in if arms.is_empty() { &one[..] } else { &arms[..] }.iter().enumerate() {
+        let (base, tip) =
+            (run.model.arm_base_in_world(&p, arm), run.model.feature_in_link(&p, FeatureId(arm)));
+        frames.push(frame_entry(format!("{prefix}base"), "world", &base));
+        frames.push(frame_entry(format!("{prefix}tip"), "last link", &tip));
+    }
     for (index, recording) in run.recordings.iter().enumerate() {
         if let Some(board) = run.model.board_in_world(&p, index) {
             frames.push(frame_entry(format!("board.{}", recording.name), "world", &board));

@@ -7,8 +7,11 @@
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_calibrate::{Calibration, Estimate};
-use armcal_core::{Observation, Pose, Unit, Visited};
-use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
+use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
+use armcal_model::{
+    ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Model, ModelError, RigidLink,
+    Session,
+};
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -31,6 +34,12 @@ pub struct PastModel {
     chain: ChainText,
     base: FrameFacts,
     tip: FrameFacts,
+    /// Of several arms, base and tip of each behind the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    more_arms: Vec<[FrameFacts; 2]>,
+    /// The rigid link between two tips before the fit [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    link_length_m: Option<f64>,
     boards: Vec<FrameFacts>,
     effects: Vec<EffectTable>,
     session: Session,
@@ -89,6 +98,14 @@ pub struct RecordingFacts {
 pub(crate) enum ChainText {
     Dh { text: String },
     Urdf { text: String, base_link: String, tip_link: String },
+    Arms { arms: Vec<ArmText> },
+}
+
+/// One of several arms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ArmText {
+    name: String,
+    chain: ChainText,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -138,7 +155,7 @@ impl PastModel {
         };
         Ok(PastModel::of_calibrated(&Calibrated {
             pipeline: &run.pipeline_name,
-            chain: chain_text(&run.model, &run.model_text, &run.pipeline_text),
+            chain: chain_text(run.model.chain(), &run.model_texts, &run.pipeline_text),
             model: &run.model,
             base: run.model.base_in_world(&run.model.nominal()),
             estimates: &run.calibration.fit.estimates,
@@ -163,6 +180,11 @@ impl PastModel {
             sigma: e.sigma,
         };
         let facts = |name: &str, pose: &Pose| FrameFacts::of(model, name, pose);
+        let prefix =
+            |arm: usize| model.chain().arms().get(arm).map_or_else(String::new, |a| a.name.clone() + ".");
+        let tip = |arm: usize| facts(&(prefix(arm) + "tip"), &model.feature_in_link(&start, FeatureId(arm)));
+        let further = (1..model.chain().arms().len())
+            .map(|arm| [facts(&(prefix(arm) + "base"), &model.arm_base_in_world(&start, arm)), tip(arm)]);
         let boards = of.recordings.iter().enumerate().filter_map(|(index, (name, _))| {
             let pose = model.board_in_world(&start, index)?;
             Some(facts(&format!("board.{name}"), &pose))
@@ -174,8 +196,10 @@ impl PastModel {
             version: VERSION.into(),
             pipeline: of.pipeline.to_owned(),
             chain: of.chain.clone(),
-            base: facts("base", &of.base),
-            tip: facts("tip", &model.tip_in_last_link(&start)),
+            base: facts(&(prefix(0) + "base"), &of.base),
+            tip: tip(0),
+            more_arms: further.collect(),
+            link_length_m: model.link_length_m(&start),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
             session: of.session.clone(),
@@ -215,25 +239,27 @@ impl PastModel {
         &self.session
     }
 
+    /// The nominal arm, or arms, in the frames.
+    fn geometry(&self, chain: Chain) -> Result<Model, ModelError> {
+        let (base, tip) = (self.base.frame(), self.tip.frame());
+        if self.more_arms.is_empty() {
+            let boards = self.boards.iter().map(FrameFacts::frame).collect();
+            return Model::new(chain, Frames { base, tip, markers: Vec::new(), boards });
+        }
+        let further =
+            self.more_arms.iter().map(|[base, tip]| ArmFrames { base: base.frame(), tip: tip.frame() });
+        let arms = std::iter::once(ArmFrames { base, tip }).chain(further).collect();
+        let link =
+            self.link_length_m.map(|length_m| RigidLink { length_m, knowledge: LengthKnowledge::Given });
+        Model::of_arms(chain, arms, link)
+    }
+
     /// The models, made again.
     ///
     /// # Errors
     /// Contents that contradict each other, as only a file changed by hand has them.
     pub fn arms(&self) -> Result<PastArms, ModelError> {
-        let path = Path::new(FILE);
-        let chain = match &self.chain {
-            ChainText::Dh { text } => Chain::from_dh_toml(text, path)?,
-            ChainText::Urdf { text, base_link, tip_link } => {
-                Chain::from_urdf(text, base_link, tip_link, path)?
-            }
-        };
-        let frames = Frames {
-            base: self.base.frame(),
-            tip: self.tip.frame(),
-            markers: Vec::new(),
-            boards: self.boards.iter().map(FrameFacts::frame).collect(),
-        };
-        let geometry = Model::new(chain, frames)?;
+        let geometry = self.geometry(self.chain.chain(Path::new(FILE))?)?;
         let joints = geometry.chain().joint_names();
         let specs = self.effects.iter().map(|e| e.spec(joints)).collect::<Result<Vec<_>, _>>()?;
         let model = geometry.with_effects(&specs, &self.session)?;
@@ -279,18 +305,44 @@ fn attached(path: &Path) -> Result<String, PastRunError> {
     found.ok_or_else(missing)
 }
 
-/// The nominal arm's file; the ends of a URDF chain are what the pipeline says.
-pub(crate) fn chain_text(model: &Model, model_text: &str, pipeline_text: &str) -> ChainText {
-    let text = model_text.to_owned();
-    if !model.chain().is_urdf() {
-        return ChainText::Dh { text };
+impl ChainText {
+    /// The arm, or arms, that the text is of.
+    fn chain(&self, path: &Path) -> Result<Chain, ModelError> {
+        match self {
+            ChainText::Dh { text } => Chain::from_dh_toml(text, path),
+            ChainText::Urdf { text, base_link, tip_link } => {
+                Chain::from_urdf(text, base_link, tip_link, path)
+            }
+            ChainText::Arms { arms } => {
+                let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(path)?)));
+                Chain::joined(chains.collect::<Result<Vec<_>, ModelError>>()?)
+            }
+        }
     }
+}
+
+/// The files of the nominal arms; the ends of a URDF chain are what the pipeline says.
+pub(crate) fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -> ChainText {
     let pipeline = pipeline_text.parse::<toml::Table>().unwrap_or_default();
-    let link = |key| {
-        let found = pipeline.get("model").and_then(|model| model.get(key)).and_then(toml::Value::as_str);
-        found.unwrap_or_default().to_owned()
+    let one = |chain: &Chain, text: &String, model: Option<&toml::Value>| {
+        let link = |key| {
+            let found = model.and_then(|model| model.get(key)).and_then(toml::Value::as_str);
+            found.unwrap_or_default().to_owned()
+        };
+        let text = text.clone();
+        match chain.is_urdf() {
+            true => ChainText::Urdf { text, base_link: link("base_link"), tip_link: link("tip_link") },
+            false => ChainText::Dh { text },
+        }
     };
-    ChainText::Urdf { text, base_link: link("base_link"), tip_link: link("tip_link") }
+    if chain.arms().is_empty() {
+        return one(chain, texts.first().unwrap_or(&String::new()), pipeline.get("model"));
+    }
+    let arms = chain.arms().iter().zip(texts).enumerate().map(|(at, (arm, text))| {
+        let section = pipeline.get("arms").and_then(|arms| arms.get(at)).and_then(|arm| arm.get("model"));
+        ArmText { name: arm.name.clone(), chain: one(&arm.chain, text, section) }
+    });
+    ChainText::Arms { arms: arms.collect() }
 }
 
 fn hashes(recording: &RecordingRun) -> Vec<String> {

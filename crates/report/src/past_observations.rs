@@ -106,7 +106,7 @@ pub fn observations_json(run: &Run) -> Result<String, ReportError> {
         schema: SCHEMA.into(),
         version: VERSION.into(),
         pipeline: run.pipeline_name.clone(),
-        model_sha256: sha256(&run.model_text),
+        model_sha256: sha256(&run.model_texts.concat()),
         board: run.board.as_ref().map(BoardFacts::of),
         settings,
         session: run.session.clone(),

@@ -24,8 +24,8 @@ pub struct Run {
     pub pipeline_name: String,
     /// Text of the pipeline, so that the result can be reproduced from itself.
     pub pipeline_text: String,
-    /// Text of the model file (DH table or URDF), which the calibrated model is written in the form of.
-    pub model_text: String,
+    /// Text of the model file (DH table or URDF), which the calibrated model is written in the form of; of several arms one each.
+    pub model_texts: Vec<String>,
     /// Recordings in the order of the pipeline; the index is [`DwellId::recording`].
     pub recordings: Vec<RecordingRun>,
     /// The calibration board, where the rig has one.
@@ -301,7 +301,8 @@ pub(crate) fn role_word(role: Role) -> &'static str {
 fn output_warnings(run: &Run) -> Vec<Warning> {
     let mut warnings = crate::mcap_file::earlier_results(run);
     // A model that cannot be written at all is an error of `write_all`, which says why.
-    warnings.extend(crate::model_file::model_file(run).into_iter().flat_map(|m| m.warnings));
+    let models = crate::model_file::model_files(run).into_iter().flatten();
+    warnings.extend(models.flat_map(|m| m.warnings));
     warnings
 }
 

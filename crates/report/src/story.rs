@@ -5,6 +5,7 @@ use crate::diagnosis_text::{all_found, briefly_found, next};
 use crate::run::{Run, Status};
 use crate::text::conclusion;
 use crate::told_warning::{ToldWarning, gravest_first};
+use crate::two_arms::scale;
 
 /// What to do where the setup contradicts the data.
 const MEND: &str =
@@ -46,9 +47,9 @@ impl Story {
             status,
             incomplete: matches!(answer.word, "identified" | "ambiguous" | "unknown"),
             next: match diagnosis {
-                Some(d) => next(run, d),
+                Some(d) => next(run, d).into_iter().chain(scale(run)).collect(),
                 None if answer.word == "setup" => vec![MEND.to_owned()],
-                None => Vec::new(),
+                None => scale(run).into_iter().collect(),
             },
             warnings: warnings(run),
             missing: answer.sentence,

@@ -12,6 +12,7 @@ use crate::parameters::{FrameEntry, frames};
 use crate::past_model::visited;
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
+use crate::two_arms::TwoArms;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{Dwell, ErrorStats, SetupReport, Unit, Visited, Warning};
 use armcal_table::{Assignment, Place};
@@ -33,6 +34,9 @@ struct Summary<'a> {
     version: &'static str,
     pipeline: &'a str,
     status: Status,
+    /// Of two arms whose tips are joined: their names, how, and the length of a link. An error is a closing error then.
+    #[serde(flatten)]
+    two_arms: Option<TwoArms<'a>>,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
     /// What each joint visited in the dwells that were calibrated or held out.
@@ -179,6 +183,7 @@ impl<'a> Summary<'a> {
             version: VERSION,
             pipeline: &run.pipeline_name,
             status: run.status(),
+            two_arms: TwoArms::of(run),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
             joints: joints(run),

@@ -5,6 +5,7 @@ use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::story::{SHOWN, Story};
 use crate::text::{estimate_shown, millimetres, printable, remark};
 use crate::told_warning::ToldWarning;
+use crate::two_arms::{about, errors_are};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{ErrorStats, Severity};
 use comfy_table::Cell;
@@ -54,7 +55,9 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
 
 fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> String {
     let pen = Pen { style };
-    let mut sections = vec![format!("armcal {VERSION}   pipeline {}\n", printable(&run.pipeline_name))];
+    let about = about(run).map_or_else(String::new, |about| format!("   {about}"));
+    let mut sections =
+        vec![format!("armcal {VERSION}   pipeline {}{about}\n", printable(&run.pipeline_name))];
     let story = Story::of(run);
     let leads = matches!(story.lamp, "setup" | "unexplained");
     sections.extend(leads.then(|| pen.verdict(&story.missing, false)));
@@ -63,7 +66,7 @@ fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> Str
         Detail::Story => errors_that_count(&pen, &run.calibration),
         Detail::Everything => errors(&pen, &run.calibration),
     };
-    sections.push(pen.section("Position errors [mm]", errors));
+    sections.push(pen.section(&format!("{} [mm]", errors_are(run)), errors));
     match detail {
         Detail::Everything => {
             sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));

@@ -3,7 +3,7 @@
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
-use crate::model_file::{self, model_file};
+use crate::model_file::{self, model_files};
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
@@ -76,7 +76,7 @@ pub fn write_all(
         return Err(ReportError::Inconsistent(format!("{opened} recordings opened for {named} in the run")));
     }
     let points = points(run)?;
-    let model = model_file(run)?;
+    let models = model_files(run)?;
     let parameters = parameters_toml(run)?;
     let past_model = PastModel::of(run)?.json()?;
     let observations = observations_json(run)?;
@@ -93,29 +93,33 @@ pub fn write_all(
         (REPORT, &page),
         (SUMMARY, &summary),
         (PARAMETERS, &parameters),
-        (model.name, &model.text),
         (past_model::FILE, &past_model),
         (OBSERVATIONS_FILE, &observations),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
     ];
-    for (name, text) in texts {
+    let models_as_texts = models.iter().map(|model| (model.name.as_str(), &model.text));
+    for (name, text) in texts.into_iter().chain(models_as_texts) {
         staged.push(stage(&out_dir.join(name), text.as_bytes())?);
     }
     for (name, bytes) in &tables {
         staged.push(stage(&out_dir.join(name), bytes)?);
     }
 
-    let attachments = [
+    let mut attachments = vec![
         Attachment { name: "pipeline.toml", media_type: "application/toml", text: &run.pipeline_text },
         Attachment { name: REPORT, media_type: "text/html", text: &page },
         Attachment { name: SUMMARY, media_type: "application/json", text: &summary },
         Attachment { name: PARAMETERS, media_type: "application/toml", text: &parameters },
-        Attachment { name: model.name, media_type: model.media_type, text: &model.text },
         Attachment { name: past_model::FILE, media_type: "application/json", text: &past_model },
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];
+    attachments.extend(models.iter().map(|model| Attachment {
+        name: &model.name,
+        media_type: model.media_type,
+        text: &model.text,
+    }));
     let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);
@@ -124,13 +128,17 @@ pub fn write_all(
     commit_all(staged)
 }
 
-/// The files that [`write_all`] writes into `out_dir`, for an arm whose nominal model is a URDF or a DH file: to look at
+/// The files that [`write_all`] writes into `out_dir`, of an arm, or several by name, each with a URDF or a DH file: to look at
 /// before a run whether they may be written.
-pub fn run_files(out_dir: &Path, urdf: bool) -> Vec<PathBuf> {
-    let model = if urdf { model_file::URDF } else { model_file::DH };
-    let texts =
-        [REPORT, SUMMARY, PARAMETERS, model, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
-    std::iter::once(RUN).chain(texts).chain(tables::FILES).map(|name| out_dir.join(name)).collect()
+pub fn run_files<'a>(
+    out_dir: &Path,
+    arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
+) -> Vec<PathBuf> {
+    let models = arms.into_iter().map(|(arm, urdf)| model_file::name(arm, urdf));
+    let fixed =
+        [RUN, REPORT, SUMMARY, PARAMETERS, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
+    let fixed = fixed.into_iter().chain(tables::FILES).map(str::to_owned);
+    fixed.chain(models).map(|name| out_dir.join(name)).collect()
 }
 
 /// Writes what a campaign keeps of each recording: `summary.json`, `parameters.toml`, `model.json` and

@@ -41,7 +41,8 @@ impl Keys {
     pub fn new(pipeline: &Pipeline, full: bool, out: &Path) -> Result<Keys, Error> {
         let mut parts =
             vec![FORMAT.to_owned(), VERSION.to_owned(), full.to_string(), settings(&pipeline.text)];
-        let model = [&pipeline.model.dh, &pipeline.model.urdf].into_iter().flatten();
+        let models = pipeline.models().into_iter();
+        let model = models.flat_map(|model| [&model.dh, &model.urdf]).flatten();
         let board = pipeline.table.iter().map(|t| &t.board);
         for (what, path) in model.map(|p| ("model", p)).chain(board.map(|p| ("board", p))) {
             let path = pipeline.resolve(path);

@@ -47,7 +47,7 @@ fn problem(run: &Run) -> Value {
     json!({
         "schema": "armcal.problem/1",
         "pipeline": run.pipeline_name,
-        "model": run.model_text,
+        "model": run.model_texts[0],
         "sigma_scale": fit.sigma_scale,
         "parameters": model.parameters().iter().zip(fit.values()).map(parameter).collect::<Vec<Value>>(),
         "frames": frames(run),
@@ -87,6 +87,7 @@ fn observation(o: &Observation) -> Value {
             json!({"cavity": cavity, "in_board_m": in_board_m.as_slice()})
         }
         Reference::Tracked { position_m, .. } => json!({"position_m": position_m.as_slice()}),
+        Reference::Joined { to, apart } => json!({"joined_to": to, "apart": apart}),
     };
     json!({
         "recording": o.dwell.recording, "dwell": o.dwell.dwell, "joint_rad": o.joint_rad, "reference": reference,

@@ -2,7 +2,7 @@
 
 use super::{Outcome, json_text, print};
 use crate::error::Error;
-use crate::pipeline::Job;
+use crate::pipeline::Pipeline;
 use armcal_core::Severity;
 use armcal_recording::{Extract, Extracted, Recording, RecordingError, RecordingReport, extract, input};
 use armcal_report::printable;
@@ -50,9 +50,10 @@ pub fn run(asked: &Request<'_>) -> Result<Outcome, Error> {
 /// The topics that a pipeline reads, as patterns that match nothing else.
 fn topics_of(path: &Path) -> Result<Vec<String>, Error> {
     let literal = |topic: &str| glob::Pattern::escape(topic);
-    Ok(match Job::load(path)? {
-        Job::OneArm(pipeline) => pipeline.streams.topics().into_iter().map(literal).collect(),
-        Job::TwoArms(pipeline) => pipeline.arms.iter().map(|arm| literal(&arm.joints.topic)).collect(),
+    let pipeline = Pipeline::load(path)?;
+    Ok(match &pipeline.two_arms {
+        None => pipeline.streams.topics().into_iter().map(literal).collect(),
+        Some(two) => two.arms.iter().map(|arm| literal(&arm.joints.topic)).collect(),
     })
 }
 

@@ -25,7 +25,9 @@ use std::path::PathBuf;
 /// go wrong in a fit.
 pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<PooledRun, Error> {
     progress.step("reading results");
-    let (model_text, chain) = frames::nominal_chain(pipeline)?;
+    pipeline.one_arm("`armcal pool` pools the recordings of one arm")?;
+    let (model_texts, chain) = frames::nominal_chain(pipeline)?;
+    let model_text = model_texts.concat();
     let board = frames::board(pipeline)?;
     let collected = collect(pipeline, &model_text, board.as_ref(), folders)?;
     let session = frames::session(pipeline, &collected.observations);

@@ -8,7 +8,9 @@ use crate::pipeline::{
 use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
-use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, Session, is_of_effect};
+use armcal_model::{
+    Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, Session, is_of_effect,
+};
 use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -17,13 +19,30 @@ use std::path::Path;
 /// The scale of a sensor is within so many of its standard errors.
 const SURELY: f64 = 5.0;
 
-/// Reads the DH or URDF file of the pipeline: its text and the chain in it.
-pub fn nominal_chain(pipeline: &Pipeline) -> Result<(String, Chain), Error> {
-    chain_of(&pipeline.model, &pipeline.folder).map_err(|e| pipeline.where_data_come_from(e))
+/// Reads the DH or URDF file of the pipeline, of two arms both: the texts and the chain in them.
+pub fn nominal_chain(pipeline: &Pipeline) -> Result<(Vec<String>, Chain), Error> {
+    let read = |model| chain_of(model, &pipeline.folder).map_err(|e| pipeline.where_data_come_from(e));
+    let chains = pipeline.models().into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+    let (texts, mut chains): (Vec<String>, Vec<Chain>) = chains.into_iter().unzip();
+    let chain = match &pipeline.two_arms {
+        None => chains.swap_remove(0),
+        Some(two) => Chain::joined(two.arms.iter().map(|arm| arm.name.clone()).zip(chains).collect())?,
+    };
+    Ok((texts, chain))
+}
+
+/// The chain alone: bases at the world's origin, tips at the last links, nothing in doubt.
+pub fn bare(chain: &Chain) -> Result<Model, Error> {
+    if chain.arms().is_empty() {
+        return Ok(Model::new(chain.clone(), Frames::of_bare_arm())?);
+    }
+    let given = |arm: &Arm, what: &str| Frame::given(format!("{}.{what}", arm.name), Pose::identity());
+    let frames = |arm: &Arm| ArmFrames { base: given(arm, "base"), tip: given(arm, "tip") };
+    Ok(Model::of_arms(chain.clone(), chain.arms().iter().map(frames).collect(), None)?)
 }
 
 /// Reads the DH or URDF file of a model section: its text and the chain in it.
-pub fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Error> {
+fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Error> {
     if let Some(dh) = &model.dh {
         let path = folder.join(dh);
         let text = read("DH model", &path)?;
@@ -56,6 +75,11 @@ pub fn nominal_model(
     board: Option<&Board>,
     seen: &[Seen],
 ) -> Result<Model, Error> {
+    if let Some(two) = &pipeline.two_arms {
+        let mut model = two.model(chain)?;
+        override_parameters(&mut model, &pipeline.parameters)?;
+        return Ok(model);
+    }
     let boards = match (&pipeline.table, board) {
         (Some(table), Some(board)) => seen
             .iter()
@@ -138,6 +162,9 @@ pub fn session(pipeline: &Pipeline, observations: &[Observation]) -> Session {
 
 /// The effects of the pipeline, in its order.
 pub fn effect_specs(pipeline: &Pipeline, model: &Model) -> Result<Vec<EffectSpec>, Error> {
+    if let Some(two) = &pipeline.two_arms {
+        return two.effect_specs(pipeline, model);
+    }
     let joints = model.chain().joint_names();
     pipeline.effects.iter().map(|table| table.spec(joints).map_err(Error::Model)).collect()
 }

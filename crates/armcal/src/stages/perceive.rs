@@ -4,11 +4,13 @@ use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::setup;
+use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
+use crate::two_arms::joined;
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
-use armcal_model::{Chain, Frames, Model};
+use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
 use armcal_report::RecordingRun;
 use armcal_table::Association;
@@ -76,7 +78,7 @@ pub fn dwells_of_all(
     progress: &Progress,
     keep: &mut dyn FnMut(Samples),
 ) -> Result<Vec<Seen>, Error> {
-    let speed_model = Model::new(chain.clone(), Frames::of_bare_arm())?;
+    let speed_model = frames::bare(chain)?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
     entries
         .map(|(index, (entry, recording))| {
@@ -195,7 +197,10 @@ fn dwells_of_one(
     let in_recording = |source| Error::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
-    let (samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
+    let (samples, streams, mut warnings) = match &pipeline.two_arms {
+        None => recording.read(&pipeline.streams).map_err(in_recording)?,
+        Some(two) => joined::read(two, name, recording)?,
+    };
     let expected = speed_model.chain().joint_names().len();
     if samples.joints.joint_rad.len() != expected {
         return Err(Error::JointCount {

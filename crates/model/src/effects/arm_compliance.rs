@@ -27,7 +27,7 @@
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
+use super::placing::{ARM, Placing, amplitude};
 use super::state::SEATED;
 use crate::rigid::Scalar;
 use crate::segment::Motion;
@@ -41,7 +41,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     target: Target::Whole,
     offered: Offered::Once,
-    shapes: &[SEATED],
+    shapes: &[SEATED, ARM],
     never_negative: &["compliance"],
     confused_with: &[
         "compliance",
@@ -69,7 +69,7 @@ struct ArmCompliance {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let turning = |joint: &usize| placing.motion(*joint) == Motion::Revolute;
-    let joints: Vec<usize> = (0..placing.zero.joints.len()).filter(turning).collect();
+    let joints: Vec<usize> = placing.zero.joints_of(placing.arm()?).filter(turning).collect();
     if joints.len() < 2 {
         return Err("fewer than two joints turn; use compliance".to_owned());
     }

@@ -27,7 +27,7 @@ use super::drivers::Drivers;
 use super::frame_shift::about;
 use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
 use super::physics::{Deformation, Physics, Slot};
-use super::placing::Placing;
+use super::placing::{ARM, Placing};
 use super::shares::Shares;
 use super::state::SEATED;
 use crate::rigid::Scalar;
@@ -54,6 +54,7 @@ pub(super) static KIND: EffectKind = EffectKind {
             values: Some(heights),
         },
         SEATED,
+        ARM,
     ],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
@@ -66,40 +67,43 @@ const OUTER: usize = 2;
 
 #[derive(Debug)]
 struct BaseCompliance {
+    arm: usize,
     shares: Shares,
 }
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joints = placing.zero.joints.len();
-    let shares = Shares::of(placing, OUTER.min(joints) - 1);
-    let largest = (0..joints).map(|joint| placing.reference_torque_nm(joint)).fold(1e-3, f64::max);
+    let arm = placing.arm()?;
+    let joints = placing.zero.joints_of(arm);
+    let shares = Shares::of(placing, joints.start + OUTER.min(joints.len()) - 1);
+    let largest = joints.map(|joint| placing.reference_torque_nm(joint)).fold(1e-3, f64::max);
     let per_deg = 1f64.to_radians() / largest;
     let unit = Unit::RadianPerNewtonMetre;
     let amplitudes =
         shares.amplitudes("compliance", unit, 0.3 * per_deg, 6.0 * per_deg, "tilt per overturning moment");
-    Ok(Placement::twisting(Slot::BASE, amplitudes, BaseCompliance { shares }))
+    Ok(Placement::twisting(Slot::Behind(arm), amplitudes, BaseCompliance { arm, shares }))
 }
 
 /// Between the foot and the axis of the second joint.
 fn heights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let Some(second) = placing.zero.joints.get(1) else { return Vec::new() };
-    let base = &placing.zero.base;
+    let Ok(arm) = placing.arm() else { return Vec::new() };
+    let Some(second) = placing.zero.joints_of(arm).nth(1) else { return Vec::new() };
+    let (second, base) = (&placing.zero.joints[second], &placing.zero.bases[arm]);
     let height_m = base.rotation.column(2).dot(&(second.origin_m - base.translation_m));
     [0.5, 1.0].iter().map(|part| part * height_m).filter(|height| *height > 0.0).collect()
 }
 
 impl Physics for BaseCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let base = &x.pose.base;
-        let gravity = &x.gravity_mps2;
-        let links = x.pose.moment_nm(&base.translation_m, x.pose.links_from(0), gravity);
-        let outer = x.pose.moment_nm(&base.translation_m, x.pose.links_from(OUTER), gravity);
-        let load = (x.pose.tip_m - base.translation_m).cross(gravity) * x.observation.load_kg;
+        let base = &x.pose.bases[self.arm];
+        let (gravity, all) = (&x.gravity_mps2, x.pose.links_of(self.arm));
+        let links = x.pose.moment_nm(&base.translation_m, all.clone(), gravity);
+        let outer = x.pose.moment_nm(&base.translation_m, (all.start + OUTER).min(all.end)..all.end, gravity);
+        let load = (x.pose.tips_m[self.arm] - base.translation_m).cross(gravity) * x.observation.load_kg;
         let turn = [0, 1, 2].map(|k| {
             let axis = base.rotation.column(k);
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
         });
         let pivot_m = Vector3::new(D::from(0.0), D::from(0.0), theta[self.shares.count()]);
-        change.twist(Slot::BASE, about(&pivot_m, turn), turn);
+        change.twist(Slot::Behind(self.arm), about(&pivot_m, turn), turn);
     }
 }

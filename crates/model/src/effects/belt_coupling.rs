@@ -49,7 +49,8 @@ struct BeltCoupling {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
-    let previous = joint.checked_sub(1).ok_or("there is no joint before the first")?;
+    let previous = joint.checked_sub(1).filter(|_| !placing.zero.is_first(joint));
+    let previous = previous.ok_or("there is no joint before the first")?;
     if placing.joint_unit(previous) != Unit::Radian {
         return Err(format!("joint {} before it slides, and this effect is about turns", previous + 1));
     }

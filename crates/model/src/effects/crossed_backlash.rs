@@ -92,10 +92,10 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 }
 
 fn others(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let joints = placing.zero.joints.len();
     let own = placing.spec.target.unwrap_or_default();
-    let near = |k: &usize| *k != own && (joints <= FEW_JOINTS || k.abs_diff(own) == 1);
-    (0..joints).filter(near).map(|k| (k + 1) as f64).collect()
+    let joints = placing.model.chain().joints_beside(own);
+    let near = |k: &usize| *k != own && (joints.len() <= FEW_JOINTS || k.abs_diff(own) == 1);
+    joints.clone().filter(near).map(|k| (k + 1) as f64).collect()
 }
 
 impl Physics for CrossedBacklash {

@@ -87,7 +87,7 @@ impl<'o> Drivers<'o> {
 
     /// Where the base was measured in the world [m].
     pub(crate) fn base_m(&self) -> Vector3<f64> {
-        self.pose.base.translation_m
+        self.pose.bases[0].translation_m
     }
 
     /// How far the joint's reading is from that of the rest before [rad] (prismatic: [m]); 0 where that is not known.
@@ -115,7 +115,7 @@ impl<'o> Drivers<'o> {
 
 pub(crate) fn gravity_in_world(session: &Session, pose: &NominalPose) -> Vector3<f64> {
     match session.gravity_in_base_mps2 {
-        Some(in_base) => pose.base.rotation * in_base,
+        Some(in_base) => pose.bases[0].rotation * in_base,
         None => session.gravity_in_world_mps2,
     }
 }

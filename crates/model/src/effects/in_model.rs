@@ -2,7 +2,7 @@
 
 use super::kind::{EffectKind, Offered, Target};
 use super::placed::{self, Effects, PlacedEffect};
-use super::placing::Placing;
+use super::placing::{ARM, Placing};
 use super::spec::Since;
 use super::state::SEATED;
 use super::{Drivers, EffectSpec, NominalPose, Session, catalogue};
@@ -119,11 +119,16 @@ impl Model {
         kind: &EffectKind,
         spec: EffectSpec,
     ) -> impl Iterator<Item = EffectSpec> + use<> {
-        let joints = match kind.target {
-            Target::Joint => (0..self.joint_count()).map(Some).collect(),
-            Target::Whole => vec![None],
+        let of_arms = kind.shapes.iter().any(|shape| shape.name == ARM.name);
+        let arms = if of_arms { self.chain().arms().len() } else { 0 };
+        let specs: Vec<EffectSpec> = match kind.target {
+            Target::Joint => (0..self.joint_count()).map(|joint| spec.clone().at(joint)).collect(),
+            Target::Whole if arms > 0 => {
+                (1..=arms).map(|arm| spec.clone().with(ARM.name, arm as f64)).collect()
+            }
+            Target::Whole => vec![spec],
         };
-        joints.into_iter().map(move |target| EffectSpec { target, ..spec.clone() })
+        specs.into_iter()
     }
 
     /// The spec with every part of the arm that a shape of its kind can name.
@@ -134,7 +139,7 @@ impl Model {
         session: &Session,
         zero: &NominalPose,
     ) -> Vec<EffectSpec> {
-        let part = kind.shapes.iter().find(|shape| !shape.parameter);
+        let part = kind.shapes.iter().find(|shape| !shape.parameter && shape.name != ARM.name);
         let Some((shape, values)) = part.and_then(|shape| Some((shape, shape.values?))) else {
             return vec![spec];
         };

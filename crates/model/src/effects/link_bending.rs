@@ -106,7 +106,7 @@ impl Physics for LinkBending {
         let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(own));
         let links_nm = pose.moment_nm(&end, pose.outer(self.link), gravity);
         let load_n = gravity * x.observation.load_kg;
-        let load_nm = (pose.tip_m - end).cross(&load_n);
+        let load_nm = (pose.joints[self.link].tip_m.unwrap_or(end) - end).cross(&load_n);
         let links = bend(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
         let outer = bend(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
         let load = bend(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);

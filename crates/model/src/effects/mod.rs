@@ -13,6 +13,7 @@
 //! To add one, start from `eccentricity.rs` (a joint), `tool_shift.rs` (a parameter), `frame_drift.rs` (a twist) or
 //! `sensor_scale.rs` (what is seen), and name the file below: as a module, and in the catalogue.
 
+mod among_all;
 mod arm_compliance;
 mod axis_tilt;
 mod backlash;

@@ -31,8 +31,8 @@ pub(crate) struct JointAxis {
     pub before: Rigid<f64>,
     /// The links it moves: its own, then those behind it.
     pub links: Range<usize>,
-    /// Whether it moves the tip.
-    pub moves_tip: bool,
+    /// The tip that it moves [m], of its own arm.
+    pub tip_m: Option<Vector3<f64>>,
 }
 
 /// A link: what one joint moves and no other joint behind it.
@@ -41,6 +41,8 @@ struct Link {
     body: Body,
     /// The link that carries it; none for one that hangs on the base.
     parent: Option<usize>,
+    /// The arm that it is part of.
+    arm: usize,
     /// Where its joint is and where it ends [m]: at the next joints and the tip.
     from_m: Vector3<f64>,
     to_m: Vec<Vector3<f64>>,
@@ -49,40 +51,38 @@ struct Link {
 /// The nominal arm in one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NominalPose {
-    /// The frame of the base, in the world.
-    pub base: Rigid<f64>,
+    /// The frame of the base of each arm, in the world.
+    pub bases: Vec<Rigid<f64>>,
     /// The joints, in the order of the joint vector.
     pub joints: Vec<JointAxis>,
     /// Joints that follow the reading of another: that reading, the change per change of it, and the joint.
     mimics: Vec<(usize, f64, JointAxis)>,
-    /// The tip [m].
-    pub tip_m: Vector3<f64>,
-    /// What each joint moves, branch after branch.
+    /// The tip of each arm [m].
+    pub tips_m: Vec<Vector3<f64>>,
+    /// What each joint moves, branch after branch, arm after arm.
     links: Vec<Link>,
-    /// Whether the links weigh what the file of the arm declares.
-    pub declared: bool,
+    /// Whether the links of each arm weigh what its file declares.
+    pub declared: Vec<bool>,
 }
 
 impl NominalPose {
-    /// Of a tree whose first segment ends at the base, and its tip.
-    pub fn of(tree: &Tree, tip: SegmentId, p: &[f64], joint_rad: &[f64]) -> NominalPose {
+    /// Of a tree whose first segments end at the bases, one an arm, and the tips of these.
+    pub fn of(tree: &Tree, tips: &[SegmentId], p: &[f64], joint_rad: &[f64]) -> NominalPose {
         let ends = tree.ends(p, joint_rad);
-        let tip_m = ends[tip].translation_m;
-        let base = ends.first().copied().unwrap_or_else(Rigid::identity);
         let mut pose = NominalPose {
-            base,
+            bases: ends[..tips.len().min(ends.len())].to_vec(),
             joints: Vec::new(),
             mimics: Vec::new(),
-            tip_m,
+            tips_m: tips.iter().map(|tip| ends[*tip].translation_m).collect(),
             links: Vec::new(),
-            declared: false,
+            declared: Vec::new(),
         };
-        // The link that each segment is part of.
-        let mut part_of: Vec<Option<usize>> = Vec::with_capacity(ends.len());
+        // The arm and the link that each segment is part of.
+        let mut part_of: Vec<(usize, Option<usize>)> = Vec::with_capacity(ends.len());
         for (id, segment) in tree.0.iter().enumerate() {
-            let parent = segment.parent.and_then(|parent| part_of[parent]);
+            let (arm, parent) = segment.parent.map_or((id, None), |parent| part_of[parent]);
             let Some(joint) = segment.joint else {
-                part_of.push(parent);
+                part_of.push((arm, parent));
                 continue;
             };
             let before = segment.parent.map_or_else(Rigid::identity, |parent| ends[parent]);
@@ -90,56 +90,62 @@ impl NominalPose {
             let link = pose.links.len();
             let axis =
                 JointAxis { links: link..link + 1, ..axis(id, segment, before, &ends[id], (p, value)) };
-            pose.begin_link(parent, &axis);
-            part_of.push(Some(link));
+            pose.begin_link(arm, parent, &axis);
+            part_of.push((arm, Some(link)));
             match joint.mimic {
                 None => pose.joints.push(axis),
                 Some(mimic) => pose.mimics.push((joint.index, mimic.ratio, axis)),
             }
         }
-        pose.end_links(part_of[tip], tip_m);
-        let bodies = pose.bodies(tree, &ends, &part_of);
-        pose.declared = bodies.is_some();
-        let bodies = bodies.unwrap_or_else(|| pose.links.iter().map(spread).collect());
-        pose.links.iter_mut().zip(bodies).for_each(|(link, body)| link.body = body);
+        let of_tips: Vec<Option<usize>> = tips.iter().map(|tip| part_of[*tip].1).collect();
+        pose.end_links(&of_tips);
+        pose.weigh(tree, &ends, &part_of);
         pose
     }
 
     /// Adds a link that hangs on another, which ends where the joint of this one is.
-    fn begin_link(&mut self, parent: Option<usize>, joint: &JointAxis) {
+    fn begin_link(&mut self, arm: usize, parent: Option<usize>, joint: &JointAxis) {
         if let Some(parent) = parent {
             self.links[parent].to_m.push(joint.origin_m);
         }
         let body = Body::NONE;
-        self.links.push(Link { body, parent, from_m: joint.start_m, to_m: Vec::new() });
+        self.links.push(Link { body, parent, arm, from_m: joint.start_m, to_m: Vec::new() });
     }
 
-    /// Ends the link of the tip at the tip, and lets every joint know what it moves.
-    fn end_links(&mut self, of_tip: Option<usize>, tip_m: Vector3<f64>) {
+    /// Ends the link of each tip at the tip, and lets every joint know what it moves.
+    fn end_links(&mut self, of_tips: &[Option<usize>]) {
         let mut ends: Vec<usize> = (1..=self.links.len()).collect();
         for k in (0..self.links.len()).rev() {
             if let Some(parent) = self.links[k].parent {
                 ends[parent] = ends[parent].max(ends[k]);
             }
         }
-        if let Some(link) = of_tip {
-            self.links[link].to_m.push(tip_m);
+        for (link, tip_m) in of_tips.iter().zip(&self.tips_m) {
+            if let Some(link) = link {
+                self.links[*link].to_m.push(*tip_m);
+            }
         }
         for joint in self.joints.iter_mut().chain(self.mimics.iter_mut().map(|(_, _, joint)| joint)) {
             joint.links.end = ends[joint.links.start];
-            joint.moves_tip = of_tip.is_some_and(|link| joint.links.contains(&link));
+            let moved = of_tips.iter().position(|link| link.is_some_and(|link| joint.links.contains(&link)));
+            joint.tip_m = moved.map(|arm| self.tips_m[arm]);
         }
     }
 
-    /// The links as the file of the arm declares them; none where it leaves one without a mass.
-    fn bodies(&self, tree: &Tree, ends: &[Rigid<f64>], part_of: &[Option<usize>]) -> Option<Vec<Body>> {
-        let mut links: Vec<Body> = self.links.iter().map(|link| link.body).collect();
-        for ((segment, end), link) in tree.0.iter().zip(ends).zip(part_of) {
+    /// Lets the links of each arm weigh what its file declares, or as much as they are long where it leaves one without a
+    /// mass.
+    fn weigh(&mut self, tree: &Tree, ends: &[Rigid<f64>], part_of: &[(usize, Option<usize>)]) {
+        let mut declared: Vec<Body> = vec![Body::NONE; self.links.len()];
+        for ((segment, end), (_, link)) in tree.0.iter().zip(ends).zip(part_of) {
             // What no joint moves bears no part.
             let Some((body, k)) = segment.body.as_ref().zip(*link) else { continue };
-            links[k].add(&Body { centre_m: end.point(&body.centre_m), ..*body });
+            declared[k].add(&Body { centre_m: end.point(&body.centre_m), ..*body });
         }
-        links.iter().all(|link| link.mass_kg > 0.0).then_some(links)
+        let known = |links: Range<usize>| declared[links].iter().all(|link| link.mass_kg > 0.0);
+        self.declared = (0..self.bases.len()).map(|arm| known(self.links_of(arm))).collect();
+        for (link, body) in self.links.iter_mut().zip(declared) {
+            link.body = if self.declared[link.arm] { body } else { spread(link) };
+        }
     }
 
     /// Where link `k` begins, and where it ends if it does not branch [m].
@@ -177,9 +183,21 @@ impl NominalPose {
         self.links[k].body.centre_m
     }
 
-    /// All links from one on.
-    pub fn links_from(&self, first: usize) -> Range<usize> {
-        first.min(self.links.len())..self.links.len()
+    /// All links of an arm.
+    pub fn links_of(&self, arm: usize) -> Range<usize> {
+        let before = |arms: usize| self.links.partition_point(|link| link.arm < arms);
+        before(arm)..before(arm + 1)
+    }
+
+    /// The joints of an arm.
+    pub fn joints_of(&self, arm: usize) -> Range<usize> {
+        let before = |arms: usize| self.joints.partition_point(|j| self.links[j.links.start].arm < arms);
+        before(arm)..before(arm + 1)
+    }
+
+    /// Whether a joint hangs on the base.
+    pub fn is_first(&self, joint: usize) -> bool {
+        self.links[self.joints[joint].links.start].parent.is_none()
     }
 
     /// The links behind a joint's own.
@@ -229,12 +247,12 @@ impl NominalPose {
         self.over_joints(joint, of)
     }
 
-    /// Generalised force on a reading of one kilogram at the tip.
+    /// Generalised force on a reading of one kilogram at the tip of its arm.
     pub fn tip_torque_nm(&self, joint: usize, gravity: &Vector3<f64>) -> f64 {
-        self.over_joints(joint, |j| match j.motion {
-            _ if !j.moves_tip => 0.0,
-            Motion::Revolute => j.axis.dot(&(self.tip_m - j.origin_m).cross(gravity)),
-            Motion::Prismatic => j.axis.dot(gravity),
+        self.over_joints(joint, |j| match (j.motion, j.tip_m) {
+            (_, None) => 0.0,
+            (Motion::Revolute, Some(tip_m)) => j.axis.dot(&(tip_m - j.origin_m).cross(gravity)),
+            (Motion::Prismatic, Some(_)) => j.axis.dot(gravity),
         })
     }
 
@@ -268,7 +286,7 @@ fn axis(
     let motion = segment.joint.map_or(Motion::Revolute, |joint| joint.motion);
     let slid_m = if motion == Motion::Prismatic { value } else { 0.0 };
     let start_m = origin_m + axis * slid_m;
-    JointAxis { origin_m, start_m, axis, motion, segment: id, before, links: 0..0, moves_tip: false }
+    JointAxis { origin_m, start_m, axis, motion, segment: id, before, links: 0..0, tip_m: None }
 }
 
 /// What a link weighs that weighs as much as it is long.

@@ -18,10 +18,8 @@ pub(crate) enum Slot {
 }
 
 impl Slot {
-    /// The world's side of the base: the whole arm moves.
+    /// The world's side of the base: the whole arm moves; of several the first one, against the others.
     pub const WORLD: Slot = Slot::Before(0);
-    /// The base frame itself.
-    pub const BASE: Slot = Slot::Behind(0);
 }
 
 /// The sum of what the effects change, in sparse lists.

@@ -319,7 +319,7 @@ impl Effects {
         }
         let in_board_m = match &x.observation.reference {
             Reference::Seated { in_board_m, .. } => in_board_m + change.seat_m,
-            Reference::Tracked { .. } => Vector3::zeros(),
+            Reference::Tracked { .. } | Reference::Joined { .. } => Vector3::zeros(),
         };
         (extended, q, in_board_m)
     }
@@ -431,10 +431,11 @@ fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
     (tree, places)
 }
 
-/// The point the sensor measured in the world [m]: the tip, or the board it is seated in.
+/// The point the sensor measured in the world [m]: the tip, or the board it is seated in; none of joined tips.
 fn sensed_m(x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Option<Vector3<f64>> {
     match &x.observation.reference {
         Reference::Tracked { .. } => Some(*tip_m),
         Reference::Seated { .. } => x.board_m,
+        Reference::Joined { .. } => None,
     }
 }

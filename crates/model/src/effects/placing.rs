@@ -1,7 +1,7 @@
 //! Putting an effect in its place on a given arm: what its kind may ask about the arm and the session.
 
 use super::drivers::gravity_in_world;
-use super::kind::EffectKind;
+use super::kind::{EffectKind, Shape};
 use super::nominal_pose::NominalPose;
 use super::session::Session;
 use super::spec::EffectSpec;
@@ -14,6 +14,18 @@ use nalgebra::Vector3;
 const UPRIGHT_COSINE: f64 = 0.999;
 /// Axes closer to parallel than this cosine count as parallel by design.
 const PARALLEL_COSINE: f64 = 0.99;
+
+/// The shape of a kind that acts on a whole arm: which one of several.
+pub(crate) const ARM: Shape = Shape {
+    name: "arm",
+    unit: Unit::One,
+    default: Some(1.0),
+    lower: 1.0,
+    upper: 64.0,
+    meaning: "number of the arm, of several",
+    parameter: false,
+    values: None,
+};
 
 /// One spec about to be placed.
 pub(crate) struct Placing<'a> {
@@ -42,6 +54,20 @@ impl Placing<'_> {
         Err(format!("there is no joint {}; the arm has {}", joint + 1, self.zero.joints.len()))
     }
 
+    /// The arm the spec names; of one arm, that.
+    pub fn arm(&self) -> Result<usize, String> {
+        let arms = self.model.chain().arms();
+        let given = self.spec.shape.iter().find(|(key, _)| key == ARM.name).map(|(_, value)| *value);
+        if given.is_none() && arms.len() > 1 {
+            let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
+            return Err(format!("say of which arm: arm = 1 to {} ({})", names.len(), names.join(", ")));
+        }
+        let number = given.unwrap_or(1.0);
+        (0..self.zero.bases.len())
+            .find(|arm| (*arm + 1) as f64 == number)
+            .ok_or_else(|| format!("arm = {number} is not the number of an arm"))
+    }
+
     /// The joint the spec names, if it turns.
     pub fn turning_joint(&self) -> Result<usize, String> {
         let joint = self.joint()?;
@@ -55,7 +81,7 @@ impl Placing<'_> {
     pub fn loaded(&self, joint: usize) -> Result<(), String> {
         let gravity = gravity_in_world(self.session, self.zero);
         let along = self.zero.joints[joint].axis.dot(&gravity).abs() / gravity.norm().max(f64::MIN_POSITIVE);
-        if joint > 0 || self.motion(joint) == Motion::Prismatic || along < UPRIGHT_COSINE {
+        if !self.zero.is_first(joint) || self.motion(joint) == Motion::Prismatic || along < UPRIGHT_COSINE {
             return Ok(());
         }
         Err(format!("the axis of joint {} stands upright, so gravity does not load it", joint + 1))

@@ -57,7 +57,7 @@ impl Session {
             .iter()
             .filter_map(|o| match &o.reference {
                 Reference::Tracked { position_m, .. } => Some(*position_m),
-                Reference::Seated { .. } => None,
+                Reference::Seated { .. } | Reference::Joined { .. } => None,
             })
             .collect();
         let centre_m = mean(&tracked);

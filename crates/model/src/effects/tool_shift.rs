@@ -22,7 +22,7 @@
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitudes_xyz};
+use super::placing::{ARM, Placing, amplitudes_xyz};
 use crate::rigid::Scalar;
 use armcal_core::Unit;
 
@@ -34,7 +34,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     target: Target::Whole,
     offered: Offered::Events,
-    shapes: &[],
+    shapes: &[ARM],
     never_negative: &[],
     confused_with: &["zero_slip", "frame_shift"],
     source: include_str!("tool_shift.rs"),
@@ -50,7 +50,8 @@ struct ToolShift {
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
     let amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift on the last link along");
-    Ok(Placement::new(amplitudes, ToolShift { tip: placing.model.tip_segment().parameters.start }))
+    let tip = placing.model.tip_segment(placing.arm()?).parameters.start;
+    Ok(Placement::new(amplitudes, ToolShift { tip }))
 }
 
 impl Physics for ToolShift {

@@ -25,7 +25,7 @@
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
+use super::placing::{ARM, Placing, amplitude};
 use crate::rigid::Scalar;
 use crate::segment::Motion;
 use armcal_core::Unit;
@@ -38,7 +38,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     target: Target::Whole,
     offered: Offered::Recordings,
-    shapes: &[],
+    shapes: &[ARM],
     never_negative: &[],
     confused_with: &["zero_slip", "frame_shift", "tool_shift"],
     source: include_str!("undeclared_load.rs"),
@@ -55,7 +55,8 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
     let loaded = |joint: &usize| placing.motion(*joint) == Motion::Revolute && placing.loaded(*joint).is_ok();
     let stretched = |joint| (joint, (placing.gravity_mps2() * placing.reach_m(joint)).max(1e-3));
-    let joints: Vec<(usize, f64)> = (0..placing.zero.joints.len()).filter(loaded).map(stretched).collect();
+    let joints: Vec<(usize, f64)> =
+        placing.zero.joints_of(placing.arm()?).filter(loaded).map(stretched).collect();
     if joints.is_empty() {
         return Err("gravity loads none of the joints that turn".to_owned());
     }

@@ -1,6 +1,7 @@
-//! What can be measured of an arm: its tip, and markers on its links.
+//! What can be measured of an arm: its tip, and markers on its links; and every frame of it, for drawing.
 
 use super::Model;
+use crate::rigid::Rigid;
 use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
 use armcal_core::{FeatureId, Observation, Pose};
@@ -13,7 +14,47 @@ pub(super) struct Feature {
     pub route: Route,
 }
 
+/// A frame of the arm, for drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkFrame {
+    /// A DH row, a link of the URDF, a base, a tip.
+    pub name: String,
+    /// The one that it hangs on, by its place among all; none for a base.
+    pub parent: Option<usize>,
+    /// Where it is in the base, of several arms the first one's.
+    pub in_base: Pose,
+}
+
 impl Model {
+    /// Every frame of the arm: base, the end of each segment (a DH row, or a link of the URDF, fixed ones included), tip;
+    /// parents before those that hang on them.
+    pub fn link_frames(&self, p: &[f64], joint_rad: &[f64]) -> Vec<LinkFrame> {
+        let mut ends: Vec<Rigid<f64>> = Vec::with_capacity(self.tree.0.len());
+        // By segment: the last frame with a name on the way to it.
+        let mut named: Vec<Option<usize>> = Vec::with_capacity(self.tree.0.len());
+        let mut frames: Vec<LinkFrame> = Vec::with_capacity(self.tree.0.len());
+        let first = self.base_in_world(p).inverse();
+        for (id, segment) in self.tree.0.iter().enumerate() {
+            // In the base frame the base is where it is.
+            let end = match segment.parent {
+                None if id == 0 => Rigid::identity(),
+                None => Rigid::from(&(first * self.arm_base_in_world(p, id))),
+                Some(parent) => ends[parent].then(&segment.transform(p, joint_rad)),
+            };
+            let parent = segment.parent.and_then(|parent| named[parent]);
+            named.push(segment.frame.as_ref().map_or(parent, |_| Some(frames.len())));
+            let frame = |name: &String| LinkFrame { name: name.clone(), parent, in_base: Pose::from(&end) };
+            frames.extend(segment.frame.iter().map(frame));
+            ends.push(end);
+        }
+        frames
+    }
+
+    /// The arm, of several, that a feature is on.
+    pub fn arm_of(&self, feature: FeatureId) -> usize {
+        self.route(feature).first().copied().unwrap_or(0)
+    }
+
     /// A feature in the link that carries it.
     pub fn feature_in_link(&self, p: &[f64], feature: FeatureId) -> Pose {
         let own = self.route(feature).last().map(|end| self.tree.0[*end].transform(p, &[]));

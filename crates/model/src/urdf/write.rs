@@ -37,7 +37,7 @@ impl Model {
         let mut edits = Vec::new();
         let mut warnings = Vec::new();
         let tip_is_calibrated =
-            self.parameters()[self.tip_segment().parameters.clone()].iter().any(|parameter| parameter.free);
+            self.parameters()[self.tip_segment(0).parameters.clone()].iter().any(|parameter| parameter.free);
         for joint in joints {
             // A moving joint is two segments: its origin and its motion.
             let carries_tip =

@@ -2,9 +2,9 @@
 //!
 //! None of these may panic or hang; what a reader accepts must also survive what is done with it first.
 
+use armcal::Pipeline;
 use armcal::check::reference::Calibrated;
 use armcal::compensate::targets;
-use armcal::{ClosedPipeline, Pipeline};
 use armcal_lab::LabConfig;
 use armcal_lab::pair::PairConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Frames, Model, Session};
@@ -33,8 +33,9 @@ pub fn pipeline(bytes: &[u8]) {
             }
         }
         1 => {
-            if let Ok(pipeline) = ClosedPipeline::parse(path, text.to_owned(), Path::new("")) {
-                pipeline.closed_chain.closure();
+            let two = format!("{text}\n[closed_chain]\nkind = \"same-point\"\n");
+            if let Ok(pipeline) = Pipeline::parse(path, two, Path::new("")) {
+                let _ = pipeline.arm_files();
             }
         }
         2 => {

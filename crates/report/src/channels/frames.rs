@@ -4,7 +4,7 @@ use super::shapes::{quaternion, vector};
 use super::{Messages, WORLD, run_start_ns, timestamp};
 use crate::run::Run;
 use armcal_core::{Dwell, Pose};
-use armcal_model::Model;
+use armcal_model::{LinkFrame, Model};
 use foxglove::messages as fox;
 use std::collections::BTreeSet;
 
@@ -20,25 +20,18 @@ pub(super) fn put_standing(run: &Run, out: &mut Messages) {
 }
 
 /// The world, with nothing in it yet.
-pub(super) fn world(time_ns: i64) -> fox::FrameTransform {
+fn world(time_ns: i64) -> fox::FrameTransform {
     transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity())
 }
 
-/// The frames of an arm under a prefix, each in the one before it.
-pub(super) fn arm(
-    model: &Model,
-    prefix: &str,
-    p: &[f64],
-    joint_rad: &[f64],
-    time_ns: i64,
-) -> Vec<fox::FrameTransform> {
-    let mut parent = WORLD.to_owned();
-    let hung = |link: Link| {
-        let transform = transform(time_ns, &parent, &link.name, &link.in_parent);
-        parent = link.name;
-        transform
+/// The frames of the arms under a prefix, each in the one that it hangs on.
+fn arm(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], time_ns: i64) -> Vec<fox::FrameTransform> {
+    let links = links(model, prefix, p, joint_rad);
+    let hung = |link: &Link| {
+        let parent = link.parent.map_or(WORLD, |parent| links[parent].name.as_str());
+        transform(time_ns, parent, &link.name, &link.in_parent)
     };
-    links(model, prefix, p, joint_rad).into_iter().map(hung).collect()
+    links.iter().map(hung).collect()
 }
 
 /// The world, and the map of boards beside it.
@@ -51,27 +44,29 @@ fn board_map(time_ns: i64) -> fox::FrameTransform {
     transform(time_ns, WORLD, super::board_map::FRAME, &Pose::identity())
 }
 
-/// A frame of the arm in the frame before it, the first one in the world.
+/// A frame of the arm in the frame that it hangs on, a base in the world.
 pub(super) struct Link {
     pub name: String,
+    /// That frame, by its place among all; none for a base.
+    pub parent: Option<usize>,
     pub in_parent: Pose,
 }
 
-/// The frames of the arm under a prefix, in the order of the chain.
+/// The frames of the arms under a prefix, in the order of the chain.
 pub(super) fn links(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64]) -> Vec<Link> {
     let mut names = BTreeSet::new();
-    let mut base_from_parent = model.base_in_world(p).inverse();
-    let link = |(name, base_from_child): (String, Pose)| {
-        let mut name = format!("{prefix}/{name}");
+    let base_from_world = model.base_in_world(p).inverse();
+    let frames = model.link_frames(p, joint_rad);
+    let link = |frame: &LinkFrame| {
+        let mut name = format!("{prefix}/{}", frame.name);
         // A link may be called like the frames around the arm; a frame must not be its own parent.
         while !names.insert(name.clone()) {
             name.push('\'');
         }
-        let in_parent = base_from_parent.inverse() * base_from_child;
-        base_from_parent = base_from_child;
-        Link { name, in_parent }
+        let base_from_parent = frame.parent.map_or(base_from_world, |parent| frames[parent].in_base);
+        Link { name, parent: frame.parent, in_parent: base_from_parent.inverse() * frame.in_base }
     };
-    model.link_frames_in_base(p, joint_rad).into_iter().map(link).collect()
+    frames.iter().map(link).collect()
 }
 
 /// The tree in the pose of a dwell, complete.

@@ -42,9 +42,6 @@ mod arrows;
 pub(crate) mod board_grid;
 pub(crate) mod board_map;
 mod board_scale;
-mod closed_arms;
-mod closed_chain;
-mod closed_story;
 pub(crate) mod cloud;
 mod facts;
 mod findings;
@@ -55,8 +52,6 @@ pub(crate) mod robots;
 mod scene;
 mod shapes;
 
-pub(crate) use closed_arms::closed_places_m;
-pub(crate) use closed_chain::closed_messages;
 pub(crate) use findings::{curve_topic, implied_topic};
 pub(crate) use scene::places_m;
 

@@ -33,7 +33,7 @@ pub(super) fn put(recording: &RecordingRun, points: &[&Point], out: &mut Message
 fn put_tip(recording: &RecordingRun, point: &Point, out: &mut Messages) {
     let time_ns = point.observation.time_ns;
     let (publish_ns, tip) = match &point.observation.reference {
-        Reference::Seated { .. } => (time_ns, at(&point.measured_m)),
+        Reference::Seated { .. } | Reference::Joined { .. } => (time_ns, at(&point.measured_m)),
         Reference::Tracked { orientation, .. } => {
             let stamp_ns = recording.clock.as_ref().map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
             let rotation = orientation.unwrap_or_default();

@@ -4,7 +4,7 @@
 
 use super::frames::{BOARD as BOARD_FRAME, Link, links};
 use super::shapes::Rgba;
-use super::{Messages, run_start_ns, scene};
+use super::{Messages, WORLD, run_start_ns, scene};
 use crate::run::Run;
 use armcal_core::Pose;
 use armcal_model::Model;
@@ -43,7 +43,7 @@ pub(super) fn put(run: &Run, out: &mut Messages) {
 }
 
 /// An arm, whose links are called like its frames under the prefix.
-pub(super) fn arm_urdf(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], rgba: Rgba) -> String {
+fn arm_urdf(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], rgba: Rgba) -> String {
     let turned: Vec<f64> = joint_rad.iter().map(|q| q + TURNED).collect();
     let [stands, turned] = [joint_rad, &turned].map(|joint_rad| links(model, prefix, p, joint_rad));
     // Viewers make a path of it.
@@ -91,21 +91,31 @@ fn defined(name: &str, [r, g, b, a]: Rgba) -> String {
 /// in which it does not move: the first for a URDF, the second for Denavit-Hartenberg rows.
 fn urdf(prefix: &str, stands: &[Link], turned: &[Link], rgba: Rgba) -> String {
     let mut visuals = vec![String::new(); stands.len()];
-    for k in 1..stands.len() {
-        let (here, there) = (stands[k].in_parent, turned[k].in_parent);
+    for (k, link) in stands.iter().enumerate() {
+        let Some(parent) = link.parent else { continue };
+        let (here, there) = (link.in_parent, turned[k].in_parent);
         let (along, moved) = (here.translation.vector, there.translation.vector);
         if (along - moved).norm() < NOTHING_M {
-            visuals[k - 1] += &cylinder(&along, prefix);
+            visuals[parent] += &cylinder(&along, prefix);
         } else {
             visuals[k] += &cylinder(&here.inverse().translation.vector, prefix);
         }
     }
     let mut text = format!("{HEAD}<robot name=\"{prefix}\">\n{}", defined(prefix, rgba));
+    // A robot has one root: of several arms the world.
+    let arms = stands.iter().filter(|link| link.parent.is_none()).count();
+    if arms > 1 {
+        let _ = writeln!(text, "  <link name=\"{WORLD}\"/>");
+    }
     for (link, visual) in stands.iter().zip(&visuals) {
         let _ = writeln!(text, "  <link name=\"{}\">{visual}</link>", escaped(&link.name));
     }
-    for (k, link) in stands.iter().enumerate().skip(1) {
-        let (name, parent) = (escaped(&link.name), escaped(&stands[k - 1].name));
+    for link in stands {
+        let parent = link.parent.map_or(WORLD, |parent| stands[parent].name.as_str());
+        if link.parent.is_none() && arms == 1 {
+            continue;
+        }
+        let (name, parent) = (escaped(&link.name), escaped(parent));
         let _ = writeln!(
             text,
             "  <joint name=\"{name}/joint\" type=\"floating\"><parent link=\"{parent}\"/><child link=\"{name}\"/>{}</joint>",

@@ -58,8 +58,8 @@ pub(crate) fn places_m(run: &Run, points: &[Point]) -> Vec<Vector3<f64>> {
     let fitted = run.calibration.fit.values();
     let base = run.model.base_in_world(&fitted);
     let links = run.recordings.iter().flat_map(|r| run.posed(r)).flat_map(|dwell| {
-        let frames = run.model.link_frames_in_base(&fitted, &dwell.joint_rad);
-        frames.into_iter().map(|(_, frame)| (base * frame).translation.vector).collect::<Vec<_>>()
+        let frames = run.model.link_frames(&fitted, &dwell.joint_rad);
+        frames.into_iter().map(|frame| (base * frame.in_base).translation.vector).collect::<Vec<_>>()
     });
     let places = points.iter().map(|p| p.measured_m).chain(links).chain([base.translation.vector]);
     let mut places: Vec<Vector3<f64>> = places.filter(|m| m.iter().all(|x| x.is_finite())).collect();
@@ -68,30 +68,36 @@ pub(crate) fn places_m(run: &Run, points: &[Point]) -> Vec<Vector3<f64>> {
 }
 
 /// Over the middle of places, where nothing is in the way [m].
-pub(super) fn above_m(places: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+fn above_m(places: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let (low, high) = extent(places.iter().copied())?;
     Some(((low + high) / 2.0).xy().push(high.z + ABOVE * (high - low).norm()))
 }
 
-/// Links as lines, joints as spheres, the predicted tip as a smaller one.
-pub(super) fn arm(
-    id: &str,
-    model: &Model,
-    p: &[f64],
-    rgba: Rgba,
-    time_ns: i64,
-    joint_rad: &[f64],
-) -> fox::SceneEntity {
+/// Links as lines, joints as spheres, predicted tips as smaller ones.
+fn arm(id: &str, model: &Model, p: &[f64], rgba: Rgba, time_ns: i64, joint_rad: &[f64]) -> fox::SceneEntity {
     let world_from_base = model.base_in_world(p);
-    let frames = model.link_frames_in_base(p, joint_rad);
+    let frames = model.link_frames(p, joint_rad);
     let places_m: Vec<Vector3<f64>> =
-        frames.iter().map(|(_, frame)| (world_from_base * frame).translation.vector).collect();
+        frames.iter().map(|frame| (world_from_base * frame.in_base).translation.vector).collect();
     let mut arm = entity(id, time_ns);
-    arm.lines.push(line_strip(&places_m, 0.006, rgba));
-    if let Some((tip_m, joints_m)) = places_m.split_last() {
-        arm.spheres.extend(joints_m.iter().map(|joint_m| sphere(joint_m, 0.025, rgba)));
-        arm.spheres.push(sphere(tip_m, 0.006, rgba));
+    // One line as long as each frame hangs on the one before it.
+    let mut line: Vec<usize> = Vec::new();
+    let mut draw = |line: &[usize]| {
+        let places_m: Vec<Vector3<f64>> = line.iter().map(|k| places_m[*k]).collect();
+        arm.lines.extend((places_m.len() > 1).then(|| line_strip(&places_m, 0.006, rgba)));
+    };
+    for (k, frame) in frames.iter().enumerate() {
+        if k > 0 && frame.parent != Some(k - 1) {
+            draw(&line);
+            line = frame.parent.into_iter().collect();
+        }
+        line.push(k);
     }
+    draw(&line);
+    let is_end = |k: &usize| !frames.iter().any(|frame| frame.parent == Some(*k));
+    let (ends, joints): (Vec<usize>, Vec<usize>) = (0..frames.len()).partition(is_end);
+    arm.spheres.extend(joints.iter().map(|k| sphere(&places_m[*k], 0.025, rgba)));
+    arm.spheres.extend(ends.iter().map(|k| sphere(&places_m[*k], 0.006, rgba)));
     arm
 }
 

@@ -4,7 +4,6 @@
 //! Paths keep to what both applications understand: names, slices and indices, no functions. All arrays of a plot are
 //! of one message, because a plot has one x for all its series and pairs them by position.
 
-mod closed;
 mod config;
 mod current;
 mod joints;
@@ -15,7 +14,6 @@ mod spec;
 mod tabs;
 mod views;
 
-use crate::closed_chain::ClosedRun;
 use crate::findings::Findings;
 use crate::points::Point;
 use crate::run::Run;
@@ -30,15 +28,7 @@ pub(crate) struct Layouts {
 
 /// The layout of a run, in both formats, ending in a newline.
 pub(crate) fn layouts(run: &Run, points: &[Point], findings: &Findings) -> Layouts {
-    written(&tabs::content(run, points, findings))
-}
-
-/// The same of a run of two arms.
-pub(crate) fn closed_layouts(run: &ClosedRun) -> Layouts {
-    written(&closed::content(run))
-}
-
-fn written(content: &spec::Content) -> Layouts {
+    let content = tabs::content(run, points, findings);
     let text = |value: &serde_json::Value| format!("{value:#}\n");
-    Layouts { current: text(&current::layout(content)), legacy: text(&legacy::layout(content)) }
+    Layouts { current: text(&current::layout(&content)), legacy: text(&legacy::layout(&content)) }
 }

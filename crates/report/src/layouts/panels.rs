@@ -82,18 +82,6 @@ pub(super) fn outward(f: &Findings) -> Content {
     Content::plot("Error outward", course(path("time_min"), series))
 }
 
-/// Closing errors of two arms, before and after the calibration each on a scale of its own.
-pub(super) fn closing_over_recorded_time() -> Vec<Content> {
-    let path = |field: &str| format!("/armcal/course.{field}[:]");
-    let nominal = vec![dots(path("nominal_mm"), "nominal", GREY)];
-    let fitted =
-        vec![dots(path("fitted_mm"), "calibrated", ORANGE), dots(path("expected_mm"), "noise", PURPLE)];
-    vec![
-        Content::plot("Closing error, nominal", course(path("time_min"), nominal)),
-        Content::plot("Closing error", course(path("time_min"), fitted)),
-    ]
-}
-
 fn course(x_path: String, series: Vec<Series>) -> Plot {
     let (x_label, y_label) = ("recorded time [min]".into(), "error [mm]".into());
     Plot { x_path, x_label, y_label, y_range: None, beyond: 0, series }

@@ -1,17 +1,14 @@
 //! What the 3D panels look at.
 
 use super::spec::View;
-use crate::channels::{board_grid, board_map, closed_places_m, cloud, places_m, robots};
-use crate::closed_chain::ClosedRun;
+use crate::channels::{board_grid, board_map, cloud, places_m, robots};
 use crate::findings::Findings;
 use crate::points::{Point, extent};
 use crate::run::Run;
 use nalgebra::{Matrix3, Vector3};
 
-/// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides. The
-/// one of two arms is higher.
+/// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides.
 const PANEL: f64 = 1.2;
-const PANEL_OF_TWO: f64 = 0.8;
 /// Opening of the camera from top to bottom [deg].
 pub(super) const OPENING_DEG: f64 = 45.0;
 /// Nearer than this the camera does not go [m].
@@ -26,7 +23,7 @@ const ANGLES_DEG: [f64; 2] = [60.0, 45.0];
 /// The arm and the points it visited.
 pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
     let places = places_m(run, points);
-    let (target_m, distance_m) = sight(&places, PANEL);
+    let (target_m, distance_m) = sight(&places);
     let mut topics = vec![
         ("/armcal/scene", true),
         ("/armcal/arms", true),
@@ -57,16 +54,8 @@ pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
     }
 }
 
-/// Two arms in a closed chain.
-pub(super) fn both_arms(run: &ClosedRun) -> View {
-    let (target_m, distance_m) = sight(&closed_places_m(run), PANEL_OF_TWO);
-    let topics = vec![("/armcal/scene", true), ("/armcal/arms", true), ("/armcal/arrows_calibrated", true)];
-    let (target_m, angles_deg) = (target_m.into(), Some(ANGLES_DEG));
-    View { frame: "world", target_m, distance_m, angles_deg, topics, robots: Vec::new() }
-}
-
 /// Where the camera looks, and from how far all places are just in the picture [m].
-fn sight(places: &[Vector3<f64>], panel: f64) -> (Vector3<f64>, f64) {
+fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     let [phi, theta] = ANGLES_DEG.map(f64::to_radians);
     // The viewers' camera stands in -x and -y for an angle of 45 degrees about the vertical.
     let towards = Vector3::new(-phi.sin() * theta.sin(), -phi.sin() * theta.cos(), phi.cos());
@@ -78,7 +67,7 @@ fn sight(places: &[Vector3<f64>], panel: f64) -> (Vector3<f64>, f64) {
     let half_height = (OPENING_DEG.to_radians() / 2.0).tan() / MARGIN;
     let from = |m: &Vector3<f64>| {
         let off = m - middle;
-        off.z + (off.x.abs() / panel).max(off.y.abs()) / half_height
+        off.z + (off.x.abs() / PANEL).max(off.y.abs()) / half_height
     };
     let distance_m = seen.iter().map(from).fold(NEAREST_M, f64::max);
     (axes * middle, distance_m)

@@ -186,7 +186,7 @@ fn dwells(run: &Run) -> Dwells {
     let cavity_mm = |axis: usize| {
         Column::of(run.observations.iter().map(|o| match &o.reference {
             armcal_core::Reference::Seated { in_board_m, .. } => Some(in_board_m[axis] * 1e3),
-            armcal_core::Reference::Tracked { .. } => None,
+            armcal_core::Reference::Tracked { .. } | armcal_core::Reference::Joined { .. } => None,
         }))
     };
     Dwells {

@@ -35,6 +35,7 @@ use crate::sizes::sizes_of;
 use crate::story::Story;
 use crate::text::millimetres;
 use crate::told_warning::ToldWarning;
+use crate::two_arms::about;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
 use armcal_diagnose::{Explanation, FoundEffect, Nested, NotTestable};
@@ -75,8 +76,10 @@ pub enum PageKind {
 pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, ReportError> {
     let story = Story::of(run);
     let connect = if kind == PageKind::Live { "'self'" } else { "'none'" };
-    let title = || run.pipeline_name.clone();
-    let shell = Shell::new("report-page", (title(), title()), &SCRIPTS, &Document::of(run, basis), connect)?;
+    let title = run.pipeline_name.clone();
+    let about = about(run).map(|about| format!("{title} · {about}"));
+    let kicker = about.unwrap_or_else(|| title.clone());
+    let shell = Shell::new("report-page", (title, kicker), &SCRIPTS, &Document::of(run, basis), connect)?;
     let page = ReportPage {
         shell: shell.telling(&story),
         live: kind == PageKind::Live,

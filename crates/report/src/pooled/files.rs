@@ -227,7 +227,7 @@ fn model(run: &PooledRun) -> PastModel {
     let hashes = |r: &PooledRecordingRun| r.files.iter().map(|f| f.sha256.clone()).collect();
     PastModel::of_calibrated(&Calibrated {
         pipeline: &run.pipeline_name,
-        chain: chain_text(model, &run.model_text, &run.pipeline_text),
+        chain: chain_text(model.chain(), std::slice::from_ref(&run.model_text), &run.pipeline_text),
         model,
         base: last_base_and_tip(run, &nominal).0,
         estimates: &estimates,

@@ -1,21 +1,50 @@
-//! Two joint streams as one, so that a dwell is an interval in which both arms stand still; and apart again.
+//! Two joint streams as one, so that a dwell is an interval in which both arms stand still.
 //!
 //! Both streams must be stamped by one clock. The rows are those of the slower stream, each with the latest reading of
 //! the other: nothing is interpolated, and no reading of the slower one is used twice.
 
+use super::TwoArms;
 use crate::error::Error;
 use armcal_core::robust::median;
-use armcal_core::{Dwell, JointSamples, Observation, Reference};
-use nalgebra::Vector3;
+use armcal_core::{JointSamples, Samples, Warning};
+use armcal_recording::{Recording, StreamReport};
 
 /// A reading older than this many periods of its own stream is missing, not old.
 const OLDEST_PERIODS: f64 = 3.5;
+
+/// Reads the joint streams of both arms as one.
+///
+/// # Errors
+/// A recording that cannot be read, streams that do not overlap.
+pub fn read(
+    two: &TwoArms,
+    name: &str,
+    recording: &Recording,
+) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), Error> {
+    let (mut joints, mut streams, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    for (arm, own) in two.arms.iter().zip(two.streams()) {
+        let read = recording.read(&own);
+        let (samples, of_arm, said) =
+            read.map_err(|source| Error::Recording { recording: name.to_owned(), source })?;
+        joints.push(samples.joints);
+        streams.extend(of_arm);
+        warnings.extend(
+            said.into_iter().map(|w| Warning { subject: format!("{}: {}", arm.name, w.subject), ..w }),
+        );
+    }
+    let names = two.arms.each_ref().map(|arm| arm.name.as_str());
+    let joined = <[JointSamples; 2]>::try_from(joints).map_err(|_| "there must be two joint streams".into());
+    let joints = joined
+        .and_then(|joints| join(&joints, names))
+        .map_err(|problem| Error::TwoArms { problem: format!("recording `{name}`: {problem}") })?;
+    Ok((Samples { joints, ..Samples::default() }, streams, warnings))
+}
 
 /// Joins the streams of both arms: the columns of the first, then those of the second.
 ///
 /// # Errors
 /// In words: no time at which both were recorded.
-pub fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, String> {
+fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, String> {
     let span = |s: &JointSamples| Some([*s.time_ns.first()?, *s.time_ns.last()?]);
     let [Some(a), Some(b)] = [span(&arms[0]), span(&arms[1])] else {
         return Err("one of the joint streams has no rows".into());
@@ -56,38 +85,25 @@ pub fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, 
     })
 }
 
-/// One arm's part of a dwell of both: `first` joints come before its own `count`. Its reference is the other arm.
-pub fn of_arm(dwell: &Dwell, first: usize, count: usize) -> Observation {
-    let own = first..first + count;
-    let pairs = first..(first + count).saturating_sub(1);
-    let joint_rad = dwell.joint_rad[own.clone()].to_vec();
-    Observation {
-        time_ns: dwell.mid_ns(),
-        joint_sigma_rad: dwell.joint_sigma_rad[own.clone()].to_vec(),
-        arrival: dwell.arrival[own.clone()].to_vec(),
-        path_memory_rad: Some(dwell.path_memory_rad[own.clone()].to_vec()),
-        pair_memory_rad: Some(dwell.pair_memory_rad[pairs].to_vec()),
-        moved_rad: dwell.moved_rad.as_ref().map(|moved| moved[own.clone()].to_vec()),
-        effort_nm: dwell.effort_nm.as_ref().map(|e| e[own].to_vec()),
-        ..Observation::bare(dwell.id, joint_rad, Reference::position(Vector3::zeros()))
-    }
-}
-
-/// Refuses an arm that is held in one pose throughout: nothing can be learnt of it.
-pub fn check_moves(name: &str, observations: &[Observation], least_rad: f64) -> Result<(), Error> {
-    let joints = observations.first().map_or(0, |o| o.joint_rad.len());
+/// Refuses an arm that is held in one pose throughout: nothing can be learnt of it. `readings` are its own in each dwell.
+pub fn check_moves<'o>(
+    name: &str,
+    readings: impl Iterator<Item = &'o [f64]> + Clone,
+    least_rad: f64,
+) -> Result<(), Error> {
+    let joints = readings.clone().next().map_or(0, <[f64]>::len);
     let range = |joint: usize| {
-        let of = observations.iter().map(|o| o.joint_rad[joint]);
+        let of = readings.clone().map(|q| q[joint]);
         of.clone().fold(f64::NEG_INFINITY, f64::max) - of.fold(f64::INFINITY, f64::min)
     };
     let widest_rad = (0..joints).map(range).fold(0.0, f64::max);
-    if observations.len() < 2 || widest_rad >= least_rad {
+    let dwells = readings.clone().count();
+    if dwells < 2 || widest_rad >= least_rad {
         return Ok(());
     }
     let problem = format!(
-        "the {name} arm never moves: over {} dwells none of its joints changes by more than {:.3} deg; lead both arms \
+        "the {name} arm never moves: over {dwells} dwells none of its joints changes by more than {:.3} deg; lead both arms \
          through many poses, or check its topic and joint names",
-        observations.len(),
         widest_rad.to_degrees()
     );
     Err(Error::TwoArms { problem })
@@ -149,27 +165,10 @@ mod tests {
         let empty = join(&[stream(0, 10, 0), stream(0, 10, 9)], ["right", "left"]).expect_err("empty");
         assert!(empty.contains("no rows"), "{empty}");
 
-        let dwell = |q: f64| Dwell {
-            id: armcal_core::DwellId { recording: 0, dwell: 0 },
-            start_ns: 0,
-            end_ns: 1_000_000_000,
-            joint_rad: vec![q, 0.5, 0.5],
-            joint_spread_rad: vec![0.0; 3],
-            joint_sigma_rad: vec![1e-5; 3],
-            effort_nm: None,
-            samples: 50,
-            effective_samples: 50.0,
-            arrival: vec![armcal_core::Arrival::Unknown; 3],
-            path_memory_rad: vec![Vec::new(); 3],
-            pair_memory_rad: vec![[Vec::new(), Vec::new()]; 2],
-            moved_rad: None,
-            tip: None,
-            temperature_c: None,
-        };
-        let observed = |first, count| [0.0, 1.0].map(|q| of_arm(&dwell(q), first, count));
-        assert_eq!(observed(1, 2)[1].joint_rad, [0.5, 0.5]);
-        assert!(check_moves("right", &observed(0, 1), 0.02).is_ok());
-        let said = check_moves("left", &observed(1, 2), 0.02).expect_err("still").to_string();
+        let dwells = [[0.0, 0.5, 0.5], [1.0, 0.5, 0.5]];
+        assert!(check_moves("right", dwells.iter().map(|q| &q[..1]), 0.02).is_ok());
+        let still = check_moves("left", dwells.iter().map(|q| &q[1..]), 0.02);
+        let said = still.expect_err("still").to_string();
         assert!(said.contains("the left arm never moves: over 2 dwells"), "{said}");
     }
 }

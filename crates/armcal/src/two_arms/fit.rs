@@ -1,0 +1,202 @@
+//! From dwells of both arms to a calibration: which dwells are joined -> where the other base is -> fit.
+
+use super::joined::check_moves;
+use super::pipeline::{ClosureKind, TwoArms};
+use crate::error::Error;
+use crate::setup::Inputs;
+use crate::stages::{frames, observe};
+use crate::story::Fitted;
+use armcal_calibrate::{
+    HoldoutConfig, align_frames, calibrate, expected_norm_m, fit_frames, position_covariance_m2,
+};
+use armcal_core::{FeatureId, Observation, Parameter, Reference, Rejection, Role};
+use armcal_model::Model;
+use nalgebra::Matrix3;
+
+/// Which dwells are joined and where the other base is depend on each other; so do fit and outliers.
+const MAX_ROUNDS: usize = 5;
+/// A calibrated closing error this many times what the noise explains is that of tips that are not joined.
+const OPEN_FACTOR: f64 = 10.0;
+/// An arm none of whose joints moves by as much is not led through poses [rad]: 1 deg.
+const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
+
+/// Calibrates both arms on the dwells in which their tips are joined.
+///
+/// # Errors
+/// An arm that never moves, too few dwells that are joined, a calibration that cannot be made.
+pub fn fit_joined(inputs: &Inputs, arms: &TwoArms, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
+    let Inputs { pipeline, chain, seen, changes, .. } = inputs;
+    let mut geometry = frames::nominal_model(pipeline, chain, None, seen)?;
+    frames::change_nominals(&mut geometry, changes)?;
+    let search = Search { inputs, arms, all: observations(inputs, arms) };
+    search.check_both_move(&geometry, &search.all)?;
+    let near = search.near(&mut geometry)?;
+    let effects = frames::effect_specs(pipeline, &geometry)?;
+    let model = match effects.is_empty() {
+        true => geometry.clone(),
+        false => geometry.with_effects(&effects, &frames::session(pipeline, &search.all))?,
+    };
+    search.settled(geometry, model, near, told)
+}
+
+/// Every dwell, as if its tips were joined: the tip of the first arm is the reference for that of the second.
+fn observations(inputs: &Inputs, arms: &TwoArms) -> Vec<Observation> {
+    let apart = arms.closure.kind == ClosureKind::RigidLink;
+    let covariance_m2 = Matrix3::identity() * (arms.closure.sigma_mm * 1e-3).powi(2);
+    let joined = |dwell| Observation {
+        feature: FeatureId(1),
+        ..observe::observation(dwell, 0.0, Reference::Joined { to: FeatureId::TIP, apart }, covariance_m2)
+    };
+    inputs.seen.iter().flat_map(|seen| &seen.dwells).map(joined).collect()
+}
+
+/// The dwells of both arms, of which some are joined.
+struct Search<'a> {
+    inputs: &'a Inputs,
+    arms: &'a TwoArms,
+    all: Vec<Observation>,
+}
+
+impl Search<'_> {
+    /// Places the base that nobody knows, and finds the dwells that the nominal arms may have closed: both together, because
+    /// an open dwell would pull the base away.
+    fn near(&self, geometry: &mut Model) -> Result<Vec<bool>, Error> {
+        let (fit, limit_m) = (&self.inputs.pipeline.fit, self.limit_m());
+        let mut near = vec![true; self.all.len()];
+        for _ in 0..MAX_ROUNDS {
+            let joined = self.chosen(&near);
+            self.enough(&joined)?;
+            place_bases(geometry, &align_frames(geometry, &joined, fit)?);
+            // A link's length must not pull the base: the frames alone are fitted before a dwell is judged.
+            let start = fit_frames(geometry, &joined, fit)?;
+            let again: Vec<bool> =
+                self.all.iter().map(|o| closing_error_m(geometry, &start, o) <= limit_m).collect();
+            if again == near {
+                break;
+            }
+            near = again;
+        }
+        let joined = self.chosen(&near);
+        self.enough(&joined)?;
+        self.check_both_move(geometry, &joined)?;
+        Ok(near)
+    }
+
+    /// Calibrates, and leaves out what turns out not to have been joined, until every dwell stays where it is.
+    fn settled(
+        &self,
+        geometry: Model,
+        model: Model,
+        near: Vec<bool>,
+        told: &mut dyn FnMut(usize),
+    ) -> Result<Fitted, Error> {
+        let pipeline = &self.inputs.pipeline;
+        let mut is_joined = near.clone();
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            told(rounds);
+            let joined = self.chosen(&is_joined);
+            self.enough(&joined)?;
+            // Only the last fit is judged; those on the way to it need no hold-out.
+            let search = calibrate(&model, &joined, &pipeline.fit, &HoldoutConfig::None)?;
+            let (p, scale) = (search.fit.values(), search.fit.sigma_scale.max(1.0));
+            let expected_m =
+                |o: &Observation| expected_norm_m(&position_covariance_m2(&model, &p, o)) * scale;
+            let closes = |o: &Observation| closing_error_m(&model, &p, o) <= OPEN_FACTOR * expected_m(o);
+            let again: Vec<bool> = self.all.iter().zip(&near).map(|(o, near)| *near && closes(o)).collect();
+            if again != is_joined && rounds < MAX_ROUNDS {
+                is_joined = again;
+                continue;
+            }
+            let open = |(o, joined): (&Observation, &bool)| {
+                let why = format!(
+                    "the tips are not joined: the calibrated arms are {:.1} mm from closing, the noise explains {:.2} mm",
+                    closing_error_m(&model, &p, o) * 1e3,
+                    expected_m(o) * 1e3
+                );
+                (!joined).then_some(Rejection { dwell: o.dwell, why })
+            };
+            let rejections = self.all.iter().zip(&is_joined).filter_map(open).collect();
+            let calibration = calibrate(&model, &joined, &pipeline.fit, &pipeline.holdout)?;
+            let places = vec![None; self.inputs.seen.len()];
+            // What is looked at here has settled, whatever the rounds.
+            let rounds = 1;
+            return Ok(Fitted {
+                geometry,
+                model,
+                observations: joined,
+                calibration,
+                places,
+                rejections,
+                rounds,
+            });
+        }
+    }
+
+    fn limit_m(&self) -> f64 {
+        self.arms.closure.max_gap_mm * 1e-3
+    }
+
+    fn chosen(&self, which: &[bool]) -> Vec<Observation> {
+        self.all.iter().zip(which).filter(|(_, chosen)| **chosen).map(|(o, _)| o.clone()).collect()
+    }
+
+    fn check_both_move(&self, geometry: &Model, dwells: &[Observation]) -> Result<(), Error> {
+        let of = |joints: std::ops::Range<usize>| dwells.iter().map(move |o| &o.joint_rad[joints.clone()]);
+        let mut arms = geometry.chain().arms().iter();
+        arms.try_for_each(|arm| check_moves(&arm.name, of(arm.joints.clone()), LEAST_MOTION_RAD))
+    }
+
+    /// Three points place a base, six distances do; twice as many also show which dwells do not belong. A pose held twice
+    /// counts once.
+    fn enough(&self, joined: &[Observation]) -> Result<(), Error> {
+        let least = match self.arms.closure.kind {
+            ClosureKind::SamePoint => 6,
+            ClosureKind::RigidLink => 12,
+        };
+        let poses = different_poses(joined);
+        if poses >= least {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} of {} dwells of both arms have their tips within {:.0} mm of closing, in {poses} different poses; {least} are \
+             the least that place one arm against the other and show which dwells do not belong: record more poses with the \
+             tips joined, or check joint names, signs and units, arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+            joined.len(),
+            self.all.len(),
+            self.limit_m() * 1e3
+        );
+        Err(Error::TwoArms { problem })
+    }
+}
+
+/// How far the joined tips are from where each arm puts the other [m].
+fn closing_error_m(model: &Model, p: &[f64], o: &Observation) -> f64 {
+    model.residual(p, o).position_m.norm()
+}
+
+/// Lets every estimated base start where it was aligned.
+fn place_bases(geometry: &mut Model, aligned: &[f64]) {
+    let names: Vec<String> =
+        geometry.chain().arms().iter().map(|arm| format!("{}.base.", arm.name)).collect();
+    for (arm, name) in names.iter().enumerate() {
+        let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && p.name.starts_with(name);
+        if geometry.parameters().iter().any(estimated) {
+            let base = geometry.arm_base_in_world(aligned, arm);
+            geometry.set_arm_base_start(arm, base);
+        }
+    }
+}
+
+/// Poses that differ from all earlier ones by [`LEAST_MOTION_RAD`] in some joint.
+fn different_poses(joined: &[Observation]) -> usize {
+    let mut poses: Vec<&[f64]> = Vec::new();
+    for q in joined.iter().map(|o| o.joint_rad.as_slice()) {
+        let same = |pose: &&[f64]| pose.iter().zip(q).all(|(a, b)| (a - b).abs() < LEAST_MOTION_RAD);
+        if !poses.iter().any(same) {
+            poses.push(q);
+        }
+    }
+    poses.len()
+}

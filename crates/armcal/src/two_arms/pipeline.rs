@@ -1,0 +1,278 @@
+//! The pipeline file of two arms, and what it becomes: a pipeline like any other.
+
+use crate::check::CheckSection;
+use crate::error::Error;
+use crate::pipeline::{
+    FramePose, FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, recording_name,
+};
+use armcal_calibrate::{FitConfig, HoldoutConfig};
+use armcal_diagnose::DiagnosisConfig;
+use armcal_dwell::DwellConfig;
+use armcal_model::{Chain, EffectSpec, EffectTable, LengthKnowledge, Model, RigidLink};
+use armcal_recording::{JointStream, Streams};
+use armcal_report::OutputConfig;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The two arms of a pipeline, and how their tips are joined.
+#[derive(Debug, Clone)]
+pub struct TwoArms {
+    /// The arms.
+    pub arms: [ArmSection; 2],
+    /// How their tips are joined.
+    pub closure: ClosedChainSection,
+}
+
+/// A pipeline of two arms, as written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    data: Option<String>,
+    /// Each with both arms in it.
+    #[serde(default)]
+    recordings: Vec<RecordingPaths>,
+    arms: Vec<ArmSection>,
+    closed_chain: ClosedChainSection,
+    #[serde(default)]
+    dwell: DwellConfig,
+    /// Changes to single parameters, by their names with the arm's prefix.
+    #[serde(default)]
+    parameters: Vec<ParameterOverride>,
+    /// Physical effects, joints by their names with the arm's prefix or numbered through both arms.
+    #[serde(default)]
+    effects: Vec<EffectTable>,
+    #[serde(default)]
+    fit: FitConfig,
+    #[serde(default)]
+    holdout: HoldoutConfig,
+    #[serde(default)]
+    diagnosis: DiagnosisConfig,
+    #[serde(default)]
+    check: CheckSection,
+    #[serde(default)]
+    output: OutputConfig,
+}
+
+/// One recording.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecordingPaths {
+    name: Option<String>,
+    paths: Vec<PathBuf>,
+}
+
+/// One arm.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmSection {
+    /// Its name, the prefix of its parameters.
+    pub name: String,
+    /// Its joint stream.
+    pub joints: JointStream,
+    /// Its nominal model.
+    pub model: ModelSection,
+    /// Its base in the common world. `at` counts for every `pose`; `"measured"` takes it with `sigma_mm`, `sigma_deg`.
+    #[serde(default)]
+    pub base: FrameSection,
+    /// The joined point on its last link.
+    #[serde(default)]
+    pub tip: FrameSection,
+    /// Changes to single parameters, by their names without the arm's prefix.
+    #[serde(default)]
+    pub parameters: Vec<ParameterOverride>,
+    /// Physical effects beyond geometry.
+    #[serde(default)]
+    pub effects: Vec<EffectTable>,
+}
+
+/// How the tips are joined.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosedChainSection {
+    /// `"same-point"` or `"rigid-link"`.
+    pub kind: ClosureKind,
+    /// With a rigid link: the distance of the two tips [mm].
+    pub length_mm: Option<f64>,
+    /// How well that is known: `"given"` (default), `"measured"` with `length_sigma_mm`, `"estimated"`.
+    #[serde(default)]
+    pub length: FramePose,
+    /// Standard error of a measured length [mm].
+    #[serde(default)]
+    pub length_sigma_mm: f64,
+    /// How far apart the joined points may be all the same, 1 sigma per axis [mm]; default 0.1.
+    #[serde(default = "default_sigma_mm")]
+    pub sigma_mm: f64,
+    /// Dwells in which the nominal arms have their tips further from closing than this are not joined [mm]; default 100.
+    #[serde(default = "default_max_gap_mm")]
+    pub max_gap_mm: f64,
+}
+
+/// How tips can be joined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClosureKind {
+    /// Both in one point.
+    SamePoint,
+    /// On a rigid link with a ball joint at either end.
+    RigidLink,
+}
+
+fn default_sigma_mm() -> f64 {
+    0.1
+}
+
+fn default_max_gap_mm() -> f64 {
+    100.0
+}
+
+impl ClosedChainSection {
+    /// The rigid link between the tips, where that is what joins them.
+    fn link(&self) -> Option<RigidLink> {
+        let length_m = self.length_mm.filter(|_| self.kind == ClosureKind::RigidLink)? * 1e-3;
+        let knowledge = match self.length {
+            FramePose::Given => LengthKnowledge::Given,
+            FramePose::Measured => LengthKnowledge::Measured { sigma_m: self.length_sigma_mm * 1e-3 },
+            FramePose::Estimated => LengthKnowledge::Estimated,
+        };
+        Some(RigidLink { length_m, knowledge })
+    }
+}
+
+impl TwoArms {
+    /// Reads and checks the text of a pipeline of two arms; its paths are not resolved yet.
+    ///
+    /// # Errors
+    /// A text that is none, with the place; what contradicts itself.
+    pub fn parse(path: &Path, text: &str) -> Result<Pipeline, Error> {
+        let file: File = toml::from_str(text)
+            .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?;
+        let problem = |key: &str, problem| Error::PipelineContradiction {
+            path: path.to_owned(),
+            key: key.into(),
+            problem,
+        };
+        let count = file.arms.len();
+        let arms = <[ArmSection; 2]>::try_from(file.arms).map_err(|_| {
+            problem("arms", format!("has {count} entries; a closed chain is made of two [[arms]]"))
+        })?;
+        let two = TwoArms { arms, closure: file.closed_chain };
+        if let Some((key, said)) = two.contradiction() {
+            return Err(problem(key, said));
+        }
+        let [first, _] = &two.arms;
+        let entry = |r: RecordingPaths| {
+            let name = Some(recording_name(r.name.as_ref(), &r.paths));
+            RecordingEntry { name, paths: r.paths, tilt: Default::default(), load_kg: 0.0 }
+        };
+        Ok(Pipeline {
+            name: file.name,
+            data: file.data,
+            recordings: file.recordings.into_iter().map(entry).collect(),
+            streams: joints_only(&first.joints),
+            clock: Default::default(),
+            dwell: file.dwell,
+            table: None,
+            sensor: Default::default(),
+            model: first.model.clone(),
+            frames: Default::default(),
+            parameters: file.parameters,
+            effects: file.effects,
+            observations: Default::default(),
+            fit: file.fit,
+            holdout: file.holdout,
+            pool: Default::default(),
+            diagnosis: file.diagnosis,
+            verify: Default::default(),
+            check: file.check,
+            output: file.output,
+            two_arms: Some(two),
+            folder: PathBuf::new(),
+            text: String::new(),
+        })
+    }
+
+    /// What to read of each arm.
+    pub fn streams(&self) -> [Streams; 2] {
+        self.arms.each_ref().map(|arm| joints_only(&arm.joints))
+    }
+
+    /// Both nominal arms in one world, their chains read already.
+    pub fn model(&self, chain: &Chain) -> Result<Model, Error> {
+        use crate::stages::frames::{frame, override_parameters};
+        let frames = |arm: &ArmSection| armcal_model::ArmFrames {
+            base: frame(&format!("{}.base", arm.name), &arm.base, true),
+            tip: frame(&format!("{}.tip", arm.name), &arm.tip, false),
+        };
+        let all = self.arms.iter().map(frames).collect();
+        let mut model = Model::of_arms(chain.clone(), all, self.closure.link())?;
+        for (arm, of_chain) in self.arms.iter().zip(chain.arms()) {
+            let named = |p: &ParameterOverride| ParameterOverride {
+                name: of_chain.parameter_among_all(&p.name),
+                ..p.clone()
+            };
+            let own: Vec<ParameterOverride> = arm.parameters.iter().map(named).collect();
+            override_parameters(&mut model, &own)?;
+        }
+        Ok(model)
+    }
+
+    /// The effects of both arms, then those of the pipeline.
+    pub fn effect_specs(&self, pipeline: &Pipeline, model: &Model) -> Result<Vec<EffectSpec>, Error> {
+        let mut specs = Vec::new();
+        for (at, (arm, of_chain)) in self.arms.iter().zip(model.chain().arms()).enumerate() {
+            for table in &arm.effects {
+                let own = table.spec(of_chain.chain.joint_names())?;
+                specs.push(of_chain.effect_among_all(at + 1, own)?);
+            }
+        }
+        let joints = model.chain().joint_names();
+        let of_all = pipeline.effects.iter().map(|table| table.spec(joints));
+        specs.extend(of_all.collect::<Result<Vec<_>, _>>()?);
+        Ok(specs)
+    }
+
+    /// What serde cannot see.
+    fn contradiction(&self) -> Option<(&'static str, String)> {
+        let (arms, chain) = (&self.arms, &self.closure);
+        // They name files.
+        let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_');
+        let taken = ["parameters", "pipeline", "calibrated"];
+        let is_file_name = |name: &str| !name.is_empty() && !taken.contains(&name) && name.chars().all(plain);
+        if let Some(arm) = arms.iter().find(|arm| !is_file_name(&arm.name)) {
+            return Some(("arms.name", format!("`{}` cannot be the name of a file of results", arm.name)));
+        }
+        if arms[0].joints.topic == arms[1].joints.topic && arms[0].joints.names == arms[1].joints.names {
+            return Some((
+                "arms.joints",
+                "is the same for both arms; give each its own topic, or its own joint names on a topic they share".into(),
+            ));
+        }
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        if !positive(chain.sigma_mm) {
+            return Some((
+                "closed_chain.sigma_mm",
+                "must be above zero: no joint holds a point exactly".into(),
+            ));
+        }
+        if !positive(chain.max_gap_mm) {
+            return Some(("closed_chain.max_gap_mm", "must be above zero".into()));
+        }
+        match (chain.kind, chain.length_mm) {
+            (ClosureKind::RigidLink, None) => Some((
+                "closed_chain.length_mm",
+                "is missing; a rigid link has a length, even if it is estimated".into(),
+            )),
+            (ClosureKind::SamePoint, Some(_)) => Some((
+                "closed_chain.length_mm",
+                "has no meaning for tips in one point; use kind = \"rigid-link\" or remove it".into(),
+            )),
+            _ => None,
+        }
+    }
+}
+
+fn joints_only(joints: &JointStream) -> Streams {
+    let joints = joints.clone();
+    Streams { joints, set_points: None, tip: None, base: None, table: None, temperature: None }
+}

@@ -1,0 +1,196 @@
+//! Several arms in one world: their chains side by side, and what joins their tips.
+//!
+//! ```text
+//! tips in one point:      0 = tip_1(q_1, p_1) - tip_2(q_2, p_2)              3 rows [m]
+//! tips on a rigid link:   0 = |tip_1(q_1, p_1) - tip_2(q_2, p_2)| - length   1 row  [m]
+//! ```
+//!
+//! Each arm is the other's reference then, and no camera is needed (Bennett and Hollerbach 1991: autonomous calibration of
+//! single-loop closed kinematic chains; Zhuang and Roth 1996, ch. 9).
+
+use crate::chain::Source;
+use crate::segment::{Joint, Segment};
+use crate::{Chain, Frame, ModelError};
+use armcal_core::{Parameter, Role, Unit};
+use std::ops::Range;
+
+/// The part of a joined chain that is one arm's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm {
+    /// Its name, the prefix of its parameters and joints: `right.joint1.theta`.
+    pub name: String,
+    /// The arm by itself.
+    pub chain: Chain,
+    /// Its parameters among those of all arms.
+    pub parameters: Range<usize>,
+    /// Its joints among those of all arms.
+    pub joints: Range<usize>,
+    /// Its segments among those of all arms.
+    pub(crate) segments: Range<usize>,
+}
+
+/// The frames of one arm of several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmFrames {
+    /// world_from_base.
+    pub base: Frame,
+    /// last link_from_tip.
+    pub tip: Frame,
+}
+
+/// A rigid link with a ball joint at either end, between the tips of two arms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidLink {
+    /// Distance of the two points, before the fit [m].
+    pub length_m: f64,
+    /// How well that is known.
+    pub knowledge: LengthKnowledge,
+}
+
+/// What is known about a length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LengthKnowledge {
+    /// It is exact.
+    Given,
+    /// It was measured with this standard error [m].
+    Measured {
+        /// Standard error [m].
+        sigma_m: f64,
+    },
+    /// Nobody measured it: it is fitted.
+    Estimated,
+}
+
+impl Chain {
+    /// Several arms side by side: their parameters, joints and links one arm behind the other, each named `<arm>.<name>`.
+    ///
+    /// # Errors
+    /// Two arms of one name, a name that cannot be a prefix.
+    pub fn joined(arms: Vec<(String, Chain)>) -> Result<Chain, ModelError> {
+        check_names(&arms)?;
+        let mut all = Chain {
+            name: arms.iter().map(|(_, chain)| chain.name.as_str()).collect::<Vec<_>>().join(" and "),
+            segments: Vec::new(),
+            end: None,
+            parameters: Vec::new(),
+            joint_names: Vec::new(),
+            joint_limits: Vec::new(),
+            source: Source::Arms(Vec::new()),
+        };
+        let mut parts = Vec::with_capacity(arms.len());
+        for (name, chain) in arms {
+            let (segments, parameters) = (all.segments.len(), all.parameters.len());
+            let joints = all.joint_names.len();
+            all.segments.extend(chain.segments.iter().map(|s| s.behind(&name, segments, parameters, joints)));
+            let prefixed = |p: &Parameter| Parameter { name: format!("{name}.{}", p.name), ..p.clone() };
+            all.parameters.extend(chain.parameters.iter().map(prefixed));
+            all.joint_names.extend(chain.joint_names.iter().map(|joint| format!("{name}.{joint}")));
+            all.joint_limits.extend(chain.joint_limits.iter().copied());
+            parts.push(Arm {
+                name,
+                parameters: parameters..all.parameters.len(),
+                joints: joints..all.joint_names.len(),
+                segments: segments..all.segments.len(),
+                chain,
+            });
+        }
+        all.source = Source::Arms(parts);
+        Ok(all)
+    }
+
+    /// The arms that it was joined from; none where it is one arm.
+    pub fn arms(&self) -> &[Arm] {
+        match &self.source {
+            Source::Arms(arms) => arms,
+            Source::Dh(_) | Source::Urdf(_) => &[],
+        }
+    }
+
+    /// The joints that are in one arm with a joint, itself among them.
+    pub(crate) fn joints_beside(&self, joint: usize) -> Range<usize> {
+        let own = self.arms().iter().find(|arm| arm.joints.contains(&joint));
+        own.map_or(0..self.joint_names.len(), |arm| arm.joints.clone())
+    }
+}
+
+impl Segment {
+    /// The same in a longer list, behind so many segments, parameters and joints of other arms.
+    fn behind(&self, arm: &str, segments: usize, parameters: usize, joints: usize) -> Segment {
+        Segment {
+            parent: self.parent.map(|parent| parent + segments),
+            frame: self.frame.as_ref().map(|frame| format!("{arm}.{frame}")),
+            joint: self.joint.map(|joint| Joint { index: joint.index + joints, ..joint }),
+            parameters: self.parameters.start + parameters..self.parameters.end + parameters,
+            ..self.clone()
+        }
+    }
+}
+
+fn check_names(arms: &[(String, Chain)]) -> Result<(), ModelError> {
+    let bad = |problem: String| Err(ModelError::BadArms { problem });
+    for (at, (name, _)) in arms.iter().enumerate() {
+        if name.is_empty() || name == "link" || name.contains('.') {
+            return bad(format!("an arm cannot be named `{name}`; use a word such as right"));
+        }
+        if arms[..at].iter().any(|(other, _)| other == name) {
+            return bad(format!("two arms are named `{name}`; give each a name of its own"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses arms that nothing holds in the world; `parameters` are those of the frames too.
+pub(crate) fn check_bases(bases: &[Segment], parameters: &[Parameter]) -> Result<(), ModelError> {
+    let is_free = |base: &&Segment| parameters[base.parameters.clone()].iter().any(|p| p.free);
+    let name = |base: &Segment| base.frame.clone().unwrap_or_default().trim_end_matches(".base").to_owned();
+    let free: Vec<String> = bases.iter().filter(is_free).map(name).collect();
+    if bases.len() < 2 || free.len() < bases.len() {
+        return Ok(());
+    }
+    let problem = format!(
+        "the bases of {} are both free, so that nothing holds the pair in place; make one of them pose = \"given\"",
+        free.join(" and ")
+    );
+    Err(ModelError::BadArms { problem })
+}
+
+impl RigidLink {
+    /// Name of its length among the parameters.
+    pub const LENGTH: &'static str = "link.length";
+
+    /// Its length as a parameter [m].
+    ///
+    /// # Errors
+    /// A length or standard error that is no positive number.
+    pub(crate) fn parameter(&self) -> Result<Parameter, ModelError> {
+        let bad = |problem: String| Err(ModelError::BadArms { problem });
+        let length_m = self.length_m;
+        if !(length_m.is_finite() && length_m > 0.0) {
+            return bad(format!("the link is {length_m} m long; give its length in millimetres, above zero"));
+        }
+        let (free, prior_sigma, role) = match self.knowledge {
+            LengthKnowledge::Given => (false, None, Role::KnownFrame),
+            LengthKnowledge::Measured { sigma_m } if sigma_m.is_finite() && sigma_m > 0.0 => {
+                (true, Some(sigma_m), Role::KnownFrame)
+            }
+            LengthKnowledge::Measured { sigma_m } => {
+                return bad(format!(
+                    "the standard error of the link's length is {sigma_m} m; give one above zero, or call the length given"
+                ));
+            }
+            LengthKnowledge::Estimated => (true, None, Role::EstimatedFrame),
+        };
+        Ok(Parameter {
+            name: RigidLink::LENGTH.into(),
+            unit: Unit::Metre,
+            nominal: length_m,
+            lower: 0.0,
+            upper: f64::INFINITY,
+            prior_sigma,
+            assumed: None,
+            free,
+            role,
+            meaning: "distance of the two tips on the link".into(),
+        })
+    }
+}
