@@ -42,5 +42,5 @@ pub use effects::{
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge, Marker};
-pub use model::Model;
+pub use model::{Model, RecordingStart};
 pub use residual::ModelResidual;
