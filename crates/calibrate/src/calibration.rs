@@ -19,7 +19,7 @@ use crate::model_problem::{ModelProblem, describe, position_covariance_m2, white
 use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::priors::scales_of;
-use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, Scene, fit_problem};
+use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Reference, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
@@ -33,7 +33,12 @@ pub fn calibrate(
     config: &FitConfig,
     holdout: &HoldoutConfig,
 ) -> Result<Calibration, CalibrateError> {
-    calibrate_scene(model.into(), observations, config, holdout)
+    config.check()?;
+    if observations.is_empty() {
+        return Err(CalibrateError::NoObservations { context: String::new() });
+    }
+    let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
+    judged(&Judge { model, observations, config }, &holdout, config)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -46,21 +51,6 @@ pub fn holdout_turns(
     holdout: &HoldoutConfig,
 ) -> Result<Vec<Vec<usize>>, CalibrateError> {
     Ok(holdout::resolve(holdout, observations, &frames::board_names(model))?.turns)
-}
-
-/// The same for a model or a pool.
-pub(crate) fn calibrate_scene(
-    scene: Scene<'_>,
-    observations: &[Observation],
-    config: &FitConfig,
-    holdout: &HoldoutConfig,
-) -> Result<Calibration, CalibrateError> {
-    config.check()?;
-    if observations.is_empty() {
-        return Err(CalibrateError::NoObservations { context: String::new() });
-    }
-    let holdout = holdout::resolve(holdout, observations, &frames::board_names(scene.model()))?;
-    judged(&Judge { scene, observations, config }, &holdout, config)
 }
 
 /// Observations that can be fitted without some of them, and the error of each.
@@ -198,7 +188,7 @@ fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
 }
 
 struct Judge<'a> {
-    scene: Scene<'a>,
+    model: &'a Model,
     observations: &'a [Observation],
     config: &'a FitConfig,
 }
@@ -212,7 +202,7 @@ impl Judged for Judge<'_> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
             let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
-            ModelProblem::new(self.scene, chosen.map(|(_, o)| o), self.config)
+            ModelProblem::new(self.model, chosen.map(|(_, o)| o), self.config)
         };
         let (train, test) = (side(false)?, side(true)?);
         let unseen = self.frames_only_in(&test, &train);
@@ -237,15 +227,14 @@ impl Judged for Judge<'_> {
 
     fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
         let o = &self.observations[i];
-        let (model, values) = self.scene.seen(o, &turn.values);
-        let covariance = position_covariance_m2(model, &values, o);
-        let fitted = model.residual(&values, o);
+        let covariance = position_covariance_m2(self.model, &turn.values, o);
+        let fitted = self.model.residual(&turn.values, o);
         let whitened = whitened(&fitted, &covariance)
             .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
         Ok(Residual {
             dwell: o.dwell,
             held_out,
-            nominal_m: model.residual(&self.scene.seen(o, &turn.nominal_values).1, o).position_m,
+            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
             fitted_m: fitted.position_m,
             whitened,
             weight: if held_out { 1.0 } else { turn.weight(i) },
@@ -259,7 +248,7 @@ impl Judge<'_> {
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
         let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
         let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
-        let prior_scales = scales_of(fit, self.scene.parameters());
+        let prior_scales = scales_of(fit, self.model.parameters());
         Near { values, sigma_scale: fit.sigma_scale, prior_scales }
     }
 
@@ -267,10 +256,10 @@ impl Judge<'_> {
     /// something about and `train` does not.
     fn frames_only_in(&self, test: &ModelProblem<'_>, train: &ModelProblem<'_>) -> Vec<String> {
         let known: BTreeSet<String> =
-            frames::touched_frames(self.scene, train.observations()).into_iter().collect();
-        let unknown = self.scene.parameters().iter().filter(|p| p.free && p.role != Role::KnownFrame);
+            frames::touched_frames(self.model, train.observations()).into_iter().collect();
+        let unknown = self.model.parameters().iter().filter(|p| p.free && p.role != Role::KnownFrame);
         let unknown: BTreeSet<&str> = unknown.map(frames::frame_of).collect();
-        frames::touched_frames(self.scene, test.observations())
+        frames::touched_frames(self.model, test.observations())
             .into_iter()
             .filter(|frame| !known.contains(frame) && unknown.contains(frame.as_str()))
             .collect()

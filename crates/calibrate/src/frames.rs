@@ -9,7 +9,7 @@ use crate::model_problem::ModelProblem;
 use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
-use crate::{CalibrateError, FitConfig, Objective, Scene, fit};
+use crate::{CalibrateError, FitConfig, Objective, fit};
 use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Role};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -58,11 +58,11 @@ pub fn fit_frames_from(
 /// [`fit_frames`] on observations already checked.
 pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<Vec<f64>, CalibrateError> {
     let touched = touched(problem);
-    fit_some(problem, problem.scene().nominal(), config, &|p| touched.contains(frame_of(p)))
+    fit_some(problem, problem.model().nominal(), config, &|p| touched.contains(frame_of(p)))
 }
 
 fn touched(problem: &ModelProblem<'_>) -> BTreeSet<String> {
-    touched_frames(problem.scene(), problem.observations()).into_iter().collect()
+    touched_frames(problem.model(), problem.observations()).into_iter().collect()
 }
 
 /// Fits only the estimated-frame parameters `which` accepts, the others at `start`.
@@ -85,49 +85,56 @@ pub(crate) fn fit_some(
     Ok(white.parameters_at(&solved.at.x))
 }
 
-/// The alternation on all observations; what a recording of a pool has for itself then on its own ones.
+/// The alternation on all observations; what a recording has copies of then on its own ones.
 fn aligned(
     problem: &ModelProblem<'_>,
     config: &FitConfig,
     start: Vec<f64>,
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Vec<f64> {
-    let scene = problem.scene();
-    let all = Alignment::new(scene.model(), problem.observations(), config);
-    let Scene::Pooled(pool) = scene else { return all.run(start, which) };
-    let mut p = start;
-    let of_model = all.run(p[..scene.model().parameters().len()].to_vec(), which);
-    p[..of_model.len()].copy_from_slice(&of_model);
-    for run in scene.alike(problem.observations()) {
-        let Some(view) = run.first().and_then(|o| pool.views().get(o.dwell.recording)) else { continue };
-        let own = view.model.parameters().iter().zip(&view.index);
-        let own = own.filter(|(_, global)| pool.is_copy(**global) && which(&pool.parameters()[**global]));
+    let model = problem.model();
+    let mut p = Alignment::new(model, problem.observations(), config).run(start, which);
+    if model.copies().is_empty() {
+        return p;
+    }
+    for run in problem.alike(problem.observations()) {
+        let Some(recording) = run.first().map(|o| o.dwell.recording) else { continue };
+        let Some(known) = model.known_in(recording) else { continue };
+        let (alone, local) = model.in_recording(recording, &p);
+        let own = alone.parameters().iter().zip(known);
+        let own =
+            own.filter(|(_, global)| model.copies().contains(global) && which(&model.parameters()[**global]));
         let own: BTreeSet<&str> = own.map(|(local, _)| local.name.as_str()).collect();
-        let local: Vec<f64> = view.index.iter().map(|&index| p[index]).collect();
-        let placed = Alignment::new(&view.model, run, config).run(local, &|p| own.contains(p.name.as_str()));
-        view.index.iter().zip(placed).for_each(|(&index, value)| p[index] = value);
+        let placed =
+            Alignment::new(alone, run, config).run(local.into_owned(), &|p| own.contains(p.name.as_str()));
+        known.iter().zip(placed).for_each(|(&index, value)| p[index] = value);
     }
     p
 }
 
 /// Names of the frames the observations say something about: the base, the tip, the markers that were measured, and the
-/// boards with seated dwells; then what else the observed recordings of a pool have for themselves.
-pub(crate) fn touched_frames(scene: Scene<'_>, observations: &[&Observation]) -> Vec<String> {
-    let names = frame_names(scene.model());
-    let tips = tips_at(scene.model());
+/// boards with seated dwells, the link of tips that are kept apart; then what the observed recordings have copies of.
+pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Vec<String> {
+    let (names, tips) = (frame_names(model), tips_at(model));
     let measured: BTreeSet<usize> = observations.iter().map(|o| tips + o.feature.0).collect();
     let known = |k: &usize| *k < 2 * tips || measured.contains(k);
-    let features = tips + scene.model().features().count();
+    let features = tips + model.features().count();
     let arm = names.iter().enumerate().take(features).filter(|(k, _)| known(k));
     let mut touched: Vec<String> = arm.map(|(_, name)| name.clone()).collect();
     let seated: BTreeSet<usize> =
         observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
-    let boards = names.iter().skip(features).take(scene.model().boards()).enumerate();
+    let boards = names.iter().skip(features).take(model.boards()).enumerate();
     touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
     if observations.iter().any(|o| matches!(o.reference, Reference::Joined { apart: true, .. })) {
         touched.extend(names.last().cloned());
     }
-    touched.extend(scene.own_parts(observations));
+    let observed: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();
+    for index in observed.into_iter().flat_map(|recording| model.own_parameters(recording)) {
+        let part = frame_of(&model.parameters()[index]);
+        if model.copies().contains(&index) && touched.last().is_none_or(|last| last != part) {
+            touched.push(part.to_owned());
+        }
+    }
     touched
 }
 
@@ -149,7 +156,9 @@ pub(crate) fn board_names(model: &Model) -> Vec<String> {
 /// Frames of the model in its documented order: bases, tips, markers, then one board a recording, and a link.
 pub(crate) fn frame_names(model: &Model) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
-    for p in model.parameters().iter().filter(|p| matches!(p.role, Role::EstimatedFrame | Role::KnownFrame)) {
+    let shared = |index: &usize| !model.copies().contains(index);
+    let all = (0..model.parameters().len()).filter(shared).map(|index| &model.parameters()[index]);
+    for p in all.filter(|p| matches!(p.role, Role::EstimatedFrame | Role::KnownFrame)) {
         let name = frame_of(p);
         if names.last().is_none_or(|last| last != name) {
             names.push(name.to_string());

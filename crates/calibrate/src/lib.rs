@@ -14,7 +14,8 @@
 //! * priors that nobody declared: `priors` learns how far lengths, angles and joint zeros of this arm are from nominal;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
-//! * many recordings of one arm, each with parameters of its own: [`PooledModel`], [`calibrate_pooled`];
+//! * many recordings of one arm, each with parameters of its own ([`armcal_model::Model::with_own`]): their columns are eliminated
+//!   recording by recording ([`problem::Problem::known`]), so that work and memory grow with the number of recordings;
 //! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
 mod calibration;
@@ -34,14 +35,12 @@ mod noise;
 mod outcome;
 mod paired;
 mod paper;
-mod pooled;
 mod poses;
 mod priors;
 pub mod problem;
 mod products;
 mod rigid_fit;
 mod robust;
-mod scene;
 mod solver;
 mod statistics;
 mod structure;
@@ -67,6 +66,4 @@ pub use model_problem::{ModelProblem, position_covariance_m2};
 pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
-pub use pooled::{PooledModel, PooledRecording, calibrate_pooled};
 pub use products::{gram, inner};
-pub use scene::Scene;

@@ -7,7 +7,7 @@
 
 use crate::joined::scale;
 use crate::problem::{Known, Linearised, Problem, Symmetry};
-use crate::{CalibrateError, FitConfig, Objective, Scene};
+use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::{Model, ModelResidual};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
@@ -60,9 +60,9 @@ fn joint_sigma_rad(model: &Model, p: &[f64], o: &Observation) -> Vec<f64> {
     sigma_rad
 }
 
-/// A model (or a pool of them) and the observations it should explain.
+/// A model and the observations it should explain.
 pub struct ModelProblem<'a> {
-    scene: Scene<'a>,
+    model: &'a Model,
     observations: Vec<&'a Observation>,
     /// The observations of each block: those of one dwell that stand behind each other, each of another feature.
     blocks: Vec<Range<usize>>,
@@ -73,19 +73,22 @@ impl<'a> ModelProblem<'a> {
     /// Checks that every observation is complete and finite. Orientation rows are used where
     /// `config.use_orientation` is set and the observation has them with a standard error above zero.
     pub fn new(
-        scene: impl Into<Scene<'a>>,
+        model: &'a Model,
         observations: impl IntoIterator<Item = &'a Observation>,
         config: &FitConfig,
     ) -> Result<ModelProblem<'a>, CalibrateError> {
-        let (scene, observations) = (scene.into(), observations.into_iter().collect::<Vec<&Observation>>());
+        let observations: Vec<&Observation> = observations.into_iter().collect();
         for o in &observations {
-            scene.check(o)?;
+            model.check(std::slice::from_ref(o))?;
             check_complete(o)?;
+            if config.objective == Objective::Paper && model.known_in(o.dwell.recording).is_some() {
+                return Err(not_recording_by_recording());
+            }
         }
         // The paper's objective counts distances, one by one.
         let together = config.objective != Objective::Paper;
         let blocks = blocks(&observations, together);
-        Ok(ModelProblem { scene, observations, blocks, use_orientation: config.use_orientation })
+        Ok(ModelProblem { model, observations, blocks, use_orientation: config.use_orientation })
     }
 
     /// The observations, in the order of the blocks.
@@ -93,8 +96,17 @@ impl<'a> ModelProblem<'a> {
         &self.observations
     }
 
-    pub(crate) fn scene(&self) -> Scene<'a> {
-        self.scene
+    pub(crate) fn model(&self) -> &'a Model {
+        self.model
+    }
+
+    /// Runs of observations that are all seen by the same model and parameters.
+    pub(crate) fn alike<'o>(
+        &self,
+        observations: &'o [&'a Observation],
+    ) -> impl Iterator<Item = &'o [&'a Observation]> + use<'a, 'o> {
+        let all = observations.first().is_none_or(|o| self.model.known_in(o.dwell.recording).is_none());
+        observations.chunk_by(move |a, b| all || a.dwell.recording == b.dwell.recording)
     }
 
     /// The rows of an observation that are used.
@@ -130,7 +142,7 @@ impl<'a> ModelProblem<'a> {
 
     /// Columns of the readings' standard errors: what they do to the rows of an observation.
     fn spread(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
-        let (rows, (model, p)) = (self.rows(o), self.scene.seen(o, p));
+        let (rows, (model, p)) = (self.rows(o), self.model.in_recording(o.dwell.recording, p));
         let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
         let moved = model.joint_jacobian(&p, o);
         match along(model, &p, o) {
@@ -148,7 +160,7 @@ impl<'a> ModelProblem<'a> {
 
     /// Covariance of what was measured of an observation, without what the encoders add.
     fn measured(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
-        let (rows, (model, p)) = (self.rows(o), self.scene.seen(o, p));
+        let (rows, (model, p)) = (self.rows(o), self.model.in_recording(o.dwell.recording, p));
         if let Some(along) = along(model, &p, o) {
             return DMatrix::from_element(1, 1, along.dot(&(o.covariance_m2 * along)));
         }
@@ -216,7 +228,7 @@ fn stacked(mut parts: Vec<Linearised>) -> Linearised {
 
 impl Problem for ModelProblem<'_> {
     fn parameters(&self) -> &[Parameter] {
-        self.scene.parameters()
+        self.model.parameters()
     }
 
     fn blocks(&self) -> usize {
@@ -236,16 +248,16 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        let rows = self.of_block(block).iter().flat_map(|o| {
-            let (model, p) = self.scene.seen(o, p);
-            model.residual(&p, o).rows().take(self.rows(o)).collect::<Vec<f64>>()
-        });
+        let rows = self
+            .of_block(block)
+            .iter()
+            .flat_map(|o| self.model.residual(p, o).rows().take(self.rows(o)).collect::<Vec<f64>>());
         DVector::from_vec(rows.collect())
     }
 
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
         let of = |o: &&Observation| {
-            let (model, p) = self.scene.seen(o, p);
+            let (model, p) = self.model.in_recording(o.dwell.recording, p);
             self.used(o, model.residual_with_jacobian(&p, o))
         };
         stacked(self.of_block(block).iter().map(of).collect())
@@ -256,9 +268,9 @@ impl Problem for ModelProblem<'_> {
             return Vec::new();
         };
         let of_blocks = first.start..self.blocks[blocks.end - 1].end;
-        let runs = self.scene.alike(&self.observations[of_blocks]);
+        let runs = self.alike(&self.observations[of_blocks]);
         let mut linearised = runs.flat_map(|run| {
-            let (model, p) = self.scene.seen(run[0], p);
+            let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
             model.residuals_with_jacobians(&p, run)
         });
         let mut of = |block: usize| {
@@ -292,21 +304,26 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn noise_depends(&self) -> bool {
-        self.scene.model().has_gaps()
+        self.model.has_gaps()
     }
 
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
         if self.observations.iter().any(|o| !o.is_joined()) {
             return Vec::new();
         }
-        scale(self.scene.model(), p).into_iter().collect()
+        scale(self.model, p).into_iter().collect()
     }
 
     fn known(&self) -> Vec<Known> {
-        let mut known = self.scene.known(&self.observations);
+        let (mut known, mut end) = (Vec::new(), 0);
         // The blocks of a recording hold its observations, and no others.
         let block = |observation: usize| self.blocks.partition_point(|run| run.start < observation);
-        known.iter_mut().for_each(|k| k.blocks = block(k.blocks.start)..block(k.blocks.end));
+        for run in self.alike(&self.observations) {
+            let blocks = block(end)..block(end + run.len());
+            end += run.len();
+            let parameters = run.first().and_then(|o| self.model.known_in(o.dwell.recording));
+            known.extend(parameters.map(|parameters| Known { blocks, parameters: parameters.to_vec() }));
+        }
         known
     }
 }
@@ -338,6 +355,16 @@ fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
         return Err(CalibrateError::BadCovariance { observation });
     }
     Ok(())
+}
+
+fn not_recording_by_recording() -> CalibrateError {
+    CalibrateError::BadConfig {
+        key: "fit.objective",
+        value: "\"paper\"".into(),
+        why:
+            "the sum of distances is not solved recording by recording; give \"robust\" or \"least-squares\""
+                .into(),
+    }
 }
 
 /// One finite reading with a standard error for each joint.

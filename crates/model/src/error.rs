@@ -223,6 +223,16 @@ pub enum ModelError {
         /// The dwell.
         dwell: armcal_core::DwellId,
     },
+    /// An observation of a recording that a model with recordings of its own does not have.
+    #[error(
+        "{dwell} is of none of the {recordings} recordings of the model: make the model with all recordings"
+    )]
+    NoRecording {
+        /// The dwell.
+        dwell: armcal_core::DwellId,
+        /// How many the model has.
+        recordings: usize,
+    },
 }
 
 /// The candidate most similar to `name`, if any is similar at all.

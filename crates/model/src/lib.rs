@@ -44,5 +44,5 @@ pub use effects::{
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge, Marker};
-pub use model::{LinkFrame, Model};
+pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;

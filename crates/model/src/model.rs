@@ -3,6 +3,7 @@
 mod alone;
 mod features;
 mod linearisation;
+mod scopes;
 
 use crate::arms::{self, ArmFrames, RigidLink};
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
@@ -17,6 +18,8 @@ use features::Feature;
 pub use features::LinkFrame;
 use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
+pub use scopes::RecordingStart;
+use scopes::Scopes;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -42,6 +45,8 @@ pub struct Model {
     effects: Option<Effects>,
     /// What is known of the parameters of effects, of those that are not in the model too.
     pub(crate) declared: Arc<[Declared]>,
+    /// What single recordings have for themselves beside their boards; nothing, where all of them know all.
+    scopes: Option<Arc<Scopes>>,
 }
 
 /// What stands around the chain.
@@ -112,7 +117,17 @@ impl Model {
             tree.0.push(Segment { parent: Some(end), ..segment });
             features.push(Feature { name, route: tree.route(tree.0.len() - 1) });
         }
-        Ok(Model { chain, parameters, tree, features, link, boards, effects: None, declared: Arc::default() })
+        Ok(Model {
+            chain,
+            parameters,
+            tree,
+            features,
+            link,
+            boards,
+            effects: None,
+            declared: Arc::default(),
+            scopes: None,
+        })
     }
 
     /// The arm.
@@ -157,6 +172,7 @@ impl Model {
             check_parameter(&edited[index])?;
         }
         self.parameters = edited;
+        self.refresh();
         Ok(matching.len())
     }
 
@@ -165,6 +181,7 @@ impl Model {
     pub fn set_board_start(&mut self, recording: usize, board_in_world: Pose) -> bool {
         let Some(board) = self.boards.get_mut(&recording) else { return false };
         restart(board, &mut self.parameters, board_in_world);
+        self.refresh();
         true
     }
 
@@ -177,28 +194,7 @@ impl Model {
     /// The same of one of several arms, such as to the pose that brings the tips of two arms together.
     pub fn set_arm_base_start(&mut self, arm: usize, base_in_world: Pose) {
         restart(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
-    }
-
-    /// The same model for the observations of one recording, without the boards of the others; and the index that each
-    /// of its parameters has in this model. With many boards it is evaluated in the time that one takes.
-    pub fn in_recording(&self, recording: usize) -> (Model, Vec<usize>) {
-        let first = self.tree.0.iter().map(|segment| segment.parameters.end).max().unwrap_or(0);
-        let own = self.boards.get(&recording).map_or(first..first, |board| board.parameters.clone());
-        let behind = first + self.boards.values().map(|board| board.parameters.len()).sum::<usize>();
-        let index: Vec<usize> = (0..first).chain(own.clone()).chain(behind..self.parameters.len()).collect();
-        let end = first + own.len();
-        let board = |board: &Segment| Segment { parameters: first..end, ..board.clone() };
-        let model = Model {
-            chain: self.chain.clone(),
-            parameters: index.iter().map(|&i| self.parameters[i].clone()).collect(),
-            tree: self.tree.clone(),
-            features: self.features.clone(),
-            link: self.link.map(|link| link - (behind - end)),
-            boards: self.boards.get(&recording).map(|own| (recording, board(own))).into_iter().collect(),
-            effects: self.effects.as_ref().map(|e| e.moved(behind - end, self, index.len())),
-            declared: self.declared.clone(),
-        };
-        (model, index)
+        self.refresh();
     }
 
     /// Indices of the parameters of a recording's board; none where it has no board.
@@ -223,6 +219,10 @@ impl Model {
             }
             if matches!(o.reference, Reference::Joined { apart: true, .. }) && self.link.is_none() {
                 return Err(ModelError::NoLink { dwell: o.dwell });
+            }
+            if let Some(recordings) = self.recordings().filter(|recordings| o.dwell.recording >= *recordings)
+            {
+                return Err(ModelError::NoRecording { dwell: o.dwell, recordings });
             }
             if o.cavity().is_some() && !self.boards.contains_key(&o.dwell.recording) {
                 return Err(ModelError::NoBoard { dwell: o.dwell });
@@ -270,6 +270,9 @@ impl Model {
     /// Where the tip was, in the world: as the sensor saw it, the cavity of the board, or where the tip of the arm is that it
     /// was joined to [m].
     pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.measured_tip_in_world(&p, o);
+        }
         // Where the arm comes into it only through what effects do to the seat, it need not be followed.
         match (&o.reference, &self.effects) {
             (Reference::Tracked { position_m, .. }, _) => *position_m,
@@ -296,16 +299,23 @@ impl Model {
 
     /// The residual and d residual / d p: its rows, one column for every parameter, free or not. Exact.
     pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        if let Some((model, own)) = self.seen(p, o) {
+            let (residual, jacobian) = model.residual_with_jacobian(&own, o);
+            return (residual, self.by_all(&jacobian, o));
+        }
         Linearisation::of(self, p, &[o]).residual_with_jacobian(o)
     }
 
     /// [`Model::residual_with_jacobian`] of many observations at the same parameters, in their order: what is alike for
-    /// all of them is worked out once.
+    /// all of them is worked out once, where no recording has parameters of its own.
     pub fn residuals_with_jacobians(
         &self,
         p: &[f64],
         observations: &[&Observation],
     ) -> Vec<(ModelResidual, DMatrix<f64>)> {
+        if self.scopes.is_some() {
+            return observations.iter().map(|o| self.residual_with_jacobian(p, o)).collect();
+        }
         let at = Linearisation::of(self, p, observations);
         observations.iter().map(|o| at.residual_with_jacobian(o)).collect()
     }
@@ -351,6 +361,9 @@ impl Model {
     /// Joints that may rest anywhere in the gaps of their drives, and the variance of where they do [rad^2]
     /// (prismatic: [m^2]): noise that no reading shows.
     pub fn slack(&self, p: &[f64], o: &Observation) -> Vec<(usize, f64)> {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.slack(&p, o);
+        }
         let seated = o.cavity().is_some();
         self.effects.as_ref().map_or_else(Vec::new, |effects| effects.slack(p, o.dwell, seated))
     }
@@ -428,10 +441,15 @@ impl Model {
     ) -> Result<Model, ModelError> {
         check_names(&parameters)?;
         let effects = Some(Effects::new(placed, session.into(), self, parameters.len()));
-        Ok(Model { parameters, effects, ..self.clone() })
+        let mut model = Model { parameters, effects, ..self.clone() };
+        model.refresh();
+        Ok(model)
     }
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.sides(&p, o);
+        }
         let drivers = self.effects.as_ref().map(|effects| effects.drivers(self, o));
         let at = |feature: FeatureId| match (&self.effects, &drivers) {
             (Some(effects), Some(drivers)) => {

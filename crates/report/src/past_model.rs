@@ -6,7 +6,7 @@
 
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
-use armcal_calibrate::{Calibration, Estimate};
+use armcal_calibrate::Calibration;
 use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{
     ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Model, ModelError, RigidLink,
@@ -121,10 +121,6 @@ pub(crate) struct Calibrated<'a> {
     pub pipeline: &'a str,
     pub chain: ChainText,
     pub model: &'a Model,
-    /// Where the base starts (world_from_base).
-    pub base: Pose,
-    /// One for each parameter of the model.
-    pub estimates: &'a [Estimate],
     pub calibration: &'a Calibration,
     /// Name and hashes of the files of every recording.
     pub recordings: Vec<(&'a str, Vec<String>)>,
@@ -157,8 +153,6 @@ impl PastModel {
             pipeline: &run.pipeline_name,
             chain: chain_text(run.model.chain(), &run.model_texts, &run.pipeline_text),
             model: &run.model,
-            base: run.model.base_in_world(&run.model.nominal()),
-            estimates: &run.calibration.fit.estimates,
             calibration: &run.calibration,
             recordings: run.recordings.iter().map(|r| (r.name.as_str(), hashes(r))).collect(),
             observations: &run.observations,
@@ -167,18 +161,24 @@ impl PastModel {
         }))
     }
 
-    /// What any calibration leaves for later.
+    /// What any calibration leaves for later: the arm as it was last. What each recording has for itself is that of the last.
     pub(crate) fn of_calibrated(of: &Calibrated<'_>) -> PastModel {
         let model = of.model;
         let start = model.nominal();
         let calibration = of.calibration;
-        let values = of.estimates.iter().zip(&calibration.nominal_values);
-        let value = |(e, nominal): (&Estimate, &f64)| Value {
-            name: e.parameter.name.clone(),
-            nominal: *nominal,
-            calibrated: e.value,
-            sigma: e.sigma,
+        let last = of.recordings.len().saturating_sub(1);
+        let value = |index: usize| {
+            let at = model.in_place_of(index, last);
+            let estimate = &calibration.fit.estimates[at];
+            Value {
+                name: model.parameters()[index].name.clone(),
+                nominal: calibration.nominal_values[at],
+                calibrated: estimate.value,
+                sigma: estimate.sigma,
+            }
         };
+        let shared = (0..model.parameters().len()).filter(|index| !model.copies().contains(index));
+        let (alone, start_then) = model.in_recording(last, &start);
         let facts = |name: &str, pose: &Pose| FrameFacts::of(model, name, pose);
         let prefix =
             |arm: usize| model.chain().arms().get(arm).map_or_else(String::new, |a| a.name.clone() + ".");
@@ -196,14 +196,14 @@ impl PastModel {
             version: VERSION.into(),
             pipeline: of.pipeline.to_owned(),
             chain: of.chain.clone(),
-            base: facts(&(prefix(0) + "base"), &of.base),
+            base: facts(&(prefix(0) + "base"), &alone.base_in_world(&start_then)),
             tip: tip(0),
             more_arms: further.collect(),
             link_length_m: model.link_length_m(&start),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
             session: of.session.clone(),
-            parameters: values.map(value).collect(),
+            parameters: shared.map(value).collect(),
             recordings: recordings.map(|(i, (name, sha256))| recording(name, sha256, i, of)).collect(),
             postures_rad: thinned(of.observations),
             range_rad: (0..model.joint_count()).map(|j| range(of.observations, j)).collect(),

@@ -12,9 +12,9 @@ use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::stages::frames;
-use armcal_calibrate::{HoldoutConfig, PooledModel, PooledRecording, calibrate_pooled};
+use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::{Observation, Pose};
-use armcal_model::{Chain, Frame, Frames, Knowledge, Model, Session};
+use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart, Session};
 use armcal_report::PooledRun;
 use std::path::PathBuf;
 
@@ -31,16 +31,16 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
     let board = frames::board(pipeline)?;
     let collected = collect(pipeline, &model_text, board.as_ref(), folders)?;
     let session = frames::session(pipeline, &collected.observations);
-    let pool = pooled_model(pipeline, chain, &collected, &session)?;
+    let model = pooled_model(pipeline, chain, &collected, &session)?;
 
     progress.step(&format!("calibrating {} recordings", collected.recordings.len()));
     let observations: &[Observation] = &collected.observations;
-    let calibration = calibrate_pooled(&pool, observations, &pipeline.fit, &pipeline.holdout)?;
+    let calibration = calibrate(&model, observations, &pipeline.fit, &pipeline.holdout)?;
     let turns = pipeline.pool.turns.min(collected.recordings.len());
     let transfer = if turns > 1 {
         progress.step(&format!("holding recordings out in {turns} turns"));
         let holdout = HoldoutConfig::RecordingFolds { k: turns };
-        Some(calibrate_pooled(&pool, observations, &pipeline.fit, &holdout)?)
+        Some(calibrate(&model, observations, &pipeline.fit, &holdout)?)
     } else {
         None
     };
@@ -49,7 +49,7 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         pipeline_text: pipeline.text.clone(),
         model_text,
         recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
-        pool,
+        model,
         observations: collected.observations,
         session,
         calibration,
@@ -64,7 +64,7 @@ fn pooled_model(
     chain: Chain,
     collected: &Collected,
     session: &Session,
-) -> Result<PooledModel, Error> {
+) -> Result<Model, Error> {
     let mut base = frames::frame("base", &pipeline.frames.base, true);
     let measured = pipeline.frames.base.pose == FramePose::Measured;
     let bases: Vec<Pose> = collected.recordings.iter().filter(|_| measured).map(|r| r.base).collect();
@@ -84,10 +84,10 @@ fn pooled_model(
     model.check_declared(session)?;
     let effects = frames::effect_specs(pipeline, &model)?;
     let model = model.with_effects(&effects, session)?;
-    let recording = |r: &CollectedRecording| PooledRecording {
+    let recording = |r: &CollectedRecording| RecordingStart {
         name: r.run.name.clone(),
         base_in_world: measured.then_some(r.base),
     };
-    let recordings: Vec<PooledRecording> = collected.recordings.iter().map(recording).collect();
-    Ok(PooledModel::new(model, &recordings, &pipeline.pool.per_recording)?)
+    let recordings: Vec<RecordingStart> = collected.recordings.iter().map(recording).collect();
+    Ok(model.with_own(&recordings, &pipeline.pool.per_recording)?)
 }

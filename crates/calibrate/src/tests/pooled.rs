@@ -2,12 +2,9 @@
 
 use super::rig;
 use crate::problem::Problem;
-use crate::{
-    Calibration, Fit, FitConfig, HoldoutConfig, ModelProblem, Objective, PooledModel, PooledRecording,
-    calibrate, calibrate_pooled, fit_problem,
-};
+use crate::{Calibration, Fit, FitConfig, HoldoutConfig, ModelProblem, Objective, calibrate, fit_problem};
 use armcal_core::{Observation, Parameter, Pose};
-use armcal_model::{Frame, Knowledge, Model};
+use armcal_model::{Frame, Knowledge, Model, RecordingStart};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -37,13 +34,13 @@ fn small_pose(rng: &mut ChaCha8Rng) -> Pose {
     Pose::new(draw(0.03), draw(0.2))
 }
 
-fn recordings(count: usize) -> Vec<PooledRecording> {
-    (0..count).map(|k| PooledRecording { name: format!("day{k}"), base_in_world: None }).collect()
+fn recordings(count: usize) -> Vec<RecordingStart> {
+    (0..count).map(|k| RecordingStart { name: format!("day{k}"), base_in_world: None }).collect()
 }
 
-fn pooled(model: &Model, count: usize, own: &[&str]) -> PooledModel {
+fn pooled(model: &Model, count: usize, own: &[&str]) -> Model {
     let own: Vec<String> = own.iter().map(|name| (*name).to_owned()).collect();
-    PooledModel::new(model.clone(), &recordings(count), &own).unwrap()
+    model.with_own(&recordings(count), &own).unwrap()
 }
 
 /// Largest difference of two fits: of values in standard deviations, and of the covariance in units of the deviations.
@@ -85,7 +82,7 @@ fn assert_same(dense: &Calibration, structured: &Calibration) {
 fn compare(model: &Model, observations: &[Observation], count: usize, holdout: &HoldoutConfig) {
     let config = FitConfig::default();
     let dense = calibrate(model, observations, &config, holdout).unwrap();
-    let structured = calibrate_pooled(&pooled(model, count, &[]), observations, &config, holdout).unwrap();
+    let structured = calibrate(&pooled(model, count, &[]), observations, &config, holdout).unwrap();
     assert_same(&dense, &structured);
 }
 
@@ -94,7 +91,7 @@ fn pools_of_any_size_have_the_optimum_of_one_dense_fit() {
     for (sizes, seed) in [(vec![30, 30, 30], 1), (vec![9, 60, 25, 40, 12, 33, 20], 2), (vec![15; 12], 3)] {
         let (model, truth, observations) = days(&sizes, seed);
         compare(&model, &observations, sizes.len(), &HoldoutConfig::None);
-        let fit = calibrate_pooled(
+        let fit = calibrate(
             &pooled(&model, sizes.len(), &[]),
             &observations,
             &FitConfig::default(),
@@ -125,7 +122,7 @@ fn outliers_active_bounds_and_recordings_too_short_change_nothing_of_that() {
     let config = FitConfig::default();
     let dense = calibrate(&model, &observations, &config, &HoldoutConfig::None).unwrap();
     let structured =
-        calibrate_pooled(&pooled(&model, 5, &[]), &observations, &config, &HoldoutConfig::None).unwrap();
+        calibrate(&pooled(&model, 5, &[]), &observations, &config, &HoldoutConfig::None).unwrap();
     assert_same(&dense, &structured);
     assert!(structured.fit.estimates[a2].at_bound);
     assert!(structured.fit.weights.iter().filter(|w| **w < 0.25).count() >= 8);
@@ -203,10 +200,10 @@ fn own_bases_and_joint_zeros_are_eliminated_exactly_and_found() {
         let mut seen = rig::tracked(&today, &own, 40, &mut rng);
         seen.iter_mut().for_each(|o| o.dwell.recording = day);
         observations.extend(seen);
-        recordings.push(PooledRecording { name: format!("day{day}"), base_in_world: Some(camera) });
+        recordings.push(RecordingStart { name: format!("day{day}"), base_in_world: Some(camera) });
     }
     let own = ["base.*".to_owned(), "joint3.theta".to_owned()];
-    let pool = PooledModel::new(model, &recordings, &own).unwrap();
+    let pool = model.with_own(&recordings, &own).unwrap();
     assert_eq!(pool.own_parameters(2).len(), 7);
     let config = FitConfig::default();
     let free = |p: &Parameter| p.free;
@@ -240,7 +237,7 @@ fn threads_do_not_change_a_bit() {
     let with = |threads: usize| {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let holdout = HoldoutConfig::EachRecording;
-        threads.install(|| calibrate_pooled(&pool, &observations, &FitConfig::default(), &holdout)).unwrap()
+        threads.install(|| calibrate(&pool, &observations, &FitConfig::default(), &holdout)).unwrap()
     };
     assert_eq!(with(1), with(4));
 }
@@ -249,7 +246,7 @@ fn threads_do_not_change_a_bit() {
 fn what_cannot_be_pooled_is_named() {
     let (model, _, observations) = days(&[10, 10], 9);
     let refused = |own: &str| {
-        let all = PooledModel::new(model.clone(), &recordings(2), &[own.to_owned()]);
+        let all = model.with_own(&recordings(2), &[own.to_owned()]);
         all.unwrap_err().to_string()
     };
     assert!(refused("joint1.tetha").contains("joint1.theta"));
@@ -257,10 +254,10 @@ fn what_cannot_be_pooled_is_named() {
     assert!(refused("board.*").contains("its recording's own"));
     let pool = pooled(&model, 2, &[]);
     let paper = FitConfig { objective: Objective::Paper, ..FitConfig::default() };
-    let error = calibrate_pooled(&pool, &observations, &paper, &HoldoutConfig::None).unwrap_err();
+    let error = calibrate(&pool, &observations, &paper, &HoldoutConfig::None).unwrap_err();
     assert!(error.to_string().contains("fit.objective"));
     let mut stray = observations.clone();
     stray.last_mut().unwrap().dwell.recording = 2;
-    let error = calibrate_pooled(&pool, &stray, &FitConfig::default(), &HoldoutConfig::None).unwrap_err();
-    assert!(error.to_string().contains("2 recordings in the pool"));
+    let error = calibrate(&pool, &stray, &FitConfig::default(), &HoldoutConfig::None).unwrap_err();
+    assert!(error.to_string().contains("2 recordings of the model"));
 }

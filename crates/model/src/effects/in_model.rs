@@ -101,6 +101,9 @@ impl Model {
 
     /// What drives the effects in an observation.
     pub fn drivers<'o>(&self, session: &Session, o: &'o Observation) -> Drivers<'o> {
+        if let Some(model) = self.known_by(o) {
+            return model.drivers(session, o);
+        }
         let nominal = self.nominal();
         let pose = self.nominal_pose(&nominal, &o.joint_rad);
         let seated = o.cavity().is_some();

@@ -188,11 +188,12 @@ impl Effects {
         Effects { placed, session, tree, routes, slots }
     }
 
-    /// The same effects in a model that lacks `fewer` parameters before theirs and has `count` in all.
-    pub fn moved(&self, fewer: usize, model: &Model, count: usize) -> Effects {
+    /// The same effects with their parameters at other places of the vector, which has `count` in all.
+    pub fn moved(&self, place: &dyn Fn(usize) -> usize, model: &Model, count: usize) -> Effects {
         let mut placed = self.placed.clone();
         for effect in &mut placed {
-            effect.parameters = effect.parameters.start - fewer..effect.parameters.end - fewer;
+            let first = place(effect.parameters.start);
+            effect.parameters = first..first + effect.parameters.len();
         }
         Effects::new(placed, self.session.clone(), model, count)
     }

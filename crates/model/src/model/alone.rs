@@ -35,6 +35,7 @@ impl Model {
             boards: BTreeMap::new(),
             effects: None,
             declared: Arc::default(),
+            scopes: None,
         };
         Some((model, index))
     }

@@ -68,6 +68,9 @@ impl Model {
 
     /// Motion of a feature per unit of each joint reading, in the order of its route.
     pub(super) fn joint_twists(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Vec<(usize, Twist)> {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.joint_twists(&p, feature, o);
+        }
         match &self.effects {
             None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
             Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
@@ -81,6 +84,9 @@ impl Model {
 
     /// Where the model puts a feature, in the world, effects included.
     pub fn feature_in_world(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Pose {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.feature_in_world(&p, feature, o);
+        }
         let at = match &self.effects {
             None => self.tree.follow(self.route(feature), p, &o.joint_rad),
             Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,

@@ -15,7 +15,6 @@ use crate::summary::{
 };
 use crate::text::conclusion;
 use crate::write::{REPORT, commit_all, stage};
-use armcal_calibrate::Estimate;
 use armcal_core::{Pose, Warning};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -144,7 +143,7 @@ fn summary_of<'a>(
     recording: &'a PooledRecordingRun,
     errors: &RecordingErrors,
 ) -> RecordingSummary<'a> {
-    let own = run.pool.own_parameters(at);
+    let own = run.model.own_parameters(at);
     let estimates = &run.calibration.fit.estimates;
     RecordingSummary {
         name: &recording.name,
@@ -191,8 +190,7 @@ fn frames(run: &PooledRun) -> Vec<FrameEntry> {
     let mut frames =
         vec![frame_entry("base".into(), "world", &base), frame_entry("tip".into(), "last link", &tip)];
     for (index, recording) in run.recordings.iter().enumerate() {
-        let local = run.pool.in_recording(index, &p);
-        if let Some(board) = local.and_then(|(model, p)| model.board_in_world(&p, index)) {
+        if let Some(board) = run.model.board_in_world(&p, index) {
             frames.push(frame_entry(format!("board.{}", recording.name), "world", &board));
         }
     }
@@ -200,38 +198,18 @@ fn frames(run: &PooledRun) -> Vec<FrameEntry> {
 }
 
 fn last_base_and_tip(run: &PooledRun, p: &[f64]) -> (Pose, Pose) {
-    match run.pool.in_recording(run.recordings.len().saturating_sub(1), p) {
-        Some((model, p)) => (model.base_in_world(&p), model.tip_in_last_link(&p)),
-        None => (run.pool.model().base_in_world(p), run.pool.model().tip_in_last_link(p)),
-    }
+    let (model, p) = run.model.in_recording(run.recordings.len().saturating_sub(1), p);
+    (model.base_in_world(&p), model.tip_in_last_link(&p))
 }
 
 /// The calibrated model as it was in the last recording.
 fn model(run: &PooledRun) -> PastModel {
-    let model = run.pool.model();
-    let all = &run.calibration.fit.estimates;
-    let last = run.recordings.len().saturating_sub(1);
-    let mut estimates: Vec<Estimate> = all[..model.parameters().len()].to_vec();
-    let mut calibration = run.calibration.clone();
-    let copies = run.pool.own_parameters(last).into_iter().filter(|&index| index >= estimates.len());
-    let prefix = run.recordings.last().map(|r| format!("{}.", r.name)).unwrap_or_default();
-    for copy in copies.collect::<Vec<usize>>() {
-        let name = all[copy].parameter.name.strip_prefix(&prefix).unwrap_or_default();
-        if let Some(index) = model.index(name) {
-            let parameter = estimates[index].parameter.clone();
-            estimates[index] = Estimate { parameter, ..all[copy].clone() };
-            calibration.nominal_values[index] = calibration.nominal_values[copy];
-        }
-    }
-    let nominal: Vec<f64> = run.pool.parameters().iter().map(|p| p.nominal).collect();
     let hashes = |r: &PooledRecordingRun| r.files.iter().map(|f| f.sha256.clone()).collect();
     PastModel::of_calibrated(&Calibrated {
         pipeline: &run.pipeline_name,
-        chain: chain_text(model.chain(), std::slice::from_ref(&run.model_text), &run.pipeline_text),
-        model,
-        base: last_base_and_tip(run, &nominal).0,
-        estimates: &estimates,
-        calibration: &calibration,
+        chain: chain_text(run.model.chain(), std::slice::from_ref(&run.model_text), &run.pipeline_text),
+        model: &run.model,
+        calibration: &run.calibration,
         recordings: run.recordings.iter().map(|r| (r.name.as_str(), hashes(r))).collect(),
         observations: &run.observations,
         session: &run.session,

@@ -14,9 +14,9 @@ pub use terminal::pooled_terminal;
 use crate::past_observations::ObservedFile;
 use crate::recording_names::RecordingNames;
 use crate::run::{Status, status_of, without_repeats};
-use armcal_calibrate::{Calibration, PooledModel, Residual};
+use armcal_calibrate::{Calibration, Residual};
 use armcal_core::{ErrorStats, Observation, Warning};
-use armcal_model::Session;
+use armcal_model::{Model, Session};
 use std::path::PathBuf;
 
 /// A finished pooled calibration.
@@ -31,7 +31,7 @@ pub struct PooledRun {
     /// The recordings in the order of time; the index is that of the observations' dwells.
     pub recordings: Vec<PooledRecordingRun>,
     /// The model, and what each recording has for itself.
-    pub pool: PooledModel,
+    pub model: Model,
     /// What the fit saw, and what was held out of it, in the order of the recordings.
     pub observations: Vec<Observation>,
     /// What effects know of all observations.
@@ -109,9 +109,9 @@ impl PooledRun {
 
     /// Whether a parameter is shared, by its index.
     pub(crate) fn shared(&self) -> Vec<bool> {
-        let mut shared = vec![true; self.pool.parameters().len()];
+        let mut shared = vec![true; self.model.parameters().len()];
         for recording in 0..self.recordings.len() {
-            self.pool.own_parameters(recording).into_iter().for_each(|index| shared[index] = false);
+            self.model.own_parameters(recording).into_iter().for_each(|index| shared[index] = false);
         }
         shared
     }

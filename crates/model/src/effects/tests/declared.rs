@@ -43,7 +43,9 @@ fn the_narrowest_words_come_last_and_the_specs_own_win() {
         width(&rig().0, &session, EffectSpec::new("gravity_backlash").at(1)).prior_sigma
     );
     // What is declared of the arm's model stays with the part of it that one recording needs.
-    let part = model.in_recording(0).0;
+    let day = crate::RecordingStart { name: "day".into(), base_in_world: None };
+    let pool = model.with_own(&[day], &[]).expect("a pool");
+    let part = pool.in_recording(0, &pool.nominal()).0.clone();
     assert_eq!(width(&part, &session, EffectSpec::new("backlash").at(1)), second);
 }
 
