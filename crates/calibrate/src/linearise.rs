@@ -2,10 +2,10 @@
 
 use crate::model_problem::ModelProblem;
 use crate::whitened::Whitened;
-use crate::{CalibrateError, FitConfig};
+use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::Observation;
 use armcal_model::Model;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::ops::Range;
 
 /// A model linearised at given parameters, in units of noise and prior.
@@ -15,12 +15,25 @@ pub struct Linearisation {
     pub axes: Vec<LinearAxis>,
     /// Rows of each observation: 3 of position, or 6 with orientation.
     pub rows: Vec<Range<usize>>,
+    /// What the raw rows of each observation are in the world: 3 x its rows, times them a displacement [m].
+    pub to_metres: Vec<Matrix3xX<f64>>,
+    /// The observations by pose: what was measured in one dwell shares its noise.
+    pub poses: Vec<LinearPose>,
     /// Whitened measured - predicted: N(0, 1) rows when the model is complete and the declared noise right.
     pub residual: DVector<f64>,
     /// d residual / d x, x the parameters in units of [`LinearAxis::scale`].
     pub jacobian: DMatrix<f64>,
-    /// Inverse of the lower Cholesky factor of each observation's covariance: whitened = this x raw.
-    pub whitener: Vec<DMatrix<f64>>,
+}
+
+/// What was measured of one pose.
+#[derive(Debug, Clone)]
+pub struct LinearPose {
+    /// Its observations: one, or one of each feature that was seen.
+    pub observations: Range<usize>,
+    /// Their rows.
+    pub rows: Range<usize>,
+    /// Inverse of the lower Cholesky factor of the rows' covariance: whitened = this x raw.
+    pub whitener: DMatrix<f64>,
 }
 
 /// One free parameter.
@@ -43,8 +56,12 @@ pub fn linearise(
     values: &[f64],
     config: &FitConfig,
 ) -> Result<Linearisation, CalibrateError> {
+    // Whatever was minimised, rows of one pose share the noise of its readings.
+    let config = &FitConfig { objective: Objective::Robust, ..config.clone() };
     let problem = ModelProblem::new(model, observations, config)?;
     let rows = problem.rows_of_each();
+    let to_metres = (0..observations.len()).map(|i| problem.to_metres(i, values)).collect();
+    let runs = problem.runs().to_vec();
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
     let at = white.at(white.start())?;
     let axis = |(a, x): (&crate::whitened::Axis, &f64)| LinearAxis {
@@ -53,11 +70,16 @@ pub fn linearise(
         precision: a.precision,
         offset: *x,
     };
+    let pose = |(observations, whitener): (Range<usize>, DMatrix<f64>)| {
+        let rows = rows[observations.start].start..rows[observations.end - 1].end;
+        LinearPose { observations, rows, whitener }
+    };
     Ok(Linearisation {
         axes: white.axes.iter().zip(at.x.iter()).map(axis).collect(),
-        rows,
+        to_metres,
         jacobian: white.jacobian(&at),
         residual: at.residual,
-        whitener: white.into_whitener(),
+        poses: runs.into_iter().zip(white.into_whitener()).map(pose).collect(),
+        rows,
     })
 }

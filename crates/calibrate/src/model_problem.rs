@@ -6,6 +6,7 @@
 //! were measured in one dwell, enters through the encoders only: a block is all that was measured in a dwell.
 
 use crate::joined::scale;
+use crate::poses::measured_together;
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter, Reference};
@@ -86,8 +87,10 @@ impl<'a> ModelProblem<'a> {
             }
         }
         // The paper's objective counts distances, one by one.
-        let together = config.objective != Objective::Paper;
-        let blocks = blocks(&observations, together);
+        let blocks = match config.objective {
+            Objective::Paper => (0..observations.len()).map(|i| i..i + 1).collect(),
+            _ => measured_together(&observations),
+        };
         Ok(ModelProblem { model, observations, blocks, use_orientation: config.use_orientation })
     }
 
@@ -131,6 +134,22 @@ impl<'a> ModelProblem<'a> {
             first..end
         });
         rows.collect()
+    }
+
+    /// What the rows of an observation are in the world: 3 x its rows, times them the displacement [m] that its feature is off.
+    /// A displacement moves what is predicted of the rows by the transpose of it.
+    pub(crate) fn to_metres(&self, observation: usize, p: &[f64]) -> Matrix3xX<f64> {
+        let o = self.observations[observation];
+        let (model, p) = self.model.in_recording(o.dwell.recording, p);
+        match along(model, &p, o) {
+            Some(along) => Matrix3xX::from_columns(&[along]),
+            None => Matrix3xX::identity(self.rows(o)),
+        }
+    }
+
+    /// The runs of observations that are one block each.
+    pub(crate) fn runs(&self) -> &[Range<usize>] {
+        &self.blocks
     }
 
     /// The rows that are used.
@@ -191,22 +210,6 @@ fn turning_jacobian(model: &Model, p: &[f64], o: &Observation) -> Matrix3xX<f64>
         jacobian.set_column(joint, &(turn / (2.0 * JOINT_STEP_RAD)));
     }
     jacobian
-}
-
-/// Runs of observations of one dwell, each of another feature; each by itself where they are not taken together.
-fn blocks(observations: &[&Observation], together: bool) -> Vec<Range<usize>> {
-    let mut blocks: Vec<Range<usize>> = Vec::with_capacity(observations.len());
-    for (i, o) in observations.iter().enumerate() {
-        let joins = |run: &Range<usize>| {
-            let run = &observations[run.clone()];
-            run[0].dwell == o.dwell && run.iter().all(|other| other.feature != o.feature)
-        };
-        match blocks.last_mut().filter(|run| together && joins(run)) {
-            Some(run) => run.end = i + 1,
-            None => blocks.push(i..i + 1),
-        }
-    }
-    blocks
 }
 
 /// Linearised rows one below the other.

@@ -4,10 +4,29 @@
 //! that the fit saw is no test of it.
 
 use armcal_core::Observation;
+use std::borrow::Borrow;
+use std::ops::Range;
 
 /// Joint difference, in every joint, below which two dwells are of one pose [rad] (sliding: [m]): what a hand that leads the
 /// arm back, or a controller, leaves over; far above the noise of encoders.
 const SAME_POSE_RAD: f64 = 0.01;
+
+/// The runs of observations that are what was measured in one dwell, each of another feature, in the order given. They share
+/// the readings of the joints, and with them the encoders' noise.
+pub fn measured_together<O: Borrow<Observation>>(observations: &[O]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::with_capacity(observations.len());
+    for (i, o) in observations.iter().map(Borrow::borrow).enumerate() {
+        let joins = |run: &Range<usize>| {
+            let mut run = observations[run.clone()].iter().map(Borrow::borrow);
+            run.all(|other: &Observation| other.dwell == o.dwell && other.feature != o.feature)
+        };
+        match runs.last_mut().filter(|run| joins(run)) {
+            Some(run) => run.end = i + 1,
+            None => runs.push(i..i + 1),
+        }
+    }
+    runs
+}
 
 /// Number of the group that each observation belongs to: no two observations of one pose are in different groups, and
 /// groups are as small as that allows. Different cavities are different poses, however close.

@@ -38,11 +38,7 @@ pub(crate) struct Unlisted {
 pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisConfig) -> Vec<Unlisted> {
     let mut all = Vec::new();
     for (c, channel) in problem.channels.iter().enumerate() {
-        let power: Vec<f64> = problem
-            .dwells
-            .iter()
-            .map(|d| channel.columns.rows(d.first_row, d.rows).norm_squared() * d.sigma_m().powi(2))
-            .collect();
+        let power: Vec<f64> = problem.dwells.iter().map(|d| d.moved_m2(&channel.columns)).collect();
         for (k, driver) in drivers.iter().enumerate() {
             if let DriverKind::Own(j) | DriverKind::DirectionAlong(j) = driver.kind
                 && channel.name != format!("joint{}", j + 1)
@@ -131,9 +127,7 @@ pub(crate) fn discrepancies(problem: &Problem, config: &DiagnosisConfig) -> Vec<
 fn world_axes(problem: &Problem) -> Arc<DMatrix<f64>> {
     let mut base = DMatrix::zeros(problem.rows(), 3);
     for d in &problem.dwells {
-        if let Some(inverse) = d.metres.try_inverse() {
-            base.view_mut((d.first_row, 0), (3, 3)).copy_from(&inverse);
-        }
+        base.rows_mut(d.first_row, d.rows).copy_from(&d.displaced);
     }
     Arc::new(base)
 }

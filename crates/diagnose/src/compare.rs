@@ -23,10 +23,20 @@ pub fn compare_heldout(
     compare_errors(&held_out_errors_m(before), &held_out_errors_m(after), observations, config)
 }
 
-/// Errors of a calibration on the dwells that were held out of it, by dwell [m].
+/// Errors of a calibration on the dwells that were held out of it, by dwell [m]: the mean over what was measured in it.
 pub(crate) fn held_out_errors_m(calibration: &Calibration) -> BTreeMap<DwellId, f64> {
     let held_out = calibration.residuals.iter().filter(|r| r.held_out);
-    held_out.map(|r| (r.dwell, r.fitted_m.norm())).collect()
+    mean_by_dwell(held_out.map(|r| (r.dwell, r.fitted_m.norm())))
+}
+
+/// The mean of the errors in each dwell: features of one pose are no sample of poses.
+pub fn mean_by_dwell(errors_m: impl Iterator<Item = (DwellId, f64)>) -> BTreeMap<DwellId, f64> {
+    let mut sums: BTreeMap<DwellId, (f64, f64)> = BTreeMap::new();
+    for (dwell, error_m) in errors_m {
+        let (sum, count) = sums.entry(dwell).or_insert((0.0, 0.0));
+        (*sum, *count) = (*sum + error_m, *count + 1.0);
+    }
+    sums.into_iter().map(|(dwell, (sum, count))| (dwell, sum / count)).collect()
 }
 
 /// The same of errors by dwell [m], before and after, wherever they come from.

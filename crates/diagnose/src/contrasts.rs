@@ -61,7 +61,7 @@ pub(crate) fn contrast(
         return None;
     }
     let ratio = xy / xx;
-    let rows = (pairs.len() * problem.dwells[0].rows) as f64;
+    let rows = pairs.iter().map(|(a, _)| problem.dwells[*a].rows).sum::<usize>() as f64;
     let ratio_sigma = ((yy - xy * xy / xx).max(0.0) / (rows - 1.0).max(1.0) / xx).sqrt();
     let p = sign_flip(&parts.iter().map(|p| p.1).collect::<Vec<_>>(), config);
     // Three, not two: a name is not given up for what one true effect in twenty does by chance.
@@ -89,7 +89,7 @@ pub(crate) fn pairs(problem: &Problem, toggle: Toggle, config: &DiagnosisConfig)
         }
         let partner = (i + 1..used.len()).find(|&j| {
             let (a, b) = (&problem.dwells[i], &problem.dwells[j]);
-            !used[j] && a.rows == b.rows && same_place(a, b, limit) && differs(a, b, toggle)
+            !used[j] && a.measured_as(b) && same_place(a, b, limit) && differs(a, b, toggle)
         });
         if let Some(j) = partner {
             (used[i], used[j]) = (true, true);

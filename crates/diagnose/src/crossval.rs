@@ -7,12 +7,12 @@
 use crate::config::DiagnosisConfig;
 use crate::held_out::HeldOut;
 use crate::places::units;
-use crate::problem::Problem;
+use crate::problem::{DwellRow, Problem};
 use crate::projection::cholesky_upper;
 use crate::whitener::Whitener;
 use armcal_calibrate::gram;
 use armcal_calibrate::grouped_ci95;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::{BTreeMap, BTreeSet};
@@ -159,15 +159,19 @@ fn solve(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     upper.solve_upper_triangular(&half).unwrap_or(half)
 }
 
-/// Position errors [m] of the dwells from whitened rows.
-pub(crate) fn norms_m(problem: &Problem, rows: &DVector<f64>) -> Vec<f64> {
-    problem
-        .dwells
-        .iter()
-        .map(|d| {
-            (d.metres * Vector3::new(rows[d.first_row], rows[d.first_row + 1], rows[d.first_row + 2])).norm()
-        })
-        .collect()
+/// Position errors of one dwell.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DwellErrors {
+    /// Their sum over what was measured in it [m].
+    pub sum_m: f64,
+    /// How much that was.
+    pub count: f64,
+}
+
+/// Position errors of the dwells from whitened rows.
+pub(crate) fn errors_m(problem: &Problem, rows: &DVector<f64>) -> Vec<DwellErrors> {
+    let of = |d: &DwellRow| DwellErrors { sum_m: d.errors_m(rows).sum(), count: d.parts.len() as f64 };
+    problem.dwells.iter().map(of).collect()
 }
 
 /// What `effect` columns do to errors on the groups, each predicted without itself. Where the noise remembers, whether
@@ -207,13 +211,14 @@ pub(crate) fn compare(
             .sum()
     };
     let fall: Vec<f64> = groups.iter().map(|g| power(before, &g.scored) - power(after, &g.scored)).collect();
-    let (from, to) = (norms_m(problem, before), norms_m(problem, after));
-    let n = problem.dwells.len().max(1) as f64;
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / n * 1e3;
-    let changes: Vec<(f64, f64)> = groups
-        .iter()
-        .map(|g| (g.scored.iter().map(|i| to[*i] - from[*i]).sum::<f64>() * 1e3, g.scored.len() as f64))
-        .collect();
+    let (from, to) = (errors_m(problem, before), errors_m(problem, after));
+    let n = from.iter().map(|e| e.count).sum::<f64>().max(1.0);
+    let mean = |v: &[DwellErrors]| v.iter().map(|e| e.sum_m).sum::<f64>() / n * 1e3;
+    let change = |g: &Group| {
+        let change_m = g.scored.iter().map(|i| to[*i].sum_m - from[*i].sum_m).sum::<f64>();
+        (change_m * 1e3, g.scored.iter().map(|i| from[*i].count).sum::<f64>())
+    };
+    let changes: Vec<(f64, f64)> = groups.iter().map(change).collect();
     let total_before = before.norm_squared();
     HeldOut {
         before: mean(&from),

@@ -36,11 +36,7 @@ pub(crate) fn expression(
 ) -> Option<Expression> {
     let acts_on = channel.axes.get(axis)?;
     let base = Arc::new(channel.columns.columns(axis, 1).into_owned());
-    let power: Vec<f64> = problem
-        .dwells
-        .iter()
-        .map(|d| base.rows(d.first_row, d.rows).norm_squared() * d.sigma_m().powi(2))
-        .collect();
+    let power: Vec<f64> = problem.dwells.iter().map(|d| d.moved_m2(&base)).collect();
     let families: Vec<(Family, Vec<f64>, Columns)> = families(problem, driver)
         .into_iter()
         .map(|family| {

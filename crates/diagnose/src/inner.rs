@@ -2,7 +2,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::confusion::likeness;
-use crate::crossval::{by_place, left_out, norms_m};
+use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
     BeforeAfter, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
 };
@@ -11,7 +11,7 @@ use crate::explain::explanations;
 use crate::forward::{Accepted, Search, search};
 use crate::judge::{Grade, Judged};
 use crate::outliers::{Cleaned, flipped, set_aside};
-use crate::problem::Problem;
+use crate::problem::{Part, Problem};
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
@@ -60,8 +60,9 @@ fn assemble(
     }
     let probability = if search.left_over { 1.0 - weighed.p_nothing } else { weighed.p_nothing };
     let mean = |p: &Problem, w: &Weighed| {
-        let norms = norms_m(p, &left_out(p, None, &by_place(p), w.scale));
-        norms.iter().sum::<f64>() / norms.len().max(1) as f64 * 1e3
+        let errors = errors_m(p, &left_out(p, None, &by_place(p), w.scale));
+        errors.iter().map(|e| e.sum_m).sum::<f64>() / errors.iter().map(|e| e.count).sum::<f64>().max(1.0)
+            * 1e3
     };
     let noise = noise(&search.with_curves.weighed);
     let set_aside: Vec<_> = whole.dwells.iter().zip(keep).filter(|(_, k)| !**k).map(|(d, _)| d.id).collect();
@@ -104,9 +105,12 @@ fn assemble(
 
 /// Mean error that the declared noise alone gives [mm].
 fn floor_mm(problem: &Problem) -> f64 {
-    let expected_m =
-        |d: &crate::problem::DwellRow| armcal_calibrate::expected_norm_m(&(d.metres * d.metres.transpose()));
-    problem.dwells.iter().map(expected_m).sum::<f64>() / problem.dwells.len().max(1) as f64 * 1e3
+    let expected_m = |part: &Part| {
+        let covariance_m2 = &part.metres * part.metres.transpose();
+        armcal_calibrate::expected_norm_m(&covariance_m2.fixed_view::<3, 3>(0, 0).into_owned())
+    };
+    let expected_m: Vec<f64> = problem.dwells.iter().flat_map(|d| &d.parts).map(expected_m).collect();
+    expected_m.iter().sum::<f64>() / expected_m.len().max(1) as f64 * 1e3
 }
 
 fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {

@@ -88,7 +88,7 @@ extern crate self as armcal_diagnose;
 
 pub use armcal_model::Toggle;
 pub use combination::{Combination, Term};
-pub use compare::{compare_errors, compare_heldout};
+pub use compare::{compare_errors, compare_heldout, mean_by_dwell};
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;
 pub use diagnosis::*;
@@ -102,7 +102,7 @@ pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use planned::plan_dwells;
-pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
+pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 pub use refit::{LinearRefit, Refit};
 pub use ripple::Ripple;
 pub use rivals::AfterRefit;

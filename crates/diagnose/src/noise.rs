@@ -1,7 +1,7 @@
 //! Noise that is not independent from dwell to dwell, or not as large as declared: seats, visits, short memory, play
 //! (notes 4.7 iii). [`crate::whitener`] takes it out of rows.
 
-use crate::problem::Problem;
+use crate::problem::{Part, Problem};
 use nalgebra::DVector;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -80,8 +80,9 @@ impl Noise {
         if problem.dwells.len() >= 20 {
             found.push(Noise::Memory);
         }
-        let tracked = problem.dwells.iter().filter(|d| d.tracked).count();
-        if tracked >= 20 && tracked < problem.dwells.len() {
+        let (tracked, seated): (Vec<&Part>, Vec<&Part>) =
+            problem.dwells.iter().flat_map(|d| &d.parts).partition(|part| part.tracked);
+        if tracked.len() >= 20 && !seated.is_empty() {
             found.extend([Noise::Sensor, Noise::Tracked, Noise::Seated]);
         }
         found.extend((0..problem.joints()).map(Noise::Slack).filter(|n| n.direction(problem).is_some()));

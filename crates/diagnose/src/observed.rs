@@ -157,8 +157,8 @@ impl Refit for ModelRefit<'_> {
     ) -> Result<Option<AfterRefit>, DiagnoseError> {
         let (model, values) = self.fitted(&names(accepted))?;
         let linear = linearise(&model, self.weighed, &values, self.fit)?;
-        let rows = linear.rows.iter().zip(keep).filter(|(_, keep)| **keep);
-        let rows: Vec<usize> = rows.flat_map(|(rows, _)| rows.clone()).collect();
+        let kept = linear.poses.iter().zip(keep).filter(|(_, keep)| **keep);
+        let rows: Vec<usize> = kept.flat_map(|(pose, _)| pose.rows.clone()).collect();
         let residual = linear.residual.select_rows(&rows);
         let mut jacobian = linear.jacobian.select_rows(&rows);
         let mut square = residual.norm_squared();

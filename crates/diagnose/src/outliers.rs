@@ -181,7 +181,7 @@ fn agreement(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
     for &i in found {
         let distance = |j: &usize| (z.row(i) - z.row(*j)).norm_squared();
         let others =
-            found.iter().copied().filter(|j| *j != i && problem.dwells[*j].rows == problem.dwells[i].rows);
+            found.iter().copied().filter(|j| *j != i && problem.dwells[*j].measured_as(&problem.dwells[i]));
         if let Some(j) = others.min_by(|a, b| distance(a).total_cmp(&distance(b))) {
             sum += rows(i).dot(&rows(j)) / (rows(i).norm() * rows(j).norm()).max(1e-300);
         }

@@ -2,7 +2,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::problem::Problem;
-use armcal_calibrate::MIN_CAVITIES;
+use armcal_calibrate::{MIN_CAVITIES, measured_together};
 use armcal_core::Observation;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -44,24 +44,25 @@ pub(crate) fn units(problem: &Problem) -> Vec<usize> {
     unit
 }
 
-/// At most `max_weighed` of the observations: one drawn from each of as many equal stretches of time, so that every part
-/// of the session and, as motions go, of joint space keeps its share. The draw keeps clear of a regular motion's period.
+/// The observations of at most `max_weighed` poses: one drawn from each of as many equal stretches of time, so that every
+/// part of the session and, as motions go, of joint space keeps its share. The draw keeps clear of a regular motion's period.
 pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisConfig) -> Vec<&'o Observation> {
-    let (n, most) = (observations.len(), config.max_weighed);
+    let poses = measured_together(observations);
+    let (n, most) = (poses.len(), config.max_weighed);
     if n <= most {
         return observations.iter().collect();
     }
     let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by_key(|i| observations[*i].dwell);
+    order.sort_by_key(|i| observations[poses[*i].start].dwell);
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7417);
     let mut drawn: Vec<usize> =
         (0..most).map(|k| order[rng.random_range(k * n / most..(k + 1) * n / most)]).collect();
     drawn.sort_unstable();
-    drawn.into_iter().map(|i| &observations[i]).collect()
+    drawn.into_iter().flat_map(|i| &observations[poses[i].clone()]).collect()
 }
 
-/// The cavity; for a tracked tip the pose, where it was visited more than once.
-pub(crate) fn places(observations: &[Observation]) -> Vec<Option<String>> {
+/// The cavity; for a tracked pose the pose itself, where it was visited more than once. One observation of each pose is asked.
+pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
     let same = |a: &Observation, b: &Observation| {
         a.joint_rad.len() == b.joint_rad.len()
             && a.joint_rad.iter().zip(&b.joint_rad).all(|(a, b)| (a - b).abs() < SAME_POSE_RAD)
@@ -69,7 +70,7 @@ pub(crate) fn places(observations: &[Observation]) -> Vec<Option<String>> {
     let mut poses: Vec<(usize, usize)> = Vec::new();
     let mut member = vec![None; observations.len()];
     for (i, o) in observations.iter().enumerate().filter(|(_, o)| o.cavity().is_none()) {
-        let known = poses.iter().position(|(first, _)| same(&observations[*first], o));
+        let known = poses.iter().position(|(first, _)| same(observations[*first], o));
         let k = known.unwrap_or_else(|| {
             poses.push((i, 0));
             poses.len() - 1
@@ -77,7 +78,7 @@ pub(crate) fn places(observations: &[Observation]) -> Vec<Option<String>> {
         poses[k].1 += 1;
         member[i] = Some(k);
     }
-    let name = |(i, o): (usize, &Observation)| match (o.cavity(), member[i]) {
+    let name = |(i, o): (usize, &&Observation)| match (o.cavity(), member[i]) {
         (Some(cavity), _) => Some(cavity.to_owned()),
         (None, Some(k)) if poses[k].1 > 1 => Some(format!("pose {}", k + 1)),
         _ => None,

@@ -3,9 +3,9 @@
 use crate::DiagnoseError;
 use crate::crossval::EFFECT_PRECISION;
 use crate::whitener::Whitener;
-use armcal_core::{DwellId, Unit};
+use armcal_core::{DwellId, FeatureId, Unit};
 use armcal_model::Toggle;
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::sync::Arc;
 
 /// A linearised calibration with everything that might be missing from it.
@@ -39,8 +39,10 @@ pub struct DwellRow {
     pub id: DwellId,
     /// First row in the stacked residual.
     pub first_row: usize,
-    /// Rows: 3, or 6 with orientation.
+    /// Rows of all that was measured in it.
     pub rows: usize,
+    /// What was measured, in the order of the rows.
+    pub parts: Vec<Part>,
     /// Time since the start of the session [s].
     pub time_s: f64,
     /// Joint readings [rad].
@@ -55,13 +57,24 @@ pub struct DwellRow {
     pub temperature_c: Option<f64>,
     /// Place that is visited again: the cavity, where there is one.
     pub place: Option<String>,
-    /// Whether the position sensor saw the tip, rather than a cavity holding it.
-    pub tracked: bool,
+    /// Whitened rows of a displacement of all that was measured by 1 m along each axis of the world: `rows` x 3.
+    pub displaced: DMatrix<f64>,
     /// Whitened rows of a displacement by one declared standard deviation along each axis of the board, or of the
-    /// world where there is no board: `rows` x 3.
+    /// world where there is no board: `rows` x 3. What a cavity does not hold is not displaced beside what it does.
     pub seat: DMatrix<f64>,
-    /// Position residual [m] = this x the first three whitened rows.
-    pub metres: Matrix3<f64>,
+}
+
+/// What was measured of one feature in a dwell: its tip, or a marker.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// The feature.
+    pub feature: FeatureId,
+    /// Its rows: 3, or 6 with orientation.
+    pub rows: usize,
+    /// Whether the position sensor saw it, rather than a cavity holding it.
+    pub tracked: bool,
+    /// What it is off [m] = this x the whitened rows of its dwell: 3 x the dwell's rows.
+    pub metres: Matrix3xX<f64>,
 }
 
 impl DwellRow {
@@ -70,9 +83,50 @@ impl DwellRow {
         self.first_row..self.first_row + self.rows
     }
 
-    /// Declared standard deviation of a coordinate [m].
-    pub fn sigma_m(&self) -> f64 {
-        (self.metres.norm_squared() / 3.0).sqrt()
+    /// Its parts, each with its rows.
+    pub fn ranges(&self) -> impl Iterator<Item = (&Part, std::ops::Range<usize>)> {
+        self.parts.iter().scan(self.first_row, |first, part| {
+            let rows = *first..*first + part.rows;
+            *first = rows.end;
+            Some((part, rows))
+        })
+    }
+
+    /// Declared variance of a coordinate [m^2], mean over what was measured.
+    fn variance_m2(&self) -> f64 {
+        self.parts.iter().map(|part| part.metres.norm_squared()).sum::<f64>()
+            / (3 * self.parts.len().max(1)) as f64
+    }
+
+    /// About how far columns displace what was measured in it, squared [m^2]: the sum over the columns, mean over its parts.
+    pub(crate) fn moved_m2(&self, columns: &DMatrix<f64>) -> f64 {
+        let sigma_m = self.variance_m2().sqrt();
+        columns.rows(self.first_row, self.rows).norm_squared() * sigma_m.powi(2)
+            / self.parts.len().max(1) as f64
+    }
+
+    /// What whitened rows say that its parts are off [m].
+    pub(crate) fn errors_m(&self, rows: &DVector<f64>) -> impl Iterator<Item = f64> {
+        let own = rows.rows(self.first_row, self.rows);
+        self.parts.iter().map(move |part| (&part.metres * own).norm())
+    }
+
+    /// How many of its first rows are of the same features as those of another dwell.
+    pub(crate) fn rows_as_in(&self, other: &DwellRow) -> usize {
+        let mut both = self.parts.iter().zip(&other.parts);
+        let mut same = 0;
+        while let Some((a, b)) = both.next().filter(|(a, b)| a.feature == b.feature) {
+            same += a.rows.min(b.rows);
+            if a.rows != b.rows {
+                break;
+            }
+        }
+        same
+    }
+
+    /// Whether the same features were measured in another dwell, with as many rows each.
+    pub(crate) fn measured_as(&self, other: &DwellRow) -> bool {
+        self.rows == other.rows && self.rows_as_in(other) == self.rows
     }
 }
 
@@ -253,6 +307,8 @@ impl Problem {
             same("the joints of a dwell", d.joint_rad.len(), self.joints())?;
             same("the arrival signs of a dwell", d.arrival.len(), self.joints())?;
             same("the seat rows of a dwell", d.seat.nrows(), d.rows)?;
+            same("the displaced rows of a dwell", d.displaced.nrows(), d.rows)?;
+            same("the rows of what was measured in a dwell", d.parts.iter().map(|p| p.rows).sum(), d.rows)?;
             at += d.rows;
         }
         let finite = self.residual.iter().chain(self.geometry.iter()).chain(self.geometry_offset.iter());

@@ -83,7 +83,8 @@ fn lack_of_fit(problem: &Problem, e: &DVector<f64>, p_eff: f64) -> Option<LackOf
     }
     let (mut pure, mut pure_dof, mut rows) = (0.0, 0.0, 0.0);
     for members in groups.values() {
-        let width = members.iter().map(|i| problem.dwells[*i].rows).min().unwrap_or(0);
+        let first = &problem.dwells[members[0]];
+        let width = members.iter().map(|i| first.rows_as_in(&problem.dwells[*i])).min().unwrap_or(0);
         let part = |i: &usize| e.rows(problem.dwells[*i].first_row, width).into_owned();
         let mean = members.iter().map(part).fold(DVector::zeros(width), |a, b| a + b) / members.len() as f64;
         pure += members.iter().map(|i| (part(i) - &mean).norm_squared()).sum::<f64>();
@@ -113,7 +114,7 @@ fn moran(problem: &Problem, e: &DVector<f64>, config: &DiagnosisConfig) -> (f64,
         }
         for (_, j) in near.iter().take(k.max(1)) {
             let (a, b) = (&problem.dwells[i], &problem.dwells[*j]);
-            let width = a.rows.min(b.rows);
+            let width = a.rows_as_in(b);
             pairs.push((i, *j, e.rows(a.first_row, width).dot(&e.rows(b.first_row, width))));
         }
     }
@@ -138,7 +139,7 @@ fn lag1(problem: &Problem, e: &DVector<f64>) -> (f64, f64) {
     for w in order.windows(2) {
         let (a, b) = (&problem.dwells[w[0]], &problem.dwells[w[1]]);
         if a.id.recording == b.id.recording {
-            let width = a.rows.min(b.rows);
+            let width = a.rows_as_in(b);
             product += e.rows(a.first_row, width).dot(&e.rows(b.first_row, width));
             count += width as f64;
         }

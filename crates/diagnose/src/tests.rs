@@ -137,10 +137,10 @@ fn whiteners_are_inverse_roots_of_their_covariance() {
 #[test]
 fn dwells_that_scatter_more_than_declared_are_whitened_by_a_factor() {
     let mut p = small(2);
-    p.dwells.iter_mut().step_by(3).for_each(|d| d.tracked = true);
+    p.dwells.iter_mut().step_by(3).for_each(|d| d.parts[0].tracked = true);
     let place = dense(Noise::Place, 1.0, &p);
     for (noise, tracked) in [(Noise::Tracked, true), (Noise::Seated, false), (Noise::TrackedAndPlace, true)] {
-        let wider = |row: usize| p.dwells[row / 3].tracked == tracked;
+        let wider = |row: usize| p.dwells[row / 3].parts[0].tracked == tracked;
         let size = |row: usize| if wider(row) { 10f64.sqrt() } else { 1.0 };
         let alike = |i: usize, k: usize| {
             if noise == Noise::TrackedAndPlace { place[(i, k)] } else { f64::from(i == k) }
@@ -177,23 +177,23 @@ fn dense_sensor(b: f64, places: bool, p: &Problem) -> DMatrix<f64> {
         if row % 3 != column % 3 {
             return 0.0;
         }
-        let ((load_a, back_a), (load_c, back_c)) = (share(a.tracked), share(c.tracked));
+        let ((load_a, back_a), (load_c, back_c)) = (share(a.parts[0].tracked), share(c.parts[0].tracked));
         let gap = a.id.dwell.abs_diff(c.id.dwell) as f64;
         let memory = f64::from(a.id.recording == c.id.recording) * (-gap / 3.0).exp();
         let sensor = (load_a * load_c * memory + f64::from(row == column)) * back_a * back_c;
         if !places {
             return sensor;
         }
-        let place = f64::from(!a.tracked && !c.tracked && a.place == c.place);
+        let place = f64::from(!a.parts[0].tracked && !c.parts[0].tracked && a.place == c.place);
         let half = |tracked: bool| if tracked { 1.0 } else { 0.5f64.sqrt() };
-        (sensor + place) * half(a.tracked) * half(c.tracked)
+        (sensor + place) * half(a.parts[0].tracked) * half(c.parts[0].tracked)
     })
 }
 
 #[test]
 fn a_wandering_sensor_is_whitened_with_and_without_errors_of_places() {
     let mut p = small(2);
-    p.dwells.iter_mut().skip(1).step_by(3).for_each(|d| d.tracked = true);
+    p.dwells.iter_mut().skip(1).step_by(3).for_each(|d| d.parts[0].tracked = true);
     for (noise, places) in [(Noise::Sensor, false), (Noise::SensorAndPlace, true)] {
         let c = dense_sensor(1.7, places, &p);
         assert_whitens(noise, 1.7, &p, c);

@@ -8,12 +8,12 @@ use crate::DiagnoseError;
 use crate::group::{one_frequency, with_groups};
 use crate::knowledge::Knowledge;
 use crate::places::places;
-use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan};
+use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 use crate::stretches::stretches;
-use armcal_calibrate::{FitConfig, Linearisation, linearise};
+use armcal_calibrate::{FitConfig, LinearPose, Linearisation, linearise};
 use armcal_core::{DwellId, Observation, Reference, Unit};
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -153,7 +153,7 @@ impl View<'_> {
 
     /// Every family with a shape: products where the shape switches or modulates, columns of their own otherwise.
     fn scans(&self, channels: &[Channel], base: &Linearisation) -> Result<Vec<Scan>, DiagnoseError> {
-        let dwells: Vec<DwellId> = self.observations.iter().map(|o| o.dwell).collect();
+        let dwells: Vec<DwellId> = self.poses(base).map(|o| o.dwell).collect();
         let Some(first) = dwells.iter().min().copied() else { return Ok(Vec::new()) };
         let mut scans = Vec::new();
         for (family, mut members) in self.model.scans(self.session, self.observations) {
@@ -169,7 +169,7 @@ impl View<'_> {
             let joint = family.target.map(|j| format!("joint{}", j + 1));
             let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
             let points = match channel {
-                Some(channel) if family.kind == "periodic" => self.modulated(channel, &members)?,
+                Some(channel) if family.kind == "periodic" => self.modulated(channel, &members, base)?,
                 _ => self.candidates(&members)?,
             };
             scans.push(Scan::of(family.to_string(), points));
@@ -202,7 +202,8 @@ impl View<'_> {
         base: &Linearisation,
     ) -> Option<Scan> {
         let Columns::Dense(columns) = &whole.columns else { return None };
-        let found = stretches(dwells, &base.rows, columns, &base.residual);
+        let rows: Vec<_> = base.poses.iter().map(|pose| pose.rows.clone()).collect();
+        let found = stretches(dwells, &rows, columns, &base.residual);
         let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
         let members: Vec<EffectSpec> =
             found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
@@ -233,7 +234,12 @@ impl View<'_> {
     }
 
     /// A periodic error turns its joint by a sine and a cosine of the reading.
-    fn modulated(&self, channel: &Channel, members: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
+    fn modulated(
+        &self,
+        channel: &Channel,
+        members: &[EffectSpec],
+        base: &Linearisation,
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
         let Some(first) = members.first() else { return Ok(Vec::new()) };
         let like = self.candidates(std::slice::from_ref(first))?;
         let Some(like) = like.first() else { return Ok(Vec::new()) };
@@ -244,8 +250,9 @@ impl View<'_> {
         let joint = first.target.unwrap_or_default();
         let at = |member: &EffectSpec| {
             let frequency = member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1);
-            let basis = DMatrix::from_fn(self.observations.len(), 2, |i, k| {
-                let (sine, cosine) = (frequency * self.observations[i].joint_rad[joint]).sin_cos();
+            let turned: Vec<f64> = self.poses(base).map(|o| frequency * o.joint_rad[joint]).collect();
+            let basis = DMatrix::from_fn(turned.len(), 2, |i, k| {
+                let (sine, cosine) = turned[i].sin_cos();
                 like.amplitudes[k].typical * if k == 0 { sine } else { cosine }
             });
             Candidate {
@@ -258,43 +265,55 @@ impl View<'_> {
         Ok(members.iter().map(at).collect())
     }
 
+    /// One observation of each pose: what it says of the arm holds of all of them.
+    fn poses<'l>(&self, linear: &'l Linearisation) -> impl Iterator<Item = &'l Observation>
+    where
+        Self: 'l,
+    {
+        linear.poses.iter().map(|pose| &self.observations[pose.observations.start])
+    }
+
     /// Where the unknown may enter: a joint, a length of the chain, the twist between two axes, a displacement.
     fn channels(&self, linear: &Linearisation) -> Vec<Channel> {
-        // One linearisation an observation serves all joints, one all lengths and twists.
-        let turns = self.each(|o| self.model.joint_jacobian(self.values, o));
+        // One linearisation an observation serves all joints, one all lengths and twists. They are of measured - predicted.
+        let turns = self.each(|o| self.model.residual_with_joint_jacobian(self.values, o).1);
         let moves = self.each(|o| self.model.residual_with_jacobian(self.values, o).1);
+        let column =
+            |of: &DMatrix<f64>, i: usize, c: usize| -of.view((0, c), (linear.rows[i].len(), 1)).column(0);
         let joint = |j: usize| Channel {
             name: format!("joint{}", j + 1),
             unit: Unit::Radian,
             axes: vec![format!("q{}", j + 1)],
-            columns: self.displaced(linear, 1, |i, _| turns[i].column(j).into_owned()),
+            columns: whitened(linear, 1, |i, _| column(&turns[i], i, j)),
         };
         let joints: Vec<Channel> = (0..self.model.joint_count()).map(joint).collect();
         let chain = self.model.chain().parameters().iter().enumerate().filter(|(_, p)| {
             let length = p.unit == Unit::Metre && p.nominal.abs() > SHORTEST_M;
             length || p.name.ends_with(".alpha")
         });
-        let parameters = chain.map(|(index, p)| {
-            // The jacobian is that of measured - predicted.
-            let columns =
-                self.displaced(linear, 1, |i, _| -moves[i].fixed_view::<3, 1>(0, index).into_owned());
-            Channel { name: p.name.clone(), axes: vec![p.name.clone()], unit: p.unit, columns }
+        let parameters = chain.map(|(index, p)| Channel {
+            name: p.name.clone(),
+            axes: vec![p.name.clone()],
+            unit: p.unit,
+            columns: whitened(linear, 1, |i, _| column(&moves[i], i, index)),
         });
         let parameters: Vec<Channel> = parameters.collect();
         let lengths_m = self.model.lengths_m();
-        let grown =
-            |i: usize, _| lengths_m.iter().map(|(k, m)| -moves[i].fixed_view::<3, 1>(0, *k) * *m).sum();
+        let grown = |i: usize, _| {
+            let none = DVector::zeros(linear.rows[i].len());
+            lengths_m.iter().fold(none, |sum, (k, m)| sum + column(&moves[i], i, *k) * *m)
+        };
         let lengths = Channel {
             name: "lengths".to_owned(),
             axes: vec!["lengths".to_owned()],
             unit: Unit::One,
-            columns: self.displaced(linear, 1, grown),
+            columns: whitened(linear, 1, grown),
         };
         let world = Channel {
             name: "world".to_owned(),
             axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
             unit: Unit::Metre,
-            columns: self.displaced(linear, 3, |_, axis| Matrix3::identity().column(axis).into_owned()),
+            columns: whitened(linear, 3, |i, axis| displaced(linear, i, &Vector3::ith(axis, 1.0))),
         };
         let tilts = self.tilts(linear);
         let belts = self.belts(&joints);
@@ -314,24 +333,29 @@ impl View<'_> {
         let tilt = |arm: usize| {
             let centre = self.model.arm_base_in_world(self.values, arm).translation.vector;
             let rocked = |i: usize, axis: usize| {
-                let (o, axis) = (&self.observations[i], Matrix3::identity().column(axis).into_owned());
-                match o.reference {
+                let (o, about) = (&self.observations[i], Vector3::ith(axis, 1.0));
+                let moved = match o.reference {
                     // The other tip is that of this arm: it moves away from where it was.
                     Reference::Joined { to, .. } if self.model.arm_of(to) == arm => {
-                        axis.cross(&(centre - self.model.measured_tip_in_world(self.values, o)))
+                        about.cross(&(centre - self.model.measured_tip_in_world(self.values, o)))
                     }
                     _ if self.model.arm_of(o.feature) == arm => {
-                        axis.cross(&(self.model.predicted_tip_in_world(self.values, o) - centre))
+                        about.cross(&(self.model.predicted_tip_in_world(self.values, o) - centre))
                     }
                     _ => Vector3::zeros(),
+                };
+                let mut rows = displaced(linear, i, &moved);
+                if rows.len() == 6 {
+                    rows.rows_mut(3, 3).copy_from(&about);
                 }
+                rows
             };
             let of = arms.get(arm).map_or_else(String::new, |arm| format!(" of {}", arm.name));
             Channel {
                 name: format!("tilt of the base{of}"),
                 axes: Vec::new(),
                 unit: Unit::Radian,
-                columns: self.displaced(linear, 2, rocked),
+                columns: whitened(linear, 2, rocked),
             }
         };
         (0..arms.len().max(1)).map(tilt).collect()
@@ -359,58 +383,91 @@ impl View<'_> {
         self.observations.iter().map(of).collect()
     }
 
-    /// Whitened columns from displacements of the tip in the world; orientations are left as they are.
-    fn displaced(
-        &self,
-        linear: &Linearisation,
-        axes: usize,
-        displacement_m: impl Fn(usize, usize) -> nalgebra::Vector3<f64>,
-    ) -> Arc<DMatrix<f64>> {
-        let mut columns = DMatrix::zeros(linear.residual.len(), axes);
-        for (i, rows) in linear.rows.iter().enumerate() {
-            for axis in 0..axes {
-                let white = linear.whitener[i].columns(0, 3) * displacement_m(i, axis);
-                columns.view_mut((rows.start, axis), (rows.len(), 1)).copy_from(&white);
-            }
-        }
-        Arc::new(columns)
-    }
-
     fn dwells(&self, linear: &Linearisation) -> Vec<DwellRow> {
-        let places = places(self.observations);
-        let rows = self.observations.iter().zip(&linear.rows).zip(&linear.whitener).enumerate();
-        rows.map(|(i, ((o, rows), whitener))| {
+        let firsts: Vec<&Observation> = self.poses(linear).collect();
+        let places = places(&firsts);
+        let of = |(pose, place): (&LinearPose, Option<String>)| {
+            let all = &self.observations[pose.observations.clone()];
+            let o = &all[0];
             let drivers = self.model.drivers(self.session, o);
-            let sigma_m = (o.covariance_m2.trace() / 3.0).sqrt();
-            let axes = match &o.reference {
-                Reference::Seated { .. } => self.model.board_in_world(self.values, o.dwell.recording),
-                Reference::Tracked { .. } | Reference::Joined { .. } => None,
-            };
+            let held = all.iter().any(|o| o.cavity().is_some());
+            let of_place: Vec<bool> = all.iter().map(|o| o.cavity().is_some() == held).collect();
+            let board = if held { self.model.board_in_world(self.values, o.dwell.recording) } else { None };
             let axes =
-                axes.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());
+                board.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());
+            let variances =
+                all.iter().zip(&of_place).filter(|(_, of)| **of).map(|(o, _)| o.covariance_m2.trace());
+            let count = of_place.iter().filter(|of| **of).count();
+            let sigma_m = (variances.sum::<f64>() / (3 * count) as f64).sqrt();
+            let along = |axes: &Matrix3<f64>, those: &dyn Fn(usize) -> bool| {
+                let mut raw = DMatrix::zeros(pose.rows.len(), 3);
+                for (_, i) in pose.observations.clone().enumerate().filter(|(k, _)| those(*k)) {
+                    let at = linear.rows[i].start - pose.rows.start;
+                    raw.rows_mut(at, linear.rows[i].len()).copy_from(&linear.to_metres[i].tr_mul(axes));
+                }
+                &pose.whitener * raw
+            };
             DwellRow {
                 id: o.dwell,
-                first_row: rows.start,
-                rows: rows.len(),
+                first_row: pose.rows.start,
+                rows: pose.rows.len(),
+                parts: parts(linear, pose, all),
                 time_s: drivers.time_s,
                 joint_rad: o.joint_rad.clone(),
                 arrival: drivers.arrival.clone(),
                 torque_nm: drivers.torque.iter().map(|t| t.total_nm()).collect(),
                 load_kg: o.load_kg,
                 temperature_c: o.temperature_c,
-                place: places[i].clone(),
-                tracked: o.cavity().is_none(),
-                seat: whitener.columns(0, 3) * DMatrix::from_column_slice(3, 3, axes.as_slice()) * sigma_m,
-                metres: metres(whitener),
+                place,
+                displaced: along(&Matrix3::identity(), &|_| true),
+                seat: along(&axes, &|k| of_place[k]) * sigma_m,
             }
-        })
-        .collect()
+        };
+        linear.poses.iter().zip(places).map(of).collect()
     }
 }
 
-/// Inverse of the first three rows' whitener.
-fn metres(whitener: &DMatrix<f64>) -> Matrix3<f64> {
-    whitener.fixed_view::<3, 3>(0, 0).try_inverse().unwrap_or_else(Matrix3::zeros)
+/// Whitened columns from what they do to the rows of each observation.
+fn whitened(
+    linear: &Linearisation,
+    axes: usize,
+    raw: impl Fn(usize, usize) -> DVector<f64>,
+) -> Arc<DMatrix<f64>> {
+    let mut columns = DMatrix::zeros(linear.residual.len(), axes);
+    for pose in &linear.poses {
+        for axis in 0..axes {
+            let mut own = DVector::zeros(pose.rows.len());
+            for i in pose.observations.clone() {
+                let rows = &linear.rows[i];
+                own.rows_mut(rows.start - pose.rows.start, rows.len()).copy_from(&raw(i, axis));
+            }
+            columns
+                .view_mut((pose.rows.start, axis), (pose.rows.len(), 1))
+                .copy_from(&(&pose.whitener * own));
+        }
+    }
+    Arc::new(columns)
+}
+
+/// What a displacement in the world [m] of what an observation measured does to its rows; it turns nothing.
+fn displaced(linear: &Linearisation, observation: usize, by_m: &Vector3<f64>) -> DVector<f64> {
+    linear.to_metres[observation].tr_mul(by_m)
+}
+
+/// What was measured in a pose, and what its whitened rows are in metres.
+fn parts(linear: &Linearisation, pose: &LinearPose, observations: &[Observation]) -> Vec<Part> {
+    let raw = pose.whitener.clone().try_inverse();
+    let raw = raw.unwrap_or_else(|| DMatrix::zeros(pose.rows.len(), pose.rows.len()));
+    let part = |(i, o): (usize, &Observation)| {
+        let rows = &linear.rows[i];
+        Part {
+            feature: o.feature,
+            rows: rows.len(),
+            tracked: o.cavity().is_none(),
+            metres: &linear.to_metres[i] * raw.rows(rows.start - pose.rows.start, rows.len()),
+        }
+    };
+    pose.observations.clone().zip(observations).map(part).collect()
 }
 
 fn words(since: &Since) -> String {

@@ -9,8 +9,9 @@
 //! exactly for all terms).
 
 use crate::noise::Noise;
-use crate::problem::{DwellRow, Problem};
+use crate::problem::{DwellRow, Part, Problem};
 use armcal_calibrate::{gram, inner};
+use armcal_core::{DwellId, FeatureId};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -64,11 +65,11 @@ impl Whitener {
             Noise::Slack(_) => {
                 noise.direction(problem).map_or_else(|| Whitener::then([]), |v| slack(&v, problem, b))
             }
-            Noise::Tracked => scaled(problem, 1.0 + b * b, |dwell| dwell.tracked),
+            Noise::Tracked => scaled(problem, 1.0 + b * b, |_, part| part.tracked),
             Noise::TrackedAndPlace => Whitener::then(
                 [(Noise::Tracked, b), (Noise::Place, 1.0)].map(|(n, b)| Whitener::new(n, b, problem)),
             ),
-            Noise::Seated => scaled(problem, 1.0 + b * b, |dwell| !dwell.tracked),
+            Noise::Seated => scaled(problem, 1.0 + b * b, |_, part| !part.tracked),
         }
     }
 
@@ -125,7 +126,9 @@ fn innovations(filters: &[Filter], columns: &mut DMatrix<f64>) {
 /// `C = D (C_sensor + Z Z') D`: seated rows, half their variance the place's, are scaled back to the declared noise.
 fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
     let memory = memory(problem, sensor(b));
-    let seated: Vec<&DwellRow> = problem.dwells.iter().filter(|d| !d.tracked && d.place.is_some()).collect();
+    let held = |d: &DwellRow, part: &Part| !part.tracked && d.place.is_some();
+    let is_held = |d: &&DwellRow| d.parts.iter().any(|part| held(d, part));
+    let seated: Vec<&DwellRow> = problem.dwells.iter().filter(is_held).collect();
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
     for d in &seated {
         let next = place.len();
@@ -139,7 +142,7 @@ fn sensor_and_place(problem: &Problem, b: f64) -> Whitener {
     memory.apply(&mut shared);
     let (p, ln_det) = shares(&shared, 1.0);
     let places = Whitener { kind: Kind::Groups(1.0, vec![((0..problem.rows()).collect(), p)]), ln_det };
-    let halved = scaled(problem, 0.5, |d| !d.tracked && d.place.is_some());
+    let halved = scaled(problem, 0.5, held);
     Whitener::then([halved, memory, places])
 }
 
@@ -157,13 +160,15 @@ fn shares(z: &DMatrix<f64>, b: f64) -> (DMatrix<f64>, f64) {
     (p, ln_det)
 }
 
-/// This variance in some of the dwells, one in the others.
-fn scaled(problem: &Problem, variance: f64, those: impl Fn(&DwellRow) -> bool) -> Whitener {
+/// This variance of some of what was measured, one of the rest.
+fn scaled(problem: &Problem, variance: f64, those: impl Fn(&DwellRow, &Part) -> bool) -> Whitener {
     let mut factors = DVector::from_element(problem.rows(), 1.0);
     let mut ln_det = 0.0;
-    for dwell in problem.dwells.iter().filter(|d| those(d)) {
-        factors.rows_mut(dwell.first_row, dwell.rows).fill(variance.sqrt().recip());
-        ln_det += dwell.rows as f64 * variance.ln();
+    for dwell in &problem.dwells {
+        for (_, rows) in dwell.ranges().filter(|(part, _)| those(dwell, part)) {
+            ln_det += rows.len() as f64 * variance.ln();
+            factors.rows_mut(rows.start, rows.len()).fill(variance.sqrt().recip());
+        }
     }
     Whitener { kind: Kind::Rows(factors), ln_det }
 }
@@ -206,42 +211,61 @@ fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
     Whitener { kind: Kind::Groups((1.0 + b * b).sqrt(), groups), ln_det }
 }
 
-/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2, seen with unit noise; reset at each recording.
-fn memory(problem: &Problem, shares: impl Fn(&DwellRow) -> Share) -> Whitener {
+/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2 for each row of each feature, seen with unit noise; reset at each
+/// recording.
+fn memory(problem: &Problem, shares: impl Fn(&Part) -> Share) -> Whitener {
     let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
     order.sort_by_key(|i| problem.dwells[*i].id);
-    let axes = problem.dwells.iter().map(|d| d.rows).max().unwrap_or(0);
-    let mut variance = vec![1.0; axes];
+    let mut states: BTreeMap<(FeatureId, usize), State> = BTreeMap::new();
     let (mut filters, mut ln_det) = (Vec::new(), 0.0);
-    let mut last: Option<&DwellRow> = None;
     for i in order {
         let dwell = &problem.dwells[i];
-        let gap = match last {
-            Some(l) if l.id.recording == dwell.id.recording => dwell.id.dwell.abs_diff(l.id.dwell) as f64,
-            _ => f64::INFINITY,
-        };
-        let decay = (-gap / MEMORY_DWELLS).exp();
-        let Share { load, unit } = shares(dwell);
-        for (axis, state) in variance.iter_mut().enumerate() {
-            let predicted = decay * decay * *state + (1.0 - decay * decay);
-            *state = predicted;
-            if axis < dwell.rows {
+        for (part, rows) in dwell.ranges() {
+            let Share { load, unit } = shares(part);
+            for (axis, row) in rows.enumerate() {
+                let next = states.len();
+                let state = states.entry((part.feature, axis)).or_insert(State::new(next));
+                let decay = state.decay_to(dwell.id);
+                let predicted = decay * decay * state.variance + (1.0 - decay * decay);
                 let innovation = load * load * predicted + 1.0;
                 let gain = load * predicted / innovation;
-                *state = predicted * (1.0 - gain * load);
+                state.variance = predicted * (1.0 - gain * load);
+                state.last = Some(dwell.id);
                 ln_det += (innovation / unit).ln();
                 let (scale, weight) = (unit.sqrt(), innovation.sqrt().recip());
-                filters.push(Filter { row: dwell.first_row + axis, axis, scale, decay, load, gain, weight });
+                filters.push(Filter { row, axis: state.axis, scale, decay, load, gain, weight });
             }
         }
-        last = Some(dwell);
     }
     Whitener { kind: Kind::Memory(filters), ln_det }
 }
 
+/// What is remembered along one axis.
+struct State {
+    axis: usize,
+    variance: f64,
+    /// The dwell that showed it last.
+    last: Option<DwellId>,
+}
+
+impl State {
+    fn new(axis: usize) -> State {
+        State { axis, variance: 1.0, last: None }
+    }
+
+    /// The share that is left of it in a dwell.
+    fn decay_to(&self, dwell: DwellId) -> f64 {
+        let gap = match self.last {
+            Some(last) if last.recording == dwell.recording => dwell.dwell.abs_diff(last.dwell) as f64,
+            _ => f64::INFINITY,
+        };
+        (-gap / MEMORY_DWELLS).exp()
+    }
+}
+
 /// Tracked dwells wander on top of what is declared for them; half the noise of seated ones remembers.
-fn sensor(b: f64) -> impl Fn(&DwellRow) -> Share {
-    move |dwell| match dwell.tracked {
+fn sensor(b: f64) -> impl Fn(&Part) -> Share {
+    move |part| match part.tracked {
         true => Share { load: b, unit: 1.0 },
         false => Share::of_declared(1.0),
     }

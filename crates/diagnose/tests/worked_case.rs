@@ -3,12 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use armcal_core::{DwellId, Unit};
+use armcal_core::{DwellId, FeatureId, Unit};
 use armcal_diagnose::{
-    Amplitude, Candidate, Columns, Diagnosis, DiagnosisConfig, DwellRow, LinearRefit, Problem, Toggle,
+    Amplitude, Candidate, Columns, Diagnosis, DiagnosisConfig, DwellRow, LinearRefit, Part, Problem, Toggle,
     Verdict, diagnose_problem,
 };
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::sync::Arc;
 
 /// Measured minus predicted along the slide, arriving forwards and backwards at the same eight stops [mm].
@@ -31,6 +31,12 @@ fn problem() -> Problem {
         id: DwellId { recording: 0, dwell: i },
         first_row: 3 * i,
         rows: 3,
+        parts: vec![Part {
+            feature: FeatureId::TIP,
+            rows: 3,
+            tracked: true,
+            metres: Matrix3xX::identity(3) * (SIGMA_MM * 1e-3),
+        }],
         time_s: 10.0 * i as f64,
         joint_rad: vec![q],
         arrival: vec![s],
@@ -38,9 +44,8 @@ fn problem() -> Problem {
         load_kg: 0.0,
         temperature_c: None,
         place: None,
-        tracked: true,
+        displaced: DMatrix::identity(3, 3) / (SIGMA_MM * 1e-3),
         seat: DMatrix::identity(3, 3),
-        metres: Matrix3::identity() * (SIGMA_MM * 1e-3),
     };
     // Along the slide only, in units of the declared noise.
     let along = |of: &dyn Fn((f64, f64, f64)) -> f64| {

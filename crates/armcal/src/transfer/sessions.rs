@@ -13,7 +13,7 @@ use crate::stages::{frames, perceive};
 use crate::story::{self, Fitted, Settled, with_effects};
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::{DwellId, Warning};
-use armcal_diagnose::{HeldOut, compare_errors};
+use armcal_diagnose::{HeldOut, compare_errors, mean_by_dwell};
 use armcal_model::EffectSpec;
 use armcal_report::PastArms;
 use rayon::prelude::*;
@@ -195,7 +195,9 @@ impl Carrier<'_> {
         let mut warnings = placed.fit_frames(self.to, judging)?;
         warnings.append(&mut placed.warnings);
         let errors = |values: &[f64]| -> Errors {
-            judging.iter().map(|o| (o.dwell, placed.model.residual(values, o).position_m.norm())).collect()
+            mean_by_dwell(
+                judging.iter().map(|o| (o.dwell, placed.model.residual(values, o).position_m.norm())),
+            )
         };
         Ok(CarriedOver {
             nominal_errors_m: errors(&placed.nominal),

@@ -7,9 +7,9 @@ mod effects;
 
 pub use effects::{Effect, Listed, catalogue, on_joint, outside, torque};
 
-use armcal_core::{DwellId, Unit};
-use armcal_diagnose::{Amplitude, Candidate, Channel, Columns, DwellRow, Problem, Scan, Toggle};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
+use armcal_core::{DwellId, FeatureId, Unit};
+use armcal_diagnose::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan, Toggle};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix4, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StudentT};
@@ -194,6 +194,12 @@ pub fn problem(
             id: DwellId { recording: p.recording, dwell: p.dwell },
             first_row: 3 * i,
             rows: 3,
+            parts: vec![Part {
+                feature: FeatureId::TIP,
+                rows: 3,
+                tracked: p.place.is_none(),
+                metres: Matrix3xX::identity(3) * SIGMA_M,
+            }],
             time_s: p.time,
             joint_rad: p.q.to_vec(),
             arrival: p.s.to_vec(),
@@ -201,9 +207,8 @@ pub fn problem(
             load_kg: p.load,
             temperature_c: Option::None,
             place: p.place.clone(),
-            tracked: p.place.is_none(),
+            displaced: DMatrix::identity(3, 3) / SIGMA_M,
             seat: DMatrix::identity(3, 3),
-            metres: Matrix3::identity() * SIGMA_M,
         })
         .collect();
     let columns = |m: usize, f: &dyn Fn(&Pose, usize) -> Vector3<f64>| {

@@ -94,7 +94,7 @@ pub fn synthetic() -> Synthetic {
     let run = Run {
         pipeline_name: "three tilts".into(),
         pipeline_text: PIPELINE.into(),
-        model_text: DH.into(),
+        model_texts: vec![DH.into()],
         recordings: runs,
         board: Some(board),
         model,

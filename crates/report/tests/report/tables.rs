@@ -120,7 +120,7 @@ fn with_urdf(tip: Frame) -> Synthetic {
     });
     s.run.calibration.fit.estimates = estimates.collect();
     s.run.calibration.nominal_values = model.nominal();
-    s.run.model_text = URDF.into();
+    s.run.model_texts = vec![URDF.into()];
     s.run.model = model;
     s
 }
