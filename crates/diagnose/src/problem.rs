@@ -94,8 +94,9 @@ impl DwellRow {
 
     /// Declared variance of a coordinate [m^2], mean over what was measured.
     fn variance_m2(&self) -> f64 {
-        self.parts.iter().map(|part| part.metres.norm_squared()).sum::<f64>()
-            / (3 * self.parts.len().max(1)) as f64
+        // Of a distance one coordinate is known.
+        let coordinates = self.parts.iter().map(|part| part.rows.min(3)).sum::<usize>();
+        self.parts.iter().map(|part| part.metres.norm_squared()).sum::<f64>() / coordinates.max(1) as f64
     }
 
     /// About how far columns displace what was measured in it, squared [m^2]: the sum over the columns, mean over its parts.

@@ -463,7 +463,7 @@ fn parts(linear: &Linearisation, pose: &LinearPose, observations: &[Observation]
         Part {
             feature: o.feature,
             rows: rows.len(),
-            tracked: o.cavity().is_none(),
+            tracked: o.is_tracked(),
             metres: &linear.to_metres[i] * raw.rows(rows.start - pose.rows.start, rows.len()),
         }
     };

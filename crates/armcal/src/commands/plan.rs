@@ -203,6 +203,7 @@ fn place(dwell: &Proposed) -> String {
             format!("{cavity} (board as in {recording}), {way}")
         }
         Place::Free => "free pose".to_owned(),
+        Place::Joined => "tips joined".to_owned(),
         Place::Again { dwell } => format!("again: {dwell}"),
     }
 }

@@ -320,6 +320,9 @@ fn assumptions(known: &Known<'_>, allowed: &Allowed) -> Vec<String> {
             "a sensor sees the tip away from the board with {:.3} mm per axis",
             (t.covariance_m2.trace() / 3.0).sqrt() * 1e3
         )),
+        None if known.observations.iter().any(armcal_core::Observation::is_joined) => {
+            all.push("the tips are joined in every dwell, as they were".to_owned());
+        }
         None => all.push("no tip stream: only cavities of the board can be visited".to_owned()),
     }
     all.push("the noise is as declared, and sizes are those the data ask for, else typical ones".to_owned());

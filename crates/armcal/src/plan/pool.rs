@@ -1,6 +1,6 @@
 //! Every dwell the rig could do next, as the observation it would become.
 
-use super::reach::{Limits, joint_step, nearest, solve};
+use super::reach::{Limits, close, joint_step, nearest, solve};
 use super::{Allowed, Known, Tracking};
 use armcal_core::{Arrival, DwellId, Observation, Reference};
 use armcal_model::EffectSpec;
@@ -44,6 +44,8 @@ pub enum Place {
     },
     /// Away from the board, seen by the sensor.
     Free,
+    /// Both tips joined, both arms as the readings say.
+    Joined,
     /// A recorded free pose once more.
     Again {
         /// The recorded dwell.
@@ -70,6 +72,7 @@ pub fn pool(known: &Known<'_>, limits: &Limits, allowed: &Allowed, rivals: &[Eff
     let mut places = seated(known, limits, event);
     let step = (places.len() * loads_kg.len()).div_ceil(MOST_SEATED).max(1);
     places = places.into_iter().step_by(step).collect();
+    places.extend(joined(known, limits));
     places.extend(known.tracked.iter().flat_map(|tracking| free(known, limits, tracking)));
     let mut pool = Vec::new();
     for load_kg in loads_kg {
@@ -136,11 +139,7 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
         if poses.len() == POSES {
             break;
         }
-        let inner = |(joint, [low, high]): (usize, &[f64; 2])| {
-            let away = AWAY_RAD.min((high - low) / 4.0);
-            low + away + radical_inverse(draw, prime(joint)) * (high - low - 2.0 * away)
-        };
-        let joint_rad: Vec<f64> = limits.0.iter().enumerate().map(inner).collect();
+        let joint_rad = limits.drawn(draw, AWAY_RAD);
         if keep.clear(known, &joint_rad) {
             poses.push((Place::Free, joint_rad));
         }
@@ -171,6 +170,27 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
         for arrival in sides(at.joint_rad.len(), i) {
             all.push(Possible { place: place.clone(), observation: arriving(&at, arrival) });
         }
+    }
+    all
+}
+
+/// Poses of both arms spread over the joint ranges (Halton points), from each of which the tips are brought together, from every
+/// side.
+fn joined(known: &Known<'_>, limits: &Limits) -> Vec<Possible> {
+    let last = known.session.recordings.saturating_sub(1);
+    let Some(like) = known.observations.iter().rfind(|o| o.is_joined()) else { return Vec::new() };
+    let clear = AWAY_RAD / 2.0;
+    let closed = |draw: usize| {
+        let from = later(known, like, last, limits.drawn(draw, AWAY_RAD));
+        close(known, &from).filter(|q| limits.hold(q, clear))
+    };
+    let mut all = Vec::new();
+    for (pose, joint_rad) in (1..=DRAWS).filter_map(closed).take(2 * POSES).enumerate() {
+        let at = later(known, like, last, joint_rad);
+        let sides = sides(at.joint_rad.len(), pose).into_iter();
+        all.extend(
+            sides.map(|arrival| Possible { place: Place::Joined, observation: arriving(&at, arrival) }),
+        );
     }
     all
 }
@@ -275,22 +295,6 @@ fn side_of(turn_rad: f64) -> Arrival {
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-/// The digits of `n` in a base, mirrored at the point: the van der Corput sequence.
-fn radical_inverse(mut n: usize, base: usize) -> f64 {
-    let (mut value, mut weight) = (0.0, 1.0 / base as f64);
-    while n > 0 {
-        value += (n % base) as f64 * weight;
-        n /= base;
-        weight /= base as f64;
-    }
-    value
-}
-
-fn prime(index: usize) -> usize {
-    let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
-    (2..).filter(is_prime).nth(index).unwrap_or(2)
 }
 
 #[cfg(test)]

@@ -35,6 +35,15 @@ impl Limits {
         Limits((0..known.model.joint_count()).map(range).collect())
     }
 
+    /// The `draw`th of readings spread evenly over the ranges (Halton 1960), `away_rad` from their ends where there is room.
+    pub fn drawn(&self, draw: usize, away_rad: f64) -> Vec<f64> {
+        let inner = |(joint, [low, high]): (usize, &[f64; 2])| {
+            let away = away_rad.min((high - low) / 4.0);
+            low + away + radical_inverse(draw, prime(joint)) * (high - low - 2.0 * away)
+        };
+        self.0.iter().enumerate().map(inner).collect()
+    }
+
     /// Whether every joint keeps `clear_rad` away from the ends of its range.
     pub fn hold(&self, joint_rad: &[f64], clear_rad: f64) -> bool {
         joint_rad.iter().zip(&self.0).all(|(q, [low, high])| *q >= low + clear_rad && *q <= high - clear_rad)
@@ -70,4 +79,36 @@ pub fn joint_step(known: &Known<'_>, at: &Observation, way_m: &Vector3<f64>) -> 
     let damping = DAMPING_M * way_m.norm().min(1.0);
     let square = &jacobian * jacobian.transpose() + Matrix3::identity() * (damping * damping + 1e-10);
     Some(jacobian.transpose() * (square.try_inverse()? * way_m))
+}
+
+/// Joint readings of both arms that bring their tips together, or as far apart as their link is, near where `from` has them;
+/// `None` where they do not meet.
+pub fn close(known: &Known<'_>, from: &Observation) -> Option<Vec<f64>> {
+    let mut at = from.clone();
+    for _ in 0..STEPS {
+        let open_m = known.model.residual(&known.values, &at).position_m;
+        if open_m.norm() < ARRIVED_M {
+            return Some(at.joint_rad);
+        }
+        let step = joint_step(known, &at, &open_m)?;
+        let shrink = (LARGEST_STEP_RAD / step.amax()).min(1.0);
+        at.joint_rad.iter_mut().zip(step.iter()).for_each(|(q, dq)| *q += shrink * dq);
+    }
+    None
+}
+
+/// The digits of `n` in a base, mirrored at the point: the van der Corput sequence.
+fn radical_inverse(mut n: usize, base: usize) -> f64 {
+    let (mut value, mut weight) = (0.0, 1.0 / base as f64);
+    while n > 0 {
+        value += (n % base) as f64 * weight;
+        n /= base;
+        weight /= base as f64;
+    }
+    value
+}
+
+fn prime(index: usize) -> usize {
+    let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
+    (2..).filter(is_prime).nth(index).unwrap_or(2)
 }

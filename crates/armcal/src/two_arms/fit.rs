@@ -11,7 +11,7 @@ use armcal_calibrate::{
 };
 use armcal_core::{FeatureId, Observation, Parameter, Reference, Rejection, Role};
 use armcal_model::Model;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Which dwells are joined and where the other base is depend on each other; so do fit and outliers.
 const MAX_ROUNDS: usize = 5;
@@ -19,6 +19,10 @@ const MAX_ROUNDS: usize = 5;
 const OPEN_FACTOR: f64 = 10.0;
 /// An arm none of whose joints moves by as much is not led through poses [rad]: 1 deg.
 const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
+
+/// Tips that are spread over less than this share of their distance from the base are not led through poses: whatever is wrong with
+/// the arms, they close.
+const LEAST_SPREAD: f64 = 0.03;
 
 /// Calibrates both arms on the dwells in which their tips are joined.
 ///
@@ -79,6 +83,7 @@ impl Search<'_> {
         let joined = self.chosen(&near);
         self.enough(&joined)?;
         self.check_both_move(geometry, &joined)?;
+        check_spread(geometry, &joined)?;
         Ok(near)
     }
 
@@ -169,6 +174,30 @@ impl Search<'_> {
         );
         Err(Error::TwoArms { problem })
     }
+}
+
+/// Refuses arms whose tips hardly move: readings in another unit close as well as any.
+fn check_spread(geometry: &Model, joined: &[Observation]) -> Result<(), Error> {
+    let p = geometry.nominal();
+    for (at, arm) in geometry.chain().arms().iter().enumerate() {
+        let tip_m =
+            |o: &Observation| geometry.feature_in_base(&p, FeatureId(at), &o.joint_rad).translation.vector;
+        let tips_m: Vec<Vector3<f64>> = joined.iter().map(tip_m).collect();
+        let mean_m = tips_m.iter().sum::<Vector3<f64>>() / tips_m.len() as f64;
+        let square = tips_m.iter().map(|m| (m - mean_m).norm_squared()).sum::<f64>() / tips_m.len() as f64;
+        let reach_m = tips_m.iter().map(|m| m.norm()).fold(0.0, f64::max);
+        if square.sqrt() < LEAST_SPREAD * reach_m {
+            let problem = format!(
+                "the tip of the {} arm is within {:.1} mm of one point in all joined dwells, {:.0} mm from its base: lead both arms \
+                 through poses that differ more, or check the unit of its readings",
+                arm.name,
+                square.sqrt() * 1e3,
+                reach_m * 1e3
+            );
+            return Err(Error::TwoArms { problem });
+        }
+    }
+    Ok(())
 }
 
 /// How far the joined tips are from where each arm puts the other [m].

@@ -1,7 +1,9 @@
 //! The lab file of two arms: recognised by its `[[arms]]`.
 
+use super::drives::acts_on_drives;
 use crate::LabError;
 use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, positive, range, value};
+use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -54,6 +56,12 @@ pub struct PairArmConfig {
     pub home_deg: Vec<f64>,
     /// Its encoders and their topic.
     pub joints: EncoderConfig,
+    /// Mass of each link, which hangs on what is in the drives [kg]. Default 2.
+    #[serde(default = "default_link_kg", skip_serializing_if = "is_default_link")]
+    pub link_kg: f64,
+    /// What is hidden in its drives and encoders; in recordings only ([`super::simulate`]).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mechanisms: Vec<MechanismConfig>,
 }
 
 /// How the tips are joined.
@@ -121,7 +129,7 @@ impl PairConfig {
 
     /// Checks every value the simulation divides by, indexes with or waits for.
     pub fn check(&self) -> Result<(), LabError> {
-        self.arms.iter().try_for_each(PairArmConfig::check)?;
+        self.arms.iter().try_for_each(|arm| arm.check(self.recordings.len()))?;
         if self.arms[0].name == self.arms[1].name || self.arms[0].joints.topic == self.arms[1].joints.topic {
             return Err(value("arms", "the two need names and topics of their own".into()));
         }
@@ -154,7 +162,7 @@ impl PairConfig {
 }
 
 impl PairArmConfig {
-    fn check(&self) -> Result<(), LabError> {
+    fn check(&self, recordings: usize) -> Result<(), LabError> {
         let joints = self.rows.iter().filter(|row| row.joint).count();
         for (key, size) in
             [("arms.home_deg", self.home_deg.len()), ("arms.joints.names", self.joints.names.len())]
@@ -173,12 +181,25 @@ impl PairArmConfig {
         if !rows.chain(self.home_deg.iter().copied()).all(f64::is_finite) {
             return Err(value("arms", format!("`{}` has a number that is not finite", self.name)));
         }
+        not_negative("arms.link_kg", self.link_kg)?;
+        for (table, mechanism) in self.mechanisms.iter().enumerate() {
+            acts_on_drives(mechanism)?;
+            mechanism.hidden().check(&Keys { table, joints, recordings })?;
+        }
         not_negative("arms.deviation.length_mm", self.deviation.length_mm)?;
         not_negative("arms.deviation.angle_deg", self.deviation.angle_deg)?;
         not_negative("arms.placement_sigma_mm", self.placement_sigma_mm)?;
         not_negative("arms.placement_sigma_deg", self.placement_sigma_deg)?;
         self.joints.check()
     }
+}
+
+fn default_link_kg() -> f64 {
+    2.0
+}
+
+fn is_default_link(link_kg: &f64) -> bool {
+    *link_kg == default_link_kg()
 }
 
 fn default_start() -> u64 {

@@ -6,6 +6,7 @@
 //! [`observe`] goes the same way without streams: one mean reading of both arms a dwell.
 
 mod config;
+mod drives;
 mod motion;
 mod recorded;
 mod truth;
@@ -84,6 +85,10 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, La
 /// Observes a pair without recording it.
 pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
     config.check()?;
+    if config.arms.iter().any(|arm| !arm.mechanisms.is_empty()) {
+        let why = "what is in the drives depends on the way to a rest: simulate a recording".to_owned();
+        return Err(crate::config::value("arms.mechanisms", why));
+    }
     let pair = Pair::build(config);
     let mut truth = PairTruth::of_pair(config, &pair);
     let mut dwells = Vec::new();

@@ -1,5 +1,6 @@
 //! What the recorder sees of a pair: two joint state topics, each at its own instants.
 
+use super::drives::Drives;
 use super::motion::Motion;
 use super::{Pair, PairConfig};
 use crate::LabError;
@@ -45,6 +46,7 @@ fn joint_states(
     let mut noise = Stream::new(config.seed, Purpose::Encoder, stream);
     let draw = Stream::new(config.seed, Purpose::JointTransport, stream);
     let mut transport = Transport::new(&joints.transport, draw);
+    let mut drives = Drives::new(config, pair, recording, arm);
     let mut near = motion.phases[0].to_rad[arm].clone();
     let last = (motion.duration_s() * joints.rate_hz).floor() as u32;
     for sequence in 0..=last {
@@ -57,7 +59,8 @@ fn joint_states(
                 what: format!("the joined tips {time_s:.2} s after the start"),
                 short_by_mm: short_by_m * 1e3,
             })?;
-        let counts: Vec<f64> = near
+        let counts: Vec<f64> = drives
+            .reading(time_s, &near)
             .iter()
             .map(|angle| (angle / joints.count_rad() + noise.normal() * joints.noise_counts).round())
             .collect();

@@ -145,14 +145,14 @@ proptest! {
         let model = bare(dh(&text));
         prop_assume!(text.contains("standard"));
         let (p, q) = (model.nominal(), &q[..model.joint_count()]);
-        let frames = model.link_frames_in_base(&p, q);
-        let tip = frames[frames.len() - 1].1.translation.vector;
+        let frames = model.link_frames(&p, q);
+        let tip = frames[frames.len() - 1].in_base.translation.vector;
         let jacobian = model.joint_jacobian(&p, &seated(q, Vector3::zeros()));
         let kinds = text.lines().filter_map(|line| line.strip_prefix("joint = "));
         let mut column = 0;
         for (row, kind) in kinds.enumerate() {
             // Standard DH: the joint of a row turns about the z of the frame before it.
-            let before = &frames[row].1;
+            let before = &frames[row].in_base;
             let z = before.rotation * Vector3::z();
             let expected = match kind {
                 "\"revolute\"" => z.cross(&(tip - before.translation.vector)),
@@ -169,13 +169,13 @@ proptest! {
 fn urdf_joints_move_the_tip_like_the_geometric_jacobian() {
     let model = bare(urdf(oracles::MIXED, "base", "hand"));
     let (p, q) = (model.nominal(), [0.7, 0.25, -1.3]);
-    let frames = model.link_frames_in_base(&p, &q);
-    let tip = frames[frames.len() - 1].1.translation.vector;
+    let frames = model.link_frames(&p, &q);
+    let tip = frames[frames.len() - 1].in_base.translation.vector;
     let jacobian = model.joint_jacobian(&p, &seated(&q, Vector3::zeros()));
-    let turn = &frames[1].1;
+    let turn = &frames[1].in_base;
     let about = turn.rotation * Vector3::new(0.0, 0.6, 0.8);
     assert!((jacobian.column(0) - about.cross(&(tip - turn.translation.vector))).norm() < 1e-14);
-    let along = frames[2].1.rotation * Vector3::new(0.6, 0.0, 0.8);
+    let along = frames[2].in_base.rotation * Vector3::new(0.6, 0.0, 0.8);
     assert!((jacobian.column(1) - along).norm() < 1e-14);
     // The tip lies on the wrist's axis.
     assert!(jacobian.column(2).norm() < 1e-14);

@@ -130,8 +130,8 @@ fn a_urdf_with_every_kind_of_joint() {
     assert_eq!(model.chain().joint_names(), ["turn", "slide", "wrist"]);
     assert_pose(&nominal_tip(&model, &[0.7, 0.25, -1.3]), expected, "mixed");
     // The link of the fixed joint keeps its frame; the fixed joint has no parameters.
-    let frames = model.link_frames_in_base(&model.nominal(), &[0.0; 3]);
-    assert!(frames.iter().any(|(name, _)| name == "bracket"));
+    let frames = model.link_frames(&model.nominal(), &[0.0; 3]);
+    assert!(frames.iter().any(|frame| frame.name == "bracket"));
     assert!(model.index("mount.x").is_none() && model.index("slide.rz").is_some());
 }
 

@@ -85,11 +85,11 @@ fn every_entry_is_a_parameter_within_the_papers_bounds() {
 #[test]
 fn the_drawn_frames_lead_from_base_to_tip() {
     let model = bare(dh(RIGHT_ARM));
-    let frames = model.link_frames_in_base(&model.nominal(), &[0.0; 3]);
-    let names: Vec<&str> = frames.iter().map(|(name, _)| name.as_str()).collect();
+    let frames = model.link_frames(&model.nominal(), &[0.0; 3]);
+    let names: Vec<&str> = frames.iter().map(|frame| frame.name.as_str()).collect();
     assert_eq!(names, ["base", "joint1", "joint2", "joint3", "tool", "tip"]);
     // Shoulder 76 mm up, elbow 400 mm above it.
-    assert!((frames[1].1.translation.vector - Vector3::new(0.0, 0.0, 0.076)).norm() < 1e-15);
-    assert!((frames[2].1.translation.vector - Vector3::new(0.0, 0.0, 0.476)).norm() < 1e-15);
-    assert_eq!(frames[5].1.translation, model.tip_in_base(&model.nominal(), &[0.0; 3]).translation);
+    assert!((frames[1].in_base.translation.vector - Vector3::new(0.0, 0.0, 0.076)).norm() < 1e-15);
+    assert!((frames[2].in_base.translation.vector - Vector3::new(0.0, 0.0, 0.476)).norm() < 1e-15);
+    assert_eq!(frames[5].in_base.translation, model.tip_in_base(&model.nominal(), &[0.0; 3]).translation);
 }

@@ -1,4 +1,4 @@
-//! The page of a calibration without a diagnosis: of a pool, of two arms.
+//! The page of a calibration without a diagnosis: of a pool.
 //!
 //! It says what [`Overview`] holds, in the frame and with the scripts of all pages.
 

@@ -5,6 +5,7 @@ use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::DEGREES;
 use crate::setup::trial::{Change, Inputs};
 use armcal_core::{Parameter, Unit};
+use armcal_model::{Arm, Chain};
 
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
 /// A parameter on its bound is let go this many times as far.
@@ -35,40 +36,40 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             }
         }
     }
-    let of_unit = |unit: Unit| -> Vec<String> {
-        inputs.chain.parameters().iter().filter(|p| p.unit == unit).map(|p| p.name.clone()).collect()
-    };
-    for (unit, factor, words) in [
-        (Unit::Metre, 1e-3, "all lengths of the model a thousandth (micrometres given as millimetres)"),
-        (Unit::Metre, 1e3, "all lengths of the model a thousand times as long (metres given as millimetres)"),
-        (Unit::Metre, 0.1, "all lengths of the model a tenth"),
-        (Unit::Metre, 10.0, "all lengths of the model ten times as long (centimetres given as millimetres)"),
-        (Unit::Metre, 25.4, "all lengths of the model 25.4 times as long (inches given as millimetres)"),
-        (Unit::Metre, 1.0 / 25.4, "all lengths of the model divided by 25.4 (millimetres given as inches)"),
-        (Unit::Radian, DEGREES, "all angles of the model read as radians, not degrees"),
-        (Unit::Radian, 1.0 / DEGREES, "all angles of the model read as degrees, not radians"),
+    let files = files(&inputs.chain);
+    for (unit, factor, what, words) in [
+        (Unit::Metre, 1e-3, "lengths", "a thousandth (micrometres given as millimetres)"),
+        (Unit::Metre, 1e3, "lengths", "a thousand times as long (metres given as millimetres)"),
+        (Unit::Metre, 0.1, "lengths", "a tenth"),
+        (Unit::Metre, 10.0, "lengths", "ten times as long (centimetres given as millimetres)"),
+        (Unit::Metre, 25.4, "lengths", "25.4 times as long (inches given as millimetres)"),
+        (Unit::Metre, 1.0 / 25.4, "lengths", "divided by 25.4 (millimetres given as inches)"),
+        (Unit::Radian, DEGREES, "angles", "read as radians, not degrees"),
+        (Unit::Radian, 1.0 / DEGREES, "angles", "read as degrees, not radians"),
     ] {
-        let names = of_unit(unit);
-        if !names.is_empty() {
-            let change = words;
-            all.push(Hypothesis::new("model-unit", "the model", change, FILE, move |i| {
-                i.changes.extend(names.iter().map(|name| Change::nominal(name, factor, 0.0)));
-            }));
+        for (model, parameters) in &files {
+            let own = parameters.iter().filter(|p| p.unit == unit);
+            let names: Vec<String> = own.map(|p| p.name.clone()).collect();
+            if !names.is_empty() {
+                let change = format!("all {what} of {model} {words}");
+                all.push(Hypothesis::new("model-unit", model.clone(), change, FILE, move |i| {
+                    i.changes.extend(names.iter().map(|name| Change::nominal(name, factor, 0.0)));
+                }));
+            }
         }
     }
-    let mirrored: Vec<String> = inputs
-        .chain
-        .parameters()
-        .iter()
-        .filter(|p| [".d", ".alpha"].iter().any(|field| p.name.ends_with(field)))
-        .map(|p| p.name.clone())
-        .collect();
-    if !mirrored.is_empty() {
-        let change =
-            "the signs of every d and alpha of the DH table reversed (the arm mirrored: of the other hand)";
-        all.push(Hypothesis::new("model-mirrored", "the model", change, FILE, move |i| {
-            i.changes.extend(mirrored.iter().map(|name| Change::nominal(name, -1.0, 0.0)));
-        }));
+    for (model, parameters) in &files {
+        let own = parameters.iter().filter(|p| [".d", ".alpha"].iter().any(|field| p.name.ends_with(field)));
+        let mirrored: Vec<String> = own.map(|p| p.name.clone()).collect();
+        if !mirrored.is_empty() {
+            let of = if files.len() > 1 { format!(" of {model}") } else { String::new() };
+            let change = format!(
+                "the signs of every d and alpha of the DH table{of} reversed (the arm mirrored: of the other hand)"
+            );
+            all.push(Hypothesis::new("model-mirrored", model.clone(), change, FILE, move |i| {
+                i.changes.extend(mirrored.iter().map(|name| Change::nominal(name, -1.0, 0.0)));
+            }));
+        }
     }
     let exchanged = columns_exchanged(inputs.chain.parameters());
     if !exchanged.is_empty() {
@@ -112,29 +113,42 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     all
 }
 
+/// The parameters of each model file. Of two arms joined to each other no change of both files at once is tried: arms that are
+/// all smaller, or seen in a mirror, close just as well.
+fn files(chain: &Chain) -> Vec<(String, &[Parameter])> {
+    let of_arm =
+        |arm: &Arm| (format!("the model of {}", arm.name), &chain.parameters()[arm.parameters.clone()]);
+    match chain.arms() {
+        [] => vec![("the model".to_owned(), chain.parameters())],
+        arms => arms.iter().map(of_arm).collect(),
+    }
+}
+
 /// A model of another size, or of an arm with another tool. Rarer.
 pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
-    let parameters = inputs.chain.parameters();
-    let lengths: Vec<String> =
-        parameters.iter().filter(|p| p.unit == Unit::Metre).map(|p| p.name.clone()).collect();
-    if lengths.is_empty() {
-        return Vec::new();
-    }
-    let mut all = Hypothesis::of_each(&SIZES, 1.0, FAR_SIZE, move |times| {
-        let lengths = lengths.clone();
-        let change =
-            format!("all lengths of the model {times:.3} times as long (the model file of another arm)");
-        Hypothesis::new("link-length", "the model", change, FILE, move |i| {
-            i.changes.extend(lengths.iter().map(|name| Change::nominal(name, times, 0.0)));
-        })
-    });
-    for column in [".a", ".d"] {
-        let Some(last) = parameters.iter().rev().find(|p| p.name.ends_with(column)) else { continue };
-        let name = last.name.clone();
-        all.extend(Hypothesis::of_each(&LONGER_MM, 0.0, FAR_LONGER_MM, move |mm| {
-            let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
-            nominal("tool-length", &name, change, 1.0, mm * 1e-3)
+    let mut all = Vec::new();
+    for (model, parameters) in files(&inputs.chain) {
+        let lengths: Vec<String> =
+            parameters.iter().filter(|p| p.unit == Unit::Metre).map(|p| p.name.clone()).collect();
+        if lengths.is_empty() {
+            continue;
+        }
+        all.extend(Hypothesis::of_each(&SIZES, 1.0, FAR_SIZE, move |times| {
+            let lengths = lengths.clone();
+            let change =
+                format!("all lengths of {model} {times:.3} times as long (the model file of another arm)");
+            Hypothesis::new("link-length", model.clone(), change, FILE, move |i| {
+                i.changes.extend(lengths.iter().map(|name| Change::nominal(name, times, 0.0)));
+            })
         }));
+        for column in [".a", ".d"] {
+            let Some(last) = parameters.iter().rev().find(|p| p.name.ends_with(column)) else { continue };
+            let name = last.name.clone();
+            all.extend(Hypothesis::of_each(&LONGER_MM, 0.0, FAR_LONGER_MM, move |mm| {
+                let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
+                nominal("tool-length", &name, change, 1.0, mm * 1e-3)
+            }));
+        }
     }
     all
 }

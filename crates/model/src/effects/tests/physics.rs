@@ -14,7 +14,7 @@ const G: f64 = 9.80665;
 fn energy_j(model: &Model, joints: &[f64], load_kg: f64) -> f64 {
     let pose: NominalPose = model.nominal_pose(&model.nominal(), joints);
     let links: f64 = (0..joints.len()).map(|k| pose.link_mass_kg(k) * G * pose.link_centre_m(k).z).sum();
-    links + load_kg * G * pose.tip_m.z
+    links + load_kg * G * pose.tips_m[0].z
 }
 
 /// Two links that turn about y, level at zero, with a tool on the second.

@@ -1,0 +1,93 @@
+//! The drives of one arm of a pair: what the encoders read while a hand leads the links.
+
+use super::{Pair, PairConfig};
+use crate::mechanisms::MechanismConfig;
+use crate::{LabError, Mechanism, Moment};
+use nalgebra::Vector3;
+
+/// Gravity in the world [m/s^2].
+const GRAVITY_M_S2: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
+/// The gears, belts and encoders of one arm through one recording; the moments must come in order of time.
+pub(super) struct Drives<'a> {
+    config: &'a PairConfig,
+    pair: &'a Pair,
+    arm: usize,
+    recording: usize,
+    mechanisms: Vec<Box<dyn Mechanism>>,
+    /// Time [s], link and motor angles [rad] of the moment before.
+    before: Option<(f64, Vec<f64>, Vec<f64>)>,
+}
+
+impl<'a> Drives<'a> {
+    pub fn new(config: &'a PairConfig, pair: &'a Pair, recording: usize, arm: usize) -> Drives<'a> {
+        let mechanisms = config.arms[arm].mechanisms.iter().map(|m| m.hidden().mechanism()).collect();
+        Drives { config, pair, arm, recording, mechanisms, before: None }
+    }
+
+    /// What the encoders see of links at these angles [rad], before they count.
+    pub fn reading(&mut self, time_s: f64, link_rad: &[f64]) -> Vec<f64> {
+        if self.mechanisms.is_empty() {
+            return link_rad.to_vec();
+        }
+        let (built, own) = (&self.pair.arms[self.arm], &self.config.arms[self.arm]);
+        let gravity_m_s2 = built.world_from_base.rotation.inverse() * GRAVITY_M_S2;
+        let masses_kg = vec![own.link_kg; link_rad.len()];
+        let gravity_nm = built.arm.gravity_torque(link_rad, &gravity_m_s2, &masses_kg, 0.0);
+        let (then_s, links, motors) =
+            self.before.take().unwrap_or_else(|| (time_s, link_rad.to_vec(), link_rad.to_vec()));
+        let lasts_s = (time_s - then_s).max(1e-6);
+        let speed_rad_s: Vec<f64> = link_rad.iter().zip(&links).map(|(q, old)| (q - old) / lasts_s).collect();
+        // Recordings begin a quarter of an hour apart.
+        let session_s = time_s + 900.0 * self.recording as f64;
+        let now = Moment {
+            time_s,
+            session_s,
+            recording: self.recording,
+            temperature_c: 20.0,
+            warmer_k: 0.0,
+            motors_lead: false,
+            load_kg: 0.0,
+            arm: &built.arm,
+            masses_kg: &masses_kg,
+            tip_kg: 0.0,
+            gravity_m_s2: &gravity_m_s2,
+            motor_rad: &motors,
+            link_rad,
+            speed_rad_s: &speed_rad_s,
+            gravity_nm: &gravity_nm,
+        };
+        let mut motor_rad = link_rad.to_vec();
+        self.mechanisms.iter_mut().for_each(|m| m.link_to_motor(&now, &mut motor_rad));
+        let mut reading_rad = motor_rad.clone();
+        self.mechanisms.iter().for_each(|m| m.distort_encoder(&now, &mut reading_rad));
+        self.before = Some((time_s, link_rad.to_vec(), motor_rad));
+        reading_rad
+    }
+}
+
+/// Refuses what acts on anything but drives and encoders: the hand leads rigid arms.
+pub(super) fn acts_on_drives(mechanism: &MechanismConfig) -> Result<(), LabError> {
+    use MechanismConfig::{
+        AxisTilt, AxisWobble, BaseCompliance, BoardScale, Bump, CameraDistortion, CameraScale, FrameDrift,
+        LinkBending, RoomTemperature, ThermalGrowth, Twist, WarmUp,
+    };
+    let elsewhere = matches!(
+        mechanism,
+        AxisTilt(_)
+            | AxisWobble(_)
+            | BaseCompliance(_)
+            | BoardScale(_)
+            | Bump(_)
+            | CameraDistortion(_)
+            | CameraScale(_)
+            | FrameDrift(_)
+            | LinkBending(_)
+            | RoomTemperature(_)
+            | ThermalGrowth(_)
+            | Twist(_)
+            | WarmUp(_)
+    );
+    let why = "acts on links, frames or cameras; an arm of a pair takes what is in its drives and encoders";
+    if elsewhere { Err(crate::config::value("arms.mechanisms", why.to_owned())) } else { Ok(()) }
+}
