@@ -256,7 +256,11 @@ impl View<'_> {
     fn channels(&self, linear: &Linearisation) -> Vec<Channel> {
         // One linearisation an observation serves all joints, one all lengths and twists.
         let turns = self.each(|o| self.model.joint_jacobian(self.values, o));
-        let moves = self.each(|o| self.model.residual_with_jacobian(self.values, o).1);
+        // Of the recording's own length or angle where it has one: its column is that of the shared one.
+        let moves = self.each(|o| {
+            let (model, p) = self.model.in_recording(o.dwell.recording, self.values);
+            model.residual_with_jacobian(&p, o).1
+        });
         let joint = |j: usize| Channel {
             name: format!("joint{}", j + 1),
             unit: Unit::Radian,

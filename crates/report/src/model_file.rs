@@ -20,9 +20,11 @@ pub(crate) struct ModelFile {
     pub warnings: Vec<Warning>,
 }
 
-/// The calibrated model of a run.
+/// The calibrated model of a run, as it was in its last recording.
 pub(crate) fn model_file(run: &Run) -> Result<ModelFile, ReportError> {
-    calibrated(&run.model, &run.model_text, &run.calibration.fit.values())
+    let p = run.calibration.fit.values();
+    let (model, p) = run.model.in_recording(run.recordings.len().saturating_sub(1), &p);
+    calibrated(model, &run.model_text, &p)
 }
 
 /// A model with the parameters `p`, in the form of the text that its nominal one was read from.

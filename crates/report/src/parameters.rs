@@ -9,6 +9,7 @@ use serde::Serialize;
 const HEADER: &str = "\
 # Parameters of the calibrated arm. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
 # determined = false: the data say nothing about it and the prior keeps it near nominal.
+# <recording>.<parameter> and board.<recording>.* are that recording's own; everything else is shared.
 # at_bound = true: it wants to go further than its bounds allow.
 # Frames: where `frame` lies in `parent`; roll, pitch, yaw about the fixed x, y, z of the parent.
 
@@ -80,12 +81,14 @@ pub(crate) fn entry(e: &Estimate) -> Entry<'_> {
     }
 }
 
-/// Base, tip, and the board of every recording that has one, as calibrated.
+/// Base and tip, those of the last recording where each has its own, and the board of every recording that has one, as
+/// calibrated.
 pub(crate) fn frames(run: &Run) -> Vec<FrameEntry> {
     let p = run.calibration.fit.values();
+    let (last, last_p) = run.model.in_recording(run.recordings.len().saturating_sub(1), &p);
     let mut frames = vec![
-        frame_entry("base".into(), "world", &run.model.base_in_world(&p)),
-        frame_entry("tip".into(), "last link", &run.model.tip_in_last_link(&p)),
+        frame_entry("base".into(), "world", &last.base_in_world(&last_p)),
+        frame_entry("tip".into(), "last link", &last.tip_in_last_link(&last_p)),
     ];
     for (index, recording) in run.recordings.iter().enumerate() {
         if let Some(board) = run.model.board_in_world(&p, index) {

@@ -9,6 +9,7 @@ use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
 use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
 use crate::points::points;
+use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
 use crate::{ReportError, Run, summary_json};
 use armcal_recording::atomic::AtomicFile;
@@ -56,7 +57,7 @@ pub enum InputMessages {
 }
 
 /// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model (for its own
-/// tools, and as `model.json` with its effects), `observations.json` for `armcal pool`, Foxglove layouts and the
+/// tools, and as `model.json` with its effects), `observations.json` for `armcal pool` (of a pool `pool.json`), Foxglove layouts and the
 /// Parquet tables into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
@@ -79,7 +80,11 @@ pub fn write_all(
     let model = model_file(run)?;
     let parameters = parameters_toml(run)?;
     let past_model = PastModel::of(run)?.json()?;
-    let observations = observations_json(run)?;
+    // Observations of earlier results are where they were read, and a second copy of them would be pooled with them.
+    let observations = match run.is_pool() {
+        true => (pool_json::FILE, pool_json(run)),
+        false => (OBSERVATIONS_FILE, observations_json(run)?),
+    };
     let summary = summary_json(run);
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
@@ -95,7 +100,7 @@ pub fn write_all(
         (PARAMETERS, &parameters),
         (model.name, &model.text),
         (past_model::FILE, &past_model),
-        (OBSERVATIONS_FILE, &observations),
+        (observations.0, &observations.1),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
     ];
@@ -127,9 +132,17 @@ pub fn write_all(
 /// The files that [`write_all`] writes into `out_dir`, for an arm whose nominal model is a URDF or a DH file: to look at
 /// before a run whether they may be written.
 pub fn run_files(out_dir: &Path, urdf: bool) -> Vec<PathBuf> {
+    files(out_dir, urdf, OBSERVATIONS_FILE)
+}
+
+/// The same of a run of earlier results.
+pub fn pool_files(out_dir: &Path, urdf: bool) -> Vec<PathBuf> {
+    files(out_dir, urdf, pool_json::FILE)
+}
+
+fn files(out_dir: &Path, urdf: bool, observations: &str) -> Vec<PathBuf> {
     let model = if urdf { model_file::URDF } else { model_file::DH };
-    let texts =
-        [REPORT, SUMMARY, PARAMETERS, model, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
+    let texts = [REPORT, SUMMARY, PARAMETERS, model, past_model::FILE, observations, LAYOUT, LAYOUT_LEGACY];
     std::iter::once(RUN).chain(texts).chain(tables::FILES).map(|name| out_dir.join(name)).collect()
 }
 
