@@ -137,9 +137,6 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
     let result = read_json(&out.join("pool.json"));
     let warnings = result["warnings"].as_array().expect("warnings");
     assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:#?}");
-    let Some(browser) = browser() else { return };
-    let files = [out.join("report.html"), out.join("pool.json"), screenshots("overview"), "pool".into()];
-    println!("{}", scripted(&browser, "overview.mjs", &files.each_ref().map(PathBuf::as_path)));
 }
 
 /// Headline, status and steps of a page are in the text of the terminal.

@@ -101,8 +101,11 @@ pub enum Command {
         /// Folder for the results; created if missing.
         #[arg(long, default_value = "pool")]
         out: PathBuf,
-        /// Print pool.json instead of the table.
-        #[arg(long)]
+        /// Print every parameter and every notice, not only what decides.
+        #[arg(long, short)]
+        verbose: bool,
+        /// Print pool.json instead.
+        #[arg(long, conflicts_with = "verbose")]
         json: bool,
     },
     /// The catalogue of physical effects: meaning, equation, signature, confusions, source.

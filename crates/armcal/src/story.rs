@@ -253,6 +253,7 @@ impl Settled {
             session: frames::session(pipeline, &observations),
             observations,
             calibration,
+            transfer: None,
             setup,
             diagnosis: diagnosed.diagnosis,
             undiagnosed: diagnosed.undiagnosed,
@@ -277,14 +278,19 @@ pub fn recalibrate(
     run.warnings.retain(|w| ![HOLDOUT_WORSE, DIAGNOSIS_FAILED].contains(&w.code));
     run.warnings.extend(holdout_worse(&run.calibration));
     if run.setup.mistakes().next().is_none() {
-        let found = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress);
-        let Diagnosed { diagnosis, undiagnosed, warning } = Diagnosed::of(found);
-        (run.diagnosis, run.undiagnosed) = (diagnosis, undiagnosed);
-        run.warnings.extend(warning);
+        diagnose_again(run, pipeline, progress);
     }
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
     add_refits(run, pipeline, progress)
+}
+
+/// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
+pub fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
+    let found = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress);
+    let Diagnosed { diagnosis, undiagnosed, warning } = Diagnosed::of(found);
+    (run.diagnosis, run.undiagnosed) = (diagnosis, undiagnosed);
+    run.warnings.extend(warning);
 }
 
 /// Makes the choice of what was found again without each part of the hold-out. The verdict stands without it: what stops
@@ -295,9 +301,10 @@ fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
     let parts =
         holdout_turns(&run.model, &run.observations, &pipeline.holdout).map_or(0, |turns| turns.len());
     if poses > CHOSEN_AGAIN_OBSERVATIONS || parts > CHOSEN_AGAIN_PARTS {
+        let any = if run.is_pool() { "" } else { "; `armcal add suggested` does it for any" };
         let why = format!(
             "a run does so for up to {CHOSEN_AGAIN_OBSERVATIONS} poses and {CHOSEN_AGAIN_PARTS} parts of the hold-out, here \
-             are {poses} and {parts}; `armcal add suggested` does it for any"
+             are {poses} and {parts}{any}"
         );
         diagnosis.chosen_again(Err(why));
     } else {

@@ -277,7 +277,11 @@ impl View<'_> {
     fn channels(&self, linear: &Linearisation) -> Vec<Channel> {
         // One linearisation an observation serves all joints, one all lengths and twists. They are of measured - predicted.
         let turns = self.each(|o| self.model.residual_with_joint_jacobian(self.values, o).1);
-        let moves = self.each(|o| self.model.residual_with_jacobian(self.values, o).1);
+        // Of the recording's own length or angle where it has one: its column is that of the shared one.
+        let moves = self.each(|o| {
+            let (model, p) = self.model.in_recording(o.dwell.recording, self.values);
+            model.residual_with_jacobian(&p, o).1
+        });
         let column =
             |of: &DMatrix<f64>, i: usize, c: usize| -of.view((0, c), (linear.rows[i].len(), 1)).column(0);
         let joint = |j: usize| Channel {

@@ -19,7 +19,7 @@ pub use features::LinkFrame;
 use linearisation::Linearisation;
 use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
 pub use scopes::RecordingStart;
-use scopes::Scopes;
+use scopes::{OwnAsked, Scopes};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -47,6 +47,8 @@ pub struct Model {
     pub(crate) declared: Arc<[Declared]>,
     /// What single recordings have for themselves beside their boards; nothing, where all of them know all.
     scopes: Option<Arc<Scopes>>,
+    /// The same, as long as effects are still to be placed.
+    own_asked: Option<Arc<OwnAsked>>,
 }
 
 /// What stands around the chain.
@@ -127,6 +129,7 @@ impl Model {
             effects: None,
             declared: Arc::default(),
             scopes: None,
+            own_asked: None,
         })
     }
 

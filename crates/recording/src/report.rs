@@ -185,7 +185,7 @@ impl Occlusion {
 }
 
 /// Everything known about one recording (which may consist of several split files).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RecordingReport {
     /// Its files, in time order.
     pub files: Vec<FileReport>,

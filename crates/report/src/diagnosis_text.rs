@@ -129,7 +129,7 @@ pub(crate) const WITH_CURVES: &str = "with these curves in the model also ";
 /// What to do next, one step an entry.
 pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
     let recorded = d.record_next.iter().map(|r| run.in_words(&printable(r)));
-    added(d).into_iter().chain(looked_at(run, d)).chain(recorded).collect()
+    added(run, d).into_iter().chain(looked_at(run, d)).chain(recorded).collect()
 }
 
 /// The kind of an effect that was found; none of something without a name.
@@ -163,7 +163,7 @@ fn looked_at(run: &Run, d: &Diagnosis) -> Vec<String> {
 }
 
 /// What adding it to the model does, where something was found and a calibration with it confirms it.
-fn added(d: &Diagnosis) -> Option<String> {
+fn added(run: &Run, d: &Diagnosis) -> Option<String> {
     d.refitted.as_ref()?;
     let (before, after) = (d.holdout_mm.before, d.holdout_mm.after);
     let error = d.judged.words();
@@ -173,7 +173,12 @@ fn added(d: &Diagnosis) -> Option<String> {
         ),
         false => format!("the mean {error} error goes from {before:.3} to {after:.3} mm"),
     };
-    Some(format!("`armcal add suggested PIPELINE` adds it to the model: {does}"))
+    // `armcal add` reads the recordings of a pipeline; a pool has none.
+    let adds = match run.is_pool() {
+        true => "under `[[effects]]` of the pipeline, and pooled again",
+        false => "`armcal add suggested PIPELINE` adds it to the model",
+    };
+    Some(format!("{adds}: {does}"))
 }
 
 /// The answer in one sentence.

@@ -31,7 +31,8 @@ mod past_observations;
 mod past_run;
 mod pen;
 mod points;
-mod pooled;
+mod pool_json;
+mod pool_story;
 mod proto;
 mod recorded_time;
 mod recording_names;
@@ -66,11 +67,9 @@ pub use past_observations::{
 };
 pub use past_run::{PastDwell, PastParameter, PastRecording, PastResidual, PastRun, PastRunError};
 pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
-pub use pooled::{
-    POOL_SCHEMA, PooledRecordingRun, PooledRun, pooled_files, pooled_json, pooled_terminal, write_pooled,
-};
+pub use pool_json::{POOL_SCHEMA, pool_json};
 pub use recording_names::RecordingNames;
-pub use run::{Answer, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
+pub use run::{Answer, EarlierResult, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
 pub use same_dwells::{DwellMark, also_in};
 pub use sizes::size as amplitude_text;
 pub use summary::{SCHEMA, summary_json};
@@ -80,4 +79,4 @@ pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
     verification_files, verification_json, verification_paths, verification_text,
 };
-pub use write::{InputMessages, OutputConfig, run_files, write_all, write_brief};
+pub use write::{InputMessages, OutputConfig, pool_files, run_files, write_all, write_brief};

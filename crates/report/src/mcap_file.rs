@@ -170,13 +170,14 @@ fn about_input(run: &Run) -> BTreeMap<String, String> {
     let mut entries = BTreeMap::new();
     for (i, recording) in run.recordings.iter().enumerate() {
         entries.insert(format!("recording{i}.name"), recording.name.clone());
-        for (j, file) in recording.report.files.iter().enumerate() {
+        for (j, file) in recording.files().into_iter().enumerate() {
             let prefix = format!("recording{i}.file{j}");
-            let path = recording.given_path(file).to_string_lossy().into_owned();
-            entries.insert(format!("{prefix}.path"), path);
-            entries.insert(format!("{prefix}.sha256"), file.identity());
+            entries.insert(format!("{prefix}.path"), file.path);
+            entries.insert(format!("{prefix}.sha256"), file.sha256);
             entries.insert(format!("{prefix}.bytes"), file.bytes.to_string());
-            entries.insert(format!("{prefix}.profile"), file.profile.clone());
+            if let Some(read) = recording.report.files.get(j) {
+                entries.insert(format!("{prefix}.profile"), read.profile.clone());
+            }
         }
     }
     entries

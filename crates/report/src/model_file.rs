@@ -21,16 +21,17 @@ pub(crate) struct ModelFile {
     pub warnings: Vec<Warning>,
 }
 
-/// The calibrated model of a run; of several arms one each.
+/// The calibrated model of a run, as it was in its last recording; of several arms one each.
 pub(crate) fn model_files(run: &Run) -> Result<Vec<ModelFile>, ReportError> {
-    let values = run.calibration.fit.values();
-    if run.model.chain().arms().is_empty() {
+    let all = run.calibration.fit.values();
+    let (model, values) = run.model.in_recording(run.recordings.len().saturating_sub(1), &all);
+    if model.chain().arms().is_empty() {
         let text = run.model_texts.first().map_or("", String::as_str);
-        return Ok(vec![calibrated(&run.model, text, &values)?]);
+        return Ok(vec![calibrated(model, text, &values)?]);
     }
-    let arms = run.model.chain().arms().iter().zip(&run.model_texts).enumerate();
+    let arms = model.chain().arms().iter().zip(&run.model_texts).enumerate();
     let of_arm = |(at, (arm, text)): (usize, (&Arm, &String))| {
-        let (alone, index) = run.model.arm_alone(at)?;
+        let (alone, index) = model.arm_alone(at)?;
         let p: Vec<f64> = index.iter().map(|&i| values[i]).collect();
         let file = calibrated(&alone, text, &p);
         Some(file.map(|file| ModelFile { name: name(Some(&arm.name), file.name == URDF), ..file }))

@@ -9,6 +9,7 @@ use serde::Serialize;
 const HEADER: &str = "\
 # Parameters of the calibrated arm. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
 # determined = false: the data say nothing about it and the prior keeps it near nominal.
+# <recording>.<parameter> and board.<recording>.* are that recording's own; everything else is shared.
 # at_bound = true: it wants to go further than its bounds allow.
 # Frames: where `frame` lies in `parent`; roll, pitch, yaw about the fixed x, y, z of the parent.
 
@@ -80,15 +81,17 @@ pub(crate) fn entry(e: &Estimate) -> Entry<'_> {
     }
 }
 
-/// Base, tip, and the board of every recording that has one, as calibrated.
+/// Base and tip, those of the last recording where each has its own, and the board of every recording that has one, as
+/// calibrated.
 pub(crate) fn frames(run: &Run) -> Vec<FrameEntry> {
     let p = run.calibration.fit.values();
+    let (last, last_p) = run.model.in_recording(run.recordings.len().saturating_sub(1), &p);
     let arms: Vec<String> = run.model.chain().arms().iter().map(|arm| format!("{}.", arm.name)).collect();
     let one = [String::new()];
     let mut frames = Vec::new();
     for (arm, prefix) in if arms.is_empty() { &one[..] } else { &arms[..] }.iter().enumerate() {
         let (base, tip) =
-            (run.model.arm_base_in_world(&p, arm), run.model.feature_in_link(&p, FeatureId(arm)));
+            (last.arm_base_in_world(&last_p, arm), last.feature_in_link(&last_p, FeatureId(arm)));
         frames.push(frame_entry(format!("{prefix}base"), "world", &base));
         frames.push(frame_entry(format!("{prefix}tip"), "last link", &tip));
     }

@@ -6,7 +6,6 @@
 
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
-use armcal_calibrate::Calibration;
 use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{
     ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Model, ModelError, RigidLink,
@@ -95,7 +94,7 @@ pub struct RecordingFacts {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "form", rename_all = "lowercase")]
-pub(crate) enum ChainText {
+enum ChainText {
     Dh { text: String },
     Urdf { text: String, base_link: String, tip_link: String },
     Arms { arms: Vec<ArmText> },
@@ -103,7 +102,7 @@ pub(crate) enum ChainText {
 
 /// One of several arms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ArmText {
+struct ArmText {
     name: String,
     chain: ChainText,
 }
@@ -114,19 +113,6 @@ struct FrameFacts {
     xyz_m: [f64; 3],
     quaternion_xyzw: [f64; 4],
     free_rotation: bool,
-}
-
-/// What a model is written from.
-pub(crate) struct Calibrated<'a> {
-    pub pipeline: &'a str,
-    pub chain: ChainText,
-    pub model: &'a Model,
-    pub calibration: &'a Calibration,
-    /// Name and hashes of the files of every recording.
-    pub recordings: Vec<(&'a str, Vec<String>)>,
-    pub observations: &'a [Observation],
-    pub session: &'a Session,
-    pub missing: &'a [EffectSpec],
 }
 
 /// The model without effects and with them, and their parameters.
@@ -143,30 +129,15 @@ pub struct PastArms {
 }
 
 impl PastModel {
-    /// What a run leaves for later.
+    /// What a run leaves for later: the arm as it was last. What each recording has for itself is that of the last.
     pub(crate) fn of(run: &Run) -> Result<PastModel, ReportError> {
         let missing = match &run.diagnosis {
             Some(diagnosis) => diagnosis.suggested(run.model.chain().joint_names())?,
             None => Vec::new(),
         };
-        Ok(PastModel::of_calibrated(&Calibrated {
-            pipeline: &run.pipeline_name,
-            chain: chain_text(run.model.chain(), &run.model_texts, &run.pipeline_text),
-            model: &run.model,
-            calibration: &run.calibration,
-            recordings: run.recordings.iter().map(|r| (r.name.as_str(), hashes(r))).collect(),
-            observations: &run.observations,
-            session: &run.session,
-            missing: &missing,
-        }))
-    }
-
-    /// What any calibration leaves for later: the arm as it was last. What each recording has for itself is that of the last.
-    pub(crate) fn of_calibrated(of: &Calibrated<'_>) -> PastModel {
-        let model = of.model;
+        let (model, calibration) = (&run.model, &run.calibration);
         let start = model.nominal();
-        let calibration = of.calibration;
-        let last = of.recordings.len().saturating_sub(1);
+        let last = run.recordings.len().saturating_sub(1);
         let value = |index: usize| {
             let at = model.in_place_of(index, last);
             let estimate = &calibration.fit.estimates[at];
@@ -185,32 +156,32 @@ impl PastModel {
         let tip = |arm: usize| facts(&(prefix(arm) + "tip"), &model.feature_in_link(&start, FeatureId(arm)));
         let further = (1..model.chain().arms().len())
             .map(|arm| [facts(&(prefix(arm) + "base"), &model.arm_base_in_world(&start, arm)), tip(arm)]);
-        let boards = of.recordings.iter().enumerate().filter_map(|(index, (name, _))| {
+        let boards = run.recordings.iter().enumerate().filter_map(|(index, recording)| {
             let pose = model.board_in_world(&start, index)?;
-            Some(facts(&format!("board.{name}"), &pose))
+            Some(facts(&format!("board.{}", recording.name), &pose))
         });
-        let recordings = of.recordings.iter().enumerate();
+        let recordings = run.recordings.iter().enumerate();
         let judged = calibration.judged();
-        PastModel {
+        Ok(PastModel {
             schema: SCHEMA.into(),
             version: VERSION.into(),
-            pipeline: of.pipeline.to_owned(),
-            chain: of.chain.clone(),
+            pipeline: run.pipeline_name.clone(),
+            chain: chain_text(run.model.chain(), &run.model_texts, &run.pipeline_text),
             base: facts(&(prefix(0) + "base"), &alone.base_in_world(&start_then)),
             tip: tip(0),
             more_arms: further.collect(),
             link_length_m: model.link_length_m(&start),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
-            session: of.session.clone(),
+            session: run.session.clone(),
             parameters: shared.map(value).collect(),
-            recordings: recordings.map(|(i, (name, sha256))| recording(name, sha256, i, of)).collect(),
-            postures_rad: thinned(of.observations),
-            range_rad: (0..model.joint_count()).map(|j| range(of.observations, j)).collect(),
-            visited: visited(model, of.observations),
+            recordings: recordings.map(|(i, r)| recording(r, i, run)).collect(),
+            postures_rad: thinned(&run.observations),
+            range_rad: (0..model.joint_count()).map(|j| range(&run.observations, j)).collect(),
+            visited: visited(model, &run.observations),
             mean_error_m: Some(judged.fitted.mean_m).filter(|mean| mean.is_finite()),
-            missing: of.missing.iter().map(EffectSpec::to_string).collect(),
-        }
+            missing: missing.iter().map(EffectSpec::to_string).collect(),
+        })
     }
 
     /// Its JSON.
@@ -322,7 +293,7 @@ impl ChainText {
 }
 
 /// The files of the nominal arms; the ends of a URDF chain are what the pipeline says.
-pub(crate) fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -> ChainText {
+fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -> ChainText {
     let pipeline = pipeline_text.parse::<toml::Table>().unwrap_or_default();
     let one = |chain: &Chain, text: &String, model: Option<&toml::Value>| {
         let link = |key| {
@@ -345,20 +316,16 @@ pub(crate) fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -
     ChainText::Arms { arms: arms.collect() }
 }
 
-fn hashes(recording: &RecordingRun) -> Vec<String> {
-    recording.report.files.iter().map(|f| f.identity()).collect()
-}
-
-fn recording(name: &str, sha256: &[String], index: usize, of: &Calibrated<'_>) -> RecordingFacts {
-    let own: Vec<&Observation> = of.observations.iter().filter(|o| o.dwell.recording == index).collect();
+fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFacts {
+    let own: Vec<&Observation> = run.observations.iter().filter(|o| o.dwell.recording == index).collect();
     let temperatures: Vec<f64> = own.iter().filter_map(|o| o.temperature_c).collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     RecordingFacts {
-        name: name.to_owned(),
-        sha256: sha256.to_vec(),
+        name: recording.name.clone(),
+        sha256: recording.files().into_iter().map(|f| f.sha256).collect(),
         dwells: Some(own.iter().map(|o| DwellMark::of(o.time_ns, &o.joint_rad)).collect()),
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
-        last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(of.session.end_ns),
+        last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),
         load_kg: own.last().map_or(0.0, |o| o.load_kg),
         temperature_c: (!temperatures.is_empty()).then(|| mean(&temperatures)),
     }

@@ -170,19 +170,16 @@ fn check(o: &Observation, recording: usize) -> Result<(), String> {
 }
 
 fn recording(run: &Run, index: usize, recording: &RecordingRun) -> ObservedRecording {
-    let (model, start) = (&run.model, run.model.nominal());
+    let start = run.model.nominal();
+    // What the recording has for itself is its base.
+    let (model, start) = run.model.in_recording(index, &start);
     let board = model.board_in_world(&start, index);
     let of_frame = |name: String, pose: &Pose| StartFrame::of(model.parameters(), &name, pose);
-    let file = |f: &armcal_recording::FileReport| ObservedFile {
-        path: recording.given_path(f).to_string_lossy().into_owned(),
-        sha256: f.identity(),
-        bytes: f.bytes,
-    };
     ObservedRecording {
         name: recording.name.clone(),
-        files: recording.report.files.iter().map(file).collect(),
-        dwells: recording.dwells.len(),
-        rejected: recording.rejections.len(),
+        files: recording.files(),
+        dwells: recording.found(),
+        rejected: recording.rejected(),
         base: of_frame("base".into(), &model.base_in_world(&start)),
         board: board.map(|pose| of_frame(format!("board.{}", recording.name), &pose)),
         observations: run.observations.iter().filter(|o| o.dwell.recording == index).cloned().collect(),

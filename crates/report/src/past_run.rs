@@ -160,7 +160,7 @@ impl PastRun {
         };
         let recording = |r: &RecordingRun| PastRecording {
             name: r.name.clone(),
-            identities: r.report.files.iter().map(|f| f.identity()).collect(),
+            identities: r.files().into_iter().map(|f| f.sha256).collect(),
             dwells: r.dwells.iter().map(PastDwell::of).collect(),
         };
         PastRun {

@@ -1,15 +1,17 @@
 //! Everything a finished run knows. All outputs are views of this one value.
 
 use crate::diagnosis_text::{headline, setup_sentence};
+use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
-use armcal_calibrate::{ABOVE_FLOOR, Calibration};
-use armcal_core::{Dwell, DwellId, Observation, Rejection, Role, SetupReport, Severity, Warning};
+use armcal_calibrate::{ABOVE_FLOOR, Calibration, Residual};
+use armcal_core::{Dwell, DwellId, ErrorStats, Observation, Rejection, Role, SetupReport, Severity, Warning};
 use armcal_diagnose::{Diagnosis, UNEXPLAINED};
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport};
 use armcal_table::{Assignment, Association, Board, Place};
+use nalgebra::Vector3;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
@@ -38,6 +40,9 @@ pub struct Run {
     pub session: Session,
     /// The calibration; its residuals are in the order of `observations`.
     pub calibration: Calibration,
+    /// The same with whole recordings held out in turn: what the calibration is worth on a day it never saw. Of a run of
+    /// several earlier results.
+    pub transfer: Option<Calibration>,
     /// What contradicts the data about the setup, before any physics.
     pub setup: SetupReport,
     /// Which effect the calibrated model is missing; `None` where `undiagnosed` says why.
@@ -59,6 +64,8 @@ pub enum Undiagnosed {
     NotAsked,
     /// The setup contradicts the data: no physical effect is looked for in such data.
     SetupFirst,
+    /// So many parameters at once that it would take hours.
+    TooLarge,
     /// It could not be made; a warning says why.
     Failed,
 }
@@ -112,8 +119,34 @@ pub struct RecordingRun {
     pub association: Option<Association>,
     /// Dwells that do not take part in the fit, and why.
     pub rejections: Vec<Rejection>,
+    /// The result it comes from, where its files were not read: then dwells are those that were observed.
+    pub earlier: Option<EarlierResult>,
     /// What the stages after reading want the user to know about this recording.
     pub warnings: Vec<Warning>,
+}
+
+/// What an earlier run observed of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EarlierResult {
+    /// Where its observations were read.
+    pub path: PathBuf,
+    /// The files of the recording.
+    pub files: Vec<ObservedFile>,
+    /// Dwells found.
+    pub dwells: usize,
+    /// Dwells that did not become an observation.
+    pub rejected: usize,
+}
+
+/// Errors of one recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RecordingErrors {
+    /// Nominal arm.
+    pub nominal: ErrorStats,
+    /// Calibrated; held out where the pipeline holds out.
+    pub calibrated: ErrorStats,
+    /// As a day that the calibration never saw.
+    pub unseen: Option<ErrorStats>,
 }
 
 /// Whether the result can be relied upon; decides between exit codes 0 and 3.
@@ -164,6 +197,9 @@ impl Run {
         }
         let why = match self.undiagnosed {
             Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.",
+            Some(Undiagnosed::TooLarge) => {
+                "What is missing was not looked for: a diagnosis of so many recordings together would take hours; pool fewer."
+            }
             Some(Undiagnosed::SetupFirst) => "The setup comes first; what is missing was not looked for.",
             Some(Undiagnosed::NotAsked) | None => {
                 "What is missing was not looked for ([diagnosis] enabled = false)."
@@ -179,7 +215,7 @@ impl Run {
 
     /// Dwells of a recording that were seated in a cavity; without a board, those the fit could use.
     pub fn associated(&self, recording: &RecordingRun) -> usize {
-        if self.board.is_some() {
+        if self.board.is_some() && recording.earlier.is_none() {
             return recording
                 .assignments()
                 .iter()
@@ -217,6 +253,29 @@ impl Run {
         RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
     }
 
+    /// Whether it is of earlier results, without reading a recording.
+    pub fn is_pool(&self) -> bool {
+        self.recordings.iter().any(|r| r.earlier.is_some())
+    }
+
+    /// Errors of every recording.
+    pub(crate) fn errors_by_recording(&self) -> Vec<RecordingErrors> {
+        let own = |c: &Calibration, norm: fn(&Residual) -> f64| -> Vec<ErrorStats> {
+            let mut norms = vec![Vec::new(); self.recordings.len()];
+            c.residuals.iter().for_each(|r| norms[r.dwell.recording].push(norm(r)));
+            norms.iter().map(|norms| ErrorStats::of_norms(norms)).collect()
+        };
+        let nominal = own(&self.calibration, |r| r.nominal_m.norm());
+        let calibrated = own(&self.calibration, |r| r.fitted_m.norm());
+        let unseen = self.transfer.as_ref().map(|c| own(c, |r| r.fitted_m.norm()));
+        let of = |at: usize| RecordingErrors {
+            nominal: nominal[at],
+            calibrated: calibrated[at],
+            unseen: unseen.as_ref().map(|unseen| unseen[at]),
+        };
+        (0..self.recordings.len()).map(of).collect()
+    }
+
     /// Its recordings one after the other, without the time between them.
     pub(crate) fn recorded_time(&self) -> RecordedTime {
         RecordedTime::of(&self.observations, self.recordings.len())
@@ -225,6 +284,12 @@ impl Run {
     /// A sentence about it with recordings and moments by their names.
     pub fn in_words(&self, sentence: &str) -> String {
         self.recording_names().in_words(sentence)
+    }
+
+    /// Where the base stood in a recording [m].
+    pub(crate) fn base_m(&self, p: &[f64], recording: usize) -> Vector3<f64> {
+        let (model, p) = self.model.in_recording(recording, p);
+        model.base_in_world(&p).translation.vector
     }
 
     /// Name of the recording a dwell belongs to.
@@ -245,21 +310,42 @@ impl RecordingRun {
         self.association.as_ref().map_or(&[], |a| &a.assignments)
     }
 
+    /// Dwells found in it.
+    pub fn found(&self) -> usize {
+        self.earlier.as_ref().map_or(self.dwells.len(), |earlier| earlier.dwells)
+    }
+
+    /// Dwells that did not become an observation.
+    pub fn rejected(&self) -> usize {
+        self.earlier.as_ref().map_or(self.rejections.len(), |earlier| earlier.rejected)
+    }
+
+    /// Its files: paths as given, what identifies them, sizes.
+    pub(crate) fn files(&self) -> Vec<ObservedFile> {
+        let file = |f: &FileReport| ObservedFile {
+            path: self.given_path(f).to_string_lossy().into_owned(),
+            sha256: f.identity(),
+            bytes: f.bytes,
+        };
+        let read = || self.report.files.iter().map(file).collect();
+        self.earlier.as_ref().map_or_else(read, |earlier| earlier.files.clone())
+    }
+
     /// Path of a file as the pipeline gives it; results do not depend on where the pipeline lies.
-    pub(crate) fn given_path<'a>(&'a self, file: &'a FileReport) -> &'a Path {
+    fn given_path<'a>(&'a self, file: &'a FileReport) -> &'a Path {
         self.paths.iter().find(|given| file.path.ends_with(given)).unwrap_or(&file.path)
     }
 
     /// SHA-256 of the file (of an object its [`FileReport::identity`]); of those of all files, one a line, for a split
     /// recording.
     pub fn sha256(&self) -> String {
-        match self.report.files.as_slice() {
+        match self.files().as_slice() {
             [] => String::new(),
-            [file] => file.identity(),
+            [file] => file.sha256.clone(),
             files => {
                 let mut hasher = Sha256::new();
                 for file in files {
-                    hasher.update(format!("{}\n", file.identity()));
+                    hasher.update(format!("{}\n", file.sha256));
                 }
                 hex::encode(hasher.finalize())
             }

@@ -2,6 +2,7 @@
 //! Terminal and viewer say the same because both say this.
 
 use crate::diagnosis_text::{all_found, briefly_found, next};
+use crate::pool_story;
 use crate::run::{Run, Status};
 use crate::text::conclusion;
 use crate::told_warning::{ToldWarning, gravest_first};
@@ -41,15 +42,15 @@ impl Story {
         let diagnosis = run.diagnosis.as_ref();
         Story {
             lamp: lamp(answer.word, status),
-            calibration: conclusion(&run.calibration),
+            calibration: conclusion(&run.calibration) + &pool_story::transfer(run),
             found: diagnosis.map_or_else(Vec::new, |d| all_found(run, d)),
             found_briefly: diagnosis.map_or_else(Vec::new, |d| briefly_found(run, d)),
             status,
             incomplete: matches!(answer.word, "identified" | "ambiguous" | "unknown"),
             next: match diagnosis {
-                Some(d) => next(run, d).into_iter().chain(scale(run)).collect(),
+                Some(d) => next(run, d).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect(),
                 None if answer.word == "setup" => vec![MEND.to_owned()],
-                None => scale(run).into_iter().collect(),
+                None => pool_story::effect(run).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect(),
             },
             warnings: warnings(run),
             missing: answer.sentence,

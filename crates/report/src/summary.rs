@@ -10,6 +10,7 @@
 use crate::diagnosis_summary::DiagnosisSummary;
 use crate::parameters::{FrameEntry, frames};
 use crate::past_model::visited;
+use crate::past_observations::ObservedFile;
 use crate::run::{RecordingRun, Refit, Run, Status, VERSION};
 use crate::text::conclusion;
 use crate::two_arms::TwoArms;
@@ -62,27 +63,20 @@ struct RecordingSummary<'a> {
     name: &'a str,
     path: String,
     sha256: String,
-    files: Vec<FileSummary>,
+    files: Vec<ObservedFile>,
     dwells: usize,
     associated: usize,
     rejected: Vec<RejectedDwell<'a>>,
     places: Vec<DwellPlace<'a>>,
-    /// 0 when the recording has only the robot's clock; then there is no standard error either.
-    clock_offset_ms: f64,
+    /// 0 when the recording has only the robot's clock; then there is no standard error either. `null` of an earlier result,
+    /// whose own summary says it.
+    clock_offset_ms: Option<f64>,
     clock_offset_sigma_ms: Option<f64>,
     clock_drift_ppm: Option<f64>,
     clock_drift_sigma_ppm: Option<f64>,
     /// Sensor time at which the offset holds.
     clock_reference_ns: Option<i64>,
     warnings: Vec<&'a Warning>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct FileSummary {
-    path: String,
-    /// Of an object in a store its identity there, which begins with `object:`.
-    sha256: String,
-    bytes: u64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -218,17 +212,13 @@ fn recording<'a>(run: &'a Run, r: &'a RecordingRun) -> RecordingSummary<'a> {
         name: &r.name,
         path: r.paths.first().map(|p| path_text(p)).unwrap_or_default(),
         sha256: r.sha256(),
-        files: r
-            .report
-            .files
-            .iter()
-            .map(|f| FileSummary { path: path_text(r.given_path(f)), sha256: f.identity(), bytes: f.bytes })
-            .collect(),
-        dwells: r.dwells.len(),
+        files: r.files(),
+        dwells: r.found(),
+
         associated: run.associated(r),
         rejected: r.rejections.iter().map(|x| RejectedDwell { dwell: x.dwell.dwell, why: &x.why }).collect(),
         places: r.dwells.iter().enumerate().map(|(i, d)| place(d, r.assignments().get(i))).collect(),
-        clock_offset_ms: clock.map_or(0.0, |c| c.offset_s * 1e3),
+        clock_offset_ms: r.earlier.is_none().then(|| clock.map_or(0.0, |c| c.offset_s * 1e3)),
         clock_offset_sigma_ms: estimated.map(|c| c.offset_sigma_s * 1e3),
         clock_drift_ppm: clock.map(|c| c.drift * 1e6),
         clock_drift_sigma_ppm: estimated.map(|c| c.drift_sigma * 1e6),

@@ -170,7 +170,7 @@ impl Columns {
 
     fn confidence(&mut self, places: &[Option<&Assignment>]) {
         let confidence = |a: &Assignment| match a.place {
-            Place::Seated { confidence, .. } => Some(confidence),
+            Place::Seated { confidence, .. } => Some(confidence).filter(|c| c.is_finite()),
             _ => None,
         };
         self.number("confidence", places.iter().map(|a| a.and_then(confidence)));

@@ -55,7 +55,8 @@ pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
 
 fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> String {
     let pen = Pen { style };
-    let about = about(run).map_or_else(String::new, |about| format!("   {about}"));
+    let pooled = run.is_pool().then(|| format!("{} recordings of one arm", run.recordings.len()));
+    let about = about(run).or(pooled).map_or_else(String::new, |about| format!("   {about}"));
     let mut sections =
         vec![format!("armcal {VERSION}   pipeline {}{about}\n", printable(&run.pipeline_name))];
     let story = Story::of(run);
@@ -87,8 +88,7 @@ pub(crate) fn briefly(pen: &Pen, parameters: Option<String>, story: &Story) -> V
     grave.retain(|w| !story.missing.contains(&w.message));
     let left_out = [parameters, counted(notices.len())];
     let left_out: Vec<String> = left_out.into_iter().flatten().collect();
-    let brief =
-        (!left_out.is_empty()).then(|| format!("{} (`armcal run -v` lists them)", left_out.join("; ")));
+    let brief = (!left_out.is_empty()).then(|| format!("{} (`-v` lists them)", left_out.join("; ")));
     let counted = brief.map(|brief| pen.list(std::iter::once(("-", brief))));
     let more = grave.len().saturating_sub(SHOWN);
     grave.truncate(SHOWN);
@@ -113,7 +113,7 @@ pub(crate) fn ending(pen: &Pen, story: &Story, detail: Detail, shown: Shown) -> 
 /// So many at most, and how many more there are.
 fn first_ones(entries: &[String], most: usize) -> Vec<String> {
     let more = entries.len().saturating_sub(most);
-    let rest = (more > 0).then(|| format!("and {more} more (`armcal run -v` lists them)"));
+    let rest = (more > 0).then(|| format!("and {more} more (`-v` lists them)"));
     entries.iter().take(most).cloned().chain(rest).collect()
 }
 
@@ -135,22 +135,31 @@ fn counted(n: usize) -> Option<String> {
 }
 
 fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
-    let mut table =
-        pen.table(&["recording", "dwells", "associated", "rejected", "clock offset [ms]", "drift [ppm]"]);
+    let pool = run.is_pool();
+    let mut table = pen.table(match pool {
+        true => &["recording", "dwells", "rejected", "nominal [mm]", "calibrated", "as a new day"],
+        false => &["recording", "dwells", "associated", "rejected", "clock offset [ms]", "drift [ppm]"],
+    });
+    let errors = if pool { run.errors_by_recording() } else { Vec::new() };
     // One that is left out for a line that says so saves none.
     let most = if run.recordings.len() == most.saturating_add(1) { most + 1 } else { most };
-    for recording in run.recordings.iter().take(most) {
-        table.add_row(vec![
-            Cell::new(printable(&recording.name)),
-            number(recording.dwells.len()),
-            number(run.associated(recording)),
-            number(recording.rejections.len()),
-            number(clock_offset(recording)),
-            number(clock_drift(recording)),
-        ]);
+    for (at, recording) in run.recordings.iter().enumerate().take(most) {
+        let (dwells, rejected) = (recording.found().to_string(), recording.rejected().to_string());
+        let numbers = match errors.get(at) {
+            Some(e) => {
+                let unseen = e.unseen.map_or("-".into(), |unseen| millimetres(unseen.mean_m));
+                [dwells, rejected, millimetres(e.nominal.mean_m), millimetres(e.calibrated.mean_m), unseen]
+            }
+            None => {
+                let associated = run.associated(recording).to_string();
+                [dwells, associated, rejected, clock_offset(recording), clock_drift(recording)]
+            }
+        };
+        let name = [Cell::new(printable(&recording.name))];
+        table.add_row(name.into_iter().chain(numbers.map(number)).collect::<Vec<Cell>>());
     }
     let more = run.recordings.len().saturating_sub(most);
-    let rest = format!("and {more} more (`armcal run -v` lists them)");
+    let rest = format!("and {more} more (`-v` lists them)");
     let rest = if more > 0 { pen.list([("-", rest)].into_iter()) } else { String::new() };
     pen.render(&table) + &rest
 }
@@ -242,6 +251,6 @@ pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<Strin
 /// Warnings, and that there are more of them.
 pub(crate) fn listed(pen: &Pen, warnings: Vec<&ToldWarning>, more: usize) -> Option<String> {
     let entries = warnings.iter().map(|w| (w.severity.word(), w.text()));
-    let rest = (more > 0).then(|| ("", format!("and {more} more (`armcal run -v` lists them)")));
+    let rest = (more > 0).then(|| ("", format!("and {more} more (`-v` lists them)")));
     (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries.chain(rest))))
 }

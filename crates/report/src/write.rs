@@ -9,6 +9,7 @@ use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
 use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
 use crate::points::points;
+use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
 use crate::{ReportError, Run, summary_json};
 use armcal_recording::atomic::AtomicFile;
@@ -56,7 +57,7 @@ pub enum InputMessages {
 }
 
 /// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model (for its own
-/// tools, and as `model.json` with its effects), `observations.json` for `armcal pool`, Foxglove layouts and the
+/// tools, and as `model.json` with its effects), `observations.json` for `armcal pool` (of a pool `pool.json`), Foxglove layouts and the
 /// Parquet tables into `out_dir`, which is made if need be; returns their paths.
 ///
 /// `recordings` are the opened inputs in the order of [`Run::recordings`]; they are read only with
@@ -79,7 +80,11 @@ pub fn write_all(
     let models = model_files(run)?;
     let parameters = parameters_toml(run)?;
     let past_model = PastModel::of(run)?.json()?;
-    let observations = observations_json(run)?;
+    // Observations of earlier results are where they were read, and a second copy of them would be pooled with them.
+    let observations = match run.is_pool() {
+        true => (pool_json::FILE, pool_json(run)),
+        false => (OBSERVATIONS_FILE, observations_json(run)?),
+    };
     let summary = summary_json(run);
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
@@ -94,7 +99,7 @@ pub fn write_all(
         (SUMMARY, &summary),
         (PARAMETERS, &parameters),
         (past_model::FILE, &past_model),
-        (OBSERVATIONS_FILE, &observations),
+        (observations.0, &observations.1),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
     ];
@@ -134,9 +139,24 @@ pub fn run_files<'a>(
     out_dir: &Path,
     arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
 ) -> Vec<PathBuf> {
+    files(out_dir, arms, OBSERVATIONS_FILE)
+}
+
+/// The same of a run of earlier results.
+pub fn pool_files<'a>(
+    out_dir: &Path,
+    arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
+) -> Vec<PathBuf> {
+    files(out_dir, arms, pool_json::FILE)
+}
+
+fn files<'a>(
+    out_dir: &Path,
+    arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
+    observations: &str,
+) -> Vec<PathBuf> {
     let models = arms.into_iter().map(|(arm, urdf)| model_file::name(arm, urdf));
-    let fixed =
-        [RUN, REPORT, SUMMARY, PARAMETERS, past_model::FILE, OBSERVATIONS_FILE, LAYOUT, LAYOUT_LEGACY];
+    let fixed = [RUN, REPORT, SUMMARY, PARAMETERS, past_model::FILE, observations, LAYOUT, LAYOUT_LEGACY];
     let fixed = fixed.into_iter().chain(tables::FILES).map(str::to_owned);
     fixed.chain(models).map(|name| out_dir.join(name)).collect()
 }

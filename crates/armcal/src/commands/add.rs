@@ -82,7 +82,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
     write_all(&run, &recordings, request.out, &extended.pipeline.output)?;
-    view::remember(request.out, &extended.path)?;
+    view::remember(request.out, &extended.path, &[])?;
     progress.finish();
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();

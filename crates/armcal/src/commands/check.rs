@@ -61,7 +61,7 @@ fn judged(request: &Request<'_>, pipeline: &Pipeline) -> Result<Judged, Error> {
         story::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
-        view::remember(out, request.pipeline)?;
+        view::remember(out, request.pipeline, &[])?;
     }
     progress.finish();
     Ok(judged)

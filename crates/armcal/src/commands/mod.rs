@@ -80,11 +80,10 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             let (dwells, margin_deg, json) = (*dwells, *margin, *json);
             plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
         }
-        Command::Pool { pipeline, results, out, json } => pool::run(pipeline, results, out, *json),
-        Command::Run { pipeline, out, verbose, json } => {
-            let detail = if *verbose { Detail::Everything } else { Detail::Story };
-            run::run(pipeline, out, detail, *json)
+        Command::Pool { pipeline, results, out, verbose, json } => {
+            pool::run(pipeline, results, out, detail(*verbose), *json)
         }
+        Command::Run { pipeline, out, verbose, json } => run::run(pipeline, out, detail(*verbose), *json),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))
@@ -101,6 +100,10 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             extract::run(&extract::Request { inputs, out, pipeline, topics, attachments, json })
         }
     }
+}
+
+fn detail(verbose: bool) -> Detail {
+    if verbose { Detail::Everything } else { Detail::Story }
 }
 
 /// Whether outputs may be written at all, asked before long computations.

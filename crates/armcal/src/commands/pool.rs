@@ -3,24 +3,36 @@
 use super::{Outcome, may_write, print, print_written, style};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
-use crate::pool;
 use crate::progress::Progress;
-use armcal_report::{Status, pooled_files, pooled_json, pooled_terminal, write_pooled};
+use crate::{pool, view};
+use armcal_report::{
+    Detail, InputMessages, OutputConfig, Status, pool_files, pool_json, terminal, write_all,
+};
 use std::path::{Path, PathBuf};
 
-/// Pools results, writes to `out`, prints the table (or `pool.json`).
-pub fn run(pipeline: &Path, results: &[PathBuf], out: &Path, json: bool) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load_for_others(pipeline)?;
-    may_write(pooled_files(out))?;
+/// Pools results, writes all that one arm's run has to `out`, prints the story, or everything (or `pool.json`).
+pub fn run(
+    path: &Path,
+    results: &[PathBuf],
+    out: &Path,
+    detail: Detail,
+    json: bool,
+) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load_for_others(path)?;
+    let mut files = pool_files(out, pipeline.arm_files());
+    files.push(out.join(view::SOURCE_FILE));
+    may_write(files)?;
     let progress = Progress::new();
-    let run = pool::run(&pipeline, results, &progress)?;
+    let run = pool::run(&pipeline, results, &progress)?.run;
     progress.step("writing results");
-    let written = write_pooled(&run, out)?;
+    // The recordings themselves are not at hand.
+    let written = write_all(&run, &[], out, &OutputConfig { input: InputMessages::Reference })?;
+    view::remember(out, path, results)?;
     progress.finish();
     if json {
-        print(&pooled_json(&run)?)?;
+        print(&pool_json(&run))?;
     } else {
-        print(&pooled_terminal(&run, style()))?;
+        print(&terminal(&run, style(), detail))?;
         print_written(out, &written)?;
     }
     Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })

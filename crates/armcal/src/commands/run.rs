@@ -16,7 +16,7 @@ pub fn run(path: &Path, out: &Path, detail: Detail, json: bool) -> Result<Outcom
     let (run, recordings) = story::run(&pipeline, &progress)?;
     progress.step("writing results");
     let written = write_all(&run, &recordings, out, &pipeline.output)?;
-    view::remember(out, path)?;
+    view::remember(out, path, &[])?;
     progress.finish();
 
     if json {

@@ -3,15 +3,15 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::view::{Bench, pipeline_of, serve};
+use crate::view::{Bench, serve, source_of};
 use armcal_report::summary_json;
 use std::path::Path;
 
 /// Runs the pipeline behind `input` and serves its report until the user stops it.
 pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
-    let path = pipeline_of(input)?;
+    let (path, results) = source_of(input)?;
     let progress = Progress::new();
-    let bench = Bench::of(&path, &progress)?;
+    let bench = Bench::of(&path, &results, &progress)?;
     progress.finish();
     let written = armcal_recording::input::read_to_string(&input.join("summary.json"));
     if written.is_ok_and(|text| text != summary_json(bench.run())) {

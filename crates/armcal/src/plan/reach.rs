@@ -112,3 +112,19 @@ fn prime(index: usize) -> usize {
     let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
     (2..).filter(is_prime).nth(index).unwrap_or(2)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halton_points_fill_every_box_once() {
+        let mut seen = [false; 36];
+        for n in 0..36 {
+            let [x, y] = [0, 1].map(|axis| radical_inverse(n, prime(axis)));
+            seen[(x * 4.0 + 1e-9) as usize * 9 + (y * 9.0 + 1e-9) as usize] = true;
+        }
+        assert!(seen.iter().all(|s| *s));
+        assert_eq!([0, 1, 2, 3, 4].map(prime), [2, 3, 5, 7, 11]);
+    }
+}

@@ -2,12 +2,13 @@
 
 use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
-use armcal_core::{Observation, Pose, Severity, Stage, Warning};
+use armcal_core::{Dwell, Observation, Pose, Severity, Stage, Warning};
+use armcal_recording::RecordingReport;
 use armcal_report::{
-    BoardFacts, DwellMark, OBSERVATIONS_FILE, ObservedRecording, PastObservations, PooledRecordingRun,
-    StartFrame, also_in, sha256,
+    BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, PastObservations,
+    RecordingRun, StartFrame, also_in, sha256,
 };
-use armcal_table::Board;
+use armcal_table::{Assignment, Association, Board, Place};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,7 @@ pub struct Collected {
 #[derive(Debug, Clone)]
 pub struct CollectedRecording {
     /// For the report.
-    pub run: PooledRecordingRun,
+    pub run: RecordingRun,
     /// Where the base started (world_from_base).
     pub base: Pose,
     /// Where its board started (world_from_board).
@@ -84,18 +85,73 @@ fn joined(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
     let names = unique_names(&found);
     let mut collected = Collected { recordings: Vec::new(), observations: Vec::new(), warnings };
     for (index, (f, name)) in found.into_iter().zip(names).enumerate() {
-        let ObservedRecording { files, dwells, rejected, base, board, observations, .. } = f.recording;
+        let ObservedRecording { files, dwells, rejected, base, board, mut observations, .. } = f.recording;
+        observations.iter_mut().for_each(|o| o.dwell.recording = index);
+        let board = board.as_ref().map(StartFrame::pose);
+        let earlier = EarlierResult { path: f.result, files, dwells, rejected };
         collected.recordings.push(CollectedRecording {
-            run: PooledRecordingRun { name, result: f.result, files, dwells, rejected },
+            run: recording_run(name, earlier, board, &observations),
             base: base.pose(),
-            board: board.as_ref().map(StartFrame::pose),
+            board,
         });
-        collected.observations.extend(observations.into_iter().map(|mut o| {
-            o.dwell.recording = index;
-            o
-        }));
+        collected.observations.extend(observations);
     }
     collected
+}
+
+/// A recording as its result tells of it: what was observed, and nothing of its files.
+fn recording_run(
+    name: String,
+    earlier: EarlierResult,
+    board: Option<Pose>,
+    observations: &[Observation],
+) -> RecordingRun {
+    let mut dwells: Vec<Dwell> = observations.iter().map(dwell).collect();
+    dwells.dedup_by_key(|d| d.id);
+    let seated = |o: &Observation| {
+        let place = match o.cavity() {
+            Some(cavity) => Place::Seated { cavity: cavity.to_owned(), confidence: f64::NAN },
+            None => Place::FreeSpace,
+        };
+        Assignment { dwell: o.dwell, place, distance_m: f64::NAN }
+    };
+    let association = board.map(|board_in_world| Association {
+        assignments: observations.iter().map(seated).collect(),
+        board_in_world,
+        warnings: Vec::new(),
+    });
+    RecordingRun {
+        name,
+        paths: earlier.files.iter().map(|file| PathBuf::from(&file.path)).collect(),
+        report: RecordingReport::default(),
+        clock: None,
+        dwells,
+        association,
+        rejections: Vec::new(),
+        earlier: Some(earlier),
+        warnings: Vec::new(),
+    }
+}
+
+/// What an observation tells of its dwell; what it does not is not a number.
+fn dwell(o: &Observation) -> Dwell {
+    Dwell {
+        id: o.dwell,
+        start_ns: o.time_ns,
+        end_ns: o.time_ns,
+        joint_rad: o.joint_rad.clone(),
+        joint_spread_rad: vec![f64::NAN; o.joint_rad.len()],
+        joint_sigma_rad: o.joint_sigma_rad.clone(),
+        effort_nm: o.effort_nm.clone(),
+        samples: 0,
+        effective_samples: f64::NAN,
+        arrival: o.arrival.clone(),
+        path_memory_rad: o.path_memory_rad.clone().unwrap_or_default(),
+        pair_memory_rad: o.pair_memory_rad.clone().unwrap_or_default(),
+        moved_rad: o.moved_rad.clone(),
+        tip: None,
+        temperature_c: o.temperature_c,
+    }
 }
 
 /// Every file of observations in the folders and below, each once, in the order of the paths.

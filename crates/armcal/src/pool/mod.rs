@@ -1,6 +1,6 @@
 //! `armcal pool`: one calibration of the results of many runs, without their recordings.
 //!
-//! results -> [`collect`] -> one model with what each recording has for itself -> calibration -> [`PooledRun`].
+//! results -> [`collect`] -> one model with what each recording has for itself -> calibration -> diagnosis -> [`Run`].
 
 mod collect;
 mod section;
@@ -12,59 +12,79 @@ use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::stages::frames;
+use crate::story;
 use armcal_calibrate::{HoldoutConfig, calibrate};
-use armcal_core::{Observation, Pose};
-use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart, Session};
-use armcal_report::PooledRun;
+use armcal_core::{Pose, SetupReport};
+use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
+use armcal_report::{Run, Undiagnosed};
 use std::path::PathBuf;
+
+/// Free parameters up to which what is missing is looked for: the search works on all of them at once.
+const DIAGNOSED_PARAMETERS: usize = 300;
+
+/// A pool, and the nominal arm in it, without effects.
+pub struct Pooled {
+    /// The run of all results.
+    pub run: Run,
+    /// What effects are put on.
+    pub geometry: Model,
+}
 
 /// Pools the results found in `folders` as the pipeline says; nothing is written.
 ///
 /// # Errors
 /// Results that are missing, or of another arm, board or setting than the pipeline's, each by name; and what can
 /// go wrong in a fit.
-pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<PooledRun, Error> {
+pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<Pooled, Error> {
     progress.step("reading results");
     pipeline.one_arm("`armcal pool` pools the recordings of one arm")?;
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
-    let model_text = model_texts.concat();
+
     let board = frames::board(pipeline)?;
-    let collected = collect(pipeline, &model_text, board.as_ref(), folders)?;
-    let session = frames::session(pipeline, &collected.observations);
-    let model = pooled_model(pipeline, chain, &collected, &session)?;
+    let collected = collect(pipeline, &model_texts.concat(), board.as_ref(), folders)?;
+    let geometry = geometry(pipeline, chain, &collected)?;
+    let effects = frames::effect_specs(pipeline, &geometry)?;
+    let observations = collected.observations;
+    let model = story::with_effects(pipeline, &geometry, &effects, &observations)?;
 
     progress.step(&format!("calibrating {} recordings", collected.recordings.len()));
-    let observations: &[Observation] = &collected.observations;
-    let calibration = calibrate(&model, observations, &pipeline.fit, &pipeline.holdout)?;
+    let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
     let turns = pipeline.pool.turns.min(collected.recordings.len());
     let transfer = if turns > 1 {
         progress.step(&format!("holding recordings out in {turns} turns"));
         let holdout = HoldoutConfig::RecordingFolds { k: turns };
-        Some(calibrate(&model, observations, &pipeline.fit, &holdout)?)
+        Some(calibrate(&model, &observations, &pipeline.fit, &holdout)?)
     } else {
         None
     };
-    Ok(PooledRun {
+    let mut run = Run {
         pipeline_name: pipeline.name.clone(),
         pipeline_text: pipeline.text.clone(),
-        model_text,
+        model_texts,
         recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
+        board,
         model,
-        observations: collected.observations,
-        session,
+        session: frames::session(pipeline, &observations),
+        observations,
         calibration,
         transfer,
+        setup: SetupReport::default(),
+        diagnosis: None,
+        undiagnosed: Some(Undiagnosed::TooLarge),
+        steps: Vec::new(),
+        alternatives: Vec::new(),
         warnings: collected.warnings,
-    })
+    };
+    let free = run.model.parameters().iter().filter(|p| p.free).count();
+    if free <= DIAGNOSED_PARAMETERS {
+        story::diagnose_again(&mut run, pipeline, progress);
+        story::add_refits(&mut run, pipeline, progress)?;
+    }
+    Ok(Pooled { run, geometry })
 }
 
 /// The nominal arm among the frames of all recordings, as one run of them together would have it.
-fn pooled_model(
-    pipeline: &Pipeline,
-    chain: Chain,
-    collected: &Collected,
-    session: &Session,
-) -> Result<Model, Error> {
+fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, Error> {
     let mut base = frames::frame("base", &pipeline.frames.base, true);
     let measured = pipeline.frames.base.pose == FramePose::Measured;
     let bases: Vec<Pose> = collected.recordings.iter().filter(|_| measured).map(|r| r.base).collect();
@@ -81,13 +101,11 @@ fn pooled_model(
     let boards = collected.recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
     frames::declare(&mut model, pipeline)?;
-    model.check_declared(session)?;
-    let effects = frames::effect_specs(pipeline, &model)?;
-    let model = model.with_effects(&effects, session)?;
-    let recording = |r: &CollectedRecording| RecordingStart {
+    let start = |r: &CollectedRecording| RecordingStart {
         name: r.run.name.clone(),
         base_in_world: measured.then_some(r.base),
     };
-    let recordings: Vec<RecordingStart> = collected.recordings.iter().map(recording).collect();
-    Ok(model.with_own(&recordings, &pipeline.pool.per_recording)?)
+    // Each recording knows its own board alone, so that work grows with their number and no faster.
+    model.ask_own(collected.recordings.iter().map(start).collect(), pipeline.pool.per_recording.clone());
+    Ok(model)
 }

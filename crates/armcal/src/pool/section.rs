@@ -4,7 +4,8 @@ use crate::error::Error;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How recordings are pooled.
+/// How recordings are calibrated together: what they share in `armcal run` and `armcal pool`, and how the latter asks whether
+/// that carries over.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoolSection {

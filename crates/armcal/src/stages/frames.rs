@@ -9,7 +9,8 @@ use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
 use armcal_model::{
-    Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, Session, is_of_effect,
+    Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, RecordingStart, Session,
+    is_of_effect,
 };
 use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
@@ -96,6 +97,12 @@ pub fn nominal_model(
     };
     let mut model = Model::new(chain.clone(), frames)?;
     declare(&mut model, pipeline)?;
+    let own = &pipeline.pool.per_recording;
+    if seen.len() > 1 && !own.is_empty() {
+        let base = |s: &Seen| s.base.as_ref().map(|base| base.pose);
+        let start = |s: &Seen| RecordingStart { name: s.name.clone(), base_in_world: base(s) };
+        model.ask_own(seen.iter().map(start).collect(), own.clone());
+    }
     Ok(model)
 }
 

@@ -38,7 +38,8 @@ pub fn associate_all(
     seen.iter()
         .enumerate()
         .map(|(recording, seen)| {
-            let tips: Vec<DwellTip> = seen.dwells.iter().map(|d| dwell_tip(model, p, d)).collect();
+            let (alone, own) = model.in_recording(recording, p);
+            let tips: Vec<DwellTip> = seen.dwells.iter().map(|d| dwell_tip(alone, &own, d)).collect();
             let known = table.pose != BoardPose::Estimated || boards_fitted;
             let start = match model.board_in_world(p, recording) {
                 Some(pose) if known => BoardStart::Known(pose),

@@ -136,6 +136,7 @@ pub fn recording_runs(
             clock: seen.clock,
             dwells: seen.dwells,
             association,
+            earlier: None,
             rejections: rejections.iter().filter(|r| r.dwell.recording == index).cloned().collect(),
             warnings: seen.warnings,
         })

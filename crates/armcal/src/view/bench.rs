@@ -4,6 +4,7 @@ use super::requests::{Choices, Wanted};
 use crate::commands::add;
 use crate::error::Error;
 use crate::pipeline::Pipeline;
+use crate::pool::{self, Pooled};
 use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story;
@@ -27,14 +28,24 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Runs a pipeline; its results stay in memory.
-    pub fn of(path: &Path, progress: &Progress) -> Result<Bench, Error> {
-        let pipeline = Pipeline::load(path)?;
-        let settled = story::settle(&pipeline, progress)?;
-        let geometry = settled.fitted.geometry.clone();
+    /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
+    pub fn of(path: &Path, results: &[PathBuf], progress: &Progress) -> Result<Bench, Error> {
+        let (pipeline, geometry, run) = match results {
+            [] => {
+                let pipeline = Pipeline::load(path)?;
+                let settled = story::settle(&pipeline, progress)?;
+                let geometry = settled.fitted.geometry.clone();
+                let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
+                story::add_refits(&mut run, &pipeline, progress)?;
+                (pipeline, geometry, run)
+            }
+            results => {
+                let pipeline = Pipeline::load_for_others(path)?;
+                let Pooled { run, geometry } = pool::run(&pipeline, results, progress)?;
+                (pipeline, geometry, run)
+            }
+        };
         let own = frames::effect_specs(&pipeline, &geometry)?;
-        let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
-        story::add_refits(&mut run, &pipeline, progress)?;
         let basis = Basis::of(&run);
         Ok(Bench { pipeline, path: path.to_owned(), geometry, own, run, basis })
     }

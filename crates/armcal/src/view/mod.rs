@@ -15,4 +15,4 @@ mod turns;
 pub use bench::Bench;
 pub use server::serve;
 pub(crate) use source::FILE as SOURCE_FILE;
-pub use source::{pipeline_of, remember};
+pub use source::{remember, source_of};

@@ -16,11 +16,12 @@ const STEP_MARGIN: usize = 2;
 impl Model {
     /// The same model with more effects behind its parameters; at their nominal zero they change nothing.
     ///
-    /// Their parameters are named `<spec>.<quantity>`. Errors name what a spec asks for and this arm, or these
+    /// Their parameters are named `<spec>.<quantity>`. Behind them stands what recordings were asked to have for themselves
+    /// ([`Model::ask_own`]). Errors name what a spec asks for and this arm, or these
     /// observations, cannot give.
     pub fn with_effects(&self, specs: &[EffectSpec], session: &Session) -> Result<Model, ModelError> {
         if specs.is_empty() {
-            return Ok(self.clone());
+            return self.clone().with_own_asked();
         }
         let zero = self.zero_pose();
         let mut parameters = self.parameters().to_vec();
@@ -30,7 +31,7 @@ impl Model {
             placed.push(effect);
             parameters.extend(own);
         }
-        self.with_placed(placed, session.clone(), parameters)
+        self.with_placed(placed, session.clone(), parameters)?.with_own_asked()
     }
 
     /// The effects, in the order of their parameters.

@@ -36,6 +36,7 @@ impl Model {
             effects: None,
             declared: Arc::default(),
             scopes: None,
+            own_asked: None,
         };
         Some((model, index))
     }

@@ -23,6 +23,13 @@ pub struct RecordingStart {
     pub base_in_world: Option<Pose>,
 }
 
+/// What [`Model::with_own`] is to be asked.
+#[derive(Debug, PartialEq)]
+pub(super) struct OwnAsked {
+    recordings: Vec<RecordingStart>,
+    own: Vec<String>,
+}
+
 /// Which parameters are copied, for which recordings.
 #[derive(Debug)]
 pub(super) struct Scopes {
@@ -74,6 +81,7 @@ impl Model {
             }));
         }
         check_names(&model.parameters)?;
+        model.own_asked = None;
         for &index in &own {
             let original = &mut model.parameters[index];
             original.free = false;
@@ -82,6 +90,19 @@ impl Model {
         let bases = recordings.iter().map(|r| r.base_in_world).collect();
         model.scopes = Some(Arc::new(Scopes::new(bases, own, self.parameters.len())));
         Ok(model)
+    }
+
+    /// Asks for [`Model::with_own`] once the effects are placed ([`Model::with_effects`]), whose parameters may be among them.
+    pub fn ask_own(&mut self, recordings: Vec<RecordingStart>, own: Vec<String>) {
+        self.own_asked = Some(Arc::new(OwnAsked { recordings, own }));
+    }
+
+    /// The model with what was asked for.
+    pub(crate) fn with_own_asked(self) -> Result<Model, ModelError> {
+        match self.own_asked.clone() {
+            Some(asked) => self.with_own(&asked.recordings, &asked.own),
+            None => Ok(self),
+        }
     }
 
     fn own_indices(&self, patterns: &[String]) -> Result<BTreeSet<usize>, ModelError> {
@@ -214,29 +235,33 @@ impl View {
             ..model.parameters[of].clone()
         };
         let mut parameters: Vec<Parameter> = index.iter().zip(&kept).map(named).collect();
+        let base = model.tree.0[0].parameters.clone();
         let mut tree = model.tree.clone();
-        let place = |old: usize| kept.binary_search(&old).unwrap_or(parameters.len());
-        let effects = model.effects.as_ref().map(|effects| effects.moved(&place, model, parameters.len()));
-        let link = model.link.map(place);
-        if let Some(base_in_world) = scopes.bases[recording] {
-            restart(&mut tree.0[0], &mut parameters, base_in_world);
+        let link = model.link.map(|link| kept.binary_search(&link).unwrap_or(parameters.len()));
+        // A rotation vector counts from where the frame starts: it moves with its parameters, or not at all.
+        if let Some(start) = scopes.bases[recording].filter(|_| base.clone().all(|k| index[k] != k)) {
+            restart(&mut tree.0[0], &mut parameters, start);
         }
         let board = |board: &Segment| {
             let parameters = in_tree..in_tree + board.parameters.len();
             (recording, Segment { parameters, ..board.clone() })
         };
-        let model = Model {
+        let mut own = Model {
             chain: model.chain.clone(),
             parameters,
             tree,
             features: model.features.clone(),
             link,
             boards: model.boards.get(&recording).map(board).into_iter().collect(),
-            effects,
+            effects: None,
             declared: model.declared.clone(),
             scopes: None,
+            own_asked: None,
         };
-        View { model, index }
+        let count = own.parameters.len();
+        let place = |old: usize| kept.binary_search(&old).unwrap_or(count);
+        own.effects = model.effects.as_ref().map(|effects| effects.moved(&place, &own, count));
+        View { model: own, index }
     }
 
     /// Its parameters out of all.

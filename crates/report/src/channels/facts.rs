@@ -99,7 +99,7 @@ fn assignment(recording: &RecordingRun, dwell: &Dwell, used: bool) -> proto::Ass
         Some(Place::Seated { cavity, confidence }) => {
             message.set_place(P::Seated);
             message.cavity.clone_from(cavity);
-            message.confidence = Some(*confidence);
+            message.confidence = Some(*confidence).filter(|c| c.is_finite());
         }
         Some(Place::Hovering { height_m, above }) => {
             message.set_place(P::Hovering);

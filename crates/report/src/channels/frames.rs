@@ -74,7 +74,8 @@ pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, time_ns: i64, out:
     let fitted = run.calibration.fit.values();
     let mut transforms = standing(time_ns);
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
-        transforms.extend(arm(&run.model, prefix, p, &dwell.joint_rad, time_ns));
+        let (model, p) = run.model.in_recording(recording, p);
+        transforms.extend(arm(model, prefix, &p, &dwell.joint_rad, time_ns));
     }
     if let Some(board) = run.model.board_in_world(&fitted, recording) {
         let name = format!("board/{}", run.recordings[recording].name);

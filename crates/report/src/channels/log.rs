@@ -23,9 +23,9 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
         let found = format!(
             "{}: {} dwells, {} associated, {} rejected",
             recording.name,
-            recording.dwells.len(),
+            recording.found(),
             run.associated(recording),
-            recording.rejections.len()
+            recording.rejected()
         );
         put(out, start_ns, Level::Info, "armcal.dwell", &recording.name, found);
         for warning in recording.all_warnings() {

@@ -40,10 +40,12 @@ pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Dr
 /// Both arms in the pose of a dwell, and the tip as it was measured.
 pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
-    let mut entities = vec![
-        arm("arm/nominal", &run.model, &run.calibration.nominal_values, GREY, time_ns, &dwell.joint_rad),
-        arm("arm/calibrated", &run.model, &fitted, GREEN, time_ns, &dwell.joint_rad),
-    ];
+    let drawn = |id: &str, p: &[f64], rgba: Rgba| {
+        let (model, p) = run.model.in_recording(dwell.id.recording, p);
+        arm(id, model, &p, rgba, time_ns, &dwell.joint_rad)
+    };
+    let nominal = &run.calibration.nominal_values;
+    let mut entities = vec![drawn("arm/nominal", nominal, GREY), drawn("arm/calibrated", &fitted, GREEN)];
     let observed = own.iter().find(|p| p.observation.dwell == dwell.id).map(|p| p.measured_m);
     let mut measured = entity("tip/measured", time_ns);
     if let Some(tip_m) = observed.or(dwell.tip.as_ref().map(|t| t.position_m)) {
@@ -56,12 +58,14 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: 
 /// Everywhere that the arm and the measured tips go, and the legend above them [m].
 pub(crate) fn places_m(run: &Run, points: &[Point]) -> Vec<Vector3<f64>> {
     let fitted = run.calibration.fit.values();
-    let base = run.model.base_in_world(&fitted);
     let links = run.recordings.iter().flat_map(|r| run.posed(r)).flat_map(|dwell| {
-        let frames = run.model.link_frames(&fitted, &dwell.joint_rad);
+        let (model, p) = run.model.in_recording(dwell.id.recording, &fitted);
+        let base = model.base_in_world(&p);
+        let frames = model.link_frames(&p, &dwell.joint_rad);
         frames.into_iter().map(|frame| (base * frame.in_base).translation.vector).collect::<Vec<_>>()
     });
-    let places = points.iter().map(|p| p.measured_m).chain(links).chain([base.translation.vector]);
+    let bases = (0..run.recordings.len()).map(|recording| run.base_m(&fitted, recording));
+    let places = points.iter().map(|p| p.measured_m).chain(links).chain(bases);
     let mut places: Vec<Vector3<f64>> = places.filter(|m| m.iter().all(|x| x.is_finite())).collect();
     places.extend(above_m(&places));
     places

@@ -6,14 +6,14 @@ use crate::run::Run;
 
 pub(super) fn course(run: &Run, points: &[Point], in_time: &[usize]) -> Course {
     let time_min = recorded_min(run, points);
-    let base_m = run.model.base_in_world(&run.calibration.fit.values()).translation.vector;
+    let fitted = run.calibration.fit.values();
     let mut m = Course::default();
     for &i in in_time {
         let p = &points[i];
         let norms_m = [p.residual.nominal_m.norm(), p.residual.fitted_m.norm(), p.residual.expected_norm_m];
         let after_m = p.steps_m.last().map(|r| r.norm());
         // At the base itself there is no direction away from it; nothing reaches there.
-        let away = (p.measured_m - base_m).normalize();
+        let away = (p.measured_m - run.base_m(&fitted, p.observation.dwell.recording)).normalize();
         let outward_m = away.dot(&p.residual.fitted_m);
         let effect_m = p.effect_m.map(|effect_m| away.dot(&effect_m));
         if !norms_m.iter().copied().chain(after_m).chain(effect_m).chain([outward_m]).all(f64::is_finite) {

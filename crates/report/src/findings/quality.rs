@@ -40,9 +40,9 @@ fn recording(run: &Run, r: &RecordingRun) -> RecordingQuality {
         first_ns.zip(last_ns).map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 / 60e9);
     RecordingQuality {
         recording: r.name.clone(),
-        dwells: count(r.dwells.len()),
+        dwells: count(r.found()),
         used: count(run.used(r)),
-        rejected: count(r.rejections.len()),
+        rejected: count(r.rejected()),
         duration_min: short(duration_min),
         occluded: r.report.streams.iter().map(|s| s.occluded.total()).sum(),
         damaged: count(r.report.files.iter().map(|f| f.damaged.len()).sum()),

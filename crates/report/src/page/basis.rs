@@ -46,7 +46,6 @@ impl Basis {
     /// Of a run.
     pub fn of(run: &Run) -> Basis {
         let values = run.calibration.fit.values();
-        let base_m = run.model.base_in_world(&values).translation.vector;
         let observations = &run.observations;
         let sign = |o: &armcal_core::Observation, j: usize| o.arrival.get(j).map_or(0, |a| a.sign() as i8);
         let joints = 0..run.model.joint_count();
@@ -67,7 +66,7 @@ impl Basis {
             time_cuts: run.recorded_time().cuts(),
             outwards: observations
                 .iter()
-                .map(|o| run.model.measured_tip_in_world(&values, o) - base_m)
+                .map(|o| run.model.measured_tip_in_world(&values, o) - run.base_m(&values, o.dwell.recording))
                 .map(|d| d.try_normalize(1e-9).unwrap_or_else(Vector3::zeros))
                 .collect(),
         }

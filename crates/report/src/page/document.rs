@@ -179,10 +179,16 @@ fn ranking(
 
 fn dwells(run: &Run) -> Dwells {
     let values = run.calibration.fit.values();
-    let base = run.model.base_in_world(&values);
     let measured_m: Vec<_> =
         run.observations.iter().map(|o| run.model.measured_tip_in_world(&values, o)).collect();
-    let in_base_m: Vec<_> = measured_m.iter().map(|m| base.inverse() * nalgebra::Point3::from(*m)).collect();
+    let in_base_m: Vec<_> = measured_m
+        .iter()
+        .zip(&run.observations)
+        .map(|(m, o)| {
+            let (model, p) = run.model.in_recording(o.dwell.recording, &values);
+            model.base_in_world(&p).inverse() * nalgebra::Point3::from(*m)
+        })
+        .collect();
     let cavity_mm = |axis: usize| {
         Column::of(run.observations.iter().map(|o| match &o.reference {
             armcal_core::Reference::Seated { in_board_m, .. } => Some(in_board_m[axis] * 1e3),

@@ -119,7 +119,8 @@ fn joint_levers(run: &Run, values: &[f64], o: &Observation) -> Vec<Option<Lever>
 
 /// Parts per million of all lengths.
 fn length_lever(run: &Run, values: &[f64], o: &Observation) -> Option<Lever> {
-    let jacobian = run.model.residual_with_jacobian(values, o).1;
+    let (model, p) = run.model.in_recording(o.dwell.recording, values);
+    let jacobian = model.residual_with_jacobian(&p, o).1;
     // The jacobian is that of measured minus predicted.
     let grown = |(k, length_m): (usize, f64)| -jacobian.fixed_view::<3, 1>(0, k).into_owned() * length_m;
     let column_m = run.model.lengths_m().into_iter().map(grown).sum::<Vector3<f64>>() * 1e-6;

@@ -6,7 +6,7 @@
 //! * [`Basis`]: what all refits share, with `levers` (implied errors of joints and lengths);
 //! * `shown`: one calibration as it is drawn, with `bands`, `groups`, `signature`;
 //! * `document`: all of it as one value; `embed`: how it gets into the page; `quality`: the tables about the data;
-//! * `shell`: what all pages have in common; `overview`: the page of a pool and of two arms; `compared`: that of
+//! * `shell`: what all pages have in common; `compared`: that of
 //!   `armcal compare`.
 
 mod bands;
@@ -17,7 +17,6 @@ pub(crate) mod embed;
 mod groups;
 mod levers;
 mod numbers;
-pub(crate) mod overview;
 mod quality;
 pub(crate) mod shell;
 mod shown;

@@ -1,6 +1,8 @@
 //! What the page's tables say about the data themselves.
 
-use crate::run::{RecordingRun, Run};
+use crate::past_observations::ObservedFile;
+use crate::run::{RecordingErrors, RecordingRun, Run};
+use crate::text::millimetres;
 use armcal_recording::StreamReport;
 
 /// One recording.
@@ -9,18 +11,13 @@ pub(crate) struct RecordingRow {
     pub dwells: usize,
     pub used: usize,
     pub rejected: usize,
+    /// Nominal, calibrated, as a new day [mm]; empty where no recording was held out.
+    pub mean_mm: Vec<String>,
     pub clock: String,
     pub drift: String,
-    pub files: Vec<FileRow>,
+    /// With what is damaged in each.
+    pub files: Vec<(ObservedFile, String)>,
     pub streams: Vec<StreamRow>,
-}
-
-/// One of its files.
-pub(crate) struct FileRow {
-    pub path: String,
-    pub sha256: String,
-    pub bytes: u64,
-    pub damage: String,
 }
 
 /// One of its streams.
@@ -44,43 +41,46 @@ pub(crate) struct RejectionRow {
 
 /// All recordings.
 pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow> {
-    run.recordings.iter().map(|r| recording(run, r)).collect()
+    let errors = run.errors_by_recording();
+    run.recordings.iter().zip(&errors).map(|(r, errors)| recording(run, r, errors)).collect()
 }
 
-fn recording(run: &Run, r: &RecordingRun) -> RecordingRow {
+fn recording(run: &Run, r: &RecordingRun, errors: &RecordingErrors) -> RecordingRow {
     let clock = r.clock.as_ref();
     let ms = |s: f64| s * 1e3;
     RecordingRow {
         name: r.name.clone(),
-        dwells: r.dwells.len(),
+        dwells: r.found(),
         used: run.used(r),
-        rejected: r.rejections.len(),
-        clock: clock.map_or("one clock".into(), |c| match c.declared {
-            true => format!("{:.2} declared", ms(c.offset_s)),
-            false => format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s)),
-        }),
+        rejected: r.rejected(),
+        mean_mm: errors
+            .unseen
+            .map(|unseen| [errors.nominal, errors.calibrated, unseen].map(|e| millimetres(e.mean_m)).to_vec())
+            .unwrap_or_default(),
+        clock: match clock {
+            Some(c) if c.declared => format!("{:.2} declared", ms(c.offset_s)),
+            Some(c) => format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s)),
+            None if r.earlier.is_some() => "–".into(),
+            None => "one clock".into(),
+        },
         drift: clock.map_or("–".into(), |c| match c.declared {
             true => format!("{:.1} declared", c.drift * 1e6),
             false => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
         }),
-        files: r
-            .report
-            .files
-            .iter()
-            .map(|f| FileRow {
-                path: r.given_path(f).to_string_lossy().into_owned(),
-                sha256: f.identity(),
-                bytes: f.bytes,
-                damage: match (f.truncated_at, f.damaged.len()) {
-                    (None, 0) => "none".into(),
-                    (cut, parts) => {
-                        let cut = cut.map_or(String::new(), |at| format!("cut off at byte {at}; "));
-                        format!("{cut}{parts} damaged parts")
-                    }
-                },
-            })
-            .collect(),
+        files: r.files().into_iter().enumerate().map(|(at, file)| (file, damage(r, at))).collect(),
         streams: r.report.streams.iter().map(stream).collect(),
+    }
+}
+
+fn damage(r: &RecordingRun, file: usize) -> String {
+    match r.report.files.get(file).map(|f| (f.truncated_at, f.damaged.len())) {
+        // Its own result says so.
+        None => "–".into(),
+        Some((None, 0)) => "none".into(),
+        Some((cut, parts)) => {
+            let cut = cut.map_or(String::new(), |at| format!("cut off at byte {at}; "));
+            format!("{cut}{parts} damaged parts")
+        }
     }
 }
 

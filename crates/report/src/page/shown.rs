@@ -96,18 +96,6 @@ pub(crate) struct ParameterRow {
     pub at_bound: bool,
 }
 
-impl ParameterRow {
-    /// What is to be known of it beside its numbers.
-    pub fn notes(&self) -> &'static str {
-        match (self.determined, self.at_bound) {
-            (true, false) => "",
-            (true, true) => "at its bound",
-            (false, false) => "undetermined",
-            (false, true) => "undetermined, at its bound",
-        }
-    }
-}
-
 impl Shown {
     /// The run's own calibration.
     pub fn of_run(run: &Run, basis: &Basis) -> Shown {

@@ -106,6 +106,7 @@ pub fn synthetic() -> Synthetic {
         undiagnosed: Some(Undiagnosed::NotAsked),
         steps: Vec::new(),
         alternatives: Vec::new(),
+        transfer: None,
         warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
     };
     Synthetic { run, recordings, paths, folder }
@@ -196,6 +197,7 @@ fn recording_run(
         dwells,
         association: Some(Association { assignments, board_in_world, warnings: Vec::new() }),
         rejections,
+        earlier: None,
         warnings: match index {
             1 => vec![warning("gap", "/joint_states", "a gap of 2.1 s; check the network of the robot")],
             _ => Vec::new(),

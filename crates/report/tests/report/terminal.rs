@@ -40,7 +40,7 @@ fn many_recordings_do_not_push_the_verdict_off_the_screen() {
     s.run.recordings.resize(40, one);
     let story = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
     assert!(story.lines().count() < 38, "{story}");
-    assert!(story.contains("and 36 more (`armcal run -v` lists them)"), "{story}");
+    assert!(story.contains("and 36 more (`-v` lists them)"), "{story}");
     let everything = terminal(&s.run, TerminalStyle::Plain, Detail::Everything);
     assert!(!everything.contains("and 36 more"), "{everything}");
 }
