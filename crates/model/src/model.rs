@@ -61,18 +61,19 @@ impl Model {
             Ok(segment)
         };
         let base = place(&frames.base)?;
-        let mut hung = vec![(frames.tip.name.clone(), chain.end(), place(&frames.tip)?)];
+        let mut hung = vec![(frames.tip.name.clone(), None, chain.end(), place(&frames.tip)?)];
         for marker in &frames.markers {
-            hung.push((marker.frame.name.clone(), chain.end_of(&marker.link)?, place(&marker.frame)?));
+            let (name, link) = (marker.frame.name.clone(), Some(marker.link.clone()));
+            hung.push((name, link, chain.end_of(&marker.link)?, place(&marker.frame)?));
         }
         let boards =
             frames.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         check_names(&parameters)?;
         let mut tree = chain.on(base);
         let mut features = Vec::with_capacity(hung.len());
-        for (name, end, segment) in hung {
+        for (name, link, end, segment) in hung {
             tree.0.push(Segment { parent: Some(end), ..segment });
-            features.push(Feature { name, route: tree.route(tree.0.len() - 1) });
+            features.push(Feature { name, link, route: tree.route(tree.0.len() - 1) });
         }
         Ok(Model { chain, parameters, tree, features, boards, effects: None, declared: Arc::default() })
     }

@@ -7,8 +7,8 @@
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_calibrate::{Calibration, Estimate};
-use armcal_core::{Observation, Pose, Unit, Visited};
-use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Model, ModelError, Session};
+use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
+use armcal_model::{Chain, EffectSpec, EffectTable, Frame, Frames, Marker, Model, ModelError, Session};
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,9 @@ pub struct PastModel {
     chain: ChainText,
     base: FrameFacts,
     tip: FrameFacts,
+    /// Absent in a model without markers, and in one written before there were any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    markers: Vec<MarkerFacts>,
     boards: Vec<FrameFacts>,
     effects: Vec<EffectTable>,
     session: Session,
@@ -97,6 +100,14 @@ struct FrameFacts {
     xyz_m: [f64; 3],
     quaternion_xyzw: [f64; 4],
     free_rotation: bool,
+}
+
+/// A marker and the link that it is on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct MarkerFacts {
+    link: String,
+    #[serde(flatten)]
+    frame: FrameFacts,
 }
 
 /// What a model is written from.
@@ -167,6 +178,10 @@ impl PastModel {
             let pose = model.board_in_world(&start, index)?;
             Some(facts(&format!("board.{name}"), &pose))
         });
+        let marker = |(feature, name, link): (FeatureId, &str, &str)| MarkerFacts {
+            link: link.to_owned(),
+            frame: facts(name, &model.feature_in_link(&start, feature)),
+        };
         let recordings = of.recordings.iter().enumerate();
         let judged = calibration.judged();
         PastModel {
@@ -176,6 +191,7 @@ impl PastModel {
             chain: of.chain.clone(),
             base: facts("base", &of.base),
             tip: facts("tip", &model.tip_in_last_link(&start)),
+            markers: model.markers().map(marker).collect(),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
             session: of.session.clone(),
@@ -230,7 +246,7 @@ impl PastModel {
         let frames = Frames {
             base: self.base.frame(),
             tip: self.tip.frame(),
-            markers: Vec::new(),
+            markers: self.markers.iter().map(MarkerFacts::marker).collect(),
             boards: self.boards.iter().map(FrameFacts::frame).collect(),
         };
         let geometry = Model::new(chain, frames)?;
@@ -330,6 +346,12 @@ fn range(observations: &[Observation], joint: usize) -> [f64; 2] {
     let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     readings.fold(start, |[low, high], q| [q.min(low), q.max(high)])
+}
+
+impl MarkerFacts {
+    fn marker(&self) -> Marker {
+        Marker { link: self.link.clone(), frame: self.frame.frame() }
+    }
 }
 
 impl FrameFacts {

@@ -164,6 +164,7 @@ mod tests {
             pair_memory_rad: vec![[Vec::new(), Vec::new()]; 2],
             moved_rad: None,
             tip: None,
+            markers: Default::default(),
             temperature_c: None,
         };
         let observed = |first, count| [0.0, 1.0].map(|q| of_arm(&dwell(q), first, count));

@@ -121,7 +121,7 @@ fn seen_in(
 
 fn joints_only(joints: &JointStream) -> Streams {
     let joints = joints.clone();
-    Streams { joints, set_points: None, tip: None, base: None, table: None, temperature: None }
+    Streams { joints, ..Streams::default() }
 }
 
 /// Both arms in every dwell.

@@ -2,13 +2,15 @@
 
 use crate::error::Error;
 use crate::pipeline::{
-    BoardPose, FramePose, FrameSection, MarkersOn, ModelSection, ParameterOverride, Pipeline, TableSection,
-    Vertical,
+    BoardPose, FramePose, FrameSection, MarkerSection, MarkersOn, ModelSection, ParameterOverride, Pipeline,
+    TableSection, Vertical,
 };
 use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
-use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, Session, is_of_effect};
+use armcal_model::{
+    Chain, EffectSpec, Frame, Frames, Knowledge, Marker, Model, Override, Session, is_of_effect,
+};
 use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -67,12 +69,22 @@ pub fn nominal_model(
     let frames = Frames {
         base: base_frame(&pipeline.frames.base, seen),
         tip: frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation),
-        markers: Vec::new(),
+        markers: markers(pipeline),
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?;
     declare(&mut model, pipeline)?;
     Ok(model)
+}
+
+/// The markers of the pipeline, in the order of their names.
+pub fn markers(pipeline: &Pipeline) -> Vec<Marker> {
+    let turns = pipeline.fit.use_orientation;
+    let marker = |(name, section): (&String, &MarkerSection)| Marker {
+        link: section.link.clone(),
+        frame: frame(name, &section.frame(), turns),
+    };
+    pipeline.markers.iter().map(marker).collect()
 }
 
 /// What the pipeline says of sensor and parameters.

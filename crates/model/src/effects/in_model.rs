@@ -119,11 +119,12 @@ impl Model {
         kind: &EffectKind,
         spec: EffectSpec,
     ) -> impl Iterator<Item = EffectSpec> + use<> {
-        let joints = match kind.target {
-            Target::Joint => (0..self.joint_count()).map(Some).collect(),
-            Target::Whole => vec![None],
+        let at: Vec<EffectSpec> = match kind.target {
+            Target::Joint => (0..self.joint_count()).map(|joint| spec.clone().at(joint)).collect(),
+            Target::Marker => self.markers().map(|(_, name, _)| spec.clone().at_marker(name)).collect(),
+            Target::Whole => vec![spec],
         };
-        joints.into_iter().map(move |target| EffectSpec { target, ..spec.clone() })
+        at.into_iter()
     }
 
     /// The spec with every part of the arm that a shape of its kind can name.
