@@ -106,6 +106,9 @@ mod pool;
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
 
+/// Are several markers a pose one pose, and one that came loose found as that?
+mod several_markers;
+
 /// Does a recording in a bucket give what it gives on disk, for a fraction of its bytes?
 #[cfg(feature = "s3")]
 mod object_storage;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Names a dwell for ever: recording in the order of the pipeline, dwell in the order of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -41,7 +42,7 @@ impl Arrival {
     }
 }
 
-/// What the position sensor saw of the tip during a dwell, in the sensor's frame.
+/// What the position sensor saw of the tip, or of a marker, during a dwell, in the sensor's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TipMeasurement {
     /// Robust mean position [m].
@@ -90,6 +91,8 @@ pub struct Dwell {
     pub moved_rad: Option<Vec<f64>>,
     /// The tip as the position sensor saw it.
     pub tip: Option<TipMeasurement>,
+    /// The markers that it saw, by name.
+    pub markers: BTreeMap<String, TipMeasurement>,
     /// Mean temperature [degC].
     pub temperature_c: Option<f64>,
 }

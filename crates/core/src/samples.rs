@@ -1,6 +1,7 @@
 //! Time series as columns. Each stream has one clock, strictly increasing in time.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
 
 /// Joint readings; `joint_rad[j][i]` is joint `j` at `time_ns[i]`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -80,6 +81,8 @@ pub struct Samples {
     pub set_points: Option<JointSamples>,
     /// The tip (or the marker on the end effector).
     pub tip: Option<PoseSamples>,
+    /// Markers on the arm, by name.
+    pub bodies: BTreeMap<String, PoseSamples>,
     /// The robot's base.
     pub base: Option<PoseSamples>,
     /// The calibration table.

@@ -2,7 +2,7 @@
 
 use armcal_core::{DwellId, Observation};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest dwells on either side of a comparison.
 const FEWEST: usize = 5;
@@ -60,7 +60,7 @@ pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) ->
             |of: &[usize]| of.iter().map(|i| errors[*i].error_m).sum::<f64>() / of.len() as f64 * 1e3;
         let (error_mm, elsewhere_mm) = (mean_mm(&inside), mean_mm(&outside));
         let (times_noise, elsewhere_times_noise) = (mean_in.exp(), mean_out.exp());
-        let dwells = inside.len();
+        let dwells = inside.iter().map(|i| errors[*i].observation.dwell).collect::<BTreeSet<_>>().len();
         found.push((
             sigmas,
             ErrorPlace { place, dwells, error_mm, elsewhere_mm, times_noise, elsewhere_times_noise },

@@ -3,6 +3,8 @@
 #[path = "../tests/arm/mod.rs"]
 pub(crate) mod arm;
 
+mod markers;
+
 use crate::cells::Unlisted;
 use crate::noise::Noise;
 use crate::projection::Projection;

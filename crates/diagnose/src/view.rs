@@ -138,9 +138,10 @@ impl View<'_> {
 
     fn target(&self, spec: &EffectSpec) -> String {
         let joint = spec.target.and_then(|j| self.model.chain().joint_names().get(j).cloned());
-        match (joint, &spec.since) {
-            (Some(joint), None) => joint,
-            (Some(joint), Some(since)) => format!("{joint} {}", words(since)),
+        let at = spec.marker.as_ref().map(|name| format!("marker {name}")).or(joint);
+        match (at, &spec.since) {
+            (Some(at), None) => at,
+            (Some(at), Some(since)) => format!("{at} {}", words(since)),
             (None, Some(since)) => words(since),
             (None, None) => {
                 let number = spec.shape.iter().find(|(name, _)| name == "arm").map(|(_, number)| *number);

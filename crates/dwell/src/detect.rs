@@ -1,6 +1,6 @@
 //! The dwells of one recording.
 
-use armcal_core::{Dwell, DwellId, Samples, Severity, Stage, TipMeasurement, Warning};
+use armcal_core::{Dwell, DwellId, PoseSamples, Samples, Severity, Stage, TipMeasurement, Warning};
 use std::ops::Range;
 
 use crate::history::History;
@@ -22,9 +22,9 @@ const LARGEST_FLOOR_DEG: f64 = 2.0;
 ///
 /// # Errors
 /// No joint rows, columns of different length, stamps that do not increase, a senseless configuration.
-pub fn detect_dwells(
+pub fn detect_dwells<'s>(
     recording: usize,
-    samples: &Samples,
+    samples: &'s Samples,
     clock: Option<&ClockAlignment>,
     config: &DwellConfig,
 ) -> Result<(Vec<Dwell>, Vec<Warning>), DwellError> {
@@ -33,15 +33,27 @@ pub fn detect_dwells(
     if let Some(tip) = &samples.tip {
         check_poses(tip, DOING, "tip")?;
     }
+    for body in samples.bodies.values() {
+        check_poses(body, DOING, "marker")?;
+    }
     if let Some(temperature) = &samples.temperature {
         check_order(&temperature.time_ns, DOING, "temperature")?;
     }
     let encoders = Encoders::of(&samples.joints, config);
-    let tip = samples.tip.as_ref().filter(|t| !t.is_empty());
-    let tip = tip.map(|t| Tip::of(t, clock, &samples.joints.time_ns, config));
-    let found = pauses(&encoders, tip.as_ref().filter(|_| config.use_tip), config);
+    let timed = |seen: &'s PoseSamples| Tip::of(seen, clock, &samples.joints.time_ns, config);
+    let tip = samples.tip.as_ref().filter(|t| !t.is_empty()).map(timed);
+    let markers: Vec<(&String, Tip<'_>)> = samples
+        .bodies
+        .iter()
+        .filter(|(_, body)| !body.is_empty())
+        .map(|(name, body)| (name, timed(body)))
+        .collect();
+    // Where nothing sees the tip, a marker tells when the arm stands still.
+    let still = tip.as_ref().or(markers.first().map(|(_, marker)| marker));
+    let found = pauses(&encoders, still.filter(|_| config.use_tip), config);
 
-    let summary = Summary { samples, encoders: &encoders, tip: tip.as_ref(), clock, config };
+    let summary =
+        Summary { samples, encoders: &encoders, tip: tip.as_ref(), markers: &markers, clock, config };
     let history = History::of(&encoders, config);
     let mut dwells: Vec<Dwell> = Vec::with_capacity(found.rows.len());
     for (dwell, rows) in found.rows.iter().enumerate() {
@@ -56,6 +68,7 @@ struct Summary<'a> {
     samples: &'a Samples,
     encoders: &'a Encoders<'a>,
     tip: Option<&'a Tip<'a>>,
+    markers: &'a [(&'a String, Tip<'a>)],
     clock: Option<&'a ClockAlignment>,
     config: &'a DwellConfig,
 }
@@ -88,15 +101,21 @@ impl Summary<'_> {
             pair_memory_rad: history.pair_memory(rows.start, &joint_rad),
             moved_rad: before.map(|before| moved_rad(&before.joint_rad, &joint_rad)),
             joint_rad,
-            tip: self.tip_of(start_ns, end_ns, creeps),
+            tip: self.tip.and_then(|tip| self.seen(tip, start_ns, end_ns, creeps)),
+            markers: self
+                .markers
+                .iter()
+                .filter_map(|(name, marker)| {
+                    Some(((*name).clone(), self.seen(marker, start_ns, end_ns, creeps)?))
+                })
+                .collect(),
             temperature_c: stream
                 .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
         }
     }
 
-    /// The tip frames whose time lies in the dwell for certain, the error of the alignment considered.
-    fn tip_of(&self, start_ns: i64, end_ns: i64, creeps: bool) -> Option<TipMeasurement> {
-        let tip = self.tip?;
+    /// The frames of the tip, or of a marker, whose time lies in the dwell for certain, the error of the alignment considered.
+    fn seen(&self, tip: &Tip<'_>, start_ns: i64, end_ns: i64, creeps: bool) -> Option<TipMeasurement> {
         let margin_s = self.clock.map_or(0.0, |c| {
             let at =
                 tip.robot_ns.partition_point(|t| *t < start_ns).min(tip.robot_ns.len().saturating_sub(1));
@@ -153,6 +172,7 @@ impl Summary<'_> {
             );
             warnings.push(say(Severity::Notice, "dwell-without-tip", message));
         }
+        warnings.extend(self.markers.iter().filter_map(|(name, _)| unseen(name, dwells)));
         warnings
     }
 
@@ -232,6 +252,27 @@ impl Summary<'_> {
             config.min_duration_s
         )
     }
+}
+
+/// The dwells in which a marker was not seen; they keep what was seen of the others.
+fn unseen(name: &str, dwells: &[Dwell]) -> Option<Warning> {
+    let blind: Vec<usize> =
+        dwells.iter().filter(|d| !d.markers.contains_key(name)).map(|d| d.id.dwell).collect();
+    (!blind.is_empty()).then(|| {
+        let message = format!(
+            "the sensor saw it in {} of {} dwells, not in {}; what else was seen then is used",
+            dwells.len() - blind.len(),
+            dwells.len(),
+            list(&blind)
+        );
+        Warning::new(
+            Severity::Notice,
+            Stage::Dwell,
+            "dwell-without-marker",
+            format!("marker {name}"),
+            message,
+        )
+    })
 }
 
 /// How far each joint went from one dwell to the next [rad].

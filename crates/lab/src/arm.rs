@@ -61,6 +61,23 @@ impl AxisArm {
         (0..=link).rev().fold(*point_m, |p, j| self.axes[j].turn_point(&p, joint_rad[j]))
     }
 
+    /// Where the link of a joint ends in the zero position: at the next axis, or at the tip [m].
+    pub fn link_end_m(&self, link: usize) -> Vector3<f64> {
+        self.axes.get(link + 1).map_or(self.tip_m, |next| next.point_m)
+    }
+
+    /// A body fixed to the link of joint `link`, `at_m` from where that ends, along the axes of the base in the zero position,
+    /// where it is [base frame].
+    pub fn carried_pose(&self, link: usize, at_m: &Vector3<f64>, joint_rad: &[f64]) -> Pose {
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()]
+            .map(|axis| (0..=link).rev().fold(axis, |v, j| turn(&self.axes[j].direction, &v, joint_rad[j])));
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+        Isometry3::from_parts(
+            Translation3::from(self.carried(link, &(self.link_end_m(link) + at_m), joint_rad)),
+            UnitQuaternion::from_rotation_matrix(&rotation),
+        )
+    }
+
     /// The tip [m, base frame].
     pub fn tip(&self, joint_rad: &[f64]) -> Vector3<f64> {
         self.carried(self.joint_count() - 1, &self.tip_m, joint_rad)
@@ -106,8 +123,7 @@ impl AxisArm {
 
     /// The link of joint `link` in the zero position: from its own axis to the next one, or to the tip [m].
     pub fn link_m(&self, link: usize) -> Vector3<f64> {
-        let end = self.axes.get(link + 1).map_or(self.tip_m, |next| next.point_m);
-        end - self.axes[link].point_m
+        self.link_end_m(link) - self.axes[link].point_m
     }
 
     /// Gravity's torque on each joint, `> 0` pushing towards `+q` [N m].

@@ -253,15 +253,20 @@ impl<'a> Engine<'a> {
         let mut reading = self.servo.angle_rad.clone();
         let tip = self.world_from_base * self.arm.tip_pose(&self.link_rad);
         let mut seen = self.bodies(&tip);
+        let mut markers = self.markers();
         for mechanism in &mut mechanisms {
             mechanism.distort_encoder(&self.moment(), &mut reading);
             for (body, pose) in [Body::Tip, Body::Table, Body::Base].into_iter().zip(&mut seen) {
                 mechanism.distort_camera(&self.moment(), body, pose);
             }
+            for (marker, pose) in markers.iter_mut().enumerate() {
+                mechanism.distort_camera(&self.moment(), Body::Marker(marker), pose);
+            }
         }
         self.mechanisms = mechanisms;
         self.reading_rad = reading;
         self.push(tip, seen);
+        self.trace.push_markers(markers);
     }
 
     /// Where the marker sets of tip, table and base are in the world.
@@ -279,6 +284,15 @@ impl<'a> Engine<'a> {
             table,
             self.world_from_base * self.rig.base_from_plate,
         ]
+    }
+
+    /// Where the markers on the links are in the world.
+    fn markers(&self) -> Vec<Pose> {
+        let at = |marker: &crate::config::MarkerConfig| {
+            let at_m = Vector3::from(marker.at_mm) * 1e-3;
+            self.world_from_base * self.arm.carried_pose(marker.link - 1, &at_m, &self.link_rad)
+        };
+        self.config.vicon.markers.iter().map(at).collect()
     }
 
     fn push(&mut self, tip: Pose, [seen_tip, seen_table, seen_base]: [Pose; 3]) {

@@ -60,6 +60,8 @@ pub enum Body {
     Table,
     /// The robot's base.
     Base,
+    /// A marker on a link of the arm, by its index in `[[vicon.markers]]`.
+    Marker(usize),
 }
 
 /// One hidden physical effect. Every hook defaults to "does nothing".

@@ -74,8 +74,12 @@ fn dwell_s(session: &Session, rest: &Rest) -> [f64; 2] {
 
 fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) -> Vec<Observation> {
     let mut encoders = Stream::new(config.seed, Purpose::Quick, 2 * recording);
-    let mut camera = Camera::new(config, recording, session.trace.duration_s());
-    let mut observations: Vec<Observation> = Vec::new();
+    let duration_s = session.trace.duration_s();
+    let mut camera = Camera::new(config, recording, duration_s);
+    let markers = 0..config.vicon.markers.len();
+    let mut on_links: Vec<Camera<'_>> =
+        markers.map(|marker| Camera::of_marker(config, recording, marker)).collect();
+    let (mut observations, mut dwell): (Vec<Observation>, usize) = (Vec::new(), 0);
     for rest in &session.rests {
         let span_s = dwell_s(session, rest);
         if span_s[1] - span_s[0] < SHORTEST_S {
@@ -95,9 +99,10 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
         let since = &session.trace.reading_rad[..rest.first];
         let mid_s = (span_s[0] + span_s[1]) / 2.0;
         let temperature = session.trace.temperature_c[rest.last];
+        let first = observations.len();
         observations.push(Observation {
             feature: FeatureId::TIP,
-            dwell: DwellId { recording, dwell: observations.len() },
+            dwell: DwellId { recording, dwell },
             time_ns: config.start_ns(recording) + (mid_s * 1e9).round() as i64,
             arrival: past::arrivals(since, &readings.mean_rad, config.joints.count_rad()),
             path_memory_rad: Some(past::memories(since, &readings.mean_rad, config.joints.count_rad())),
@@ -112,6 +117,18 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             reference,
             covariance_m2,
         });
+        dwell += 1;
+        for (marker, camera) in on_links.iter_mut().enumerate() {
+            let (reference, covariance_m2) =
+                camera.tip(&session.trace.seen(Body::Marker(marker))[rest.last], span_s);
+            let feature = FeatureId(marker + 1);
+            observations.push(Observation {
+                feature,
+                reference,
+                covariance_m2,
+                ..observations[first].clone()
+            });
+        }
     }
     observations
 }

@@ -62,6 +62,14 @@ pub enum Purpose {
     Quick = 24,
     /// What a scenario is made of.
     Scenario = 25,
+    /// Position noise of the markers on the arm.
+    ViconMarker = 26,
+    /// Occlusions of the markers on the arm.
+    OcclusionMarker = 27,
+    /// Stamps and transport of the markers on the arm.
+    TransportMarker = 28,
+    /// Readings of the markers on the quick path.
+    QuickMarker = 29,
 }
 
 /// One stream of random numbers.

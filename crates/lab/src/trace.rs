@@ -35,6 +35,8 @@ pub struct Trace {
     pub seen_table: Vec<Pose>,
     /// What the cameras make of the base, before noise.
     pub seen_base: Vec<Pose>,
+    /// What the cameras make of each marker on the arm, before noise.
+    pub seen_markers: Vec<Vec<Pose>>,
     /// The arm's temperature [degC].
     pub temperature_c: Vec<f64>,
 }
@@ -84,12 +86,19 @@ impl Trace {
         self.time_s.last().copied().unwrap_or(0.0)
     }
 
+    /// Adds what the cameras make of the markers in a step.
+    pub fn push_markers(&mut self, seen: Vec<Pose>) {
+        self.seen_markers.resize(seen.len(), Vec::new());
+        self.seen_markers.iter_mut().zip(seen).for_each(|(marker, pose)| marker.push(pose));
+    }
+
     /// The poses of a body as the cameras see it.
     pub fn seen(&self, body: Body) -> &[Pose] {
         match body {
             Body::Tip => &self.seen_tip,
             Body::Table => &self.seen_table,
             Body::Base => &self.seen_base,
+            Body::Marker(marker) => &self.seen_markers[marker],
         }
     }
 }

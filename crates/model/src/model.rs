@@ -101,10 +101,11 @@ impl Model {
         let bases = around.arms.iter().map(|arm| place(&arm.base)).collect::<Result<Vec<_>, _>>()?;
         let mut hung = Vec::with_capacity(around.arms.len() + around.markers.len());
         for (ArmFrames { tip, .. }, end) in around.arms.iter().zip(chain.ends()) {
-            hung.push((tip.name.clone(), end, place(tip)?));
+            hung.push((tip.name.clone(), None, end, place(tip)?));
         }
         for marker in &around.markers {
-            hung.push((marker.frame.name.clone(), chain.end_of(&marker.link)?, place(&marker.frame)?));
+            let (name, link) = (marker.frame.name.clone(), Some(marker.link.clone()));
+            hung.push((name, link, chain.end_of(&marker.link)?, place(&marker.frame)?));
         }
         let boards =
             around.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
@@ -115,9 +116,9 @@ impl Model {
         check_names(&parameters)?;
         let mut tree = chain.on(bases);
         let mut features = Vec::with_capacity(hung.len());
-        for (name, end, segment) in hung {
+        for (name, link, end, segment) in hung {
             tree.0.push(Segment { parent: Some(end), ..segment });
-            features.push(Feature { name, route: tree.route(tree.0.len() - 1) });
+            features.push(Feature { name, link, route: tree.route(tree.0.len() - 1) });
         }
         Ok(Model {
             chain,

@@ -22,6 +22,8 @@ const BODIES_SAMPLED: u64 = 20;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Request<'a> {
     pub role: &'static str,
+    /// Which of several of this role.
+    pub name: Option<&'a str>,
     pub topic: &'a str,
     pub kind: Kind<'a>,
 }

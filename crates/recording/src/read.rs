@@ -44,7 +44,15 @@ impl Recording {
                 }
                 "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
                 "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
-                _ => samples.table = streams.table.as_ref().map(|s| stage.poses(s)).transpose()?,
+                "table" => samples.table = streams.table.as_ref().map(|s| stage.poses(s)).transpose()?,
+                _ => {
+                    let stream = request.name.and_then(|name| streams.bodies.get_key_value(name));
+                    if let Some((name, seen)) = stream.map(|(name, s)| (name, stage.marker(s))) {
+                        seen?.into_iter().for_each(|seen| {
+                            samples.bodies.insert(name.clone(), seen);
+                        });
+                    }
+                }
             }
             reports.push(stage.report);
         }
@@ -58,6 +66,7 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
     for (role, stream) in joints {
         requests.extend(stream.map(|s| Request {
             role,
+            name: None,
             topic: &s.topic,
             kind: Kind::Joints { wanted: &s.names },
         }));
@@ -65,12 +74,19 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
     for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
         requests.extend(stream.iter().map(|s| Request {
             role,
+            name: None,
             topic: &s.topic,
             kind: Kind::Pose { body: s.body.as_deref(), unit: s.unit },
         }));
     }
+    requests.extend(streams.bodies.iter().map(|(name, s)| Request {
+        role: "bodies",
+        name: Some(name),
+        topic: &s.topic,
+        kind: Kind::Pose { body: s.body.as_deref(), unit: s.unit },
+    }));
     if let Some(stream) = &streams.temperature {
-        requests.push(Request { role: "temperature", topic: &stream.topic, kind: Kind::Scalar });
+        requests.push(Request { role: "temperature", name: None, topic: &stream.topic, kind: Kind::Scalar });
     }
     requests
 }
@@ -86,7 +102,7 @@ struct Reading<'a> {
 impl<'a> Reading<'a> {
     fn new(request: &Request<'_>, gathered: &'a Gathered, warnings: &'a mut Vec<Warning>) -> Reading<'a> {
         let report = StreamReport {
-            role: request.role.to_owned(),
+            role: request.name.map_or(request.role.to_owned(), |name| format!("{}.{name}", request.role)),
             topic: request.topic.to_owned(),
             clock: Clock::Log,
             clock_reason: String::new(),
@@ -176,6 +192,18 @@ impl<'a> Reading<'a> {
             position_m,
             orientation: oriented.then(|| poses::orientations(table, &rows)).flatten(),
         })
+    }
+
+    /// None where the sensor never saw it: a marker that is hidden costs its own rows, not the recording.
+    fn marker(&mut self, stream: &PoseStream) -> Result<Option<PoseSamples>, RecordingError> {
+        match self.poses(stream) {
+            Err(unseen @ RecordingError::NoRows { .. }) => {
+                let text = format!("nothing is known of this marker here: {unseen}");
+                self.say(Severity::DataLost, "marker-unseen", text);
+                Ok(None)
+            }
+            read => read.map(Some),
+        }
     }
 
     /// None where no reading can be a temperature: a thermometer that is broken costs its effects, not the recording.

@@ -2,6 +2,7 @@
 
 use crate::Clock;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The streams to read. Only `joints` is required.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -15,6 +16,9 @@ pub struct Streams {
     /// The tip, or the marker body on the end effector.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<PoseStream>,
+    /// Markers on the arm, by the names that `[markers]` gives them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bodies: BTreeMap<String, PoseStream>,
     /// The robot's base.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<PoseStream>,
@@ -32,7 +36,8 @@ impl Streams {
         let joints = [Some(&self.joints), self.set_points.as_ref()];
         let poses = [&self.tip, &self.base, &self.table];
         let topics = joints.into_iter().flatten().map(|s| s.topic.as_str());
-        let topics = topics.chain(poses.into_iter().flatten().map(|s| s.topic.as_str()));
+        let poses = poses.into_iter().flatten().chain(self.bodies.values());
+        let topics = topics.chain(poses.map(|s| s.topic.as_str()));
         let mut topics: Vec<&str> = topics.chain(self.temperature.iter().map(|s| s.topic.as_str())).collect();
         topics.sort_unstable();
         topics.dedup();

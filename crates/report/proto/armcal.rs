@@ -221,6 +221,9 @@ pub struct Residual {
     /// Norm after adding what the diagnosis found, one entry an effect (topic /armcal/steps).
     #[prost(double, repeated, tag = "16")]
     pub step_norm_mm: ::prost::alloc::vec::Vec<f64>,
+    /// What was measured: the name of a marker; absent where it was the tip.
+    #[prost(string, optional, tag = "17")]
+    pub feature: ::core::option::Option<::prost::alloc::string::String>,
 }
 /// One parameter of the model, in SI units and as shown to people.
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -12,6 +12,7 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod by_marker;
 mod campaign;
 mod channels;
 mod comparison;

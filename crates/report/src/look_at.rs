@@ -17,6 +17,9 @@ pub fn look_at(kind: &EffectKind) -> &'static str {
         ("tool_shift", _) => {
             "The tool or its markers were remounted, bent or knocked: look at the last link."
         }
+        ("marker_shift", _) => {
+            "That marker came loose, was knocked or put on again: look at its mount, and at the recording around that time."
+        }
         ("unsettled_reading", _) => {
             "Read the joints later, when arm and readings have settled: look at waiting times, filters and whether set-points are recorded."
         }

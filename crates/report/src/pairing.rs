@@ -62,7 +62,7 @@ pub(crate) fn paired<'r>(before: &'r PastRun, after: &'r PastRun) -> Paired<'r> 
     let mut pairs = Vec::new();
     let mut left = Left::default();
     for (at, a) in after.residuals.iter().enumerate() {
-        match one.partner(&other, at, |b| is(b, a.dwell.recording)) {
+        match one.partner(&other, at, a.feature.as_deref(), |b| is(b, a.dwell.recording)) {
             Ok(partner) if !used[partner] => {
                 used[partner] = true;
                 pairs.push((&before.residuals[partner], a));
@@ -72,7 +72,7 @@ pub(crate) fn paired<'r>(before: &'r PastRun, after: &'r PastRun) -> Paired<'r> 
         }
     }
     for (at, b) in before.residuals.iter().enumerate().filter(|(at, _)| !used[*at]) {
-        let partner = other.partner(&one, at, |a| is(b.dwell.recording, a));
+        let partner = other.partner(&one, at, b.feature.as_deref(), |a| is(b.dwell.recording, a));
         left.add(Side::Before, b, partner.map_or_else(|why| why, |_| TWICE));
     }
     Paired { pairs, unpaired: left.told }
@@ -85,8 +85,8 @@ const TWICE: &str = "the result has them twice, and they count once";
 struct Times<'r> {
     /// Times of the dwell of each residual.
     dwell_of: Vec<Option<&'r PastDwell>>,
-    /// Residuals of each recording with their dwells, by time.
-    by_recording: Vec<Vec<(&'r PastDwell, usize)>>,
+    /// Residuals of each recording with their dwells, by what was measured, by time.
+    by_recording: Vec<BTreeMap<Option<&'r str>, Vec<(&'r PastDwell, usize)>>>,
 }
 
 impl<'r> Times<'r> {
@@ -96,22 +96,24 @@ impl<'r> Times<'r> {
             .collect();
         let dwell_of: Vec<_> =
             (run.residuals.iter()).map(|r| known.get(&(r.dwell.recording, r.dwell.dwell)).copied()).collect();
-        let mut by_recording = vec![Vec::new(); run.recordings.len()];
+        let mut by_recording = vec![BTreeMap::<_, Vec<_>>::new(); run.recordings.len()];
         for (at, (residual, dwell)) in run.residuals.iter().zip(&dwell_of).enumerate() {
             if let (Some(own), Some(dwell)) = (by_recording.get_mut(residual.dwell.recording), dwell) {
-                own.push((*dwell, at));
+                own.entry(residual.feature.as_deref()).or_default().push((*dwell, at));
             }
         }
-        by_recording.iter_mut().for_each(|own| own.sort_by_key(|(dwell, at)| (dwell.start_ns, *at)));
+        let all = by_recording.iter_mut().flat_map(BTreeMap::values_mut);
+        all.for_each(|own| own.sort_by_key(|(dwell, at)| (dwell.start_ns, *at)));
         Times { dwell_of, by_recording }
     }
 
-    /// The residual here of the dwell that is residual `at` of `other`, or why there is none; `same` says which
+    /// The residual here of this feature in the dwell that is residual `at` of `other`, or why there is none; `same` says which
     /// recordings here are the same as its own.
     fn partner(
         &self,
         other: &Times<'_>,
         at: usize,
+        feature: Option<&str>,
         same: impl Fn(usize) -> bool,
     ) -> Result<usize, &'static str> {
         let Some(dwell) = other.dwell_of[at] else { return Err("their result does not say when they were") };
@@ -119,7 +121,7 @@ impl<'r> Times<'r> {
         if own.is_empty() {
             return Err("the other result is not made from this recording");
         }
-        let found = own.iter().find_map(|r| at_time(&self.by_recording[*r], dwell));
+        let found = own.iter().find_map(|r| at_time(self.by_recording[*r].get(&feature)?, dwell));
         found.map(|(_, at)| *at).ok_or("the other result used no dwell of this recording at their times")
     }
 }

@@ -8,8 +8,8 @@ use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{
-    ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Model, ModelError, RigidLink,
-    Session,
+    ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Marker, Model, ModelError,
+    RigidLink, Session,
 };
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -33,6 +33,9 @@ pub struct PastModel {
     chain: ChainText,
     base: FrameFacts,
     tip: FrameFacts,
+    /// Absent in a model without markers, and in one written before there were any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    markers: Vec<MarkerFacts>,
     /// Of several arms, base and tip of each behind the first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     more_arms: Vec<[FrameFacts; 2]>,
@@ -115,6 +118,14 @@ struct FrameFacts {
     free_rotation: bool,
 }
 
+/// A marker and the link that it is on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct MarkerFacts {
+    link: String,
+    #[serde(flatten)]
+    frame: FrameFacts,
+}
+
 /// The model without effects and with them, and their parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PastArms {
@@ -160,6 +171,10 @@ impl PastModel {
             let pose = model.board_in_world(&start, index)?;
             Some(facts(&format!("board.{}", recording.name), &pose))
         });
+        let marker = |(feature, name, link): (FeatureId, &str, &str)| MarkerFacts {
+            link: link.to_owned(),
+            frame: facts(name, &model.feature_in_link(&start, feature)),
+        };
         let recordings = run.recordings.iter().enumerate();
         let judged = calibration.judged();
         Ok(PastModel {
@@ -169,6 +184,7 @@ impl PastModel {
             chain: chain_text(run.model.chain(), &run.model_texts, &run.pipeline_text),
             base: facts(&(prefix(0) + "base"), &alone.base_in_world(&start_then)),
             tip: tip(0),
+            markers: model.markers().map(marker).collect(),
             more_arms: further.collect(),
             link_length_m: model.link_length_m(&start),
             boards: boards.collect(),
@@ -215,7 +231,8 @@ impl PastModel {
         let (base, tip) = (self.base.frame(), self.tip.frame());
         if self.more_arms.is_empty() {
             let boards = self.boards.iter().map(FrameFacts::frame).collect();
-            return Model::new(chain, Frames { base, tip, markers: Vec::new(), boards });
+            let markers = self.markers.iter().map(MarkerFacts::marker).collect();
+            return Model::new(chain, Frames { base, tip, markers, boards });
         }
         let further =
             self.more_arms.iter().map(|[base, tip]| ArmFrames { base: base.frame(), tip: tip.frame() });
@@ -349,6 +366,12 @@ fn range(observations: &[Observation], joint: usize) -> [f64; 2] {
     let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     readings.fold(start, |[low, high], q| [q.min(low), q.max(high)])
+}
+
+impl MarkerFacts {
+    fn marker(&self) -> Marker {
+        Marker { link: self.link.clone(), frame: self.frame.frame() }
+    }
 }
 
 impl FrameFacts {

@@ -62,6 +62,8 @@ pub struct PastResidual {
     pub dwell: DwellId,
     /// Cavity; empty when the tip was tracked.
     pub cavity: String,
+    /// The marker that was measured; `None` of the tip.
+    pub feature: Option<String>,
     /// Whether the fit that predicted it never saw it.
     pub held_out: bool,
     /// Norm of measured minus predicted [m].
@@ -144,6 +146,7 @@ impl PastRun {
             recording: run.recording_name(r.dwell).to_owned(),
             dwell: r.dwell,
             cavity: o.cavity().unwrap_or_default().to_owned(),
+            feature: run.model.marker_name(o.feature).map(str::to_owned),
             held_out: r.held_out,
             error_m: r.fitted_m.norm(),
         };
@@ -270,6 +273,7 @@ impl From<proto::Residual> for PastResidual {
             recording: r.recording,
             dwell: DwellId { recording: r.recording_index as usize, dwell: r.dwell as usize },
             cavity: r.cavity,
+            feature: r.feature,
             held_out: r.held_out,
             error_m: r.fitted_norm_mm * 1e-3,
         }

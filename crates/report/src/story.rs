@@ -50,7 +50,11 @@ impl Story {
             next: match diagnosis {
                 Some(d) => next(run, d).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect(),
                 None if answer.word == "setup" => vec![MEND.to_owned()],
-                None => pool_story::effect(run).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect(),
+                None => pool_story::effect(run)
+                    .into_iter()
+                    .chain(pool_story::days(run))
+                    .chain(scale(run))
+                    .collect(),
             },
             warnings: warnings(run),
             missing: answer.sentence,

@@ -7,6 +7,7 @@
 //! could know beforehand (base, tool, a board whose pose is estimated); `fitted_mm` is the error with
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
+use crate::by_marker::{MarkerErrors, by_marker};
 use crate::diagnosis_summary::DiagnosisSummary;
 use crate::parameters::{FrameEntry, frames};
 use crate::past_model::visited;
@@ -40,6 +41,9 @@ struct Summary<'a> {
     two_arms: Option<TwoArms<'a>>,
     recordings: Vec<RecordingSummary<'a>>,
     fit: FitSummary<'a>,
+    /// Errors by marker, the tip among them; absent of an arm without markers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    markers: Vec<MarkerErrors<'a>>,
     /// What each joint visited in the dwells that were calibrated or held out.
     joints: Vec<JointSummary<'a>>,
     /// Base, tip and boards as calibrated.
@@ -180,6 +184,7 @@ impl<'a> Summary<'a> {
             two_arms: TwoArms::of(run),
             recordings: run.recordings.iter().map(|r| recording(run, r)).collect(),
             fit: fit(&run.calibration),
+            markers: by_marker(run),
             joints: joints(run),
             frames: frames(run),
             refits: run.refits().map(refit).collect(),

@@ -70,6 +70,7 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
     c.integer("dwell", points.iter().map(|p| p.observation.dwell.dwell as i64));
     c.integer("time_ns", points.iter().map(|p| p.observation.time_ns));
     c.text("cavity", points.iter().map(|p| p.observation.cavity()));
+    c.text("feature", points.iter().map(|p| Some(run.model.feature_name(p.observation.feature))));
     let places: Vec<Option<&Assignment>> = points.iter().map(|p| assignment(run, p.observation)).collect();
     c.confidence(&places);
     for j in 0..run.model.joint_count() {

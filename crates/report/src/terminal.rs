@@ -1,5 +1,6 @@
 //! The summary a person reads in the terminal: the story in one screen, or everything.
 
+use crate::by_marker::{MarkerErrors, by_marker};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{RecordingRun, Run, Status, VERSION};
 use crate::story::{SHOWN, Story};
@@ -68,6 +69,10 @@ fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> Str
         Detail::Everything => errors(&pen, &run.calibration),
     };
     sections.push(pen.section(&format!("{} [mm]", errors_are(run)), errors));
+    let markers = by_marker(run);
+    sections.extend(
+        (!markers.is_empty()).then(|| pen.section("Mean errors by marker [mm]", of_markers(&pen, &markers))),
+    );
     match detail {
         Detail::Everything => {
             sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
@@ -178,6 +183,21 @@ fn clock_drift(recording: &RecordingRun) -> String {
         Some(c) => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
         None => "-".into(),
     }
+}
+
+fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>]) -> String {
+    let mut table = pen.table(&["marker", "n", "nominal", "calibrated", "noise floor"]);
+    for of in markers {
+        let mm = |mm: f64| number(millimetres(mm * 1e-3));
+        table.add_row(vec![
+            Cell::new(printable(of.marker)),
+            number(of.n),
+            mm(of.nominal_mm),
+            mm(of.fitted_mm),
+            mm(of.floor_mm),
+        ]);
+    }
+    pen.render(&table)
 }
 
 /// Nominal and calibrated errors on both sides of the hold-out.

@@ -69,7 +69,11 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
         ("zero_slip", Some(offset)) => limits.in_teeth(joint, offset.value),
         _ => String::new(),
     };
-    let at = if kind.target == Target::Joint { format!(" at {joint}") } else { String::new() };
+    let at = match (kind.target, &spec.marker) {
+        (Target::Joint, _) => format!(" at {joint}"),
+        (_, Some(marker)) => format!(" of {marker}"),
+        _ => String::new(),
+    };
     printable(&format!(
         "`{}`{at}{}: {}; {}{teeth}.{rivals} {} If it is here to stay, `armcal add {} PIPELINE` models it.",
         effect.name,

@@ -37,7 +37,11 @@ fn overview() -> String {
 
 /// How it is written: `backlash:JOINT`, `periodic:JOINT,frequency=..`.
 fn spec(kind: &EffectKind) -> String {
-    let joint = if kind.target == Target::Joint { ":JOINT" } else { "" };
+    let joint = match kind.target {
+        Target::Joint => ":JOINT",
+        Target::Marker => ":MARKER",
+        Target::Whole => "",
+    };
     let needed = kind.shapes.iter().filter(|s| s.default.is_none());
     let shapes: String = needed.map(|s| format!(",{}=..", s.name)).collect();
     format!("{}{joint}{shapes}", kind.name)

@@ -149,6 +149,7 @@ fn dwell(o: &Observation) -> Dwell {
         path_memory_rad: o.path_memory_rad.clone().unwrap_or_default(),
         pair_memory_rad: o.pair_memory_rad.clone().unwrap_or_default(),
         moved_rad: o.moved_rad.clone(),
+        markers: Default::default(),
         tip: None,
         temperature_c: o.temperature_c,
     }

@@ -2,15 +2,15 @@
 
 use crate::error::Error;
 use crate::pipeline::{
-    BoardPose, FramePose, FrameSection, MarkersOn, ModelSection, ParameterOverride, Pipeline, TableSection,
-    Vertical,
+    BoardPose, FramePose, FrameSection, MarkerSection, MarkersOn, ModelSection, ParameterOverride, Pipeline,
+    TableSection, Vertical,
 };
 use crate::setup::Change;
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Pose};
 use armcal_model::{
-    Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Model, Override, RecordingStart, Session,
-    is_of_effect,
+    Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Marker, Model, Override, RecordingStart,
+    Session, is_of_effect,
 };
 use armcal_recording::input;
 use armcal_table::{Association, Board, Tilt};
@@ -33,9 +33,9 @@ pub fn nominal_chain(pipeline: &Pipeline) -> Result<(Vec<String>, Chain), Error>
 }
 
 /// The chain alone: bases at the world's origin, tips at the last links, nothing in doubt.
-pub fn bare(chain: &Chain) -> Result<Model, Error> {
+pub fn bare(chain: &Chain, markers: Vec<Marker>) -> Result<Model, Error> {
     if chain.arms().is_empty() {
-        return Ok(Model::new(chain.clone(), Frames::of_bare_arm())?);
+        return Ok(Model::new(chain.clone(), Frames { markers, ..Frames::of_bare_arm() })?);
     }
     let given = |arm: &Arm, what: &str| Frame::given(format!("{}.{what}", arm.name), Pose::identity());
     let frames = |arm: &Arm| ArmFrames { base: given(arm, "base"), tip: given(arm, "tip") };
@@ -92,7 +92,7 @@ pub fn nominal_model(
     let frames = Frames {
         base: base_frame(&pipeline.frames.base, seen),
         tip: frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation),
-        markers: Vec::new(),
+        markers: markers(pipeline),
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?;
@@ -104,6 +104,16 @@ pub fn nominal_model(
         model.ask_own(seen.iter().map(start).collect(), own.clone());
     }
     Ok(model)
+}
+
+/// The markers of the pipeline, in the order of their names.
+pub fn markers(pipeline: &Pipeline) -> Vec<Marker> {
+    let turns = pipeline.fit.use_orientation;
+    let marker = |(name, section): (&String, &MarkerSection)| Marker {
+        link: section.link.clone(),
+        frame: frame(name, &section.frame(), turns),
+    };
+    pipeline.markers.iter().map(marker).collect()
 }
 
 /// What the pipeline says of sensor and parameters.

@@ -5,3 +5,4 @@ pub mod observe;
 pub mod past;
 pub mod perceive;
 pub mod readings;
+pub mod rigid;

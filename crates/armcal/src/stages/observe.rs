@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
 use crate::stages::perceive::Seen;
-use armcal_core::{Dwell, DwellId, FeatureId, Observation, Reference, Rejection};
+use armcal_core::{Dwell, DwellId, FeatureId, Observation, Reference, Rejection, TipMeasurement};
 use armcal_dwell::Moment;
 use armcal_model::Model;
 use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
@@ -76,12 +76,19 @@ pub fn observations(
                 (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
                 (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
             };
+            let of = |feature, (reference, covariance_m2): Referenced| Observation {
+                feature,
+                ..observation(dwell, seen.load_kg, reference, covariance_m2)
+            };
+            let markers = markers_of(pipeline, dwell);
+            let seen_of_it = !markers.is_empty();
             match outcome {
-                Ok((reference, covariance_m2)) => {
-                    observed.observations.push(observation(dwell, seen.load_kg, reference, covariance_m2));
-                }
+                Ok(tip) => observed.observations.push(of(FeatureId::TIP, tip)),
+                // Of a dwell without its tip, the markers are left.
+                Err(_) if seen_of_it => {}
                 Err(why) => observed.rejections.push(Rejection { dwell: dwell.id, why }),
             }
+            observed.observations.extend(markers.into_iter().map(|(feature, marker)| of(feature, marker)));
         }
     }
     if observed.observations.is_empty() {
@@ -155,13 +162,29 @@ fn seated(board: &Board, cavity: &str) -> Result<Referenced, String> {
 
 /// The tip is where the sensor saw it.
 fn tracked(pipeline: &Pipeline, dwell: &Dwell) -> Result<Referenced, String> {
-    let settings = &pipeline.observations;
     let Some(tip) = dwell.tip.as_ref() else {
-        return Err("the sensor did not see the tip during it".into());
+        let what = if pipeline.markers.is_empty() { "the tip" } else { "the tip or a marker" };
+        return Err(format!("the sensor did not see {what} during it"));
     };
-    if !settings.tracked {
+    if !pipeline.observations.tracked {
         return Err("tracked dwells are switched off in [observations]".into());
     }
+    Ok(where_seen(pipeline, tip))
+}
+
+/// The markers that the sensor saw during a dwell, in the order of the model's features.
+fn markers_of(pipeline: &Pipeline, dwell: &Dwell) -> Vec<(FeatureId, Referenced)> {
+    if !pipeline.observations.tracked {
+        return Vec::new();
+    }
+    let features = pipeline.markers.keys().zip(FeatureId::TIP.0 + 1..);
+    let seen = features.filter_map(|(name, id)| Some((FeatureId(id), dwell.markers.get(name)?)));
+    seen.map(|(feature, marker)| (feature, where_seen(pipeline, marker))).collect()
+}
+
+/// What the sensor saw, as well as it sees.
+fn where_seen(pipeline: &Pipeline, tip: &TipMeasurement) -> Referenced {
+    let settings = &pipeline.observations;
     let floor_m2 = (settings.sensor_sigma_mm * 1e-3).powi(2);
     let covariance_m2 = tip.covariance_m2 + Matrix3::from_diagonal(&Vector3::from_element(floor_m2));
     let orientation_sigma_rad = tip.orientation_sigma_rad.hypot(settings.sensor_sigma_deg.to_radians());
@@ -170,7 +193,7 @@ fn tracked(pipeline: &Pipeline, dwell: &Dwell) -> Result<Referenced, String> {
         orientation: tip.orientation,
         orientation_sigma_rad,
     };
-    Ok((reference, covariance_m2))
+    (reference, covariance_m2)
 }
 
 /// Why a dwell is neither in a cavity nor usable as a tracked pose.

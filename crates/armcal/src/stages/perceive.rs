@@ -6,9 +6,10 @@ use crate::progress::Progress;
 use crate::setup;
 use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
+use crate::stages::rigid;
 use crate::two_arms::joined;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, Parameter, Rejection, Samples, Warning};
+use armcal_core::{Dwell, FeatureId, Parameter, PoseSamples, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
@@ -78,7 +79,7 @@ pub fn dwells_of_all(
     progress: &Progress,
     keep: &mut dyn FnMut(Samples),
 ) -> Result<Vec<Seen>, Error> {
-    let speed_model = frames::bare(chain)?;
+    let speed_model = frames::bare(chain, frames::markers(pipeline))?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
     entries
         .map(|(index, (entry, recording))| {
@@ -149,6 +150,8 @@ const BOUNDS_TO_SIGMA: f64 = 0.8;
 /// How far the nominal arm may be off: what the clocks have to be found in spite of.
 struct Doubts {
     nominal: Vec<f64>,
+    /// What the sensor saw that the clocks are aligned by.
+    leading: FeatureId,
     /// Index and standard deviation of every parameter in doubt.
     parameters: Vec<(usize, f64)>,
     /// How far the tracked point may be from the tip of the chain, per axis [m]; 0 where that is given.
@@ -156,18 +159,22 @@ struct Doubts {
 }
 
 impl Doubts {
-    fn of(pipeline: &Pipeline, model: &Model) -> Doubts {
+    fn of(pipeline: &Pipeline, model: &Model, leading: FeatureId) -> Doubts {
         let sigma =
             |p: &Parameter| p.prior_sigma.unwrap_or(BOUNDS_TO_SIGMA * 0.5 * (p.upper - p.lower)).max(0.0);
         let parameters = model.parameters().iter().enumerate().filter(|(_, p)| p.free);
         let parameters =
             parameters.map(|(k, p)| (k, sigma(p))).filter(|(_, sigma)| sigma.is_finite()).collect();
-        let tip = &pipeline.frames.tip;
+        let name = model.features().find(|(feature, _)| *feature == leading).map_or("", |(_, name)| name);
+        let tip = match pipeline.markers.get(name) {
+            Some(marker) if !leading.is_tip() => marker.frame(),
+            _ => pipeline.frames.tip.clone(),
+        };
         let association = pipeline.table.as_ref().map(|t| t.association.clone()).unwrap_or_default();
         let away_m = Vector3::from(tip.at.xyz_m).norm();
         let given = tip.pose == FramePose::Given && away_m == 0.0;
         let marker_m = if given { 0.0 } else { away_m + 1e-3 * association.marker_offset_sigma_mm };
-        Doubts { nominal: model.nominal(), parameters, marker_m }
+        Doubts { nominal: model.nominal(), leading, parameters, marker_m }
     }
 
     fn count(&self) -> usize {
@@ -183,7 +190,7 @@ impl Doubts {
         let marker = off.get(self.parameters.len()..).filter(|axes| axes.len() == 3);
         let marker_m =
             marker.map_or_else(Vector3::zeros, |axes| self.marker_m * Vector3::from_column_slice(axes));
-        (model.tip_in_base(&p, joint_rad) * Point3::from(marker_m)).coords
+        (model.feature_in_base(&p, self.leading, joint_rad) * Point3::from(marker_m)).coords
     }
 }
 
@@ -215,9 +222,9 @@ fn dwells_of_one(
         Some(stale) => warnings.push(stale),
         None => warnings.extend(readings::leaps(&samples.joints, name)),
     }
-    let clock = match &samples.tip {
-        Some(tip) if !tip.is_empty() => {
-            let doubts = Doubts::of(pipeline, speed_model);
+    let clock = match leading(&samples, speed_model) {
+        Some((feature, tip)) => {
+            let doubts = Doubts::of(pipeline, speed_model, feature);
             let tip_of = |q: &[f64], off: &[f64]| doubts.tip_m(speed_model, q, off);
             let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
             let aligned = align_clocks(&samples.joints, tip, arm, &pipeline.clock);
@@ -235,8 +242,10 @@ fn dwells_of_one(
         }
         _ => None,
     };
-    let (dwells, said) = detect_dwells(index, &samples, clock.as_ref(), &pipeline.dwell).map_err(in_dwell)?;
+    let (mut dwells, said) =
+        detect_dwells(index, &samples, clock.as_ref(), &pipeline.dwell).map_err(in_dwell)?;
     warnings.extend(said);
+    warnings.extend(rigid::reject(speed_model, &mut dwells));
     let (base, table) = static_bodies(pipeline, &samples, name, &mut warnings)?;
     let bodies = [("base", base.is_some(), &samples.base), ("table", table.is_some(), &samples.table)];
     let travels_m = bodies
@@ -265,6 +274,15 @@ fn dwells_of_one(
         readings,
     };
     Ok((samples, seen))
+}
+
+/// What the clocks are aligned by: the tip, or the first marker where nothing saw the tip.
+fn leading<'s>(samples: &'s Samples, model: &Model) -> Option<(FeatureId, &'s PoseSamples)> {
+    let seen = model.features().filter_map(|(feature, name)| match feature.is_tip() {
+        true => Some((feature, samples.tip.as_ref()?)),
+        false => Some((feature, samples.bodies.get(name)?)),
+    });
+    seen.into_iter().find(|(_, seen)| !seen.is_empty())
 }
 
 /// The error of clocks that cannot be aligned, with the reading that would align them.

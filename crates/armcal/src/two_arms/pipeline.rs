@@ -173,6 +173,7 @@ impl TwoArms {
             clock: Default::default(),
             dwell: file.dwell,
             table: None,
+            markers: Default::default(),
             sensor: Default::default(),
             model: first.model.clone(),
             frames: Default::default(),
@@ -274,5 +275,6 @@ impl TwoArms {
 
 fn joints_only(joints: &JointStream) -> Streams {
     let joints = joints.clone();
-    Streams { joints, set_points: None, tip: None, base: None, table: None, temperature: None }
+    let bodies = Default::default();
+    Streams { joints, set_points: None, tip: None, bodies, base: None, table: None, temperature: None }
 }

@@ -6,8 +6,8 @@ mod task;
 
 pub use arm::{ArmConfig, DeviationConfig, DhRow, DriveConfig};
 pub use sensors::{
-    BodyConfig, ClockConfig, EncoderConfig, JointFormat, PoseMessage, TableMarkers, TemperatureConfig,
-    TransportConfig, ViconConfig,
+    BodyConfig, ClockConfig, EncoderConfig, JointFormat, MarkerConfig, PoseMessage, TableMarkers,
+    TemperatureConfig, TransportConfig, ViconConfig,
 };
 pub use task::{
     FreeConfig, HandConfig, Order, PassConfig, SetPointsConfig, StopConfig, SweepConfig, TaskConfig,
@@ -163,9 +163,13 @@ impl LabConfig {
             return Err(value("start_unix_s", why.into()));
         }
         self.check_recordings()?;
-        let recordings = self.recordings.len();
+        let (recordings, markers) = (self.recordings.len(), self.vicon.markers.len());
+        if let Some(marker) = self.vicon.markers.iter().find(|m| !(1..=joints).contains(&m.link)) {
+            let why = format!("must be a joint from 1 to {joints}, is {}", marker.link);
+            return Err(value("vicon.markers.link", why));
+        }
         let mut tables = self.mechanisms.iter().enumerate();
-        tables.try_for_each(|(table, m)| m.hidden().check(&Keys { table, joints, recordings }))
+        tables.try_for_each(|(table, m)| m.hidden().check(&Keys { table, joints, recordings, markers }))
     }
 
     fn check_recordings(&self) -> Result<(), LabError> {

@@ -102,6 +102,9 @@ pub struct ViconConfig {
     pub table: BodyConfig,
     /// The base subject.
     pub base: BodyConfig,
+    /// Markers on links of the arm, beside the tip.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub markers: Vec<MarkerConfig>,
 }
 
 /// Message type of the tracked subjects.
@@ -137,6 +140,56 @@ pub struct BodyConfig {
     pub occlusions_per_minute: f64,
     /// Mean length of a burst [s].
     pub occlusion_s: f64,
+}
+
+/// One marker on a link of the arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerConfig {
+    /// Subject name; the topic is `/vicon/<subject>/<subject>`.
+    pub subject: String,
+    /// The joint whose link carries it, from 1.
+    pub link: usize,
+    /// How far it is from where that link ends (the next axis, or the tip), along the axes of the base while all joints are at
+    /// zero [mm].
+    pub at_mm: [f64; 3],
+    /// Frames a second. Default 100.
+    #[serde(default = "default_marker_hz")]
+    pub rate_hz: f64,
+    /// Orientation noise about each axis, 1 sigma [deg]. Default 0.15.
+    #[serde(default = "default_marker_deg")]
+    pub rotation_sigma_deg: f64,
+    /// Bursts of occlusion a minute. Default 0.
+    #[serde(default)]
+    pub occlusions_per_minute: f64,
+    /// Mean length of a burst [s]. Default 0.3.
+    #[serde(default = "default_burst_s")]
+    pub occlusion_s: f64,
+}
+
+fn default_marker_hz() -> f64 {
+    100.0
+}
+
+fn default_marker_deg() -> f64 {
+    0.15
+}
+
+fn default_burst_s() -> f64 {
+    0.3
+}
+
+impl MarkerConfig {
+    /// As any other subject.
+    pub fn body(&self) -> BodyConfig {
+        BodyConfig {
+            subject: self.subject.clone(),
+            rate_hz: self.rate_hz,
+            rotation_sigma_deg: self.rotation_sigma_deg,
+            occlusions_per_minute: self.occlusions_per_minute,
+            occlusion_s: self.occlusion_s,
+        }
+    }
 }
 
 /// How the sensor's clock relates to the robot's.
@@ -233,6 +286,7 @@ impl Default for ViconConfig {
             tip: body("tip", 100.0, 0.15, 2.0),
             table: body("table", 20.0, 0.03, 0.5),
             base: body("base", 20.0, 0.05, 0.2),
+            markers: Vec::new(),
         }
     }
 }
@@ -328,7 +382,14 @@ impl ViconConfig {
         clock.transport.check("vicon.clock.transport")?;
         range("vicon.clock.offset_ms", [clock.offset_ms, 1e6])?;
         range("vicon.clock.drift_ppm", [clock.drift_ppm, 1e5])?;
-        for (key, body) in [("tip", &self.tip), ("table", &self.table), ("base", &self.base)] {
+        let markers: Vec<(String, BodyConfig)> =
+            self.markers.iter().map(|m| (format!("markers {}", m.subject), m.body())).collect();
+        let markers = markers.iter().map(|(key, body)| (key.as_str(), body));
+        let subjects = [("tip", &self.tip), ("table", &self.table), ("base", &self.base)];
+        for (key, body) in subjects.into_iter().chain(markers) {
+            if body.subject.is_empty() {
+                return Err(value(&format!("vicon.{key}.subject"), "is empty; name it".to_owned()));
+            }
             rate(&format!("vicon.{key}.rate_hz"), body.rate_hz)?;
             not_negative(&format!("vicon.{key}.rotation_sigma_deg"), body.rotation_sigma_deg)?;
             not_negative(&format!("vicon.{key}.occlusions_per_minute"), body.occlusions_per_minute)?;

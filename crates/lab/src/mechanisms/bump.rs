@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 pub struct Bump {
     /// What is knocked.
     pub body: BumpedBody,
+    /// With `body = "marker"`: which of `[[vicon.markers]]`, from 1. Default that of the tip.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marker: Option<usize>,
     /// Shift in its own frame [mm]. Default none.
     #[serde(default)]
     pub shift_mm: [f64; 3],
@@ -38,7 +41,7 @@ pub struct Bump {
 pub enum BumpedBody {
     /// The tool is bent; its markers are on it.
     Tool,
-    /// The markers of the tip only.
+    /// The markers of the tip only, or one of `[[vicon.markers]]`.
     Marker,
     /// The robot's base, its markers with it.
     Base,
@@ -95,11 +98,12 @@ impl Mechanism for Bump {
 
     fn distort_camera(&self, now: &Moment<'_>, body: Body, world_from_body: &mut Pose) {
         let loose = match body {
-            Body::Tip => BumpedBody::Marker,
-            Body::Table => BumpedBody::BoardMarkers,
-            Body::Base => BumpedBody::Cameras,
+            Body::Tip => self.marker.is_none().then_some(BumpedBody::Marker),
+            Body::Marker(marker) => (self.marker == Some(marker + 1)).then_some(BumpedBody::Marker),
+            Body::Table => Some(BumpedBody::BoardMarkers),
+            Body::Base => None,
         };
-        if loose != BumpedBody::Cameras && self.hit(now, loose) {
+        if loose.is_some_and(|loose| self.hit(now, loose)) {
             *world_from_body *= self.motion();
         }
         if self.hit(now, BumpedBody::Cameras) {
@@ -110,6 +114,9 @@ impl Mechanism for Bump {
 
 impl Hidden for Bump {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
+        if let Some(marker) = self.marker {
+            keys.marker(marker, self.body == BumpedBody::Marker)?;
+        }
         self.shift_mm.iter().try_for_each(|v| keys.within("shift_mm", *v, [-100.0, 100.0]))?;
         self.turn_deg.iter().try_for_each(|v| keys.within("turn_deg", *v, [-30.0, 30.0]))?;
         keys.event(self.recording, self.at_s, self.until_s)

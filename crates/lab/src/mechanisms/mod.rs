@@ -19,7 +19,7 @@
 //! | `belt_coupling` | a joint drags another one along | `joint`, `by`, `share_percent` |
 //! | `axis_tilt` | an axis is not parallel to the one before | `joint`, `tilt_deg` |
 //! | `zero_slip` | a pulley slips on its shaft | `joint`, `slip_deg`, `recording`, `at_s`, `until_s` |
-//! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `shift_mm`, `turn_deg`, `recording`, `at_s`, `until_s` |
+//! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `marker`, `shift_mm`, `turn_deg`, `recording`, `at_s`, `until_s` |
 //! | `thermal_growth` | links follow the thermometer | `links`, `per_kelvin_ppm` |
 //! | `warm_up` | links are heated by motors the thermometer does not see | `links`, `per_kelvin_ppm`, `rise_k`, `time_constant_s` |
 //! | `lag` | a joint that approaches its drive exponentially | `joint`, `time_constant_s` |
@@ -165,6 +165,8 @@ pub struct Keys {
     pub joints: usize,
     /// Number of recordings of the session.
     pub recordings: usize,
+    /// Number of markers on links of the arm.
+    pub markers: usize,
 }
 
 impl Keys {
@@ -177,6 +179,16 @@ impl Keys {
             return Ok(());
         }
         Err(self.wrong(key, format!("must be a joint from 1 to {}, is {number}", self.joints)))
+    }
+
+    fn marker(&self, number: usize, is_one: bool) -> Result<(), LabError> {
+        if !is_one {
+            return Err(self.wrong("marker", "needs body = \"marker\"".to_owned()));
+        }
+        if (1..=self.markers).contains(&number) {
+            return Ok(());
+        }
+        Err(self.wrong("marker", format!("must be one of {} [[vicon.markers]], is {number}", self.markers)))
     }
 
     fn finite(&self, key: &str, v: f64) -> Result<(), LabError> {

@@ -184,7 +184,7 @@ impl PairArmConfig {
         not_negative("arms.link_kg", self.link_kg)?;
         for (table, mechanism) in self.mechanisms.iter().enumerate() {
             acts_on_drives(mechanism)?;
-            mechanism.hidden().check(&Keys { table, joints, recordings })?;
+            mechanism.hidden().check(&Keys { table, joints, recordings, markers: 0 })?;
         }
         not_negative("arms.deviation.length_mm", self.deviation.length_mm)?;
         not_negative("arms.deviation.angle_deg", self.deviation.angle_deg)?;

@@ -56,19 +56,29 @@ pub struct Camera<'a> {
 
 impl<'a> Camera<'a> {
     pub fn new(config: &'a LabConfig, recording: usize, duration_s: f64) -> Camera<'a> {
-        let mut draw = Stream::new(config.seed, Purpose::Quick, 2 * recording + 1);
+        let draw = Stream::new(config.seed, Purpose::Quick, 2 * recording + 1);
+        Camera { swaps: swaps(config, recording, duration_s), ..Camera::drawn(config, recording, draw) }
+    }
+
+    /// What sees a marker on a link; it is not swapped.
+    pub fn of_marker(config: &'a LabConfig, recording: usize, marker: usize) -> Camera<'a> {
+        let stream = marker * config.recordings.len() + recording;
+        Camera::drawn(config, recording, Stream::new(config.seed, Purpose::QuickMarker, stream))
+    }
+
+    fn drawn(config: &'a LabConfig, recording: usize, mut draw: Stream) -> Camera<'a> {
         let slow = [draw.normal3(), draw.normal3()];
         Camera {
             config,
             draw,
             tails: Tails::new(&config.vicon, config.seed, recording),
-            swaps: swaps(config, recording, duration_s),
+            swaps: Vec::new(),
             slow,
             slow_at_s: 0.0,
         }
     }
 
-    /// Mean pose of the tip over a dwell, and the covariance that its own scatter suggests.
+    /// Mean pose of the tip, or of the marker, over a dwell, and the covariance that its own scatter suggests.
     pub fn tip(&mut self, truth: &Pose, span_s: [f64; 2]) -> (Reference, Matrix3<f64>) {
         let vicon = &self.config.vicon;
         let (mid_s, duration_s) = ((span_s[0] + span_s[1]) / 2.0, span_s[1] - span_s[0]);

@@ -34,7 +34,8 @@ pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
     let clock = SensorClock::draw(config, recording);
     let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
     encoder::joint_states(config, recording, session, &mut log);
-    for body in [Body::Tip, Body::Table, Body::Base] {
+    let markers = (0..config.vicon.markers.len()).map(Body::Marker);
+    for body in [Body::Tip, Body::Table, Body::Base].into_iter().chain(markers) {
         vicon::subject(config, recording, session, body, &mut log);
     }
     if config.temperature.published {

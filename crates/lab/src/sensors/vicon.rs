@@ -42,13 +42,25 @@ pub enum OcclusionKind {
 pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Body, log: &mut Log) {
     let vicon = &config.vicon;
     let (settings, purposes) = match body {
-        Body::Tip => (&vicon.tip, [Purpose::ViconTip, Purpose::OcclusionTip, Purpose::TransportTip]),
+        Body::Tip => (vicon.tip.clone(), [Purpose::ViconTip, Purpose::OcclusionTip, Purpose::TransportTip]),
         Body::Table => {
-            (&vicon.table, [Purpose::ViconTable, Purpose::OcclusionTable, Purpose::TransportTable])
+            (vicon.table.clone(), [Purpose::ViconTable, Purpose::OcclusionTable, Purpose::TransportTable])
         }
-        Body::Base => (&vicon.base, [Purpose::ViconBase, Purpose::OcclusionBase, Purpose::TransportBase]),
+        Body::Base => {
+            (vicon.base.clone(), [Purpose::ViconBase, Purpose::OcclusionBase, Purpose::TransportBase])
+        }
+        Body::Marker(marker) => (
+            vicon.markers[marker].body(),
+            [Purpose::ViconMarker, Purpose::OcclusionMarker, Purpose::TransportMarker],
+        ),
     };
-    let [noise, occlusion, transport] = purposes.map(|p| Stream::new(config.seed, p, recording));
+    let settings = &settings;
+    // Markers have their streams one after the other: of each as many as there are recordings.
+    let stream = match body {
+        Body::Marker(marker) => marker * config.recordings.len() + recording,
+        _ => recording,
+    };
+    let [noise, occlusion, transport] = purposes.map(|p| Stream::new(config.seed, p, stream));
     let (clock, start_ns) = (log.clock, config.start_ns(recording));
     let channel = announce(vicon, settings, log);
     let mut noise = Noise::new(vicon, settings, noise);

@@ -125,14 +125,15 @@ impl Model {
     ) -> impl Iterator<Item = EffectSpec> + use<> {
         let of_arms = kind.shapes.iter().any(|shape| shape.name == ARM.name);
         let arms = if of_arms { self.chain().arms().len() } else { 0 };
-        let specs: Vec<EffectSpec> = match kind.target {
+        let at: Vec<EffectSpec> = match kind.target {
             Target::Joint => (0..self.joint_count()).map(|joint| spec.clone().at(joint)).collect(),
+            Target::Marker => self.markers().map(|(_, name, _)| spec.clone().at_marker(name)).collect(),
             Target::Whole if arms > 0 => {
                 (1..=arms).map(|arm| spec.clone().with(ARM.name, arm as f64)).collect()
             }
             Target::Whole => vec![spec],
         };
-        specs.into_iter()
+        at.into_iter()
     }
 
     /// The spec with every part of the arm that a shape of its kind can name.

@@ -121,6 +121,8 @@ pub enum Target {
     Joint,
     /// On the whole: its spec names no joint.
     Whole,
+    /// At one marker.
+    Marker,
 }
 
 /// How the catalogue offers an effect.

@@ -43,6 +43,7 @@ mod hardening_compliance;
 mod in_model;
 mod kind;
 mod link_bending;
+mod marker_shift;
 mod measure;
 mod nominal_pose;
 mod periodic;
@@ -109,6 +110,7 @@ static CATALOGUE: &[&EffectKind] = &[
     &axis_tilt::KIND,
     &zero_slip::KIND,
     &tool_shift::KIND,
+    &marker_shift::KIND,
     &frame_shift::KIND,
     &board_shift::KIND,
     &unsettled_reading::KIND,

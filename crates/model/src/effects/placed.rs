@@ -155,7 +155,7 @@ pub(crate) fn place(
 /// Whether everything the spec says has a meaning for its kind.
 fn check_words(placing: &Placing<'_>) -> Result<(), String> {
     let (spec, kind) = (placing.spec, placing.kind);
-    if kind.target == super::Target::Whole && spec.target.is_some() {
+    if kind.target != super::Target::Joint && spec.target.is_some() {
         return Err("it does not act at a joint; leave the joint out".to_owned());
     }
     for (name, value) in &spec.shape {

@@ -6,6 +6,7 @@ use super::nominal_pose::NominalPose;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::Model;
+use crate::error::nearest;
 use crate::segment::Motion;
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::Vector3;
@@ -66,6 +67,28 @@ impl Placing<'_> {
         (0..self.zero.bases.len())
             .find(|arm| (*arm + 1) as f64 == number)
             .ok_or_else(|| format!("arm = {number} is not the number of an arm"))
+    }
+
+    /// The marker the spec names: its name, and the index of the first of its parameters.
+    pub fn marker(&self) -> Result<(&str, usize), String> {
+        let known: Vec<(&str, usize)> =
+            self.model.markers().map(|(id, name, _)| (name, self.model.first_of_feature(id))).collect();
+        if known.is_empty() {
+            return Err("it acts at a marker, and there are none: declare them under [markers]".to_owned());
+        }
+        let names = || known.iter().map(|(name, _)| *name);
+        let all = names().collect::<Vec<_>>().join(", ");
+        let Some(wanted) = &self.spec.marker else {
+            return Err(format!(
+                "it acts at a marker; say which of {all}, such as {}:{}",
+                self.kind.name, known[0].0
+            ));
+        };
+        known.iter().find(|(name, _)| name == wanted).copied().ok_or_else(|| {
+            let hint =
+                nearest(wanted, names()).map(|n| format!("; did you mean \"{n}\"?")).unwrap_or_default();
+            format!("there is no marker \"{wanted}\"{hint} The markers are {all}")
+        })
     }
 
     /// The joint the spec names, if it turns.

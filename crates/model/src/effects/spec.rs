@@ -1,12 +1,12 @@
 //! Naming one effect in one place: `backlash:1`, `zero_slip:2@1`, `tool_shift@1.17`, `periodic:1,frequency=30`.
 //!
-//! Grammar: `kind [":" joint] ["@" recording ["." dwell ["-" dwell]]] {"," shape "=" number}`. The joint is its
-//! number from 1 or its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only;
+//! Grammar: `kind [":" place] ["@" recording ["." dwell ["-" dwell]]] {"," shape "=" number}`. The place is a
+//! joint, by its number from 1 or its name, or a marker by its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only;
 //! `@1.17` is from dwell 17 of recording 1 to the end of the session; `@1.17-25` in its dwells 17 to 25 only.
 
 use super::expression::Expression;
 use super::table::Override;
-use super::{EffectKind, Family, catalogue, find};
+use super::{EffectKind, Family, Target, catalogue, find};
 use crate::ModelError;
 use crate::error::nearest;
 use armcal_core::DwellId;
@@ -19,6 +19,8 @@ pub struct EffectSpec {
     pub kind: String,
     /// Index of its joint, from 0.
     pub target: Option<usize>,
+    /// Name of its marker.
+    pub marker: Option<String>,
     /// When it acts; always, where nothing is said.
     pub since: Option<Since>,
     /// Shapes that differ from their defaults, in the order they were given.
@@ -127,6 +129,11 @@ impl EffectSpec {
         EffectSpec { target: Some(joint), ..self }
     }
 
+    /// The same at a marker.
+    pub fn at_marker(self, name: &str) -> EffectSpec {
+        EffectSpec { marker: Some(name.to_owned()), ..self }
+    }
+
     /// The same at another time.
     pub fn since(self, since: Since) -> EffectSpec {
         EffectSpec { since: Some(since), ..self }
@@ -150,7 +157,12 @@ impl EffectSpec {
         if spec.kind()?.family == Family::User {
             return Err(bad("write a formula as an [[effects]] table".to_owned()));
         }
-        spec.target = target.map(|joint| joint_index(joint, joint_names)).transpose().map_err(bad)?;
+        match (target, spec.kind()?.target) {
+            // Which markers there are, the model knows.
+            (Some(marker), Target::Marker) => spec.marker = Some(marker.to_owned()),
+            (Some(joint), _) => spec.target = Some(joint_index(joint, joint_names).map_err(bad)?),
+            (None, _) => {}
+        }
         spec.since = since.map(str::parse).transpose().map_err(|problem: &str| bad(problem.to_owned()))?;
         for part in parts {
             let (name, value) = part
@@ -166,6 +178,7 @@ impl EffectSpec {
     pub fn covers(&self, other: &EffectSpec) -> bool {
         self.kind == other.kind
             && (self.target.is_none() || self.target == other.target)
+            && (self.marker.is_none() || self.marker == other.marker)
             && (self.since.is_none() || self.since == other.since)
             && self.shape.iter().all(|said| other.shape.contains(said))
     }
@@ -184,6 +197,9 @@ impl std::fmt::Display for EffectSpec {
         }
         if let Some(joint) = self.target {
             write!(f, ":{}", joint + 1)?;
+        }
+        if let Some(marker) = &self.marker {
+            write!(f, ":{marker}")?;
         }
         if let Some(since) = &self.since {
             write!(f, "@{since}")?;

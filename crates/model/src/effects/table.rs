@@ -16,6 +16,7 @@
 //! parameters.k = { unit = "deg", prior = 0.3 }
 //! ```
 
+use super::Target;
 use super::expression::Expression;
 use super::spec::{EffectSpec, Since, joint_index};
 use crate::ModelError;
@@ -29,7 +30,7 @@ use std::collections::BTreeMap;
 pub struct EffectTable {
     /// Name of the kind.
     pub kind: String,
-    /// Its joint.
+    /// Its joint, or its marker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<Word>,
     /// When it acts: `1` or `"1.17"`.
@@ -139,11 +140,11 @@ impl EffectTable {
     pub fn spec(&self, joint_names: &[String]) -> Result<EffectSpec, ModelError> {
         let bad = |problem: String| ModelError::BadEffect { effect: self.kind.clone(), problem };
         let mut spec = EffectSpec::new(&self.kind);
-        spec.kind()?;
-        spec.target = match &self.target {
-            Some(word) => Some(joint_index(&word.to_string(), joint_names).map_err(bad)?),
-            None => None,
-        };
+        match (&self.target, spec.kind()?.target) {
+            (Some(word), Target::Marker) => spec.marker = Some(word.to_string()),
+            (Some(word), _) => spec.target = Some(joint_index(&word.to_string(), joint_names).map_err(bad)?),
+            (None, _) => {}
+        }
         spec.since = match &self.since {
             Some(word) => Some(word.to_string().parse::<Since>().map_err(|e| bad(format!("since: {e}")))?),
             None => None,
@@ -175,7 +176,7 @@ impl From<&EffectSpec> for EffectTable {
         let expression = spec.expression.as_ref();
         EffectTable {
             kind: spec.kind.clone(),
-            target: spec.target.map(|joint| Word::Number(joint + 1)),
+            target: spec.marker.clone().map(Word::Text).or(spec.target.map(|joint| Word::Number(joint + 1))),
             since: spec.since.map(|since| Word::Text(since.to_string())),
             name: expression.map(|e| e.name.clone()),
             formula: expression.map(|e| e.formula.clone()),

@@ -21,7 +21,7 @@ impl Model {
         let mut tree = own.chain.on(vec![base]);
         let name = tip.frame.clone().unwrap_or_default();
         tree.0.push(Segment { parent: own.chain.ends().first().copied(), ..tip });
-        let features = vec![Feature { name, route: tree.route(tree.0.len() - 1) }];
+        let features = vec![Feature { name, link: None, route: tree.route(tree.0.len() - 1) }];
         let parameter = |i: &usize| {
             let p = &self.parameters[*i];
             Parameter { name: own.without_prefix(&p.name).to_owned(), ..p.clone() }

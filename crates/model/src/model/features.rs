@@ -11,6 +11,8 @@ use nalgebra::Matrix6xX;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Feature {
     pub name: String,
+    /// The link of a marker, as it was named; none of the tip.
+    pub link: Option<String>,
     pub route: Route,
 }
 
@@ -82,6 +84,28 @@ impl Model {
         self.features.iter().enumerate().map(|(k, feature)| (FeatureId(k), feature.name.as_str()))
     }
 
+    /// The markers: which feature each is, its name, and the link that it is on.
+    pub fn markers(&self) -> impl Iterator<Item = (FeatureId, &str, &str)> {
+        let all = self.features.iter().enumerate();
+        all.filter_map(|(k, feature)| Some((FeatureId(k), feature.name.as_str(), feature.link.as_deref()?)))
+    }
+
+    /// Whether two features are on the same link.
+    pub fn on_one_link(&self, a: FeatureId, b: FeatureId) -> bool {
+        let [a, b] = [a, b].map(|feature| self.route(feature).iter().rev().nth(1));
+        a == b
+    }
+
+    /// The name of a marker; none of the tip.
+    pub fn marker_name(&self, feature: FeatureId) -> Option<&str> {
+        (!feature.is_tip()).then(|| self.feature_name(feature))
+    }
+
+    /// The name of a feature.
+    pub fn feature_name(&self, feature: FeatureId) -> &str {
+        self.features.get(feature.0).map_or("", |feature| feature.name.as_str())
+    }
+
     /// Where the model puts a feature, in the world, effects included.
     pub fn feature_in_world(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Pose {
         if let Some((model, p)) = self.seen(p, o) {
@@ -105,6 +129,11 @@ impl Model {
             turned += twist.rotation_rad;
         }
         jacobian
+    }
+
+    /// Index of the first parameter of a feature's place on its link.
+    pub(crate) fn first_of_feature(&self, feature: FeatureId) -> usize {
+        self.route(feature).last().map_or(0, |end| self.tree.0[*end].parameters.start)
     }
 
     /// The segments from the world to a feature.

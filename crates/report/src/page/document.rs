@@ -57,6 +57,8 @@ pub(crate) struct Dwells {
     pub recording: Vec<usize>,
     pub dwell: Vec<usize>,
     pub cavity: Vec<Option<String>>,
+    /// The marker that was measured; `null` of the tip.
+    pub marker: Vec<Option<String>>,
     /// Measured tip in the world [mm]: x, y, z.
     pub world_mm: [Column; 3],
     /// Measured tip from the base: distance from its vertical axis and height above it [mm].
@@ -178,6 +180,7 @@ fn ranking(
 }
 
 fn dwells(run: &Run) -> Dwells {
+    let marker = |o: &armcal_core::Observation| run.model.marker_name(o.feature).map(str::to_owned);
     let values = run.calibration.fit.values();
     let measured_m: Vec<_> =
         run.observations.iter().map(|o| run.model.measured_tip_in_world(&values, o)).collect();
@@ -199,6 +202,7 @@ fn dwells(run: &Run) -> Dwells {
         recording: run.observations.iter().map(|o| o.dwell.recording).collect(),
         dwell: run.observations.iter().map(|o| o.dwell.dwell).collect(),
         cavity: run.observations.iter().map(|o| o.cavity().map(str::to_owned)).collect(),
+        marker: run.observations.iter().map(marker).collect(),
         world_mm: [0, 1, 2].map(|axis| Column::of_all(measured_m.iter().map(|m| m[axis] * 1e3))),
         reach_mm: [
             Column::of_all(in_base_m.iter().map(|m| m.x.hypot(m.y) * 1e3)),

@@ -34,6 +34,9 @@ pub(crate) fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<
         let own = |i: usize| run.observations[i].dwell.recording == index;
         all.extend(table.group("recording", recording.name.clone(), own));
     }
+    for (feature, name) in run.model.features().filter(|_| run.model.markers().next().is_some()) {
+        all.extend(table.group("marker", name.to_owned(), |i| run.observations[i].feature == feature));
+    }
     let names = run.model.chain().joint_names();
     for (j, name) in names.iter().enumerate() {
         for (sign, word) in [(1, "+"), (-1, "−")] {

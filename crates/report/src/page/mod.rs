@@ -27,6 +27,7 @@ pub use compared::comparison_html;
 pub(crate) use numbers::Column;
 
 use crate::ReportError;
+use crate::by_marker::{MarkerErrors, by_marker};
 use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, unlisted};
 use crate::findings::shown_unlisted;
 use crate::run::{Refit, Run};
@@ -85,6 +86,7 @@ pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, R
         verdict: verdict(run),
         run,
         recordings: quality::recordings(run),
+        markers: by_marker(run).iter().map(MarkerRow::of).collect(),
         rejections: quality::rejections(run),
         next: &story.next,
         warnings: &story.warnings,
@@ -108,9 +110,34 @@ struct ReportPage<'a> {
     verdict: Verdict,
     run: &'a Run,
     recordings: Vec<quality::RecordingRow>,
+    markers: Vec<MarkerRow>,
     rejections: Vec<quality::RejectionRow>,
     next: &'a [String],
     warnings: &'a [ToldWarning],
+}
+
+/// Errors of one marker in words.
+struct MarkerRow {
+    marker: String,
+    link: String,
+    n: usize,
+    nominal: String,
+    fitted: String,
+    floor: String,
+}
+
+impl MarkerRow {
+    fn of(errors: &MarkerErrors<'_>) -> MarkerRow {
+        let mm = |mm: f64| millimetres(mm * 1e-3);
+        MarkerRow {
+            marker: errors.marker.to_owned(),
+            link: errors.link.unwrap_or("the last").to_owned(),
+            n: errors.n,
+            nominal: mm(errors.nominal_mm),
+            fitted: mm(errors.fitted_mm),
+            floor: mm(errors.floor_mm),
+        }
+    }
 }
 
 /// What the diagnosis says, in sentences.

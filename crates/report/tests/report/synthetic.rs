@@ -284,6 +284,7 @@ fn dwell(recording: usize, dwell: usize, joint_rad: &[f64]) -> Dwell {
             samples: 100,
             effective_samples: 30.0,
         }),
+        markers: Default::default(),
         temperature_c: (recording == 1).then_some(23.5),
     }
 }

@@ -199,6 +199,7 @@ mod tests {
             pair_memory_rad: Vec::new(),
             moved_rad: None,
             tip: None,
+            markers: Default::default(),
             temperature_c: None,
         }
     }

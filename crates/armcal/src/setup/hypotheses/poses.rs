@@ -197,10 +197,10 @@ fn turned(matrix: &Matrix3<f64>, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> 
     UnitQuaternion::from_matrix(&(matrix * q.to_rotation_matrix().matrix() * matrix.transpose()))
 }
 
-/// Maps what the sensor saw of the tip.
+/// Maps what the sensor saw of the arm.
 fn map_tips(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
     inputs.each_dwell(|d| {
-        if let Some(tip) = &mut d.tip {
+        for tip in d.tip.iter_mut().chain(d.markers.values_mut()) {
             tip.position_m = matrix * tip.position_m;
             tip.covariance_m2 = matrix * tip.covariance_m2 * matrix.transpose();
             if orientations {

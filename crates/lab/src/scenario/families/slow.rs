@@ -55,7 +55,7 @@ fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -
     let turn_deg =
         if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };
     let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
-    let knock = Bump { body, shift_mm, turn_deg: turn_deg.into(), recording, at_s, until_s };
+    let knock = Bump { body, marker: None, shift_mm, turn_deg: turn_deg.into(), recording, at_s, until_s };
     let (effect, channel, alike) = match body {
         BumpedBody::Tool => {
             ("tool_shift", "tip", vec![format!("zero_slip:3{when}"), format!("frame_shift{when}")])

@@ -26,7 +26,8 @@ const judged = (shown) => shown.holdout.fitted_mm ? shown.holdout : shown.train;
 
 const driver = (key) => doc.drivers.find((d) => d.key === key);
 const dwellName = (i) => doc.recordings[doc.dwells.recording[i]] + " dwell " + doc.dwells.dwell[i] +
-  (doc.dwells.cavity[i] === null ? "" : ", cavity " + doc.dwells.cavity[i]);
+  (doc.dwells.cavity[i] === null ? "" : ", cavity " + doc.dwells.cavity[i]) +
+  (doc.dwells.marker[i] === null ? "" : ", marker " + doc.dwells.marker[i]);
 const indices = doc.dwells.dwell.map((_, i) => i);
 const pointSize = indices.length > 800 ? 3 : 5;
 const rescaled = () => $("rescale").checked;

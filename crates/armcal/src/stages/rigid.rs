@@ -1,0 +1,143 @@
+//! Markers that are on one link keep their distances: one that was swapped or hit in single dwells is known by that alone.
+//!
+//! Within a recording the distance of two markers of one link is what it is in most dwells. Where a marker is off in every
+//! distance to the others, and these agree among themselves, it is rejected and the rest of its pose is kept. Of two markers
+//! nobody can say which one is off: that is said, and the fit's own weight decides. What lasts is no accident: a marker that came
+//! loose is for the diagnosis.
+
+use armcal_core::robust::{MAD_TO_SIGMA, median};
+use armcal_core::{Dwell, FeatureId, Severity, Stage, TipMeasurement, Warning};
+use armcal_model::Model;
+use std::collections::BTreeMap;
+
+/// Fewer dwells do not say what a distance is.
+const FEWEST: usize = 8;
+/// A distance that is off by more than this many standard deviations is wrong; chance does that in none of a million dwells.
+const SIGMAS: f64 = 6.0;
+/// And by more than this [m]: what markers and their mounts give.
+const LEAST_M: f64 = 0.3e-3;
+/// More of its dwells than this share, or so many in a row, are no accidents.
+const MOST: f64 = 0.1;
+const RUN: usize = 3;
+
+/// Two features of one link in one dwell, further from or nearer to each other than elsewhere.
+struct Wrong {
+    dwell: usize,
+    pair: [FeatureId; 2],
+    off_m: f64,
+}
+
+/// Takes single markers that are not where their link has them out of the dwells of one recording, and says so.
+pub fn reject(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
+    let wrong = wrong_distances(model, dwells);
+    let mut accused: BTreeMap<FeatureId, Vec<usize>> = BTreeMap::new();
+    let mut unsure: BTreeMap<[FeatureId; 2], Vec<(usize, f64)>> = BTreeMap::new();
+    for at in 0..dwells.len() {
+        let own: Vec<&Wrong> = wrong.iter().filter(|w| w.dwell == at).collect();
+        match alone(model, &dwells[at], &own) {
+            Some(feature) => accused.entry(feature).or_default().push(at),
+            None => own.iter().for_each(|w| unsure.entry(w.pair).or_default().push((at, w.off_m))),
+        }
+    }
+    accused.retain(|feature, own| {
+        accidents(own, dwells.iter().filter(|d| seen(model, d, *feature).is_some()).count())
+    });
+    unsure.retain(|_, own| accidents(&own.iter().map(|(at, _)| *at).collect::<Vec<_>>(), dwells.len()));
+    let mut warnings: Vec<Warning> =
+        accused.iter().map(|(feature, own)| rejected(model.feature_name(*feature), own, dwells)).collect();
+    for (feature, own) in &accused {
+        for at in own {
+            match feature.is_tip() {
+                true => dwells[*at].tip = None,
+                false => drop(dwells[*at].markers.remove(model.feature_name(*feature))),
+            }
+        }
+    }
+    warnings.extend(
+        unsure.iter().map(|(pair, own)| told_apart(pair.map(|id| model.feature_name(id)), own, dwells)),
+    );
+    warnings
+}
+
+/// What the sensor saw of a feature during a dwell.
+fn seen<'d>(model: &Model, dwell: &'d Dwell, feature: FeatureId) -> Option<&'d TipMeasurement> {
+    if feature.is_tip() { dwell.tip.as_ref() } else { dwell.markers.get(model.feature_name(feature)) }
+}
+
+/// Every distance within a link that is not what it is elsewhere.
+fn wrong_distances(model: &Model, dwells: &[Dwell]) -> Vec<Wrong> {
+    let features: Vec<FeatureId> = model.features().map(|(id, _)| id).collect();
+    let mut wrong = Vec::new();
+    for (k, &a) in features.iter().enumerate() {
+        for &b in features[k + 1..].iter().filter(|b| model.on_one_link(a, **b)) {
+            let distance = |(dwell, d): (usize, &Dwell)| {
+                let (a, b) = (seen(model, d, a)?, seen(model, d, b)?);
+                let between = a.position_m - b.position_m;
+                let along = between.try_normalize(0.0)?;
+                let variance_m2 = along.dot(&((a.covariance_m2 + b.covariance_m2) * along));
+                Some((dwell, between.norm(), variance_m2))
+            };
+            let all: Vec<(usize, f64, f64)> = dwells.iter().enumerate().filter_map(distance).collect();
+            if all.len() < FEWEST {
+                continue;
+            }
+            let middle_m = median(&all.iter().map(|(_, m, _)| *m).collect::<Vec<_>>());
+            let off: Vec<f64> = all.iter().map(|(_, m, _)| (m - middle_m).abs()).collect();
+            let scatter_m = MAD_TO_SIGMA * median(&off);
+            for ((dwell, m, variance_m2), off_m) in all.iter().zip(&off) {
+                if *off_m > LEAST_M.max(SIGMAS * scatter_m.max(variance_m2.sqrt())) {
+                    wrong.push(Wrong { dwell: *dwell, pair: [a, b], off_m: m - middle_m });
+                }
+            }
+        }
+    }
+    wrong
+}
+
+/// The one feature of a dwell that is off from all others of its link, of which there are at least two.
+fn alone(model: &Model, dwell: &Dwell, wrong: &[&Wrong]) -> Option<FeatureId> {
+    let has = |id: FeatureId| wrong.iter().filter(|w| w.pair.contains(&id)).count();
+    let others = |id: FeatureId| {
+        let beside = |other: &FeatureId| *other != id && model.on_one_link(id, *other);
+        model
+            .features()
+            .map(|(other, _)| other)
+            .filter(beside)
+            .filter(|o| seen(model, dwell, *o).is_some())
+            .count()
+    };
+    let is_alone = |id: &FeatureId| others(*id) >= 2 && has(*id) == others(*id) && has(*id) == wrong.len();
+    model.features().map(|(id, _)| id).find(is_alone)
+}
+
+/// Whether these are few of so many dwells, and not in a row.
+fn accidents(own: &[usize], of: usize) -> bool {
+    let few = own.len() as f64 <= (MOST * of as f64).max(1.0);
+    few && !own.windows(RUN).any(|run| run[RUN - 1] - run[0] == RUN - 1)
+}
+
+fn rejected(name: &str, own: &[usize], dwells: &[Dwell]) -> Warning {
+    let message = format!(
+        "rejected in {}: there its distances to the other markers of its link are not what they are elsewhere, as after a swap or a \
+         knock; what else was seen then is used",
+        listed(own.iter().map(|at| dwells[*at].id.dwell))
+    );
+    Warning::new(Severity::Notice, Stage::Dwell, "marker-rejected", format!("marker {name}"), message)
+}
+
+fn told_apart([a, b]: [&str; 2], own: &[(usize, f64)], dwells: &[Dwell]) -> Warning {
+    let most_m = own.iter().map(|(_, off_m)| off_m.abs()).fold(0.0, f64::max);
+    let message = format!(
+        "their distance is off by up to {:.2} mm in {}: one of them was swapped or knocked, and nothing on their link tells which; a \
+         third marker there would",
+        most_m * 1e3,
+        listed(own.iter().map(|(at, _)| dwells[*at].id.dwell))
+    );
+    Warning::new(Severity::Notice, Stage::Dwell, "marker-distance", format!("markers {a} and {b}"), message)
+}
+
+fn listed(dwells: impl Iterator<Item = usize>) -> String {
+    let all: Vec<String> = dwells.map(|d| d.to_string()).collect();
+    let more = if all.len() > 8 { ", ..." } else { "" };
+    format!("dwell {}{more}", all[..all.len().min(8)].join(", "))
+}

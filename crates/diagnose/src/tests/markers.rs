@@ -1,0 +1,194 @@
+//! Several markers a pose: their rows share the encoders' noise, and one that came loose is told from all else.
+
+use super::{assert_whitens, quick};
+use crate::knowledge::Knowledge;
+use crate::noise::Noise;
+use crate::view::View;
+use crate::{Calibrated, Diagnosis, Problem, Verdict, diagnose};
+use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
+use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
+use armcal_model::{Chain, Frame, Frames, Marker, Model, Session};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::path::Path;
+
+const ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
+const SIGMA_M: f64 = 0.1e-3;
+/// At the tip twice the sensor's own noise.
+const ENCODER_RAD: f64 = 0.4e-3;
+
+/// The paper's arm with two markers beside its tip, one on the tool, one on the upper arm.
+fn model() -> Model {
+    let chain = Chain::from_dh_toml(ARM, Path::new("arm.toml")).unwrap();
+    let marker = |name: &str, link: &str, at: [f64; 3]| Marker {
+        link: link.into(),
+        frame: Frame {
+            free_rotation: false,
+            ..Frame::estimated(name, Pose::translation(at[0], at[1], at[2]))
+        },
+    };
+    let markers =
+        vec![marker("elbow", "joint2", [0.02, -0.05, 0.03]), marker("hand", "tool", [-0.04, 0.03, -0.05])];
+    let tip = Frame { free_rotation: false, ..Frame::given("tip", Pose::identity()) };
+    Model::new(chain, Frames { tip, markers, ..Frames::of_bare_arm() }).unwrap()
+}
+
+struct Rig {
+    model: Model,
+    observations: Vec<Observation>,
+    session: Session,
+    fit: FitConfig,
+}
+
+/// What the sensor saw of an arm as designed in `n` poses; from dwell `loose` on the marker on the tool is 1.5 mm off.
+fn rig(seed: u64, n: usize, loose: Option<usize>) -> Rig {
+    let model = model();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut noise = |sigma: f64| Vector3::from_fn(|_, _| sigma * rng.sample::<f64, _>(StandardNormal));
+    let mut observations = Vec::new();
+    for dwell in 0..n {
+        let turn = |k: f64| (dwell as f64 * k).sin();
+        let q = vec![1.2 * turn(1.7), -0.5 + 0.8 * turn(2.9), 0.95 * turn(0.83)];
+        let off = noise(ENCODER_RAD);
+        for (feature, name) in model.features() {
+            let id = DwellId { recording: 0, dwell };
+            let stands = Observation {
+                feature,
+                time_ns: dwell as i64 * 5_000_000_000,
+                joint_sigma_rad: vec![ENCODER_RAD; 3],
+                covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
+                ..Observation::bare(id, q.clone(), Reference::position(Vector3::zeros()))
+            };
+            let mut truth = model.nominal();
+            if name == "hand" && loose.is_some_and(|from| dwell >= from) {
+                truth[model.index("hand.y").unwrap()] += 1.5e-3;
+            }
+            let position_m = model.predicted_tip_in_world(&truth, &stands) + noise(SIGMA_M);
+            observations.push(Observation {
+                joint_rad: q.iter().zip(off.iter()).map(|(q, off)| q + off).collect(),
+                reference: Reference::position(position_m),
+                ..stands
+            });
+        }
+    }
+    let session = Session::of(&observations);
+    Rig { model, observations, session, fit: FitConfig::default() }
+}
+
+impl Rig {
+    /// As the diagnosis sees it at the truth.
+    fn problem(&self) -> Problem {
+        let (values, sizes) = (self.model.nominal(), Default::default());
+        let knowledge = Knowledge::of(&quick(), self.model.chain().joint_names()).unwrap();
+        let Rig { model, observations, session, fit } = self;
+        View { model, values: &values, observations, session, fit, sizes: &sizes, knowledge: &knowledge }
+            .problem()
+            .unwrap()
+    }
+
+    fn diagnosed(&self) -> Diagnosis {
+        let holdout = HoldoutConfig::CavityFolds { k: 5 };
+        let Rig { model, observations, session, fit } = self;
+        let calibration = calibrate(model, observations, fit, &holdout).unwrap();
+        let calibrated =
+            Calibrated { model, calibration: &calibration, observations, session, fit, holdout: &holdout };
+        diagnose(&calibrated, &quick()).unwrap()
+    }
+}
+
+#[test]
+fn what_was_seen_of_a_pose_is_independent_once_it_is_whitened() {
+    let rig = rig(1, 400, None);
+    let problem = rig.problem();
+    problem.check().unwrap();
+    assert_eq!((problem.dwells.len(), problem.rows()), (400, 9 * 400));
+    let mut covariance = DMatrix::<f64>::zeros(9, 9);
+    for d in &problem.dwells {
+        let own = problem.residual.rows(d.first_row, d.rows);
+        covariance += own * own.transpose() / 400.0;
+    }
+    // A mean of 400 products of standard normal numbers scatters by 0.05, one of squares by 0.07.
+    let off = (&covariance - DMatrix::identity(9, 9)).amax();
+    assert!(off < 0.25, "{off} {covariance}");
+    // The encoders' noise of one pose is in all of its rows, and taken apart it would be seen.
+    let o = &rig.observations[0];
+    let lever = rig.model.joint_jacobian(&rig.model.nominal(), o).norm() * ENCODER_RAD;
+    assert!(lever > SIGMA_M, "{lever}");
+}
+
+#[test]
+fn rows_are_told_in_metres_by_what_they_measure() {
+    let mut rig = rig(2, 12, None);
+    // One marker was hidden once: the other rows of that pose stay.
+    rig.observations.retain(|o| !(o.dwell.dwell == 5 && o.feature == FeatureId(1)));
+    let problem = rig.problem();
+    let p = rig.model.nominal();
+    let mut told = problem.dwells.iter().flat_map(|d| d.errors_m(&problem.residual));
+    for o in &rig.observations {
+        let error_m = rig.model.residual(&p, o).position_m.norm();
+        let found = told.next().unwrap();
+        assert!((found - error_m).abs() < 1e-12, "{found} {error_m}");
+    }
+    assert!(told.next().is_none());
+    assert_eq!(problem.dwells[5].rows, 6);
+    assert_eq!(problem.dwells[5].rows_as_in(&problem.dwells[6]), 3, "tip and hand against tip and elbow");
+}
+
+#[test]
+fn a_joint_that_is_off_moves_all_rows_of_its_pose() {
+    let rig = rig(3, 12, None);
+    let (step, p) = (1e-6, rig.model.nominal());
+    let problem = rig.problem();
+    let channel = problem.channels.iter().find(|c| c.name == "joint2").unwrap();
+    for (d, own) in problem.dwells.iter().zip(rig.observations.chunks(3)) {
+        let stacked = |by: f64| {
+            let rows = own.iter().flat_map(|o| {
+                let mut o = o.clone();
+                o.joint_rad[1] += by;
+                let error_m: [f64; 3] = rig.model.residual(&p, &o).position_m.into();
+                error_m
+            });
+            DVector::from_iterator(9, rows)
+        };
+        let fall = (stacked(-step) - stacked(step)) / (2.0 * step);
+        let mut raw = DMatrix::zeros(9, 9);
+        for (k, part) in d.parts.iter().enumerate() {
+            raw.rows_mut(3 * k, 3).copy_from(&part.metres);
+        }
+        let found = raw * channel.columns.rows(d.first_row, d.rows).column(0);
+        assert!((&found - &fall).amax() < 1e-6, "{found} {fall}");
+    }
+}
+
+#[test]
+fn noise_that_remembers_is_that_of_each_marker_and_goes_on_while_it_is_hidden() {
+    let mut rig = rig(4, 25, None);
+    rig.observations.retain(|o| !(o.feature == FeatureId(2) && (8..11).contains(&o.dwell.dwell)));
+    let p = rig.problem();
+    let of: Vec<(usize, FeatureId, usize)> = p
+        .dwells
+        .iter()
+        .flat_map(|d| d.parts.iter().flat_map(|part| (0..3).map(|axis| (d.id.dwell, part.feature, axis))))
+        .collect();
+    let b: f64 = 1.7;
+    let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| {
+        let same = of[i].1 == of[k].1 && of[i].2 == of[k].2;
+        let memory = (-(of[i].0.abs_diff(of[k].0) as f64) / 3.0).exp();
+        (f64::from(i == k) + if same { b * b * memory } else { 0.0 }) / (1.0 + b * b)
+    });
+    assert_whitens(Noise::Memory, b, &p, c);
+}
+
+#[test]
+fn a_marker_that_came_loose_is_named_and_nothing_else() {
+    for seed in 11..14 {
+        let found = rig(seed, 48, Some(25)).diagnosed();
+        assert_eq!(found.verdict, Verdict::Identified, "{seed}: {:?}", found.names);
+        assert_eq!(found.names.len(), 1, "{:?}", found.names);
+        assert!(found.names[0].starts_with("marker_shift:hand@0.2"), "{:?}", found.names);
+        let clean = rig(seed, 48, None).diagnosed();
+        assert_eq!(clean.verdict, Verdict::NothingMissing, "{seed}: {:?}", clean.names);
+    }
+}

@@ -1,0 +1,63 @@
+//! A marker on a link of the arm came loose.
+//!
+//! # What moves
+//! One marker: it was knocked, slipped on its mount, or was put on again elsewhere.
+//!
+//! # Equation
+//! `d marker = (x, y, z)` in the link that carries it, in the recording, or from the dwell on, that the spec names.
+//!
+//! # Parameters and units
+//! `x`, `y`, `z` [m] along the axes of that link.
+//!
+//! # Signature in the data
+//! A step between recordings or at a dwell that turns with the link, of this marker and of nothing else in the same poses.
+//!
+//! # Not to be confused with
+//! `tool_shift`, of which the tip knows; `zero_slip` of a joint before the link, where no other marker is seen that the joint
+//! moves too.
+//!
+//! # Source
+//! Notes of the project.
+
+use super::drivers::Drivers;
+use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
+use super::physics::{Deformation, Physics};
+use super::placing::{Placing, amplitudes_xyz};
+use crate::rigid::Scalar;
+use armcal_core::Unit;
+
+pub(super) static KIND: EffectKind = EffectKind {
+    name: "marker_shift",
+    aliases: &[],
+    summary: "a marker on a link came loose, between recordings or at a dwell",
+    family: Family::Event,
+    toggle: Toggle::Recording,
+    target: Target::Marker,
+    offered: Offered::Events,
+    shapes: &[],
+    never_negative: &[],
+    confused_with: &["tool_shift", "zero_slip"],
+    source: include_str!("marker_shift.rs"),
+    place,
+};
+
+#[derive(Debug)]
+struct MarkerShift {
+    /// Index of the marker's x.
+    marker: usize,
+}
+
+fn place(placing: &Placing<'_>) -> Result<Placement, String> {
+    let (name, marker) = placing.marker()?;
+    placing.event()?;
+    let meaning = format!("shift of marker {name} on its link along");
+    Ok(Placement::new(amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &meaning), MarkerShift { marker }))
+}
+
+impl Physics for MarkerShift {
+    fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
+        for (axis, shift) in theta.iter().enumerate() {
+            change.parameter(self.marker + axis, *shift);
+        }
+    }
+}
