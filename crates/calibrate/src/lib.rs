@@ -62,7 +62,7 @@ pub use fit::{fit, fit_problem};
 pub use fit_warnings::{ABOVE_FLOOR, INADEQUATE};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
 pub use linearise::{LinearAxis, LinearPose, Linearisation, linearise};
-pub use model_problem::{ModelProblem, position_covariance_m2};
+pub use model_problem::{ModelProblem, PositionNoise, position_covariance_m2};
 pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};

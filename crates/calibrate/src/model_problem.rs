@@ -11,7 +11,7 @@ use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter, Reference};
 use armcal_model::{Model, ModelResidual};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use std::ops::Range;
 
 /// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
@@ -29,6 +29,33 @@ pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matr
     match along(model, p, o) {
         Some(along) => along * along.transpose() * along.dot(&(covariance * along)),
         None => covariance,
+    }
+}
+
+/// What displacements of an observation weigh against its noise.
+pub enum PositionNoise {
+    /// All three coordinates are known.
+    Full(Cholesky<f64, Const<3>>),
+    /// Only what lies along a unit vector is, with this variance [m^2].
+    Along(Vector3<f64>, f64),
+}
+
+impl PositionNoise {
+    /// Of an observation at parameters `p`; `None` where its covariance is none.
+    pub fn of(model: &Model, p: &[f64], o: &Observation) -> Option<PositionNoise> {
+        let covariance_m2 = position_covariance_m2(model, p, o);
+        match along(model, p, o) {
+            Some(along) => Some(PositionNoise::Along(along, along.dot(&(covariance_m2 * along)))),
+            None => covariance_m2.cholesky().map(PositionNoise::Full),
+        }
+    }
+
+    /// A displacement [m] by the inverse of the covariance [1/m].
+    pub fn weigh(&self, displacement_m: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            PositionNoise::Full(covariance) => covariance.solve(displacement_m),
+            PositionNoise::Along(along, variance_m2) => along * (along.dot(displacement_m) / variance_m2),
+        }
     }
 }
 

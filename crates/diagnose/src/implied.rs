@@ -10,7 +10,7 @@
 //! gear, a line over torque for compliance. Each joint explains the residual as if it were alone, so an error of one
 //! joint also appears, weaker, in the others that can move the tip the same way.
 
-use armcal_calibrate::position_covariance_m2;
+use armcal_calibrate::PositionNoise;
 use armcal_core::Observation;
 use armcal_model::Model;
 use nalgebra::Vector3;
@@ -42,12 +42,12 @@ pub fn implied_joint_errors(
     residual_m: &Vector3<f64>,
 ) -> Vec<Option<ImpliedError>> {
     let jacobian = model.joint_jacobian(p, o);
-    let weigh = position_covariance_m2(model, p, o).cholesky();
+    let noise = PositionNoise::of(model, p, o);
     let of_joint = |column: Vector3<f64>| {
         if column.norm() < NO_LEVER {
             return None;
         }
-        let weighed = weigh.as_ref()?.solve(&column);
+        let weighed = noise.as_ref()?.weigh(&column);
         let information = weighed.dot(&column);
         let error = weighed.dot(residual_m) / information;
         let sigma = information.sqrt().recip();

@@ -10,9 +10,10 @@ use crate::sizes::{clear, size_in_table, sizes, sizes_of};
 use crate::text::printable;
 use armcal_core::SetupReport;
 use armcal_diagnose::{Diagnosis, FoundEffect, HeldOut, UnknownReport, Verdict};
-use armcal_model::{EffectKind, Family, effects_toml, find};
+use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// Rows of the ranking.
 const RANKED: usize = 8;
@@ -183,7 +184,21 @@ fn added(run: &Run, d: &Diagnosis) -> Option<String> {
 
 /// The answer in one sentence.
 pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
-    run.in_words(&as_spelt(d))
+    run.in_words(&as_spelt(d)) + &joints_told(run, d)
+}
+
+/// Which arm the joints are of that a headline numbers through both; nothing for one arm.
+fn joints_told(run: &Run, d: &Diagnosis) -> String {
+    let names = run.model.chain().joint_names();
+    if run.model.chain().arms().is_empty() {
+        return String::new();
+    }
+    let of_effects = d.effects.iter().flat_map(|e| &e.set).filter_map(|name| EffectSpec::parse(name, names).ok());
+    let targets = of_effects.filter_map(|spec| spec.target);
+    let curves = d.unlisted.iter().chain(&d.unknown).filter_map(|u| u.own_angle());
+    let joints: BTreeSet<usize> = targets.chain(curves).collect();
+    let told = |joint: &usize| Some(format!(" Joint {} is {}.", joint + 1, printable(names.get(*joint)?)));
+    joints.iter().filter_map(told).collect()
 }
 
 /// The same with recordings by their index, and events as a pipeline spells them.

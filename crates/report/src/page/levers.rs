@@ -6,7 +6,7 @@
 use super::basis::joint_units;
 use crate::findings::moves_tip;
 use crate::run::Run;
-use armcal_calibrate::position_covariance_m2;
+use armcal_calibrate::PositionNoise;
 use armcal_core::Observation;
 use armcal_core::robust::median;
 use armcal_diagnose::{BLURRED, implied_joint_errors};
@@ -120,11 +120,15 @@ fn joint_levers(run: &Run, values: &[f64], o: &Observation) -> Vec<Option<Lever>
 /// Parts per million of all lengths.
 fn length_lever(run: &Run, values: &[f64], o: &Observation) -> Option<Lever> {
     let (model, p) = run.model.in_recording(o.dwell.recording, values);
-    let jacobian = model.residual_with_jacobian(&p, o).1;
-    // The jacobian is that of measured minus predicted.
-    let grown = |(k, length_m): (usize, f64)| -jacobian.fixed_view::<3, 1>(0, k).into_owned() * length_m;
+    // The jacobian is that of measured minus predicted; of a distance it has one row, along it.
+    let (residual, jacobian) = model.residual_with_jacobian(&p, o);
+    let moved = |k: usize| match residual.along {
+        Some(along) => along * jacobian[(0, k)],
+        None => jacobian.fixed_view::<3, 1>(0, k).into_owned(),
+    };
+    let grown = |(k, length_m): (usize, f64)| -moved(k) * length_m;
     let column_m = run.model.lengths_m().into_iter().map(grown).sum::<Vector3<f64>>() * 1e-6;
-    let weighed = position_covariance_m2(&run.model, values, o).cholesky()?.solve(&column_m);
+    let weighed = PositionNoise::of(&run.model, values, o)?.weigh(&column_m);
     let information = weighed.dot(&column_m);
     let lever = Lever { gain: weighed / information, column_m, sigma: information.sqrt().recip() };
     lever.gain.iter().all(|g| g.is_finite()).then_some(lever)
