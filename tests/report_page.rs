@@ -141,9 +141,16 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
     let result = read_json(&out.join("pool.json"));
     let warnings = result["warnings"].as_array().expect("warnings");
     assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:#?}");
+    // With its diagnosis, that of a run: what moved between the recordings shows in all of them together.
+    let (found, page) = (path.join("found"), rig.join("pipeline.toml"));
+    let arguments = [Path::new("pool"), &page, &path.join("runs"), Path::new("--out"), &found];
+    let output = armcal(arguments.map(Path::as_os_str));
+    let terminal = String::from_utf8_lossy(&output.stdout);
+    says_the_same(&found, &terminal);
+    assert!(terminal.contains("frame_shift") && !terminal.contains("armcal add"), "{terminal}");
     let Some(browser) = browser() else { return };
-    let files = [out.join("report.html"), out.join("pool.json"), screenshots("overview"), "pool".into()];
-    println!("{}", scripted(&browser, "overview.mjs", &files.each_ref().map(PathBuf::as_path)));
+    let files = [found.join("report.html"), found.join("summary.json"), screenshots("pool")];
+    println!("{}", scripted(&browser, "report.mjs", &files.each_ref().map(PathBuf::as_path)));
 }
 
 /// Headline, status and steps of a page are in the text of the terminal.

@@ -1,5 +1,5 @@
 // usage: overview.mjs PAGE.html RESULT.json FOLDER NAME
-// The page of a pool or of two arms: offline, silent, its first screen says what the result says, its charts draw its numbers.
+// The page of two arms: offline, silent, its first screen says what the result says, its charts draw its numbers.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -32,7 +32,7 @@ try {
   near(mean(nominal.y), judged.nominal_mm.mean, "mean of what is drawn over time, nominal");
   if (result.recordings.length > 1) {
     const lines = await data(page, "#by-recording");
-    for (const [line, errors] of [["nominal", "nominal_mm"], ["calibrated", "fitted_mm"], ["never seen", "unseen_mm"]]) {
+    for (const [line, errors] of [["nominal", "nominal_mm"], ["calibrated", "fitted_mm"]]) {
       const own = lines.find((l) => l.name === line);
       result.recordings.forEach((r, k) => near(own.y[k], r[errors].mean, `${line} ${r.name}`));
     }
