@@ -134,8 +134,16 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
         run_pipeline(&own, &path.join("runs").join(at.to_string()), &[0]);
     }
     let out = path.join("pool");
-    let arguments = [Path::new("pool"), &rig.join("0.toml"), &path.join("runs"), Path::new("--out"), &out];
-    let output = armcal(arguments.map(Path::as_os_str));
+    // One screen has no room for every step that the page has.
+    let told = [
+        Path::new("pool"),
+        Path::new("-v"),
+        &rig.join("0.toml"),
+        &path.join("runs"),
+        Path::new("--out"),
+        &out,
+    ];
+    let output = armcal(told.map(Path::as_os_str));
     assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     says_the_same(&out, &String::from_utf8_lossy(&output.stdout));
     let result = read_json(&out.join("pool.json"));
@@ -143,8 +151,8 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
     assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:#?}");
     // With its diagnosis, that of a run: what moved between the recordings shows in all of them together.
     let (found, page) = (path.join("found"), rig.join("pipeline.toml"));
-    let arguments = [Path::new("pool"), &page, &path.join("runs"), Path::new("--out"), &found];
-    let output = armcal(arguments.map(Path::as_os_str));
+    let told = [Path::new("pool"), Path::new("-v"), &page, &path.join("runs"), Path::new("--out"), &found];
+    let output = armcal(told.map(Path::as_os_str));
     let terminal = String::from_utf8_lossy(&output.stdout);
     says_the_same(&found, &terminal);
     assert!(terminal.contains("frame_shift") && !terminal.contains("armcal add"), "{terminal}");

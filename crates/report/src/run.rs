@@ -270,7 +270,9 @@ impl Run {
     pub(crate) fn errors_by_recording(&self) -> Vec<RecordingErrors> {
         let own = |c: &Calibration, norm: fn(&Residual) -> f64| -> Vec<ErrorStats> {
             let mut norms = vec![Vec::new(); self.recordings.len()];
-            c.residuals.iter().for_each(|r| norms[r.dwell.recording].push(norm(r)));
+            for r in &c.residuals {
+                norms.get_mut(r.dwell.recording).into_iter().for_each(|own| own.push(norm(r)));
+            }
             norms.iter().map(|norms| ErrorStats::of_norms(norms)).collect()
         };
         let nominal = own(&self.calibration, |r| r.nominal_m.norm());
