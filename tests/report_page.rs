@@ -156,6 +156,12 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
     let terminal = String::from_utf8_lossy(&output.stdout);
     says_the_same(&found, &terminal);
     assert!(terminal.contains("frame_shift") && !terminal.contains("armcal add"), "{terminal}");
+    let page = std::fs::read_to_string(found.join("report.html")).expect("report.html");
+    assert_eq!(
+        page.matches("On recordings that it never saw").count(),
+        2,
+        "as it opens, and for its scripts"
+    );
     let Some(browser) = browser() else { return };
     let files = [found.join("report.html"), found.join("summary.json"), screenshots("pool")];
     println!("{}", scripted(&browser, "report.mjs", &files.each_ref().map(PathBuf::as_path)));

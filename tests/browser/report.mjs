@@ -109,7 +109,7 @@ try {
   await drawn(page);
   await page.screenshot({ path: join(folder, "candidate.png"), fullPage: true });
   await page.click("#reset");
-  assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);
+  assert.ok((await page.textContent("#sentence")).trim().startsWith(summary.conclusion));
   await drawn(page);
   await page.screenshot({ path: join(folder, "light.png"), fullPage: true });
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, "no sideways scrolling on a laptop");
