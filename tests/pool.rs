@@ -220,6 +220,30 @@ fn refused(path: &Path) {
     assert!(message.contains("joint2.theta"), "{message}");
 }
 
+/// Page, summary, channels, layouts and where `armcal view` finds what was pooled, and no second copy of observations.
+fn leaves_what_a_run_leaves(out: &Path, pooled: &Value) {
+    let summary = read_json(&out.join("summary.json"));
+    assert_eq!(summary["schema"], "armcal.summary/1");
+    for same in ["/conclusion", "/status", "/answer", "/fit/holdout", "/fit/rank"] {
+        assert_eq!(summary.pointer(same), pooled.pointer(same), "{same}");
+    }
+    for file in ["run.mcap", "report.html", "foxglove-layout.json", "calibrated.toml", "observations.parquet"]
+    {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    assert!(!out.join("observations.json").exists(), "it would be pooled with what it was made of");
+    let (seen, of) = (summary["recordings"].as_array(), pooled["recordings"].as_array());
+    for (seen, of) in seen.expect("recordings").iter().zip(of.expect("recordings")) {
+        assert_eq!(
+            (&seen["name"], &seen["dwells"], &seen["files"]),
+            (&of["name"], &of["dwells"], &of["files"])
+        );
+        assert!(seen["clock_offset_ms"].is_null(), "what is not known is not zero");
+    }
+    let view = std::fs::read_to_string(out.join("view.toml")).expect("view.toml");
+    assert!(view.contains("results = [\"../results\"]"), "{view}");
+}
+
 /// The camera was set up anew every day: each recording has a base of its own, whatever the threads.
 #[test]
 fn every_day_may_have_a_base_of_its_own() {
@@ -249,6 +273,24 @@ fn every_day_may_have_a_base_of_its_own() {
     }
     let shared = parameters(&pooled, "/fit/parameters");
     assert!(named(&shared, &Value::from("base.rz"))["free"] == false);
+    leaves_what_a_run_leaves(&path.join("pool-1"), &pooled);
+    // One run of all recordings gives each its own base too, and the same arm.
+    let text = std::fs::read_to_string(&week).expect("pipeline");
+    let together = run_pipeline(&week, &path.join("together"), &[0, 3]);
+    assert!(text.contains("per_recording"));
+    let of_run = parameters(&together, "/fit/parameters");
+    let mut worst: f64 = 0.0;
+    for recording in pooled["recordings"].as_array().expect("recordings") {
+        for p in parameters(recording, "/parameters").into_iter().chain(shared.iter().copied()) {
+            let q = named(&of_run, &p["name"]);
+            assert_eq!((&p["free"], &p["determined"]), (&q["free"], &q["determined"]), "{}", p["name"]);
+            if p["free"] == true {
+                worst = worst.max((number(p, "/value") - number(q, "/value")).abs() / number(q, "/sigma"));
+            }
+        }
+    }
+    println!("pool and run, each with a base a day: {worst:.1e} sigma apart");
+    assert!(worst < 1e-3);
     // The model of the pool corrects set-points like that of a run.
     let targets = path.join("targets.csv");
     write(&targets, "name,x_m,y_m,z_m\na,0.40,0.05,0.15\n");

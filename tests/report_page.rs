@@ -130,13 +130,37 @@ fn a_pool_that_errs_above_twice_the_floor_is_inadequate_on_its_page_and_in_the_t
         run_pipeline(&own, &path.join("runs").join(at.to_string()), &[0]);
     }
     let out = path.join("pool");
-    let arguments = [Path::new("pool"), &rig.join("0.toml"), &path.join("runs"), Path::new("--out"), &out];
-    let output = armcal(arguments.map(Path::as_os_str));
+    // One screen has no room for every step that the page has.
+    let told = [
+        Path::new("pool"),
+        Path::new("-v"),
+        &rig.join("0.toml"),
+        &path.join("runs"),
+        Path::new("--out"),
+        &out,
+    ];
+    let output = armcal(told.map(Path::as_os_str));
     assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
     says_the_same(&out, &String::from_utf8_lossy(&output.stdout));
     let result = read_json(&out.join("pool.json"));
     let warnings = result["warnings"].as_array().expect("warnings");
     assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:#?}");
+    // With its diagnosis, that of a run: what moved between the recordings shows in all of them together.
+    let (found, page) = (path.join("found"), rig.join("pipeline.toml"));
+    let told = [Path::new("pool"), Path::new("-v"), &page, &path.join("runs"), Path::new("--out"), &found];
+    let output = armcal(told.map(Path::as_os_str));
+    let terminal = String::from_utf8_lossy(&output.stdout);
+    says_the_same(&found, &terminal);
+    assert!(terminal.contains("frame_shift") && !terminal.contains("armcal add"), "{terminal}");
+    let page = std::fs::read_to_string(found.join("report.html")).expect("report.html");
+    assert_eq!(
+        page.matches("On recordings that it never saw").count(),
+        2,
+        "as it opens, and for its scripts"
+    );
+    let Some(browser) = browser() else { return };
+    let files = [found.join("report.html"), found.join("summary.json"), screenshots("pool")];
+    println!("{}", scripted(&browser, "report.mjs", &files.each_ref().map(PathBuf::as_path)));
 }
 
 /// Headline, status and steps of a page are in the text of the terminal.

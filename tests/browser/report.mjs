@@ -54,7 +54,8 @@ const browser = await launch();
 try {
   const { page, seen } = await open(browser, address);
   await drawn(page);
-  assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);
+  // That of a pool goes on with what it is worth on another day.
+  assert.ok((await page.textContent("#sentence")).trim().startsWith(summary.conclusion));
   assert.equal(await number(page, "#n-before"), side(summary.fit).fitted_mm.mean);
   assert.equal(await number(page, "#n-nominal"), side(summary.fit).nominal_mm.mean);
 
@@ -108,7 +109,7 @@ try {
   await drawn(page);
   await page.screenshot({ path: join(folder, "candidate.png"), fullPage: true });
   await page.click("#reset");
-  assert.equal((await page.textContent("#sentence")).trim(), summary.conclusion);
+  assert.ok((await page.textContent("#sentence")).trim().startsWith(summary.conclusion));
   await drawn(page);
   await page.screenshot({ path: join(folder, "light.png"), fullPage: true });
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, "no sideways scrolling on a laptop");

@@ -49,6 +49,21 @@ pub const RUN: [&str; 13] = [
     "parameters.parquet",
     "view.toml",
 ];
+const POOL: [&str; 13] = [
+    "run.mcap",
+    "report.html",
+    "summary.json",
+    "pool.json",
+    "parameters.toml",
+    "calibrated.toml",
+    "model.json",
+    "foxglove-layout.json",
+    "foxglove-layout-legacy.json",
+    "dwells.parquet",
+    "observations.parquet",
+    "parameters.parquet",
+    "view.toml",
+];
 const CAMPAIGN: [&str; 3] = ["campaign.html", "campaign.json", "campaign.parquet"];
 
 /// The folder.
@@ -196,7 +211,7 @@ pub fn cases() -> Vec<Case> {
             "--out",
             &["pool", "p.toml", "result"],
             vec!["p.toml", "board.toml", "arm.toml", "result/observations.json"],
-            folder(&["pool.json", "parameters.toml", "model.json"]),
+            folder(&POOL),
         ),
         of(
             ["batch", "out"],

@@ -53,6 +53,9 @@ const SIGNATURES: [(&str, &str, &str); 11] = [
 /// A page of a version that did not say which.
 const EARLIER_PAGE: &str = "page";
 const PAGE_SUFFIX: &str = "-page";
+/// The page of a run, and what pools had of earlier versions.
+const RUN_PAGE: &str = "report-page";
+const EARLIER_POOL_PAGE: &str = "overview-page";
 
 /// Kind and columns of tables of earlier versions.
 const TABLES: [(&str, [&str; 2]); 5] = [
@@ -70,7 +73,12 @@ pub(crate) struct Mark(String);
 impl Mark {
     /// Whether a file of this kind may take the place of one of the other kind.
     pub fn replaces(&self, other: &Mark) -> bool {
-        self == other || other.0 == EARLIER_PAGE && self.0.ends_with(PAGE_SUFFIX)
+        let earlier = match other.0.as_str() {
+            EARLIER_PAGE => self.0.ends_with(PAGE_SUFFIX),
+            EARLIER_POOL_PAGE => self.0 == RUN_PAGE,
+            _ => false,
+        };
+        self == other || earlier
     }
 
     /// The kind, as people read it.

@@ -176,7 +176,7 @@ fn added(run: &Run, d: &Diagnosis) -> Option<String> {
     };
     // `armcal add` reads the recordings of a pipeline; a pool has none.
     let adds = match run.is_pool() {
-        true => "under `[[effects]]` of the pipeline, and pooled again",
+        true => "with it under `[[effects]]` of the pipeline, pooled again",
         false => "`armcal add suggested PIPELINE` adds it to the model",
     };
     Some(format!("{adds}: {does}"))

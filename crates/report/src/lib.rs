@@ -5,7 +5,8 @@
 //! `Run -> write_all -> files`. All outputs are views of the one [`Run`]; the same run gives the same bytes,
 //! and each file appears whole or not at all.
 //!
-//! Many recordings, each with a run of its own, make a [`Campaign`].
+//! Many recordings, each with a run of its own, make a [`Campaign`]; calibrated together from what those runs observed, they are
+//! a [`Run`] too, with [`pool_json`] beside its files.
 //!
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
 //! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).

@@ -9,8 +9,16 @@ use serde::Serialize;
 const HEADER: &str = "\
 # Parameters of the calibrated arm. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
 # determined = false: the data say nothing about it and the prior keeps it near nominal.
-# <recording>.<parameter> and board.<recording>.* are that recording's own; everything else is shared.
 # at_bound = true: it wants to go further than its bounds allow.
+# Frames: where `frame` lies in `parent`; roll, pitch, yaw about the fixed x, y, z of the parent.
+
+";
+
+/// Begins otherwise, so that a pool takes the place of no run's own parameters.
+const POOLED: &str = "\
+# Parameters of an arm calibrated on many recordings at once. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
+# <recording>.<parameter> and board.<recording>.* are that recording's own; everything else is shared.
+# determined = false: the data say nothing about it and the prior keeps it near nominal.
 # Frames: where `frame` lies in `parent`; roll, pitch, yaw about the fixed x, y, z of the parent.
 
 ";
@@ -61,7 +69,8 @@ pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
         parameters: fit.estimates.iter().map(entry).collect(),
         frames: frames(run),
     };
-    Ok(format!("{HEADER}{}", toml::to_string(&file)?))
+    let header = if run.is_pool() { POOLED } else { HEADER };
+    Ok(format!("{header}{}", toml::to_string(&file)?))
 }
 
 /// One parameter as it is written.

@@ -18,11 +18,14 @@ pub(crate) fn transfer(run: &Run) -> String {
 
 /// Where an effect is missing and nobody looked for it: what does.
 pub(crate) fn effect(run: &Run) -> Option<String> {
+    if !run.is_pool() {
+        return None;
+    }
     let times = run.calibration.left_over();
     let errors = run.errors_by_recording();
     let mean_m = |at: &usize| errors[*at].calibrated.mean_m;
     let worst = (0..errors.len()).max_by(|a, b| mean_m(a).total_cmp(&mean_m(b)))?;
-    (run.is_pool() && times.is_finite() && times > INADEQUATE).then(|| {
+    (times.is_finite() && times > INADEQUATE).then(|| {
         format!(
             "errors are {times:.1} times the noise floor, most in `{}` ({} mm): pool again with `[diagnosis] enabled = true`, which \
              looks for what is missing and for what moved between the recordings",

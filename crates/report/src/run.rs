@@ -64,8 +64,13 @@ pub enum Undiagnosed {
     NotAsked,
     /// The setup contradicts the data: no physical effect is looked for in such data.
     SetupFirst,
-    /// So many parameters at once that it would take hours.
-    TooLarge,
+    /// The search works on all free parameters at once, and these are more than the `most` it is made for.
+    TooLarge {
+        /// How many are free.
+        free: usize,
+        /// How many may be.
+        most: usize,
+    },
     /// It could not be made; a warning says why.
     Failed,
 }
@@ -195,17 +200,20 @@ impl Run {
         if let Some(diagnosis) = &self.diagnosis {
             return Answer { word: diagnosis.verdict.word(), sentence: headline(self, diagnosis) };
         }
-        let why = match self.undiagnosed {
-            Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.",
-            Some(Undiagnosed::TooLarge) => {
-                "What is missing was not looked for: a diagnosis of so many recordings together would take hours; pool fewer."
+        let sentence = match self.undiagnosed {
+            Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.".to_owned(),
+            Some(Undiagnosed::SetupFirst) => {
+                "The setup comes first; what is missing was not looked for.".to_owned()
             }
-            Some(Undiagnosed::SetupFirst) => "The setup comes first; what is missing was not looked for.",
+            Some(Undiagnosed::TooLarge { free, most }) => format!(
+                "What is missing was not looked for: that search works on all free parameters at once, here {free}, and {most} \
+                 are the most; pool fewer recordings for it."
+            ),
             Some(Undiagnosed::NotAsked) | None => {
-                "What is missing was not looked for ([diagnosis] enabled = false)."
+                "What is missing was not looked for ([diagnosis] enabled = false).".to_owned()
             }
         };
-        Answer { word: "not_diagnosed", sentence: why.to_owned() }
+        Answer { word: "not_diagnosed", sentence }
     }
 
     /// Every other calibration of the observations: the steps, then the alternatives.
@@ -262,7 +270,9 @@ impl Run {
     pub(crate) fn errors_by_recording(&self) -> Vec<RecordingErrors> {
         let own = |c: &Calibration, norm: fn(&Residual) -> f64| -> Vec<ErrorStats> {
             let mut norms = vec![Vec::new(); self.recordings.len()];
-            c.residuals.iter().for_each(|r| norms[r.dwell.recording].push(norm(r)));
+            for r in &c.residuals {
+                norms.get_mut(r.dwell.recording).into_iter().for_each(|own| own.push(norm(r)));
+            }
             norms.iter().map(|norms| ErrorStats::of_norms(norms)).collect()
         };
         let nominal = own(&self.calibration, |r| r.nominal_m.norm());

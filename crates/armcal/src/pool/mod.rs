@@ -70,13 +70,15 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         transfer,
         setup: SetupReport::default(),
         diagnosis: None,
-        undiagnosed: Some(Undiagnosed::TooLarge),
+        undiagnosed: None,
         steps: Vec::new(),
         alternatives: Vec::new(),
         warnings: collected.warnings,
     };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
-    if free <= DIAGNOSED_PARAMETERS {
+    if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {
+        run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
+    } else {
         story::diagnose_again(&mut run, pipeline, progress);
         story::add_refits(&mut run, pipeline, progress)?;
     }

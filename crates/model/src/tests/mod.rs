@@ -4,6 +4,7 @@ mod formats;
 mod jacobian;
 mod oracles;
 mod rig;
+mod scopes;
 mod surroundings;
 mod urdf_edit;
 

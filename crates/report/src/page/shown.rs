@@ -5,6 +5,7 @@ use super::basis::Basis;
 use super::groups::{Group, groups};
 use super::numbers::Column;
 use super::signature::{Signature, signatures};
+use crate::pool_story;
 use crate::run::{Refit, Run, role_word};
 use crate::text::{conclusion, estimate_shown, millimetres};
 use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
@@ -101,7 +102,9 @@ impl Shown {
     pub fn of_run(run: &Run, basis: &Basis) -> Shown {
         let own =
             Refit { effects: Vec::new(), model: run.model.clone(), calibration: run.calibration.clone() };
-        Shown::of(run, basis, &own)
+        let shown = Shown::of(run, basis, &own);
+        // What it is worth on another day was asked of the run's own calibration alone.
+        Shown { sentence: shown.sentence + &pool_story::transfer(run), ..shown }
     }
 
     /// Another calibration of the run's observations.
