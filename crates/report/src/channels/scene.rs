@@ -44,7 +44,8 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: 
         arm("arm/nominal", &run.model, &run.calibration.nominal_values, GREY, time_ns, &dwell.joint_rad),
         arm("arm/calibrated", &run.model, &fitted, GREEN, time_ns, &dwell.joint_rad),
     ];
-    let observed = own.iter().find(|p| p.observation.dwell == dwell.id).map(|p| p.measured_m);
+    let of_tip = |p: &&&Point| p.observation.dwell == dwell.id && p.observation.feature.is_tip();
+    let observed = own.iter().find(of_tip).map(|p| p.measured_m);
     let mut measured = entity("tip/measured", time_ns);
     if let Some(tip_m) = observed.or(dwell.tip.as_ref().map(|t| t.position_m)) {
         measured.spheres.push(sphere(&tip_m, 0.008, WHITE));
