@@ -160,9 +160,10 @@ fn a_marker_that_is_off_in_one_dwell_is_rejected_alone() {
     let rejected: Vec<&Value> = warnings.iter().filter(|w| w["code"] == "marker-rejected").collect();
     assert_eq!(rejected.len(), 1, "{warnings:#?}");
     assert_eq!(rejected[0]["subject"], "marker palm");
+    // It was off by 5 mm; the pose in which it was put back halfway is none of those.
     let errors = marker(&summary, "palm");
     assert!(number(errors, "/n") < number(marker(&summary, "tip"), "/n"));
-    assert!(number(errors, "/fitted_mm") < 1.4 * number(errors, "/floor_mm"), "{errors}");
+    assert!(number(errors, "/fitted_mm") < 2.0 * number(errors, "/floor_mm"), "{errors}");
 }
 
 /// The model before calibration: the drawing of the arm, the measured base, markers anywhere on their links.
@@ -192,8 +193,7 @@ fn in_fifty_rigs_a_loose_marker_is_named_and_on_clean_ones_nothing_is_claimed() 
             config.seed = 7000 + seed as u64;
             let observed = observe(&config).expect("a session");
             // A marker is hidden in a twelfth of the poses, each by itself.
-            let hidden =
-                |i: usize, o: &Observation| o.feature != FeatureId::TIP && (7 * i + seed) % 12 == 0;
+            let hidden = |i: usize, o: &Observation| o.feature != FeatureId::TIP && (7 * i + seed) % 12 == 0;
             let seen = observed.observations.into_iter().enumerate().filter(|(i, o)| !hidden(*i, o));
             let observations: Vec<Observation> = seen.map(|(_, o)| o).collect();
             let (model, session) = (model(&observed.nominal), Session::of(&observations));

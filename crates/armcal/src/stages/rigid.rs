@@ -204,7 +204,9 @@ mod tests {
 
     fn knock(dwells: &mut [Dwell], name: &str, at: std::ops::Range<usize>) {
         for dwell in &mut dwells[at] {
-            dwell.markers.get_mut(name).expect("seen").position_m += Vector3::new(0.0, 3e-3, 2e-3);
+            let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), dwell.joint_rad[0]);
+            let off_m = turn * Vector3::new(0.0, 3e-3, 2e-3);
+            dwell.markers.get_mut(name).expect("seen").position_m += off_m;
         }
     }
 

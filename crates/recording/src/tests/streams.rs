@@ -330,7 +330,7 @@ fn markers_are_read_each_under_its_name_and_one_that_is_never_seen_costs_itself(
             let stamp_ns = START_NS + i * STEP_NS;
             let header = Header { stamp_ns, frame_id: "world" };
             let hidden = x == 0.0;
-            let position = if hidden { [0.0; 3] } else { [x + noise(i, 0), 0.1, 0.2] };
+            let position = if hidden { [f64::NAN; 3] } else { [x + noise(i, 0), 0.1, 0.2] };
             let turned = [0.0, 0.0, 0.0, if hidden { 0.0 } else { 1.0 }];
             (stamp_ns as u64, stamp_ns as u64, ros2::pose_stamped(header, position, turned))
         };
@@ -349,7 +349,7 @@ fn markers_are_read_each_under_its_name_and_one_that_is_never_seen_costs_itself(
     let roles: Vec<&str> = reports.iter().map(|r| r.role.as_str()).collect();
     assert_eq!(roles, ["joints", "bodies.elbow", "bodies.hand", "bodies.lost"]);
     let lost = warnings.iter().find(|w| w.code == "marker-unseen").expect("said");
-    assert!(lost.subject.contains("/lost") && lost.message.contains("100 occluded"), "{lost:?}");
+    assert!(lost.subject.contains("/lost") && lost.message.contains("100 with NaN"), "{lost:?}");
     assert_eq!(streams.topics(), ["/elbow", "/hand", "/joint_states", "/lost"]);
     let bodies = [("hand".to_owned(), stream("/hands"))];
     let error = refusal(&tracks, &Streams { bodies: bodies.into(), ..two_joints() });
