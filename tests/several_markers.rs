@@ -28,7 +28,7 @@ fn recorded(folder: &Path, lab: &str, edit: impl Fn(String) -> String) -> PathBu
     let output = armcal([Path::new("simulate"), &file, Path::new("--out"), &made].map(Path::as_os_str));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text =
-        std::fs::read_to_string(root().join("pipelines/lab/three-markers-pipeline.toml")).expect("pipeline");
+        std::fs::read_to_string(root().join("pipelines/simulated/three-markers.toml")).expect("pipeline");
     let text = text
         .replace("../../out/three-markers", &made.to_string_lossy())
         .replace("../models", &root().join("pipelines/models").to_string_lossy());

@@ -32,9 +32,9 @@ pub fn reject(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
     let wrong = wrong_distances(model, dwells);
     let mut accused: BTreeMap<FeatureId, Vec<usize>> = BTreeMap::new();
     let mut unsure: BTreeMap<[FeatureId; 2], Vec<(usize, f64)>> = BTreeMap::new();
-    for at in 0..dwells.len() {
+    for (at, dwell) in dwells.iter().enumerate() {
         let own: Vec<&Wrong> = wrong.iter().filter(|w| w.dwell == at).collect();
-        match alone(model, &dwells[at], &own) {
+        match alone(model, dwell, &own) {
             Some(feature) => accused.entry(feature).or_default().push(at),
             None => own.iter().for_each(|w| unsure.entry(w.pair).or_default().push((at, w.off_m))),
         }
@@ -218,7 +218,7 @@ mod tests {
         knock(&mut all, "a", 19..20);
         let before = all.clone();
         let said = reject(&arm(&names), &mut all);
-        let told: Vec<(&str, &str)> = said.iter().map(|w| (w.code.as_ref(), w.subject.as_str())).collect();
+        let told: Vec<(&str, &str)> = said.iter().map(|w| (w.code, w.subject.as_str())).collect();
         assert_eq!(told, [("marker-rejected", "marker a"), ("marker-rejected", "marker b")]);
         assert!(said[1].message.starts_with("rejected in dwell 7:"), "{}", said[1].message);
         assert!(
@@ -234,7 +234,7 @@ mod tests {
         knock(&mut all, "a", 7..8);
         let before = all.clone();
         let said = reject(&arm(&names), &mut all);
-        assert_eq!((said.len(), said[0].code.as_ref()), (1, "marker-distance"));
+        assert_eq!((said.len(), said[0].code), (1, "marker-distance"));
         assert!(
             said[0].subject == "markers tip and a" && said[0].message.contains("in dwell 7:"),
             "{said:?}"
