@@ -193,7 +193,8 @@ fn in_fifty_rigs_a_loose_marker_is_named_and_on_clean_ones_nothing_is_claimed() 
             config.seed = 7000 + seed as u64;
             let observed = observe(&config).expect("a session");
             // A marker is hidden in a twelfth of the poses, each by itself.
-            let hidden = |i: usize, o: &Observation| o.feature != FeatureId::TIP && (7 * i + seed) % 12 == 0;
+            let hidden =
+                |i: usize, o: &Observation| o.feature != FeatureId::TIP && (7 * i + seed).is_multiple_of(12);
             let seen = observed.observations.into_iter().enumerate().filter(|(i, o)| !hidden(*i, o));
             let observations: Vec<Observation> = seen.map(|(_, o)| o).collect();
             let (model, session) = (model(&observed.nominal), Session::of(&observations));
