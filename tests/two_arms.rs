@@ -224,9 +224,9 @@ fn play_hidden_in_either_arm_has_its_joint_and_nothing_hidden_has_no_name() {
         println!("play of {width_deg} deg in joint {}: {} {names}", k + 1, said["verdict"]);
         let right = |name: &Value| {
             let name = name.as_str().unwrap_or_default();
-            ["backlash", "gravity_backlash"].iter().any(|kind| {
-                name.split([',', '@']).next() == Some(format!("{kind}:{}", k + 1).as_str())
-            })
+            ["backlash", "gravity_backlash"]
+                .iter()
+                .any(|kind| name.split([',', '@']).next() == Some(format!("{kind}:{}", k + 1).as_str()))
         };
         let names = said["names"].as_array().expect("names");
         if names.is_empty() || !names.iter().all(right) {
@@ -246,7 +246,8 @@ fn what_is_missing_of_two_arms_is_added_and_the_error_falls_to_the_floor() {
     simulate(&hiding(7_300, 4, 0.6), folder.path()).expect("simulated");
     let path = pipeline(folder.path(), "kind = \"same-point\"");
     let out = folder.path().join("out");
-    let output = armcal(["add".as_ref(), "suggested".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+    let output =
+        armcal(["add".as_ref(), "suggested".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()]);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
     let summary: Value =
@@ -269,10 +270,9 @@ fn what_is_missing_of_two_arms_is_added_and_the_error_falls_to_the_floor() {
     let checked = armcal(["check".as_ref(), path.as_os_str()]);
     assert_eq!(checked.status.code(), Some(0), "{}", String::from_utf8_lossy(&checked.stdout));
     // The effect that is told to be of an arm is that of all under its number.
-    let own = std::fs::read_to_string(&path).expect("pipeline").replace(
-        "\n[[effects]]\nkind = \"backlash\"\ntarget = \"left.joint2\"\n",
-        "",
-    );
+    let own = std::fs::read_to_string(&path)
+        .expect("pipeline")
+        .replace("\n[[effects]]\nkind = \"backlash\"\ntarget = \"left.joint2\"\n", "");
     let own = own.replace(
         "base = { pose = \"estimated\" }",
         "effects = [{ kind = \"backlash\", target = 2 }]\nbase = { pose = \"estimated\" }",
@@ -286,7 +286,13 @@ fn what_is_missing_of_two_arms_is_added_and_the_error_falls_to_the_floor() {
 fn what_to_record_next_brings_the_tips_together() {
     let shipped = root().join("pipelines/two-arms.toml");
     let effects = "backlash:2,gravity_backlash:2";
-    let output = armcal(["plan".as_ref(), shipped.as_os_str(), "--effects".as_ref(), effects.as_ref(), "--json".as_ref()]);
+    let output = armcal([
+        "plan".as_ref(),
+        shipped.as_os_str(),
+        "--effects".as_ref(),
+        effects.as_ref(),
+        "--json".as_ref(),
+    ]);
     let said: Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)));
     let dwells = said["dwells"].as_array().expect("dwells");

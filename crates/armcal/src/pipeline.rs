@@ -3,6 +3,10 @@
 //! Paths inside the file are relative to the file. Every section belongs to the crate that acts on it;
 //! this module only puts them side by side, so a key is documented where it is used.
 
+mod markers;
+
+pub use markers::MarkerSection;
+
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pool::PoolSection;
@@ -240,38 +244,6 @@ pub struct FrameSection {
     pub sigma_deg: f64,
 }
 
-/// A marker on a link of the arm; `[streams.bodies]` says by its name where it is read.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MarkerSection {
-    /// The link of a URDF, or the row of a DH table, that it is on.
-    pub link: String,
-    /// How its place on the link is known.
-    #[serde(default = "estimated")]
-    pub pose: FramePose,
-    /// Its place on the link, or where the estimate starts.
-    #[serde(default)]
-    pub at: RollPitchYaw,
-    /// Standard error of a measured place [mm].
-    #[serde(default)]
-    pub sigma_mm: f64,
-    /// Same for its rotation [deg].
-    #[serde(default)]
-    pub sigma_deg: f64,
-}
-
-fn estimated() -> FramePose {
-    FramePose::Estimated
-}
-
-impl MarkerSection {
-    /// Its place as any other frame.
-    pub fn frame(&self) -> FrameSection {
-        let MarkerSection { pose, at, sigma_mm, sigma_deg, .. } = *self;
-        FrameSection { pose, at, sigma_mm, sigma_deg }
-    }
-}
-
 /// How a frame is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -357,17 +329,6 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
 /// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
 fn is_of_two_arms(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("closed_chain"))
-}
-
-/// Why a marker cannot have a name; it begins the names of its parameters.
-fn no_name_of_a_marker(name: &str) -> Option<String> {
-    let taken = ["tip", "base", "board", "world", "table"].contains(&name);
-    let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    match (taken, plain) {
-        (true, _) => Some("is the name of something else; give the marker another".to_owned()),
-        (_, false) => Some("is no name: use letters, digits, _ and -".to_owned()),
-        _ => None,
-    }
 }
 
 impl Pipeline {
@@ -506,27 +467,7 @@ impl Pipeline {
         if self.two_arms.is_none() && self.table.is_none() && !tracked {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
         }
-        for (name, marker) in &self.markers {
-            let key = format!("markers.{name}");
-            if let Some(why) = no_name_of_a_marker(name) {
-                return fail(&key, why);
-            }
-            if !self.streams.bodies.contains_key(name) {
-                return fail(&key, format!("has no [streams.bodies.{name}] that says where it is read"));
-            }
-            if marker.pose == FramePose::Measured && marker.sigma_mm == 0.0 {
-                return fail(
-                    &format!("{key}.pose"),
-                    "is \"measured\" without sigma_mm; give it, or pose = \"given\"".into(),
-                );
-            }
-        }
-        if let Some(name) = self.streams.bodies.keys().find(|name| !self.markers.contains_key(*name)) {
-            let problem = format!(
-                "is read, but nothing says which link it is on: add [markers.{name}] with link = \"...\""
-            );
-            return fail(&format!("streams.bodies.{name}"), problem);
-        }
+        markers::check(self, &fail)?;
         if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
             return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }

@@ -1,7 +1,7 @@
 //! Undetermined directions in physical words.
 
 use crate::whitened::Axis;
-use armcal_core::Parameter;
+use armcal_core::{Parameter, Role};
 use nalgebra::DMatrix;
 
 /// Information below this share of a prior's counts as none at all.
@@ -76,6 +76,12 @@ impl<'a> Term<'a> {
         self.part.starts_with("board")
     }
 
+    /// Whether it places a marker on its link.
+    fn is_of_marker(&self) -> bool {
+        let frame = matches!(self.parameter.role, Role::EstimatedFrame | Role::KnownFrame);
+        frame && !self.is_of_board() && !is_frame(self.part, "base") && !is_frame(self.part, "tip")
+    }
+
     fn turns_about_axis(&self) -> bool {
         matches!(self.quantity, "theta" | "rz" | "zero")
     }
@@ -113,6 +119,7 @@ fn combination(terms: &[Term<'_>]) -> String {
 fn reason(terms: &[Term<'_>], blind: bool) -> String {
     let parts = distinct_parts(terms);
     let (base, tip) = (base_of(&parts), tip_of(&parts));
+    let seen = if terms.iter().any(Term::is_of_marker) { "what was measured" } else { "the tip" };
     let robot: Vec<&Term<'_>> = terms.iter().filter(|t| !t.is_of_board()).collect();
     let pair_with_base = parts.len() == 2 && terms.len() == 2;
     let boards = parts.iter().filter(|p| p.starts_with("board")).count();
@@ -122,7 +129,7 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
     }
     if let [only] = terms {
         let name = &only.parameter.name;
-        return format!("these dwells move the tip by less than their noise when {name} changes");
+        return format!("these dwells move {seen} by less than their noise when {name} changes");
     }
     if let (true, Some(base)) = (pair_with_base, base) {
         let joint = other_than(&parts, base);
@@ -172,9 +179,9 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
             return format!("these dwells do not tie {base_in_words} down");
         }
         all.push(&base_in_words);
-        return format!("{} move the tip alike over these dwells", list(&all));
+        return format!("{} move {seen} alike over these dwells", list(&all));
     }
-    format!("{} move the tip alike over these dwells", list(&names(terms)))
+    format!("{} move {seen} alike over these dwells", list(&names(terms)))
 }
 
 /// Whether a part is the frame of this name, of the only arm or (`left.base`) of one of two.

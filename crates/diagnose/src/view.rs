@@ -395,23 +395,6 @@ impl View<'_> {
             let all = &self.observations[pose.observations.clone()];
             let o = &all[0];
             let drivers = self.model.drivers(self.session, o);
-            let held = all.iter().any(|o| o.cavity().is_some());
-            let of_place: Vec<bool> = all.iter().map(|o| o.cavity().is_some() == held).collect();
-            let board = if held { self.model.board_in_world(self.values, o.dwell.recording) } else { None };
-            let axes =
-                board.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());
-            let variances =
-                all.iter().zip(&of_place).filter(|(_, of)| **of).map(|(o, _)| o.covariance_m2.trace());
-            let count = of_place.iter().filter(|of| **of).count();
-            let sigma_m = (variances.sum::<f64>() / (3 * count) as f64).sqrt();
-            let along = |axes: &Matrix3<f64>, those: &dyn Fn(usize) -> bool| {
-                let mut raw = DMatrix::zeros(pose.rows.len(), 3);
-                for (_, i) in pose.observations.clone().enumerate().filter(|(k, _)| those(*k)) {
-                    let at = linear.rows[i].start - pose.rows.start;
-                    raw.rows_mut(at, linear.rows[i].len()).copy_from(&linear.to_metres[i].tr_mul(axes));
-                }
-                &pose.whitener * raw
-            };
             DwellRow {
                 id: o.dwell,
                 first_row: pose.rows.start,
@@ -424,12 +407,41 @@ impl View<'_> {
                 load_kg: o.load_kg,
                 temperature_c: o.temperature_c,
                 place,
-                displaced: along(&Matrix3::identity(), &|_| true),
-                seat: along(&axes, &|k| of_place[k]) * sigma_m,
+                displaced: moved(linear, pose, &Matrix3::identity(), |_| true),
+                seat: self.seat(linear, pose),
             }
         };
         linear.poses.iter().zip(places).map(of).collect()
     }
+
+    /// Whitened rows of a displacement by one declared standard deviation along each axis of the board, or of the world where
+    /// nothing is held: of what a cavity holds, or of all that was seen.
+    fn seat(&self, linear: &Linearisation, pose: &LinearPose) -> DMatrix<f64> {
+        let all = &self.observations[pose.observations.clone()];
+        let held = all.iter().any(|o| o.cavity().is_some());
+        let of_place = |o: &Observation| o.cavity().is_some() == held;
+        let board = if held { self.model.board_in_world(self.values, all[0].dwell.recording) } else { None };
+        let axes = board.map_or(Matrix3::identity(), |board| *board.rotation.to_rotation_matrix().matrix());
+        let variances_m2: Vec<f64> =
+            all.iter().filter(|o| of_place(o)).map(|o| o.covariance_m2.trace()).collect();
+        let sigma_m = (variances_m2.iter().sum::<f64>() / (3 * variances_m2.len()) as f64).sqrt();
+        moved(linear, pose, &axes, |i| of_place(&self.observations[i])) * sigma_m
+    }
+}
+
+/// Whitened rows of a pose when those of its observations are displaced by 1 m along each of three axes.
+fn moved(
+    linear: &Linearisation,
+    pose: &LinearPose,
+    axes: &Matrix3<f64>,
+    those: impl Fn(usize) -> bool,
+) -> DMatrix<f64> {
+    let mut raw = DMatrix::zeros(pose.rows.len(), 3);
+    for i in pose.observations.clone().filter(|i| those(*i)) {
+        let at = linear.rows[i].start - pose.rows.start;
+        raw.rows_mut(at, linear.rows[i].len()).copy_from(&linear.to_metres[i].tr_mul(axes));
+    }
+    &pose.whitener * raw
 }
 
 /// Whitened columns from what they do to the rows of each observation.

@@ -206,6 +206,39 @@ fn what_only_the_tip_sees_moving_is_no_dwell() {
     assert!((dwells[2].start_ns - ns(s.dwells_s[2].0)) as f64 * 1e-9 < 0.1);
 }
 
+/// A marker that is hidden in a dwell costs its own measurement there, and that is said with its count.
+#[test]
+fn every_marker_that_was_seen_is_measured_and_one_that_was_hidden_is_counted() {
+    let mut r = Random::new(3);
+    let s = Session::random(&mut r, 6, (1.5, 1.5), (1.0, 1.0));
+    let joints = s.encoders(&mut r, 100.0, 2e-5, 0.0);
+    let seen = s.tip(&mut r, 100.0, 5e-5, 0.0, 0.0);
+    let mut hidden = s.tip(&mut r, 100.0, 5e-5, 0.0, 0.0);
+    let (from, to) = s.dwells_s[2];
+    let kept: Vec<usize> = (0..hidden.len())
+        .filter(|i| !(ns(from) - 100_000_000..ns(to) + 100_000_000).contains(&hidden.time_ns[*i]))
+        .collect();
+    hidden.time_ns = kept.iter().map(|i| hidden.time_ns[*i]).collect();
+    hidden.position_m = kept.iter().map(|i| hidden.position_m[*i]).collect();
+    let bodies = [("elbow".to_owned(), seen), ("hand".to_owned(), hidden)].into();
+    let (dwells, warnings) = detect(&Samples { joints, bodies, ..Samples::default() });
+    assert_eq!(dwells.len(), 6);
+    for d in &dwells {
+        assert!(d.tip.is_none() && d.markers.contains_key("elbow"));
+        assert_eq!(d.markers.contains_key("hand"), d.id.dwell != 2);
+        let error_m = (d.markers["elbow"].position_m - tip_m(&s.poses_rad[d.id.dwell], 1.0)).norm();
+        assert!(error_m < 1e-4, "{error_m}");
+    }
+    let said: Vec<&Warning> = warnings.iter().filter(|w| w.code == "dwell-without-marker").collect();
+    assert_eq!(said.len(), 1, "{warnings:?}");
+    assert_eq!(said[0].subject, "marker hand");
+    assert!(
+        said[0].message.starts_with("the sensor saw it in 5 of 6 dwells, not in dwell 2;"),
+        "{}",
+        said[0].message
+    );
+}
+
 #[test]
 fn the_tip_is_measured_on_its_own_clock() {
     let config = DwellConfig { tip_sigma_floor_mm: 0.0, ..DwellConfig::default() };

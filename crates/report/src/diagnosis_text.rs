@@ -193,7 +193,8 @@ fn joints_told(run: &Run, d: &Diagnosis) -> String {
     if run.model.chain().arms().is_empty() {
         return String::new();
     }
-    let of_effects = d.effects.iter().flat_map(|e| &e.set).filter_map(|name| EffectSpec::parse(name, names).ok());
+    let of_effects =
+        d.effects.iter().flat_map(|e| &e.set).filter_map(|name| EffectSpec::parse(name, names).ok());
     let targets = of_effects.filter_map(|spec| spec.target);
     let curves = d.unlisted.iter().chain(&d.unknown).filter_map(|u| u.own_angle());
     let joints: BTreeSet<usize> = targets.chain(curves).collect();

@@ -81,12 +81,15 @@ pub(crate) fn paired<'r>(before: &'r PastRun, after: &'r PastRun) -> Paired<'r> 
 /// Why a copy of a dwell within one result has no partner.
 const TWICE: &str = "the result has them twice, and they count once";
 
+/// Dwells in the order of time, each with the index of its residual.
+type InTime<'r> = Vec<(&'r PastDwell, usize)>;
+
 /// The observed dwells of a result by time.
 struct Times<'r> {
     /// Times of the dwell of each residual.
     dwell_of: Vec<Option<&'r PastDwell>>,
     /// Residuals of each recording with their dwells, by what was measured, by time.
-    by_recording: Vec<BTreeMap<Option<&'r str>, Vec<(&'r PastDwell, usize)>>>,
+    by_recording: Vec<BTreeMap<Option<&'r str>, InTime<'r>>>,
 }
 
 impl<'r> Times<'r> {
@@ -96,7 +99,7 @@ impl<'r> Times<'r> {
             .collect();
         let dwell_of: Vec<_> =
             (run.residuals.iter()).map(|r| known.get(&(r.dwell.recording, r.dwell.dwell)).copied()).collect();
-        let mut by_recording = vec![BTreeMap::<_, Vec<_>>::new(); run.recordings.len()];
+        let mut by_recording = vec![BTreeMap::<_, InTime<'r>>::new(); run.recordings.len()];
         for (at, (residual, dwell)) in run.residuals.iter().zip(&dwell_of).enumerate() {
             if let (Some(own), Some(dwell)) = (by_recording.get_mut(residual.dwell.recording), dwell) {
                 own.entry(residual.feature.as_deref()).or_default().push((*dwell, at));

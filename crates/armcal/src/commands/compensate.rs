@@ -49,7 +49,8 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let past = PastModel::open(request.result)?;
     let arms = past.arms()?;
     if !arms.geometry.chain().arms().is_empty() {
-        let problem = "`armcal compensate` finds set-points of one arm, and this result is about two".to_owned();
+        let problem =
+            "`armcal compensate` finds set-points of one arm, and this result is about two".to_owned();
         return Err(Error::TwoArms { problem });
     }
     let frame = target_frame(&past, request.frame)?;

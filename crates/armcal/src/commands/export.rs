@@ -38,6 +38,9 @@ fn problem(run: &Run) -> Value {
     let observations: Vec<Value> = rows
         .map(|(o, residual)| {
             let mut row = observation(o);
+            if let Some(marker) = model.marker_name(o.feature) {
+                row["feature"] = json!(marker);
+            }
             row["covariance_m2"] =
                 json!(square(&position_covariance_m2(model, &run.calibration.nominal_values, o)));
             row["in_fit"] = json!(!residual.held_out || in_turn);

@@ -32,9 +32,9 @@ pub fn reject(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
     let wrong = wrong_distances(model, dwells);
     let mut accused: BTreeMap<FeatureId, Vec<usize>> = BTreeMap::new();
     let mut unsure: BTreeMap<[FeatureId; 2], Vec<(usize, f64)>> = BTreeMap::new();
-    for at in 0..dwells.len() {
+    for (at, dwell) in dwells.iter().enumerate() {
         let own: Vec<&Wrong> = wrong.iter().filter(|w| w.dwell == at).collect();
-        match alone(model, &dwells[at], &own) {
+        match alone(model, dwell, &own) {
             Some(feature) => accused.entry(feature).or_default().push(at),
             None => own.iter().for_each(|w| unsure.entry(w.pair).or_default().push((at, w.off_m))),
         }
@@ -140,4 +140,116 @@ fn listed(dwells: impl Iterator<Item = usize>) -> String {
     let all: Vec<String> = dwells.map(|d| d.to_string()).collect();
     let more = if all.len() > 8 { ", ..." } else { "" };
     format!("dwell {}{more}", all[..all.len().min(8)].join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::{DwellId, Pose};
+    use armcal_model::{Chain, Frame, Frames, Marker};
+    use nalgebra::{Matrix3, Vector3};
+    use std::path::Path;
+
+    const ARM: &str = "name = \"a\"\n[[rows]]\nname = \"joint1\"\ntheta_deg = 0.0\nd_mm = 0.0\na_mm = 400.0\nalpha_deg = 0.0\n";
+
+    /// An arm with two markers beside its tip on its one link.
+    fn arm(markers: &[&str]) -> Model {
+        let marker =
+            |name: &&str| Marker { link: "joint1".into(), frame: Frame::estimated(*name, Pose::identity()) };
+        let chain = Chain::from_dh_toml(ARM, Path::new("a.toml")).expect("an arm");
+        let markers = markers.iter().map(marker).collect();
+        Model::new(chain, Frames { markers, ..Frames::of_bare_arm() }).expect("a model")
+    }
+
+    /// Thirty dwells of a link that turns; what was seen scatters by a few hundredths of a millimetre.
+    fn dwells(markers: &[&str]) -> Vec<Dwell> {
+        let seen = |k: usize, place: usize| {
+            let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.1 * k as f64);
+            let jitter = 2e-5 * ((k * (place + 3)) as f64).sin();
+            let at =
+                Vector3::new(0.4 + 0.03 * place as f64, 0.05 * place as f64 * place as f64 + jitter, 0.02);
+            TipMeasurement {
+                position_m: turn * at,
+                covariance_m2: Matrix3::identity() * 4e-10,
+                orientation: None,
+                orientation_sigma_rad: f64::INFINITY,
+                samples: 50,
+                effective_samples: 20.0,
+            }
+        };
+        let dwell = |k: usize| Dwell {
+            id: DwellId { recording: 0, dwell: k },
+            start_ns: k as i64 * 2_000_000_000,
+            end_ns: k as i64 * 2_000_000_000 + 1_000_000_000,
+            joint_rad: vec![0.1 * k as f64],
+            joint_spread_rad: vec![0.0],
+            joint_sigma_rad: vec![0.0],
+            effort_nm: None,
+            samples: 50,
+            effective_samples: 20.0,
+            arrival: vec![armcal_core::Arrival::Unknown],
+            path_memory_rad: Vec::new(),
+            pair_memory_rad: Vec::new(),
+            moved_rad: None,
+            tip: Some(seen(k, 0)),
+            markers: markers
+                .iter()
+                .enumerate()
+                .map(|(m, name)| ((*name).to_owned(), seen(k, m + 1)))
+                .collect(),
+            temperature_c: None,
+        };
+        (0..30).map(dwell).collect()
+    }
+
+    fn knock(dwells: &mut [Dwell], name: &str, at: std::ops::Range<usize>) {
+        for dwell in &mut dwells[at] {
+            let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), dwell.joint_rad[0]);
+            let off_m = turn * Vector3::new(0.0, 3e-3, 2e-3);
+            dwell.markers.get_mut(name).expect("seen").position_m += off_m;
+        }
+    }
+
+    #[test]
+    fn of_three_on_a_link_the_one_that_is_off_is_rejected_alone() {
+        let (names, mut all) = (["a", "b"], dwells(&["a", "b"]));
+        assert!(reject(&arm(&names), &mut all).is_empty(), "nothing is wrong");
+        knock(&mut all, "b", 7..8);
+        knock(&mut all, "a", 19..20);
+        let before = all.clone();
+        let said = reject(&arm(&names), &mut all);
+        let told: Vec<(&str, &str)> = said.iter().map(|w| (w.code, w.subject.as_str())).collect();
+        assert_eq!(told, [("marker-rejected", "marker a"), ("marker-rejected", "marker b")]);
+        assert!(said[1].message.starts_with("rejected in dwell 7:"), "{}", said[1].message);
+        assert!(
+            !all[7].markers.contains_key("b") && all[7].markers.contains_key("a") && all[7].tip.is_some()
+        );
+        assert!(!all[19].markers.contains_key("a") && all[19].markers.contains_key("b"));
+        assert_eq!(all[8..19], before[8..19]);
+    }
+
+    #[test]
+    fn of_two_nobody_can_tell_which_and_both_stay() {
+        let (names, mut all) = (["a"], dwells(&["a"]));
+        knock(&mut all, "a", 7..8);
+        let before = all.clone();
+        let said = reject(&arm(&names), &mut all);
+        assert_eq!((said.len(), said[0].code), (1, "marker-distance"));
+        assert!(
+            said[0].subject == "markers tip and a" && said[0].message.contains("in dwell 7:"),
+            "{said:?}"
+        );
+        assert_eq!(all, before);
+    }
+
+    #[test]
+    fn a_marker_that_came_loose_is_left_to_the_diagnosis() {
+        for from in [15, 27] {
+            let (names, mut all) = (["a", "b"], dwells(&["a", "b"]));
+            knock(&mut all, "b", from..30);
+            let before = all.clone();
+            assert!(reject(&arm(&names), &mut all).is_empty(), "from dwell {from}");
+            assert_eq!(all, before);
+        }
+    }
 }

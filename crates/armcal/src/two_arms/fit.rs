@@ -43,14 +43,12 @@ pub fn fit_joined(inputs: &Inputs, arms: &TwoArms, told: &mut dyn FnMut(usize)) 
     search.settled(geometry, model, near, told)
 }
 
-/// Every dwell, as if its tips were joined: the tip of the first arm is the reference for that of the second.
+/// Every dwell, as if its tips were joined: the tip of the second arm is the reference for that of the first.
 fn observations(inputs: &Inputs, arms: &TwoArms) -> Vec<Observation> {
     let apart = arms.closure.kind == ClosureKind::RigidLink;
     let covariance_m2 = Matrix3::identity() * (arms.closure.sigma_mm * 1e-3).powi(2);
-    let joined = |dwell| Observation {
-        feature: FeatureId(1),
-        ..observe::observation(dwell, 0.0, Reference::Joined { to: FeatureId::TIP, apart }, covariance_m2)
-    };
+    let to = FeatureId(1);
+    let joined = |dwell| observe::observation(dwell, 0.0, Reference::Joined { to, apart }, covariance_m2);
     inputs.seen.iter().flat_map(|seen| &seen.dwells).map(joined).collect()
 }
 

@@ -390,7 +390,10 @@ pub fn rng(seed: u64) -> ChaCha8Rng {
 pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
     p.residual *= factor;
     p.geometry *= factor;
-    p.dwells.iter_mut().flat_map(|d| &mut d.parts).for_each(|part| part.metres /= factor);
+    for d in &mut p.dwells {
+        d.displaced *= factor;
+        d.parts.iter_mut().for_each(|part| part.metres /= factor);
+    }
     let scale = |c: &mut Columns| match c {
         Columns::Dense(m) => *m = Arc::new(m.as_ref() * factor),
         Columns::Product { basis, .. } => *basis = Arc::new(basis.as_ref() * factor),

@@ -323,6 +323,39 @@ fn bodies_are_chosen_by_name() {
     assert!(error.contains("did you mean \"tip\""), "{error}");
 }
 
+#[test]
+fn markers_are_read_each_under_its_name_and_one_that_is_never_seen_costs_itself() {
+    let poses = |x: f64| {
+        let at = |i: i64| {
+            let stamp_ns = START_NS + i * STEP_NS;
+            let header = Header { stamp_ns, frame_id: "world" };
+            let hidden = x == 0.0;
+            let position = if hidden { [f64::NAN; 3] } else { [x + noise(i, 0), 0.1, 0.2] };
+            let turned = [0.0, 0.0, 0.0, if hidden { 0.0 } else { 1.0 }];
+            (stamp_ns as u64, stamp_ns as u64, ros2::pose_stamped(header, position, turned))
+        };
+        (0..100).map(at).collect()
+    };
+    let topics = [("/elbow", 1.0), ("/hand", 2.0), ("/lost", 0.0)];
+    let mut tracks = vec![joint_track(moving())];
+    tracks.extend(topics.map(|(topic, x)| track(topic, ros2::POSE_STAMPED, poses(x))));
+    let stream = |topic: &str| PoseStream { topic: topic.into(), ..PoseStream::default() };
+    let bodies = topics.map(|(topic, _)| (topic.trim_start_matches('/').to_owned(), stream(topic)));
+    let streams = Streams { bodies: bodies.into(), ..two_joints() };
+    let (samples, reports, warnings) = ok(&tracks, &streams);
+    assert_eq!(samples.bodies.keys().collect::<Vec<_>>(), ["elbow", "hand"]);
+    assert!(samples.bodies["hand"].len() == 100 && samples.bodies["hand"].position_m[7].x > 1.5);
+    assert!(samples.bodies["elbow"].position_m[7].x < 1.5 && samples.tip.is_none());
+    let roles: Vec<&str> = reports.iter().map(|r| r.role.as_str()).collect();
+    assert_eq!(roles, ["joints", "bodies.elbow", "bodies.hand", "bodies.lost"]);
+    let lost = warnings.iter().find(|w| w.code == "marker-unseen").expect("said");
+    assert!(lost.subject.contains("/lost") && lost.message.contains("100 with NaN"), "{lost:?}");
+    assert_eq!(streams.topics(), ["/elbow", "/hand", "/joint_states", "/lost"]);
+    let bodies = [("hand".to_owned(), stream("/hands"))];
+    let error = refusal(&tracks, &Streams { bodies: bodies.into(), ..two_joints() });
+    assert!(error.contains("/hands") && error.contains("/hand"), "{error}");
+}
+
 /// Two joints, and what `cell_c` reads in the cell.
 fn with_thermometer(cell_c: impl Fn(i64) -> f64) -> (Samples, Vec<StreamReport>, Vec<Warning>) {
     let at = |i: i64| {

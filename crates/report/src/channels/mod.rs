@@ -92,7 +92,7 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
     for (index, recording) in run.recordings.iter().enumerate() {
         let of_recording: Vec<&Point> =
             points.iter().filter(|p| p.observation.dwell.recording == index).collect();
-        paths::put(recording, &of_recording, &mut out);
+        paths::put(recording, &of_one_feature(&of_recording), &mut out);
         cloud::put(recording, &of_recording, &drawing, &mut out);
         scene::standing(run, index, &of_recording, &drawing, &mut out);
         arrows::put(run, index, &of_recording, &drawing, &mut out);
@@ -106,6 +106,12 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
     }
     out.messages.sort_by_key(|m| m.log_ns);
     out.messages
+}
+
+/// The points of the tip, of the first marker where the tip was not seen: a path is that of one of them.
+fn of_one_feature<'p, 'r>(points: &[&'p Point<'r>]) -> Vec<&'p Point<'r>> {
+    let first = points.iter().map(|p| p.observation.feature).min();
+    points.iter().copied().filter(|p| Some(p.observation.feature) == first).collect()
 }
 
 /// When a recording begins [ns]: its first message or dwell, so that a viewer that opens the file has at once what is

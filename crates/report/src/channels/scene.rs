@@ -46,7 +46,8 @@ pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: 
     };
     let nominal = &run.calibration.nominal_values;
     let mut entities = vec![drawn("arm/nominal", nominal, GREY), drawn("arm/calibrated", &fitted, GREEN)];
-    let observed = own.iter().find(|p| p.observation.dwell == dwell.id).map(|p| p.measured_m);
+    let of_tip = |p: &&&Point| p.observation.dwell == dwell.id && p.observation.feature.is_tip();
+    let observed = own.iter().find(of_tip).map(|p| p.measured_m);
     let mut measured = entity("tip/measured", time_ns);
     if let Some(tip_m) = observed.or(dwell.tip.as_ref().map(|t| t.position_m)) {
         measured.spheres.push(sphere(&tip_m, 0.008, WHITE));

@@ -121,7 +121,7 @@ function mapBoxes() {
     add(() => arrows(d.world_mm[0], d.world_mm[2], view.shown.world_mm[0], view.shown.world_mm[2], free, "free poses from the side", "world x [mm]", "world z [mm]", scale), "side");
   }
   $("map-caption").textContent = "Each arrow starts at its place and points the way from where the model puts the tip to where it was, as long as the error " +
-    scales.join(" and ") + "; the arrow below a map states its scale. The colour is the size of the whole error, with its part across the view.";
+    scales.join(" and ") + (d.marker.some((m) => m !== null) ? "; those of markers likewise" : "") + "; the arrow below a map states its scale. The colour is the size of the whole error, with its part across the view.";
 }
 
 function groupFigure() {
