@@ -369,9 +369,10 @@ impl View<'_> {
     /// A belt from the base keeps the forearm's direction.
     fn belts(&self, joints: &[Channel]) -> Vec<Channel> {
         let arms = self.model.chain().arms();
-        let one = [0..joints.len()];
-        let of_arms: Vec<_> = arms.iter().map(|arm| arm.joints.clone()).collect();
-        let all = if arms.is_empty() { &one[..] } else { &of_arms[..] };
+        let mut all: Vec<Range<usize>> = arms.iter().map(|arm| arm.joints.clone()).collect();
+        if all.is_empty() {
+            all.push(0..joints.len());
+        }
         let belt = |own: &Range<usize>| {
             let (upper, fore) = (own.start + 1, own.start + 2);
             Channel {

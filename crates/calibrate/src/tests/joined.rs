@@ -104,7 +104,7 @@ fn the_derivative_is_that_of_the_closing_error() {
         let model = pair(link);
         let problem = ModelProblem::new(&model, &observations, &FitConfig::default()).unwrap();
         let p: Vec<f64> = model.nominal().iter().enumerate().map(|(k, v)| v + 1e-3 * k as f64).collect();
-        for block in 0..observations.len() {
+        for (block, o) in observations.iter().enumerate() {
             let (residual, jacobian) = problem.linearised(block, &p);
             assert_eq!(residual.len(), if link.is_some() { 1 } else { 3 });
             assert!((&residual - problem.residual(block, &p)).amax() < 1e-15);
@@ -119,7 +119,6 @@ fn the_derivative_is_that_of_the_closing_error() {
                 assert!(off < 1e-8, "{} {}: {off}", word(link), model.parameters()[k].name);
             }
             // The covariance is that of the readings, carried by differences of the residual.
-            let o = &observations[block];
             let mut spread = jacobian.columns(0, o.joint_rad.len()).into_owned() * 0.0;
             for j in 0..o.joint_rad.len() {
                 let at = |step: f64| {
