@@ -1,6 +1,7 @@
 //! A model at one parameter vector: residual and exact Jacobian of as many observations as are asked for.
 
-use super::{Model, Sides, measured_m, seated_m};
+use super::Model;
+use super::prediction::{Sides, measured_m, seated_m};
 use crate::effects::Effects;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::rigid::Rigid;

@@ -1,0 +1,194 @@
+//! What is predicted of an observation and what was measured: residual and exact derivative.
+
+use super::Model;
+use super::linearisation::Linearisation;
+use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
+use crate::rigid::Rigid;
+use crate::segment::Segment;
+use armcal_core::{FeatureId, Observation, Pose, Reference};
+use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
+
+/// What is measured and what is predicted of one observation.
+pub(super) struct Sides {
+    pub measured_m: Vector3<f64>,
+    pub predicted: Rigid<f64>,
+    /// How far apart a link keeps both [m].
+    pub apart_m: Option<f64>,
+}
+
+impl Model {
+    /// Where the tip was, in the world: as the sensor saw it, the cavity of the board, or where the tip of the arm is that it
+    /// was joined to [m].
+    pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.measured_tip_in_world(&p, o);
+        }
+        // Where the arm comes into it only through what effects do to the seat, it need not be followed.
+        match (&o.reference, &self.effects) {
+            (Reference::Tracked { position_m, .. }, _) => *position_m,
+            (Reference::Seated { .. }, None) => {
+                let board = self.board_under(o).map(|board| board.transform(p, &[]));
+                measured_m(o, board.as_ref(), &seated_m(o))
+            }
+            (Reference::Seated { .. }, Some(_)) | (Reference::Joined { .. }, _) => {
+                self.sides(p, o).measured_m
+            }
+        }
+    }
+
+    /// Where the model puts what the observation is of, a tip or a marker, in the world [m], effects included.
+    pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
+        self.sides(p, o).predicted.translation_m
+    }
+
+    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of tips
+    /// on a rigid link one, along it.
+    pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
+        self.sides(p, o).residual(o)
+    }
+
+    /// The residual and d residual / d p: its rows, one column for every parameter, free or not. Exact.
+    pub fn residual_with_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        if let Some((model, own)) = self.seen(p, o) {
+            let (residual, jacobian) = model.residual_with_jacobian(&own, o);
+            return (residual, self.by_all(&jacobian, o));
+        }
+        Linearisation::of(self, p, &[o]).residual_with_jacobian(o)
+    }
+
+    /// [`Model::residual_with_jacobian`] of many observations at the same parameters, in their order: what is alike for
+    /// all of them is worked out once, where no recording has parameters of its own.
+    pub fn residuals_with_jacobians(
+        &self,
+        p: &[f64],
+        observations: &[&Observation],
+    ) -> Vec<(ModelResidual, DMatrix<f64>)> {
+        if self.scopes.is_some() {
+            return observations.iter().map(|o| self.residual_with_jacobian(p, o)).collect();
+        }
+        let at = Linearisation::of(self, p, observations);
+        observations.iter().map(|o| at.residual_with_jacobian(o)).collect()
+    }
+
+    /// d (predicted - measured) / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
+    /// encoders' noise to the tip.
+    pub fn joint_jacobian(&self, p: &[f64], o: &Observation) -> Matrix3xX<f64> {
+        let mut jacobian = Matrix3xX::zeros(self.joint_count());
+        // A reading that moves two joints on the way has two parts.
+        let mut add = |column: usize, part: Vector3<f64>| {
+            let mut own = jacobian.column_mut(column);
+            own += part;
+        };
+        for (column, twist) in self.joint_twists(p, o.feature, o) {
+            add(column, twist.translation_m);
+        }
+        if let Reference::Joined { to, .. } = o.reference {
+            for (column, twist) in self.joint_twists(p, to, o) {
+                add(column, -twist.translation_m);
+            }
+        }
+        jacobian
+    }
+
+    /// The residual and d residual / d joint reading: its rows, one column a joint. Inverse kinematics iterates on
+    /// it. What drives the effects is held, so that their own slope over the joint angle, a few per cent, is left out.
+    pub fn residual_with_joint_jacobian(&self, p: &[f64], o: &Observation) -> (ModelResidual, DMatrix<f64>) {
+        let residual = self.residual(p, o);
+        let moved = self.joint_jacobian(p, o);
+        let mut jacobian = DMatrix::zeros(residual.len(), self.joint_count());
+        match residual.along {
+            Some(along) => jacobian.row_mut(0).copy_from(&-(along.transpose() * moved)),
+            None => jacobian.rows_mut(0, 3).copy_from(&-moved),
+        }
+        if let Some(rate) = residual.rotation_rad.as_ref().map(rotation_error_rate) {
+            for (column, twist) in self.joint_twists(p, o.feature, o) {
+                add_to_column(&mut jacobian, 3, column, &(rate * twist.rotation_rad));
+            }
+        }
+        (residual, jacobian)
+    }
+
+    fn sides(&self, p: &[f64], o: &Observation) -> Sides {
+        if let Some((model, p)) = self.seen(p, o) {
+            return model.sides(&p, o);
+        }
+        let drivers = self.effects.as_ref().map(|effects| effects.drivers(self, o));
+        let at = |feature: FeatureId| match (&self.effects, &drivers) {
+            (Some(effects), Some(drivers)) => {
+                let at = effects.evaluate(p, feature, drivers);
+                (at.tip, at.in_board_m)
+            }
+            _ => (self.tree.follow(self.route(feature), p, &o.joint_rad), seated_m(o)),
+        };
+        let (predicted, in_board_m) = at(o.feature);
+        let other = match o.reference {
+            Reference::Joined { to, .. } => Some(at(to).0.translation_m),
+            _ => None,
+        };
+        let board = self.board_under(o).map(|board| board.transform(p, &[]));
+        let measured_m = other.unwrap_or_else(|| measured_m(o, board.as_ref(), &in_board_m));
+        Sides { measured_m, predicted, apart_m: self.apart_m(p, o) }
+    }
+
+    /// Index of the length of the link that keeps the joined points of an observation apart.
+    pub(super) fn link_of(&self, o: &Observation) -> Option<usize> {
+        self.link.filter(|_| matches!(o.reference, Reference::Joined { apart: true, .. }))
+    }
+
+    /// How far apart they are [m].
+    fn apart_m(&self, p: &[f64], o: &Observation) -> Option<f64> {
+        self.link_of(o).map(|link| p[link])
+    }
+
+    /// The length of the link between two tips [m]; none without one.
+    pub fn link_length_m(&self, p: &[f64]) -> Option<f64> {
+        self.link.map(|link| p[link])
+    }
+
+    /// The board that the tip is seated in.
+    pub(super) fn board_under(&self, o: &Observation) -> Option<&Segment> {
+        self.boards.get(&o.dwell.recording).filter(|_| o.cavity().is_some())
+    }
+}
+
+impl Sides {
+    pub fn residual(&self, o: &Observation) -> ModelResidual {
+        let gap_m = self.measured_m - self.predicted.translation_m;
+        if let Some(length_m) = self.apart_m {
+            // Any axis for no gap.
+            let along = gap_m.try_normalize(0.0).unwrap_or_else(Vector3::x);
+            let position_m = along * (gap_m.norm() - length_m);
+            return ModelResidual { position_m, rotation_rad: None, along: Some(along) };
+        }
+        let rotation_rad = match &o.reference {
+            Reference::Tracked { orientation: Some(measured), .. } => {
+                let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
+                Some(rotation_error_rad(measured, &predicted))
+            }
+            _ => None,
+        };
+        ModelResidual { position_m: gap_m, rotation_rad, along: None }
+    }
+}
+
+/// Where the tip was, in the world [m]; NaN in a cavity of a board that the model does not have, and where another tip is the
+/// reference.
+pub(super) fn measured_m(
+    o: &Observation,
+    board: Option<&Rigid<f64>>,
+    in_board_m: &Vector3<f64>,
+) -> Vector3<f64> {
+    match &o.reference {
+        Reference::Tracked { position_m, .. } => *position_m,
+        Reference::Seated { .. } => board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m)),
+        Reference::Joined { .. } => Vector3::repeat(f64::NAN),
+    }
+}
+
+/// The seated point as the board's file gives it [m]; zero for one that is not seated.
+pub(super) fn seated_m(o: &Observation) -> Vector3<f64> {
+    match &o.reference {
+        Reference::Seated { in_board_m, .. } => *in_board_m,
+        Reference::Tracked { .. } | Reference::Joined { .. } => Vector3::zeros(),
+    }
+}
