@@ -28,6 +28,7 @@
 mod absence;
 mod bootstrap;
 mod cells;
+mod channels;
 mod combination;
 mod compare;
 mod conclude;
