@@ -3,7 +3,7 @@
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
-use crate::model_file::{self, model_files};
+use crate::model_file::{self, ModelFile, model_files};
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::past_model::{self, PastModel};
@@ -120,11 +120,9 @@ pub fn write_all(
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];
-    attachments.extend(models.iter().map(|model| Attachment {
-        name: &model.name,
-        media_type: model.media_type,
-        text: &model.text,
-    }));
+    let of_models =
+        models.iter().map(|ModelFile { name, media_type, text, .. }| Attachment { name, media_type, text });
+    attachments.splice(4..4, of_models);
     let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);

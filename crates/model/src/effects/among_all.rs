@@ -91,9 +91,17 @@ mod tests {
         convention = "standard"
         [[rows]]
         name = "joint1"
+        theta_deg = 0.0
+        d_mm = 0.0
+        a_mm = 300.0
+        alpha_deg = 0.0
         joint = "revolute"
         [[rows]]
         name = "joint2"
+        theta_deg = 0.0
+        d_mm = 0.0
+        a_mm = 300.0
+        alpha_deg = 0.0
         joint = "revolute"
     "#;
 
