@@ -38,7 +38,7 @@ pub fn fit_joined(inputs: &Inputs, arms: &TwoArms, told: &mut dyn FnMut(usize)) 
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let model = match effects.is_empty() {
         true => geometry.clone(),
-        false => geometry.with_effects(&effects, &frames::session(pipeline, &search.all))?,
+        false => geometry.with_effects(&effects, &frames::session(pipeline, &search.chosen(&near)))?,
     };
     search.settled(geometry, model, near, told)
 }

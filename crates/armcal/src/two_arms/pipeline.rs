@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::pipeline::{
     FramePose, FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, recording_name,
 };
+use crate::stages::frames::{frame, override_parameters};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::DwellConfig;
@@ -200,7 +201,6 @@ impl TwoArms {
 
     /// Both nominal arms in one world, their chains read already.
     pub fn model(&self, chain: &Chain) -> Result<Model, Error> {
-        use crate::stages::frames::{frame, override_parameters};
         let frames = |arm: &ArmSection| armcal_model::ArmFrames {
             base: frame(&format!("{}.base", arm.name), &arm.base, true),
             tip: frame(&format!("{}.tip", arm.name), &arm.tip, false),
