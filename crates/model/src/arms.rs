@@ -133,7 +133,7 @@ fn check_names(arms: &[(String, Chain)]) -> Result<(), ModelError> {
             return bad(format!("an arm cannot be named `{name}`; use a word such as right"));
         }
         if arms[..at].iter().any(|(other, _)| other == name) {
-            return bad(format!("two arms are named `{name}`; give each a name of its own"));
+            return bad(format!("both are named `{name}`; give each a name of its own"));
         }
     }
     Ok(())

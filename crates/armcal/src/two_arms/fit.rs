@@ -15,8 +15,11 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Which dwells are joined and where the other base is depend on each other; so do fit and outliers.
 const MAX_ROUNDS: usize = 5;
-/// A calibrated closing error this many times what the noise explains is that of tips that are not joined.
+/// A calibrated closing error this many times what the noise explains is that of tips that are not joined,
 const OPEN_FACTOR: f64 = 10.0;
+/// if it is more than this share of what is allowed to nominal arms too: a joint's play puts tips millimetres apart that are
+/// joined, and whoever left these dwells out would never see it.
+const OPEN_SHARE: f64 = 0.1;
 /// An arm none of whose joints moves by as much is not led through poses [rad]: 1 deg.
 const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 
@@ -106,7 +109,10 @@ impl Search<'_> {
             let (p, scale) = (search.fit.values(), search.fit.sigma_scale.max(1.0));
             let expected_m =
                 |o: &Observation| expected_norm_m(&position_covariance_m2(&model, &p, o)) * scale;
-            let closes = |o: &Observation| closing_error_m(&model, &p, o) <= OPEN_FACTOR * expected_m(o);
+            let allowed_m = OPEN_SHARE * self.limit_m();
+            let closes = |o: &Observation| {
+                closing_error_m(&model, &p, o) <= allowed_m.max(OPEN_FACTOR * expected_m(o))
+            };
             let again: Vec<bool> = self.all.iter().zip(&near).map(|(o, near)| *near && closes(o)).collect();
             if again != is_joined && rounds < MAX_ROUNDS {
                 is_joined = again;

@@ -161,6 +161,11 @@ impl TwoArms {
         if let Some((key, said)) = two.contradiction() {
             return Err(problem(key, said));
         }
+        if let HoldoutConfig::Cavities { .. } | HoldoutConfig::EveryNthCavity { .. } = file.holdout {
+            let said = "goes by cavity, but two arms have none in common that armcal knows; use \"random\", \"cavity-folds\" \
+                        (dwells are dealt out) or \"dwells\"";
+            return Err(problem("holdout.kind", said.to_owned()));
+        }
         let [first, _] = &two.arms;
         let entry = |r: RecordingPaths| {
             let name = Some(recording_name(r.name.as_ref(), &r.paths));
