@@ -20,7 +20,7 @@ use crate::noise::expected_norm_m;
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::priors::scales_of;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
-use armcal_core::{ErrorStats, Observation, Parameter, Reference, Role, Severity, Stage, Warning};
+use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub fn calibrate(
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
     let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
-    judged(&Judge { model, observations, config }, &holdout, config)
+    judged(&Judge { model, observations, config }, &holdout)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -53,29 +53,15 @@ pub fn holdout_turns(
     Ok(holdout::resolve(holdout, observations, &frames::board_names(model))?.turns)
 }
 
-/// Observations that can be fitted without some of them, and the error of each.
-pub(crate) trait Judged: Sync {
-    /// Number of observations.
-    fn observations(&self) -> usize;
-    /// Fits without the observations `held`, from nominal or from `near`.
-    fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError>;
-    /// One observation as a turn predicts it.
-    fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError>;
-}
-
 /// Fits in the turns of the hold-out and pools their errors.
-pub(crate) fn judged(
-    judge: &dyn Judged,
-    holdout: &Holdout,
-    config: &FitConfig,
-) -> Result<Calibration, CalibrateError> {
+fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, CalibrateError> {
     if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
         let turn = judge.turn(held, None)?;
         return gathered(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
     let last = judge.turn(&[], None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
-    let near = (config.objective != Objective::Paper).then_some(&last.fit);
+    let near = (judge.config.objective != Objective::Paper).then_some(&last.fit);
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turns: Vec<Result<Turn, CalibrateError>> =
         holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
@@ -105,11 +91,7 @@ impl Turn {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let all = 0..observations.len();
         let weight_of = all.clone().map(|i| if is_held(i) { None } else { seen.next() }).collect();
-        let rows = |o: &Observation| match o.reference {
-            Reference::Joined { apart: true, .. } => 1,
-            _ => 3,
-        };
-        let rows = all.filter(|i| !is_held(*i)).map(|i| rows(&observations[i])).sum();
+        let rows = all.filter(|i| !is_held(*i)).map(|i| observations[i].position_rows()).sum();
         Turn { values: fit.values(), fit, nominal_values, weight_of, rows, warnings: Vec::new() }
     }
 
@@ -126,16 +108,16 @@ impl Turn {
 
 /// Residuals and errors of all turns and the last fit.
 fn gathered(
-    judge: &dyn Judged,
+    judge: &Judge<'_>,
     holdout: &Holdout,
     turns: &[Turn],
     last: Turn,
 ) -> Result<Calibration, CalibrateError> {
-    let mut turn_of = vec![None; judge.observations()];
+    let mut turn_of = vec![None; judge.observations.len()];
     for (t, held) in holdout.turns.iter().enumerate() {
         held.iter().for_each(|&i| turn_of[i] = Some(t));
     }
-    let mut residuals = Vec::with_capacity(judge.observations());
+    let mut residuals = Vec::with_capacity(judge.observations.len());
     let mut train = Vec::new();
     for (i, held_in) in turn_of.iter().enumerate() {
         let judged_by = held_in.map_or(&last, |t| &turns[t]);
@@ -187,17 +169,15 @@ fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
     (0..last.fit.estimates.len()).map(|k| if free(&k) { largest(k) } else { 1.0 }).collect()
 }
 
+/// Observations that can be fitted without some of them, and the error of each.
 struct Judge<'a> {
     model: &'a Model,
     observations: &'a [Observation],
     config: &'a FitConfig,
 }
 
-impl Judged for Judge<'_> {
-    fn observations(&self) -> usize {
-        self.observations.len()
-    }
-
+impl Judge<'_> {
+    /// Fits without the observations `held`, from nominal or from `near`.
     fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
@@ -225,6 +205,7 @@ impl Judged for Judge<'_> {
         Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations) })
     }
 
+    /// One observation as a turn predicts it.
     fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
         let o = &self.observations[i];
         let covariance = position_covariance_m2(self.model, &turn.values, o);

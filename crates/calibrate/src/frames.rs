@@ -125,7 +125,7 @@ pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Ve
         observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
     let boards = names.iter().skip(features).take(model.boards()).enumerate();
     touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
-    if observations.iter().any(|o| matches!(o.reference, Reference::Joined { apart: true, .. })) {
+    if observations.iter().any(|o| o.is_linked()) {
         touched.extend(names.last().cloned());
     }
     let observed: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();

@@ -62,7 +62,7 @@ impl PositionNoise {
 /// Where only the distance of an observation is known, the unit vector along it.
 fn along(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
     // Of all others it is known without following the arm.
-    if !matches!(o.reference, Reference::Joined { apart: true, .. }) {
+    if !o.is_linked() {
         return None;
     }
     model.residual(p, o).along
@@ -142,13 +142,12 @@ impl<'a> ModelProblem<'a> {
     /// The rows of an observation that are used.
     fn rows(&self, o: &Observation) -> usize {
         match &o.reference {
-            Reference::Joined { apart: true, .. } => 1,
             Reference::Tracked { orientation: Some(_), orientation_sigma_rad, .. }
                 if self.use_orientation && *orientation_sigma_rad > 0.0 =>
             {
                 6
             }
-            _ => 3,
+            _ => o.position_rows(),
         }
     }
 
@@ -398,7 +397,7 @@ fn not_recording_by_recording() -> CalibrateError {
 }
 
 /// One finite reading with a standard error for each joint.
-pub(crate) fn check_joints(o: &Observation, observation: &str) -> Result<(), CalibrateError> {
+fn check_joints(o: &Observation, observation: &str) -> Result<(), CalibrateError> {
     if o.joint_sigma_rad.len() != o.joint_rad.len() {
         let why = format!(
             "{} joint readings but {} standard errors of them: give one for each joint (0 when negligible)",

@@ -139,6 +139,16 @@ impl Observation {
     pub fn is_joined(&self) -> bool {
         matches!(self.reference, Reference::Joined { .. })
     }
+
+    /// Whether a rigid link keeps the joined points apart, so that only their distance is known.
+    pub fn is_linked(&self) -> bool {
+        matches!(self.reference, Reference::Joined { apart: true, .. })
+    }
+
+    /// Rows of position: one of a distance, three otherwise.
+    pub fn position_rows(&self) -> usize {
+        if self.is_linked() { 1 } else { 3 }
+    }
 }
 
 /// A number, or nothing for infinity, which JSON does not have.

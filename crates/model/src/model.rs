@@ -211,7 +211,7 @@ impl Model {
             if let Some(unknown) = [o.feature, other].into_iter().find(|feature| feature.0 >= features) {
                 return Err(ModelError::NoFeature { dwell: o.dwell, feature: unknown.0, features });
             }
-            if matches!(o.reference, Reference::Joined { apart: true, .. }) && self.link.is_none() {
+            if o.is_linked() && self.link.is_none() {
                 return Err(ModelError::NoLink { dwell: o.dwell });
             }
             if let Some(recordings) = self.recordings().filter(|recordings| o.dwell.recording >= *recordings)

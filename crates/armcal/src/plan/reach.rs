@@ -59,17 +59,7 @@ pub fn nearest<'a>(known: &Known<'a>, target_m: &Vector3<f64>) -> Option<&'a Obs
 /// Joint readings that bring the tip of the fitted model to a point in the world, the nearest to where `from` has them
 /// (damped least squares: Wampler 1986). `None` where the arm does not get there.
 pub fn solve(known: &Known<'_>, from: &Observation, target_m: &Vector3<f64>) -> Option<Vec<f64>> {
-    let mut at = from.clone();
-    for _ in 0..STEPS {
-        let miss = target_m - known.model.predicted_tip_in_world(&known.values, &at);
-        if miss.norm() < ARRIVED_M {
-            return Some(at.joint_rad);
-        }
-        let step = joint_step(known, &at, &miss)?;
-        let shrink = (LARGEST_STEP_RAD / step.amax()).min(1.0);
-        at.joint_rad.iter_mut().zip(step.iter()).for_each(|(q, dq)| *q += shrink * dq);
-    }
-    None
+    brought(known, from, |at| target_m - known.model.predicted_tip_in_world(&known.values, at))
 }
 
 /// The smallest change of the joints [rad] that moves the tip by `way_m` in the world.
@@ -84,13 +74,22 @@ pub fn joint_step(known: &Known<'_>, at: &Observation, way_m: &Vector3<f64>) -> 
 /// Joint readings of both arms that bring their tips together, or as far apart as their link is, near where `from` has them;
 /// `None` where they do not meet.
 pub fn close(known: &Known<'_>, from: &Observation) -> Option<Vec<f64>> {
+    brought(known, from, |at| known.model.residual(&known.values, at).position_m)
+}
+
+/// Joint readings from which nothing of the way that `left_m` tells is left, the nearest to where `from` has them.
+fn brought(
+    known: &Known<'_>,
+    from: &Observation,
+    left_m: impl Fn(&Observation) -> Vector3<f64>,
+) -> Option<Vec<f64>> {
     let mut at = from.clone();
     for _ in 0..STEPS {
-        let open_m = known.model.residual(&known.values, &at).position_m;
-        if open_m.norm() < ARRIVED_M {
+        let left_m = left_m(&at);
+        if left_m.norm() < ARRIVED_M {
             return Some(at.joint_rad);
         }
-        let step = joint_step(known, &at, &open_m)?;
+        let step = joint_step(known, &at, &left_m)?;
         let shrink = (LARGEST_STEP_RAD / step.amax()).min(1.0);
         at.joint_rad.iter_mut().zip(step.iter()).for_each(|(q, dq)| *q += shrink * dq);
     }

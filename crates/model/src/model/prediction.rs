@@ -132,7 +132,7 @@ impl Model {
 
     /// Index of the length of the link that keeps the joined points of an observation apart.
     pub(super) fn link_of(&self, o: &Observation) -> Option<usize> {
-        self.link.filter(|_| matches!(o.reference, Reference::Joined { apart: true, .. }))
+        self.link.filter(|_| o.is_linked())
     }
 
     /// How far apart they are [m].
