@@ -1,5 +1,5 @@
 use crate::support::{armcal, files_made, root};
-use armcal_core::{DwellId, FeatureId, Observation, Reference};
+use armcal_core::{Against, DwellId, FeatureId, Observation, Reference};
 use armcal_lab::pair::{PairConfig, PairTruth, simulate};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -337,7 +337,7 @@ fn what_to_record_next_brings_the_tips_together() {
         assert_eq!(dwell["where"], "joined", "{dwell}");
         let joint_deg = dwell["joint_deg"].as_array().expect("readings");
         let joint_rad: Vec<f64> = joint_deg.iter().filter_map(Value::as_f64).map(f64::to_radians).collect();
-        let joined = Reference::Joined { to: FeatureId(1), apart: false };
+        let joined = Reference::Joined { to: Against::Feature(FeatureId(1)) };
         let at = Observation::bare(DwellId { recording: 0, dwell: 0 }, joint_rad, joined);
         let open_m = arms.model.residual(&arms.values, &at).position_m.norm();
         assert!(open_m < 0.1e-3, "{open_m} m apart in {dwell}");

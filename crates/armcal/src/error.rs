@@ -180,6 +180,14 @@ pub enum Error {
         /// Why.
         source: armcal_table::TableError,
     },
+    /// A measurement that no dwell was.
+    #[error("[[measure]] `{name}`: {problem}")]
+    Measure {
+        /// Its name.
+        name: String,
+        /// What was seen, and what to do.
+        problem: String,
+    },
     /// Two arms that cannot be calibrated against each other.
     #[error("two arms: {problem}")]
     TwoArms {

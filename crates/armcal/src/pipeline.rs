@@ -4,8 +4,11 @@
 //! this module only puts them side by side, so a key is documented where it is used.
 
 mod markers;
+mod measures;
 
 pub use markers::MarkerSection;
+pub(crate) use measures::knowledge;
+pub use measures::{Measure, MeasureKind, MeasureSection};
 
 use crate::check::CheckSection;
 use crate::error::Error;
@@ -56,6 +59,15 @@ pub struct Pipeline {
     /// What else is seen of the arm than its tip, by name.
     #[serde(default)]
     pub markers: BTreeMap<String, MarkerSection>,
+    /// Points that stand in the world, by name.
+    #[serde(default)]
+    pub points: BTreeMap<String, FrameSection>,
+    /// Planes that stand in the world, by name; `at` is any point of one, z its normal.
+    #[serde(default)]
+    pub planes: BTreeMap<String, FrameSection>,
+    /// What is measured against them.
+    #[serde(default)]
+    pub measure: Vec<MeasureSection>,
     /// Changes to single parameters, applied in order.
     #[serde(default)]
     pub parameters: Vec<ParameterOverride>,
@@ -368,6 +380,9 @@ impl Pipeline {
                 source: Box::new(source),
             })?,
         };
+        let gauges = pipeline.measure.iter();
+        pipeline.streams.gauges =
+            gauges.filter_map(|m| Some((m.name().to_owned(), m.reading.clone()?))).collect();
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
         pipeline.note_inputs();
@@ -464,10 +479,13 @@ impl Pipeline {
             return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
         }
         let tracked = self.streams.tip.is_some() || !self.markers.is_empty();
-        if self.two_arms.is_none() && self.table.is_none() && !tracked {
-            return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
+        if self.two_arms.is_none() && self.table.is_none() && !tracked && self.measure.is_empty() {
+            let problem =
+                "is absent and so are [streams.tip] and [[measure]]: nothing says where the tip was";
+            return fail("table", problem.into());
         }
         markers::check(self, &fail)?;
+        measures::check(self, &fail)?;
         if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
             return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }

@@ -4,8 +4,9 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::setup::{self, Inputs};
+use crate::stages::measures::Measures;
+use crate::stages::observe::Observed;
 use crate::stages::{frames, observe, perceive};
-use crate::two_arms;
 use armcal_calibrate::{Calibration, calibrate, holdout_turns};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, Verdict, diagnose, nested};
@@ -163,32 +164,37 @@ fn without_setup(source: Error, inputs: &Inputs) -> Error {
 /// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
 pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
     let Inputs { pipeline, chain, board, seen, changes, .. } = inputs;
-    if let Some(two) = &pipeline.two_arms {
-        return two_arms::fit::fit_joined(inputs, two, told);
-    }
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let mut places = observe::associate_all(pipeline, board, &geometry, &geometry.nominal(), false, seen)?;
+    let measures = Measures::of(inputs);
+    let seen_first = observe::observations(pipeline, board, seen, &places).observations;
+    let near = measures.near(&mut geometry, &seen_first)?;
+    let mut measured = near.clone();
     let mut rounds = 0;
     loop {
         rounds += 1;
         told(rounds);
         frames::start_frames(pipeline, &mut geometry, &places);
-        let observed = observe::observations(pipeline, board, seen, &places)?;
-        let (observations, rejections) = (observed.observations, observed.rejections);
+        let mut observed = observe::observations(pipeline, board, seen, &places);
+        measures.add(&mut observed, &measured);
+        let Observed { observations, mut rejections } = observed.not_empty()?;
         let model = with_effects(pipeline, &geometry, &effects, &observations)?;
         let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
         let mut next = None;
         if rounds < inputs.most_rounds {
             let values = calibration.fit.values();
             let again = observe::associate_all(pipeline, board, &model, &values, true, seen)?;
-            next = (!observe::same_places(&again, &places)).then_some(again);
+            let closing = measures.closing(&model, &calibration, &near);
+            let settled = observe::same_places(&again, &places) && closing == measured;
+            next = (!settled).then_some((again, closing));
         }
         match next {
-            Some(again) => places = again,
+            Some(again) => (places, measured) = again,
             None => {
+                measures.explain(&mut rejections, &model, &calibration);
                 return Ok(Fitted { geometry, model, observations, calibration, places, rejections, rounds });
             }
         }

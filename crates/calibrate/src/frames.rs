@@ -10,7 +10,7 @@ use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, fit};
-use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Role};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Role};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -113,7 +113,8 @@ fn aligned(
 }
 
 /// Names of the frames the observations say something about: the base, the tip, the markers that were measured, and the
-/// boards with seated dwells, the link of tips that are kept apart; then what the observed recordings have copies of.
+/// boards with seated dwells, the places measured against and the lengths that distances count from; then what the observed
+/// recordings have copies of.
 pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Vec<String> {
     let (names, tips) = (frame_names(model), tips_at(model));
     let measured: BTreeSet<usize> = observations.iter().map(|o| tips + o.feature.0).collect();
@@ -125,9 +126,16 @@ pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Ve
         observations.iter().filter(|o| o.cavity().is_some()).map(|o| o.dwell.recording).collect();
     let boards = names.iter().skip(features).take(model.boards()).enumerate();
     touched.extend(boards.filter(|(recording, _)| seated.contains(recording)).map(|(_, name)| name.clone()));
-    if observations.iter().any(|o| o.is_linked()) {
-        touched.extend(names.last().cloned());
-    }
+    let against: BTreeSet<Against> = observations.iter().filter_map(|o| o.against()).collect();
+    let is_used = |place: &usize| against.contains(&Against::Fixed(*place));
+    touched.extend(model.places().filter(|(k, ..)| is_used(k)).map(|(_, name, _)| name.to_owned()));
+    let counted = |length: &usize| {
+        observations
+            .iter()
+            .any(|o| matches!(o.reference, Reference::Apart { length: own, .. } if own == *length))
+    };
+    let lengths = model.lengths().enumerate().filter(|(k, _)| counted(k));
+    touched.extend(lengths.map(|(_, (name, _))| name.to_owned()));
     let observed: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();
     for index in observed.into_iter().flat_map(|recording| model.own_parameters(recording)) {
         let part = frame_of(&model.parameters()[index]);
@@ -240,7 +248,13 @@ impl<'a> Alignment<'a> {
             .filter_map(|(r, name)| Some((r, place(name, &self.model.board_in_world(&nominal, r)?))))
             .filter(|(_, place)| place.position.is_some())
             .collect();
-        let nowhere = on_arm.iter().all(|(_, place)| place.position.is_none());
+        let points: Vec<(usize, Place)> = self
+            .model
+            .places()
+            .map(|(k, name, _)| (k, place(name, &self.model.place_in_world(&nominal, k))))
+            .filter(|(_, place)| place.position.is_some())
+            .collect();
+        let nowhere = on_arm.iter().all(|(_, place)| place.position.is_none()) && points.is_empty();
         if bases.iter().all(|base| base.position.is_none()) && nowhere && boards.is_empty() {
             return p;
         }
@@ -257,6 +271,9 @@ impl<'a> Alignment<'a> {
             for (recording, board) in &boards {
                 let own = seated.get(recording).map_or(&[][..], Vec::as_slice);
                 self.place_board(&mut p, *recording, board, own, &links);
+            }
+            for (point, place) in &points {
+                self.place_point(&mut p, *point, place, &links);
             }
             for (feature, place) in &on_arm {
                 self.place_feature(&mut p, *feature, place, &links);
@@ -288,9 +305,9 @@ impl<'a> Alignment<'a> {
         let is_own = |o: &Observation| o.is_joined() || self.model.arm_of(o.feature) == arm;
         let anchored = |o: &Observation| o.cavity().is_none() || !placed.contains(&o.dwell.recording);
         let in_world = |o: &Observation| self.model.feature_in_world(p, o.feature, o).translation.vector;
-        let pair = |(o, link): (&&Observation, &Pose)| match o.reference {
+        let pair = |(o, link): (&&Observation, &Pose)| match o.against() {
             // The other arm's tip is that of this one.
-            Reference::Joined { to, .. } if to == FeatureId(arm) => {
+            Some(Against::Feature(to)) if to == FeatureId(arm) => {
                 let from = self.model.feature_in_base(p, to, &o.joint_rad).translation.vector;
                 Pair { from, to: in_world(o) }
             }
@@ -315,12 +332,34 @@ impl<'a> Alignment<'a> {
         for &at in seated {
             let o = self.observations[at];
             let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
-            if let Reference::Seated { in_board_m, .. } = &o.reference {
+            if let Some(in_board_m) = o.in_board_m() {
                 let to = (base * links[at] * in_link[o.feature.0]).translation.vector;
                 pairs.push(Pair { from: *in_board_m, to });
             }
         }
         board.put(p, &rigid_fit(&pairs, &current, board.rotation.is_some()));
+    }
+
+    /// A fixed point from where the arm was while it was in it. Distances and planes are left to the solver.
+    fn place_point(&self, p: &mut [f64], point: usize, place: &Place, links: &[Pose]) {
+        let in_link = self.in_links(p);
+        let mut current = self.model.place_in_world(p, point);
+        let at = current.translation.vector;
+        let own = self.observations.iter().zip(links);
+        let own = own.filter(|(o, _)| o.against() == Some(Against::Fixed(point)) && !o.is_scalar());
+        let errors: Vec<Vector3<f64>> = own
+            .map(|(o, link)| {
+                let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
+                (base * link * in_link[o.feature.0]).translation.vector - at
+            })
+            .collect();
+        let weights = weights_of(&errors);
+        let total: f64 = weights.iter().sum();
+        if total > 0.0 {
+            let sum: Vector3<f64> = errors.iter().zip(&weights).map(|(e, w)| e * *w).sum();
+            current.translation.vector += sum / total;
+            place.put(p, &current);
+        }
     }
 
     /// Every feature in the link that carries it.

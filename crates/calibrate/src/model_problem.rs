@@ -62,7 +62,7 @@ impl PositionNoise {
 /// Where only the distance of an observation is known, the unit vector along it.
 fn along(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
     // Of all others it is known without following the arm.
-    if !o.is_linked() {
+    if !o.is_scalar() {
         return None;
     }
     model.residual(p, o).along
@@ -337,7 +337,7 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
-        if self.observations.iter().any(|o| !o.is_joined()) {
+        if self.observations.iter().any(|o| o.against().is_none()) {
             return Vec::new();
         }
         scale(self.model, p).into_iter().collect()
@@ -374,6 +374,9 @@ fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
         }
         Reference::Tracked { position_m, .. } => {
             ("the measured position", position_m.iter().copied().collect())
+        }
+        Reference::Apart { reading_m, .. } | Reference::Above { reading_m, .. } => {
+            ("the reading", vec![*reading_m])
         }
         Reference::Joined { .. } => ("nothing", Vec::new()),
     };

@@ -11,14 +11,15 @@ use std::ops::Range;
 /// arm back, or a controller, leaves over; far above the noise of encoders.
 const SAME_POSE_RAD: f64 = 0.01;
 
-/// The runs of observations that are what was measured in one dwell, each of another feature, in the order given. They share
+/// The runs of observations that are what was measured in one dwell, each of another feature or against another place, in the
+/// order given. They share
 /// the readings of the joints, and with them the encoders' noise.
 pub fn measured_together<O: Borrow<Observation>>(observations: &[O]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::with_capacity(observations.len());
     for (i, o) in observations.iter().map(Borrow::borrow).enumerate() {
         let joins = |run: &Range<usize>| {
             let mut run = observations[run.clone()].iter().map(Borrow::borrow);
-            run.all(|other: &Observation| other.dwell == o.dwell && other.feature != o.feature)
+            run.all(|other: &Observation| other.dwell == o.dwell && other.what() != o.what())
         };
         match runs.last_mut().filter(|run| joins(run)) {
             Some(run) => run.end = i + 1,

@@ -1,5 +1,6 @@
 //! Tests of the whole crate, one question a file.
 
+mod against; // do a ballbar, a gauge and a point without a camera recover what is planted?
 mod covariance; // is a covariance kept in parts the dense one?
 mod coverage; // do 95 % intervals hold 95 % of planted truths, and are parallel axes reported?
 mod frames; // are frames metres and half turns off found?

@@ -43,8 +43,8 @@ impl Target {
         match &self.place {
             Reference::Tracked { position_m, .. } => *position_m,
             Reference::Seated { in_board_m, .. } => *in_board_m,
-            // No target is asked for at another arm's tip.
-            Reference::Joined { .. } => Vector3::repeat(f64::NAN),
+            // No target is asked for against another place of the model.
+            _ => Vector3::repeat(f64::NAN),
         }
     }
 

@@ -59,6 +59,15 @@ pub struct TipMeasurement {
     pub effective_samples: f64,
 }
 
+/// What an instrument read during a dwell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeReading {
+    /// Robust mean [m].
+    pub mean_m: f64,
+    /// Standard error of that mean [m], autocorrelation taken into account.
+    pub sigma_m: f64,
+}
+
 /// One pause of the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
@@ -95,6 +104,8 @@ pub struct Dwell {
     pub markers: BTreeMap<String, TipMeasurement>,
     /// Mean temperature [degC].
     pub temperature_c: Option<f64>,
+    /// What instruments read, by name.
+    pub gauges: BTreeMap<String, GaugeReading>,
 }
 
 impl Dwell {

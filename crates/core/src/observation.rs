@@ -25,13 +25,37 @@ pub enum Reference {
         #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
         orientation_sigma_rad: f64,
     },
-    /// It is joined to another point of the arms: both in one place, or at the two ends of a rigid link.
+    /// It is in one point with another place of the model.
     Joined {
-        /// The other point.
-        to: FeatureId,
-        /// Whether a link keeps them apart, whose length is a parameter of the model: only their distance is known then.
-        apart: bool,
+        /// The other place.
+        to: Against,
     },
+    /// Its distance from another place was measured: `p[length] + reading`, as of a rigid link, or of a ballbar.
+    Apart {
+        /// The other place.
+        from: Against,
+        /// Which of the model's lengths, by its place among them.
+        length: usize,
+        /// What an instrument shows beyond that length [m]; zero without one.
+        reading_m: f64,
+    },
+    /// Its height above a plane was measured, along the plane's z axis: zero where it touches, else what a gauge shows.
+    Above {
+        /// Which of the model's fixed places.
+        plane: usize,
+        /// The height [m].
+        reading_m: f64,
+    },
+}
+
+/// A place that something can be measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// A point of the arms.
+    Feature(FeatureId),
+    /// A point or a plane that is fixed in the world, by its place among the model's.
+    Fixed(usize),
 }
 
 /// A point of the arm that is measured, by its place among the model's: the tip first (one of each arm), then the markers.
@@ -48,6 +72,9 @@ impl FeatureId {
         *self == FeatureId::TIP
     }
 }
+
+/// What was measured: a feature, and against what; nothing where a sensor saw it or a table held it.
+pub type Measured = (FeatureId, Option<Against>);
 
 /// One row of the calibration: `measured - predicted` [m] with its covariance and provenance.
 ///
@@ -126,7 +153,23 @@ impl Observation {
     pub fn cavity(&self) -> Option<&str> {
         match &self.reference {
             Reference::Seated { cavity, .. } => Some(cavity),
-            Reference::Tracked { .. } | Reference::Joined { .. } => None,
+            _ => None,
+        }
+    }
+
+    /// Centre of the cavity that the tip was seated in, in the frame of the board [m].
+    pub fn in_board_m(&self) -> Option<&Vector3<f64>> {
+        match &self.reference {
+            Reference::Seated { in_board_m, .. } => Some(in_board_m),
+            _ => None,
+        }
+    }
+
+    /// Where a sensor saw it [m].
+    pub fn seen_m(&self) -> Option<&Vector3<f64>> {
+        match &self.reference {
+            Reference::Tracked { position_m, .. } => Some(position_m),
+            _ => None,
         }
     }
 
@@ -135,19 +178,34 @@ impl Observation {
         matches!(self.reference, Reference::Tracked { .. })
     }
 
+    /// The place of the model that it was measured against; none of what a sensor saw, or of a cavity.
+    pub fn against(&self) -> Option<Against> {
+        match self.reference {
+            Reference::Joined { to } => Some(to),
+            Reference::Apart { from, .. } => Some(from),
+            Reference::Above { plane, .. } => Some(Against::Fixed(plane)),
+            Reference::Seated { .. } | Reference::Tracked { .. } => None,
+        }
+    }
+
+    /// What was measured; a dwell has one observation of each.
+    pub fn what(&self) -> Measured {
+        (self.feature, self.against())
+    }
+
     /// Whether two points of the arms are each other's reference.
     pub fn is_joined(&self) -> bool {
-        matches!(self.reference, Reference::Joined { .. })
+        matches!(self.against(), Some(Against::Feature(_)))
     }
 
-    /// Whether a rigid link keeps the joined points apart, so that only their distance is known.
-    pub fn is_linked(&self) -> bool {
-        matches!(self.reference, Reference::Joined { apart: true, .. })
+    /// Whether one number was measured, a distance or a height, and not a position.
+    pub fn is_scalar(&self) -> bool {
+        matches!(self.reference, Reference::Apart { .. } | Reference::Above { .. })
     }
 
-    /// Rows of position: one of a distance, three otherwise.
+    /// Rows of position: one of a distance or a height, three otherwise.
     pub fn position_rows(&self) -> usize {
-        if self.is_linked() { 1 } else { 3 }
+        if self.is_scalar() { 1 } else { 3 }
     }
 }
 

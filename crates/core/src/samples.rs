@@ -89,4 +89,6 @@ pub struct Samples {
     pub table: Option<PoseSamples>,
     /// Temperature [degC].
     pub temperature: Option<ScalarSamples>,
+    /// What instruments read [m], by name, on the robot's clock.
+    pub gauges: BTreeMap<String, ScalarSamples>,
 }

@@ -4,7 +4,7 @@
 use crate::problem::Channel;
 use crate::view::View;
 use armcal_calibrate::Linearisation;
-use armcal_core::{Observation, Reference, Unit};
+use armcal_core::{Against, Observation, Unit};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,9 +78,9 @@ impl View<'_> {
             let centre = self.model.arm_base_in_world(self.values, arm).translation.vector;
             let rocked = |i: usize, axis: usize| {
                 let (o, about) = (&self.observations[i], Vector3::ith(axis, 1.0));
-                let moved = match o.reference {
+                let moved = match o.against() {
                     // The other tip is that of this arm: it moves away from where it was.
-                    Reference::Joined { to, .. } if self.model.arm_of(to) == arm => {
+                    Some(Against::Feature(to)) if self.model.arm_of(to) == arm => {
                         about.cross(&(centre - self.model.measured_tip_in_world(self.values, o)))
                     }
                     _ if self.model.arm_of(o.feature) == arm => {

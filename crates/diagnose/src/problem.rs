@@ -3,7 +3,7 @@
 use crate::DiagnoseError;
 use crate::crossval::EFFECT_PRECISION;
 use crate::whitener::Whitener;
-use armcal_core::{DwellId, FeatureId, Unit};
+use armcal_core::{DwellId, Measured, Unit};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::sync::Arc;
@@ -64,11 +64,11 @@ pub struct DwellRow {
     pub seat: DMatrix<f64>,
 }
 
-/// What was measured of one feature in a dwell: its tip, or a marker.
+/// One measurement of a dwell: of its tip, or of a marker.
 #[derive(Debug, Clone)]
 pub struct Part {
-    /// The feature.
-    pub feature: FeatureId,
+    /// Of what, and against what.
+    pub what: Measured,
     /// Its rows: 3, or 6 with orientation.
     pub rows: usize,
     /// Whether the position sensor saw it, rather than a cavity holding it.
@@ -112,11 +112,11 @@ impl DwellRow {
         self.parts.iter().map(move |part| (&part.metres * own).norm())
     }
 
-    /// How many of its first rows are of the same features as those of another dwell.
+    /// How many of its first rows are of the same measurements as those of another dwell.
     pub(crate) fn rows_as_in(&self, other: &DwellRow) -> usize {
         let mut both = self.parts.iter().zip(&other.parts);
         let mut same = 0;
-        while let Some((a, b)) = both.next().filter(|(a, b)| a.feature == b.feature) {
+        while let Some((a, b)) = both.next().filter(|(a, b)| a.what == b.what) {
             same += a.rows.min(b.rows);
             if a.rows != b.rows {
                 break;
@@ -125,7 +125,7 @@ impl DwellRow {
         same
     }
 
-    /// Whether the same features were measured in another dwell, with as many rows each.
+    /// Whether the same was measured in another dwell, with as many rows each.
     pub(crate) fn measured_as(&self, other: &DwellRow) -> bool {
         self.rows == other.rows && self.rows_as_in(other) == self.rows
     }

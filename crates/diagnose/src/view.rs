@@ -334,7 +334,7 @@ fn parts(linear: &Linearisation, pose: &LinearPose, observations: &[Observation]
     let part = |(i, o): (usize, &Observation)| {
         let rows = &linear.rows[i];
         Part {
-            feature: o.feature,
+            what: o.what(),
             rows: rows.len(),
             tracked: o.is_tracked(),
             metres: &linear.to_metres[i] * raw.rows(rows.start - pose.rows.start, rows.len()),

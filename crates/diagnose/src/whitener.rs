@@ -11,7 +11,7 @@
 use crate::noise::Noise;
 use crate::problem::{DwellRow, Part, Problem};
 use armcal_calibrate::{gram, inner};
-use armcal_core::{DwellId, FeatureId};
+use armcal_core::{DwellId, Measured};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -211,12 +211,12 @@ fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {
     Whitener { kind: Kind::Groups((1.0 + b * b).sqrt(), groups), ln_det }
 }
 
-/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2 for each row of each feature, seen with unit noise; reset at each
+/// State `x_i = phi^gap x_(i-1) + ...` of variance b^2 for each row of each measurement, seen with unit noise; reset at each
 /// recording.
 fn memory(problem: &Problem, shares: impl Fn(&Part) -> Share) -> Whitener {
     let mut order: Vec<usize> = (0..problem.dwells.len()).collect();
     order.sort_by_key(|i| problem.dwells[*i].id);
-    let mut states: BTreeMap<(FeatureId, usize), State> = BTreeMap::new();
+    let mut states: BTreeMap<(Measured, usize), State> = BTreeMap::new();
     let (mut filters, mut ln_det) = (Vec::new(), 0.0);
     for i in order {
         let dwell = &problem.dwells[i];
@@ -224,7 +224,7 @@ fn memory(problem: &Problem, shares: impl Fn(&Part) -> Share) -> Whitener {
             let Share { load, unit } = shares(part);
             for (axis, row) in rows.enumerate() {
                 let next = states.len();
-                let state = states.entry((part.feature, axis)).or_insert(State::new(next));
+                let state = states.entry((part.what, axis)).or_insert(State::new(next));
                 let decay = state.decay_to(dwell.id);
                 let predicted = decay * decay * state.variance + (1.0 - decay * decay);
                 let innovation = load * load * predicted + 1.0;

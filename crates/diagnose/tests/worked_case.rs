@@ -32,7 +32,7 @@ fn problem() -> Problem {
         first_row: 3 * i,
         rows: 3,
         parts: vec![Part {
-            feature: FeatureId::TIP,
+            what: (FeatureId::TIP, None),
             rows: 3,
             tracked: true,
             metres: Matrix3xX::identity(3) * (SIGMA_MM * 1e-3),

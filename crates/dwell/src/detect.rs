@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::history::History;
 use crate::pauses::{Encoders, Pauses, Tip, pauses};
 use crate::series::{check_joints, check_order, check_poses, seconds_between};
-use crate::summary::{effective_of, effort_means, joint_means, temperature, tip_measurement};
+use crate::summary::{effective_of, effort_means, gauge, joint_means, temperature, tip_measurement};
 use crate::{ClockAlignment, DwellConfig, DwellError};
 
 const DOING: &str = "detecting dwells";
@@ -38,6 +38,9 @@ pub fn detect_dwells<'s>(
     }
     if let Some(temperature) = &samples.temperature {
         check_order(&temperature.time_ns, DOING, "temperature")?;
+    }
+    for gauge in samples.gauges.values() {
+        check_order(&gauge.time_ns, DOING, "instrument")?;
     }
     let encoders = Encoders::of(&samples.joints, config);
     let timed = |seen: &'s PoseSamples| Tip::of(seen, clock, &samples.joints.time_ns, config);
@@ -111,6 +114,12 @@ impl Summary<'_> {
                 .collect(),
             temperature_c: stream
                 .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
+            gauges: self
+                .samples
+                .gauges
+                .iter()
+                .filter_map(|(name, read)| Some((name.clone(), gauge(read, start_ns, end_ns)?)))
+                .collect(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a pause is worth: means, spreads, standard errors, the tip, temperature and effort.
 
 use armcal_core::robust::median;
-use armcal_core::{JointSamples, PoseSamples, ScalarSamples, TipMeasurement};
+use armcal_core::{GaugeReading, JointSamples, PoseSamples, ScalarSamples, TipMeasurement};
 use nalgebra::{Matrix3, Matrix4, SymmetricEigen, UnitQuaternion, Vector3, Vector4};
 use std::ops::Range;
 
@@ -12,6 +12,9 @@ use crate::stats::{HUBER_K, Mean, effective_samples, huber_mean};
 
 /// Median length of a standard normal vector in three dimensions.
 const MEDIAN_NORM_3: f64 = 1.538_172;
+
+/// Fewest readings that make one of an instrument.
+const MIN_READINGS: usize = 3;
 
 /// Fewest frames that make a tip measurement.
 const MIN_TIP_FRAMES: usize = 3;
@@ -66,6 +69,20 @@ pub(crate) fn temperature(stream: &ScalarSamples, start_ns: i64, end_ns: i64, ma
         (Some((b_s, b)), Some((a_s, a))) => Some(b + (a - b) * b_s / (b_s + a_s)),
         (one, other) => one.or(other).map(|(_, value)| value),
     }
+}
+
+/// What an instrument read in a pause; none where it read fewer than three times.
+pub(crate) fn gauge(stream: &ScalarSamples, start_ns: i64, end_ns: i64) -> Option<GaugeReading> {
+    let first = stream.time_ns.partition_point(|t| *t < start_ns);
+    let end = stream.time_ns.partition_point(|t| *t <= end_ns).max(first);
+    let within: Vec<f64> = stream.value[first..end].iter().copied().filter(|v| v.is_finite()).collect();
+    if within.len() < MIN_READINGS {
+        return None;
+    }
+    let steps = within.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let step = steps.fold(f64::INFINITY, f64::min);
+    let mean = Mean::of(&within, if step.is_finite() { step } else { 0.0 })?;
+    Some(GaugeReading { mean_m: mean.mean, sigma_m: mean.sigma })
 }
 
 /// The tip over the rows `frames`; none where it was seen fewer than three times.

@@ -43,6 +43,7 @@ fn schema(kind: Kind) -> &'static Schema {
         Kind::PoseStamped => &ros2::POSE_STAMPED,
         Kind::TransformStamped => &ros2::TRANSFORM_STAMPED,
         Kind::Temperature => &ros2::TEMPERATURE,
+        Kind::Float64 => &ros2::FLOAT64,
     }
 }
 
@@ -64,6 +65,7 @@ fn encode(channel: &Channel, message: &Message) -> Vec<u8> {
             }
         }
         Payload::Temperature { celsius, variance } => ros2::temperature(header, *celsius, *variance),
+        Payload::Number(value) => ros2::float64(*value),
     }
 }
 

@@ -164,6 +164,7 @@ fn rig(seed: u64) -> LabConfig {
         joints: Default::default(),
         vicon: Default::default(),
         temperature: Default::default(),
+        gauges: Vec::new(),
         recordings: Vec::new(),
         mechanisms: Vec::new(),
     };

@@ -3,6 +3,7 @@
 use crate::config::{DhRow, LabConfig};
 use crate::rig::Rig;
 use crate::scenario::{Hidden, Scenario};
+use crate::sensors::gauge::Standing;
 use crate::sensors::{Occlusion, SensorClock};
 use crate::session::{Due, Session};
 use crate::trace::{Rest, RestKind, Trace};
@@ -47,8 +48,20 @@ pub struct Truth {
     /// What a scenario hides, as a scorer needs to know it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hidden: Vec<Hidden>,
+    /// Where the instruments stand, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gauges: Vec<GaugeTruth>,
     /// The recordings.
     pub recordings: Vec<RecordingTruth>,
+}
+
+/// Where an instrument stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GaugeTruth {
+    /// In the base frame.
+    pub in_base: PoseTruth,
+    /// Distance at which it reads zero [m].
+    pub zero_m: f64,
 }
 
 /// One planted deviation.
@@ -192,6 +205,7 @@ impl Truth {
             count_rad: config.joints.count_rad(),
             scenario: None,
             hidden: Vec::new(),
+            gauges: (0..config.gauges.len()).map(|gauge| GaugeTruth::of(config, gauge)).collect(),
             recordings: Vec::new(),
         }
     }
@@ -282,6 +296,13 @@ impl SetPointTruth {
             reading_rad: mean_row(&trace.reading_rad[due.first..=due.last]),
             tip_world_m: mean_vector((due.first..=due.last).map(tip_at)).into(),
         }
+    }
+}
+
+impl GaugeTruth {
+    fn of(config: &LabConfig, gauge: usize) -> GaugeTruth {
+        let Standing { in_base, zero_m } = Standing::draw(config, gauge);
+        GaugeTruth { in_base: PoseTruth::from(&in_base), zero_m }
     }
 }
 

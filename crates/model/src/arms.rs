@@ -11,7 +11,7 @@
 use crate::chain::Source;
 use crate::segment::{Joint, Segment};
 use crate::{Chain, Frame, ModelError};
-use armcal_core::{Parameter, Role, Unit};
+use armcal_core::Parameter;
 use std::ops::Range;
 
 /// The part of a joined chain that is one arm's.
@@ -36,29 +36,6 @@ pub struct ArmFrames {
     pub base: Frame,
     /// last link_from_tip.
     pub tip: Frame,
-}
-
-/// A rigid link with a ball joint at either end, between the tips of two arms.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RigidLink {
-    /// Distance of the two points, before the fit [m].
-    pub length_m: f64,
-    /// How well that is known.
-    pub knowledge: LengthKnowledge,
-}
-
-/// What is known about a length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum LengthKnowledge {
-    /// It is exact.
-    Given,
-    /// It was measured with this standard error [m].
-    Measured {
-        /// Standard error [m].
-        sigma_m: f64,
-    },
-    /// Nobody measured it: it is fitted.
-    Estimated,
 }
 
 impl Chain {
@@ -152,45 +129,4 @@ pub(crate) fn check_bases(bases: &[Segment], parameters: &[Parameter]) -> Result
         free.join(" and ")
     );
     Err(ModelError::BadArms { problem })
-}
-
-impl RigidLink {
-    /// Name of its length among the parameters.
-    pub const LENGTH: &'static str = "link.length";
-
-    /// Its length as a parameter [m].
-    ///
-    /// # Errors
-    /// A length or standard error that is no positive number.
-    pub(crate) fn parameter(&self) -> Result<Parameter, ModelError> {
-        let bad = |problem: String| Err(ModelError::BadArms { problem });
-        let length_m = self.length_m;
-        if !(length_m.is_finite() && length_m > 0.0) {
-            return bad(format!("the link is {length_m} m long; give its length in millimetres, above zero"));
-        }
-        let (free, prior_sigma, role) = match self.knowledge {
-            LengthKnowledge::Given => (false, None, Role::KnownFrame),
-            LengthKnowledge::Measured { sigma_m } if sigma_m.is_finite() && sigma_m > 0.0 => {
-                (true, Some(sigma_m), Role::KnownFrame)
-            }
-            LengthKnowledge::Measured { sigma_m } => {
-                return bad(format!(
-                    "the standard error of the link's length is {sigma_m} m; give one above zero, or call the length given"
-                ));
-            }
-            LengthKnowledge::Estimated => (true, None, Role::EstimatedFrame),
-        };
-        Ok(Parameter {
-            name: RigidLink::LENGTH.into(),
-            unit: Unit::Metre,
-            nominal: length_m,
-            lower: 0.0,
-            upper: f64::INFINITY,
-            prior_sigma,
-            assumed: None,
-            free,
-            role,
-            meaning: "distance of the two tips on the link".into(),
-        })
-    }
 }

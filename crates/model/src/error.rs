@@ -49,11 +49,27 @@ pub enum ModelError {
         /// What is wrong, and what would be right.
         problem: String,
     },
-    /// Two points on a link, and the model has none.
-    #[error("{dwell} has its tips on a rigid link, but the model has no link: give closed_chain.length_mm")]
-    NoLink {
+    /// A length that cannot be one.
+    #[error("the length of {name} {problem}")]
+    BadLength {
+        /// What has it.
+        name: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// Something was measured against a place, or from a length, that the model does not have.
+    #[error(
+        "{dwell} was measured against {what} {index}, and the model has {known}: give it every place and length"
+    )]
+    NoPlace {
         /// The dwell.
         dwell: armcal_core::DwellId,
+        /// `place` or `length`.
+        what: &'static str,
+        /// Which one.
+        index: usize,
+        /// How many the model has.
+        known: usize,
     },
     /// Nothing moves.
     #[error("{}: the chain has no moving joint; give at least one row joint = \"revolute\" or \"prismatic\"", path.display())]

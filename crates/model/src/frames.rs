@@ -90,9 +90,17 @@ impl Frame {
 
     /// The segment of this frame and its parameters, which start at index `first`.
     pub(crate) fn segment(&self, first: usize) -> Result<(Segment, Vec<Parameter>), ModelError> {
+        self.segment_with(if self.free_rotation { Freedom::Full } else { Freedom::Position }, first)
+    }
+
+    /// The same with parameters for other parts of its pose.
+    pub(crate) fn segment_with(
+        &self,
+        freedom: Freedom,
+        first: usize,
+    ) -> Result<(Segment, Vec<Parameter>), ModelError> {
         self.check()?;
         let nominal = Rigid::from(&self.pose);
-        let freedom = if self.free_rotation { Freedom::Full } else { Freedom::Position };
         let parameters = self.parameters(freedom);
         let segment = Segment {
             parent: None,
@@ -134,17 +142,19 @@ impl Frame {
         let at = self.pose.translation.vector;
         let along = |axis| format!("position of {} along {axis}", self.name);
         let about = |axis| format!("rotation of {} about its own {axis}", self.name);
+        let turned = |quantity, axis| parameter((quantity, Unit::Radian, 0.0, sigma_rad, about(axis)));
+        if freedom == Freedom::Plane {
+            let meaning = format!("offset of {} along its normal", self.name);
+            let offset = parameter(("z", Unit::Metre, 0.0, sigma_m, meaning));
+            return vec![offset, turned("rx", "x"), turned("ry", "y")];
+        }
         let mut parameters = vec![
             parameter(("x", Unit::Metre, at.x, sigma_m, along("x"))),
             parameter(("y", Unit::Metre, at.y, sigma_m, along("y"))),
             parameter(("z", Unit::Metre, at.z, sigma_m, along("z"))),
         ];
         if freedom == Freedom::Full {
-            parameters.extend([
-                parameter(("rx", Unit::Radian, 0.0, sigma_rad, about("x"))),
-                parameter(("ry", Unit::Radian, 0.0, sigma_rad, about("y"))),
-                parameter(("rz", Unit::Radian, 0.0, sigma_rad, about("z"))),
-            ]);
+            parameters.extend([turned("rx", "x"), turned("ry", "y"), turned("rz", "z")]);
         }
         parameters
     }

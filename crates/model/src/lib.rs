@@ -22,6 +22,7 @@ mod deviation;
 mod dh_toml;
 mod effects;
 mod error;
+mod fixed;
 mod frames;
 mod model;
 mod residual;
@@ -34,7 +35,7 @@ mod urdf;
 #[cfg(test)]
 mod tests;
 
-pub use arms::{Arm, ArmFrames, LengthKnowledge, RigidLink};
+pub use arms::{Arm, ArmFrames};
 pub use chain::Chain;
 pub use deviation::Deviation;
 pub use effects::{
@@ -43,6 +44,7 @@ pub use effects::{
     least_dwells, place_and_moment,
 };
 pub use error::ModelError;
+pub use fixed::{FixedPlace, Length, LengthKnowledge};
 pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;

@@ -3,17 +3,19 @@
 mod alone;
 mod features;
 mod linearisation;
+mod measurement;
 mod prediction;
 mod scopes;
 
-use crate::arms::{self, ArmFrames, RigidLink};
+use crate::arms::{self, ArmFrames};
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::nearest;
+use crate::fixed::{FixedPlace, Length, Standing};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frames, ModelError};
-use armcal_core::{FeatureId, Observation, Parameter, Pose, Reference, Unit};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
 use features::Feature;
 pub use features::LinkFrame;
 pub use scopes::RecordingStart;
@@ -24,7 +26,7 @@ use std::sync::Arc;
 /// A robot in its surroundings.
 ///
 /// The parameter vector `p` has one entry for each of [`Model::parameters`], in that order: the chain's,
-/// then bases, tips, markers and boards, a link between the tips, then those of the effects; every method that takes it expects
+/// then bases, tips, markers and boards, fixed places and lengths, then those of the effects; every method that takes it expects
 /// that length. Joint vectors are in the order of [`Chain::joint_names`], [rad] (prismatic: [m]). What an observation lacks (a joint reading, a
 /// board) makes its numbers NaN; [`Model::check`] turns that into an error beforehand.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,8 +37,10 @@ pub struct Model {
     tree: Tree,
     /// What can be measured: the tip of each arm first, then the markers.
     features: Vec<Feature>,
-    /// Index of the length of the link between two tips, where there is one.
-    link: Option<usize>,
+    /// Points and planes that stand in the world and are measured against.
+    fixed: Vec<Standing>,
+    /// Indices of the lengths that distances count from.
+    lengths: Vec<usize>,
     /// World to board, by recording.
     boards: BTreeMap<usize, Segment>,
     /// What makes the arm differ from the path; nothing, where it is rigid.
@@ -54,7 +58,6 @@ struct Around {
     arms: Vec<ArmFrames>,
     markers: Vec<crate::Marker>,
     boards: Vec<crate::Frame>,
-    link: Option<RigidLink>,
 }
 
 impl Model {
@@ -64,17 +67,34 @@ impl Model {
     /// error is not a number.
     pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
         let Frames { base, tip, markers, boards } = frames;
-        let around = Around { arms: vec![ArmFrames { base, tip }], markers, boards, link: None };
+        let around = Around { arms: vec![ArmFrames { base, tip }], markers, boards };
         Model::between(chain, around)
     }
 
-    /// Puts joined chains ([`Chain::joined`]), each between its own frames, into one world; a link may join two tips.
+    /// Puts joined chains ([`Chain::joined`]), each between its own frames, into one world.
     ///
     /// # Errors
-    /// As for one arm; a number of frames that is not that of the arms, bases that are all free, a length that is no positive
-    /// number.
-    pub fn of_arms(chain: Chain, arms: Vec<ArmFrames>, link: Option<RigidLink>) -> Result<Model, ModelError> {
-        Model::between(chain, Around { arms, markers: Vec::new(), boards: Vec::new(), link })
+    /// As for one arm; a number of frames that is not that of the arms, bases that are all free.
+    pub fn of_arms(chain: Chain, arms: Vec<ArmFrames>) -> Result<Model, ModelError> {
+        Model::between(chain, Around { arms, markers: Vec::new(), boards: Vec::new() })
+    }
+
+    /// The same with fixed places to measure against, and lengths that distances count from. Before any effect.
+    ///
+    /// # Errors
+    /// Two of one name; a pose or a length that is none.
+    pub fn against(mut self, places: &[FixedPlace], lengths: &[Length]) -> Result<Model, ModelError> {
+        for place in places {
+            let (standing, own) = place.standing(self.parameters.len())?;
+            self.fixed.push(standing);
+            self.parameters.extend(own);
+        }
+        for length in lengths {
+            self.lengths.push(self.parameters.len());
+            self.parameters.push(length.parameter()?);
+        }
+        check_names(&self.parameters)?;
+        Ok(self)
     }
 
     fn between(chain: Chain, around: Around) -> Result<Model, ModelError> {
@@ -100,9 +120,6 @@ impl Model {
         let boards =
             around.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         arms::check_bases(&bases, &parameters)?;
-        let length = around.link.map(|link| link.parameter()).transpose()?;
-        let link = length.as_ref().map(|_| parameters.len());
-        parameters.extend(length);
         check_names(&parameters)?;
         let mut tree = chain.on(bases);
         let mut features = Vec::with_capacity(hung.len());
@@ -115,7 +132,8 @@ impl Model {
             parameters,
             tree,
             features,
-            link,
+            fixed: Vec::new(),
+            lengths: Vec::new(),
             boards,
             effects: None,
             declared: Arc::default(),
@@ -203,17 +221,15 @@ impl Model {
             if actual != expected {
                 return Err(ModelError::JointCount { dwell: o.dwell, actual, expected });
             }
-            let other = match o.reference {
-                Reference::Joined { to, .. } => to,
+            let other = match o.against() {
+                Some(Against::Feature(to)) => to,
                 _ => o.feature,
             };
             let features = self.features.len();
             if let Some(unknown) = [o.feature, other].into_iter().find(|feature| feature.0 >= features) {
                 return Err(ModelError::NoFeature { dwell: o.dwell, feature: unknown.0, features });
             }
-            if o.is_linked() && self.link.is_none() {
-                return Err(ModelError::NoLink { dwell: o.dwell });
-            }
+            self.check_against(o)?;
             if let Some(recordings) = self.recordings().filter(|recordings| o.dwell.recording >= *recordings)
             {
                 return Err(ModelError::NoRecording { dwell: o.dwell, recordings });
@@ -223,6 +239,20 @@ impl Model {
             }
         }
         Ok(())
+    }
+
+    /// That there is what an observation was measured against.
+    fn check_against(&self, o: &Observation) -> Result<(), ModelError> {
+        let unknown = |what, index, known| Err(ModelError::NoPlace { dwell: o.dwell, what, index, known });
+        match (o.against(), &o.reference) {
+            (Some(Against::Fixed(place)), _) if place >= self.fixed.len() => {
+                unknown("place", place, self.fixed.len())
+            }
+            (_, Reference::Apart { length, .. }) if *length >= self.lengths.len() => {
+                unknown("length", *length, self.lengths.len())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The tip in the base frame.

@@ -92,6 +92,8 @@ pub(crate) enum Freedom {
     Constant,
     /// x, y, z.
     Position,
+    /// z along its own axis from where it is at nominal, then rx, ry.
+    Plane,
     /// x, y, z, rx, ry, rz.
     Full,
 }
@@ -188,7 +190,7 @@ impl Segment {
                 let (theta, d) = joined(own, q, motion);
                 with_beta(modified_dh(theta, d, own[2], own[3]), own, *hayati)
             }
-            Geometry::Origin { nominal, .. } => origin(nominal, own),
+            Geometry::Origin { nominal, freedom } => origin(nominal, *freedom, own),
             Geometry::Axis(axis) => moved(&axis.map(D::from), q, motion),
         }
     }
@@ -263,15 +265,20 @@ fn with_beta<D: Scalar>(row: Rigid<D>, own: &[D], hayati: bool) -> Rigid<D> {
     Rigid { rotation, ..row }
 }
 
-/// `T(x, y, z) R_nominal Exp(rx, ry, rz)`, as far as these are parameters.
-fn origin<D: Scalar>(nominal: &Rigid<f64>, own: &[D]) -> Rigid<D> {
+/// `T(x, y, z) R_nominal Exp(rx, ry, rz)`, as far as these are parameters; of a plane `T_nominal Tz(z) Exp(rx, ry, 0)`.
+fn origin<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid<D> {
     let rotation = nominal.rotation.map(D::from);
-    match *own {
-        [x, y, z, rx, ry, rz] => Rigid {
-            rotation: product(&rotation, &rotation_of_vector(&Vector3::new(rx, ry, rz))),
-            translation_m: Vector3::new(x, y, z),
-        },
-        [x, y, z] => Rigid { rotation, translation_m: Vector3::new(x, y, z) },
+    let turned = |rx, ry, rz| product(&rotation, &rotation_of_vector(&Vector3::new(rx, ry, rz)));
+    match (own, freedom) {
+        (&[x, y, z, rx, ry, rz], _) => {
+            Rigid { rotation: turned(rx, ry, rz), translation_m: Vector3::new(x, y, z) }
+        }
+        (&[z, rx, ry], Freedom::Plane) => {
+            let along = rotation.column(2) * z;
+            let translation_m = nominal.translation_m.map(D::from) + along;
+            Rigid { rotation: turned(rx, ry, D::from(0.0)), translation_m }
+        }
+        (&[x, y, z], _) => Rigid { rotation, translation_m: Vector3::new(x, y, z) },
         _ => Rigid { rotation, translation_m: nominal.translation_m.map(D::from) },
     }
 }

@@ -63,7 +63,9 @@ pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;
-pub use streams::{Encoder, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams};
+pub use streams::{
+    Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
+};
 pub use url::{is_url, list, resolve};
 
 #[cfg(test)]

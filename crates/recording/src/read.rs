@@ -6,7 +6,8 @@ use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::temperature::{Scale, like_fahrenheit};
 use crate::{
-    Clock, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream, StreamReport, Streams,
+    Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
+    StreamReport, Streams,
 };
 use crate::{joints, poses};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
@@ -41,6 +42,12 @@ impl Recording {
                 "temperature" => {
                     let read = streams.temperature.as_ref().map(|s| stage.temperature(s)).transpose()?;
                     samples.temperature = read.flatten();
+                }
+                "gauges" => {
+                    let stream = request.name.and_then(|name| streams.gauges.get_key_value(name));
+                    if let Some((name, gauge)) = stream {
+                        samples.gauges.insert(name.clone(), stage.gauge(gauge)?);
+                    }
                 }
                 "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
                 "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
@@ -88,6 +95,12 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
     if let Some(stream) = &streams.temperature {
         requests.push(Request { role: "temperature", name: None, topic: &stream.topic, kind: Kind::Scalar });
     }
+    requests.extend(streams.gauges.iter().map(|(name, s)| Request {
+        role: "gauges",
+        name: Some(name),
+        topic: &s.topic,
+        kind: Kind::Scalar,
+    }));
     requests
 }
 
@@ -204,6 +217,19 @@ impl<'a> Reading<'a> {
             }
             read => read.map(Some),
         }
+    }
+
+    /// Every reading that is a number [m].
+    fn gauge(&mut self, stream: &GaugeStream) -> Result<ScalarSamples, RecordingError> {
+        let role = self.role;
+        self.refuse_undecoded(role)?;
+        let value = &self.gathered.scalars.value;
+        let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
+        drop_duplicates(&mut rows, &mut counts);
+        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        self.finish(role, &time_ns, counts)?;
+        let to_m = f64::from(stream.direction) * stream.unit.to_m();
+        Ok(ScalarSamples { time_ns, value: rows.iter().map(|i| value[*i] * to_m).collect() })
     }
 
     /// None where no reading can be a temperature: a thermometer that is broken costs its effects, not the recording.

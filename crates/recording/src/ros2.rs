@@ -127,6 +127,9 @@ pub const TEMPERATURE: Schema = Schema {
     ),
 };
 
+/// `std_msgs/msg/Float64`, see [`float64`].
+pub const FLOAT64: Schema = Schema { name: "std_msgs/msg/Float64", text: "float64 data\n" };
+
 /// `std_msgs/msg/Header`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header<'a> {
@@ -189,6 +192,13 @@ pub fn point_stamped(header: Header<'_>, point_m: [f64; 3]) -> Vec<u8> {
 pub fn temperature(header: Header<'_>, temperature_c: f64, variance_c2: f64) -> Vec<u8> {
     let mut cdr = Cdr::new(&header);
     cdr.f64s(&[temperature_c, variance_c2]);
+    cdr.bytes
+}
+
+/// Encodes one number.
+pub fn float64(value: f64) -> Vec<u8> {
+    let mut cdr = Cdr { bytes: vec![0, 1, 0, 0] };
+    cdr.f64s(&[value]);
     cdr.bytes
 }
 

@@ -28,6 +28,9 @@ pub struct Streams {
     /// Temperature [degC].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ScalarStream>,
+    /// Instruments that read a length, by the names of the measurements ([`[[measure]]`]) that they make.
+    #[serde(skip)]
+    pub gauges: BTreeMap<String, GaugeStream>,
 }
 
 impl Streams {
@@ -37,7 +40,8 @@ impl Streams {
         let poses = [&self.tip, &self.base, &self.table];
         let topics = joints.into_iter().flatten().map(|s| s.topic.as_str());
         let poses = poses.into_iter().flatten().chain(self.bodies.values());
-        let topics = topics.chain(poses.map(|s| s.topic.as_str()));
+        let gauges = self.gauges.values().map(|s| s.topic.as_str());
+        let topics = topics.chain(poses.map(|s| s.topic.as_str())).chain(gauges);
         let mut topics: Vec<&str> = topics.chain(self.temperature.iter().map(|s| s.topic.as_str())).collect();
         topics.sort_unstable();
         topics.dedup();
@@ -160,6 +164,27 @@ impl LengthUnit {
             LengthUnit::Mm => 1e-3,
         }
     }
+}
+
+/// A stream of one length, as of a ballbar or a dial gauge.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaugeStream {
+    /// Topic: a message of one number.
+    pub topic: String,
+    /// Unit of the readings; default `mm`.
+    #[serde(default = "millimetres")]
+    pub unit: LengthUnit,
+    /// +1 when readings grow with the length, -1 when they fall; default +1.
+    #[serde(default = "default_direction")]
+    pub direction: i8,
+    /// Clock; chosen automatically, with its reason recorded, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<Clock>,
+}
+
+fn millimetres() -> LengthUnit {
+    LengthUnit::Mm
 }
 
 /// A stream of one scalar, such as a temperature [degC].

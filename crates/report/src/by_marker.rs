@@ -1,13 +1,14 @@
-//! Errors by what was measured of the arm: its tip, and each of its markers.
+//! Errors by what was measured: the tip and each of its markers, by a sensor or against fixed places.
 
 use crate::run::Run;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Errors of the tip or of one marker, on the side by which the calibration is judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MarkerErrors<'a> {
-    /// Its name.
-    pub marker: &'a str,
+    /// Its name; of what was measured against a fixed place that too (`tip from post`).
+    pub marker: String,
     /// The link it is on; none of the tip.
     pub link: Option<&'a str>,
     /// Observations of it.
@@ -20,24 +21,33 @@ pub(crate) struct MarkerErrors<'a> {
     pub floor_mm: f64,
 }
 
-/// The errors of each; nothing of an arm without markers, whose errors are those of its tip.
+/// Whether more than the tip was measured, or against more than sensor and table.
+pub(crate) fn is_told(run: &Run) -> bool {
+    run.model.markers().next().is_some() || run.model.places().next().is_some()
+}
+
+/// The errors of each; nothing of an arm without markers and places, whose errors are those of its tip.
 pub(crate) fn by_marker(run: &Run) -> Vec<MarkerErrors<'_>> {
-    if run.model.markers().next().is_none() {
+    let model = &run.model;
+    if !is_told(run) {
         return Vec::new();
     }
-    let link = |id| run.model.markers().find(|(marker, ..)| *marker == id).map(|(_, _, link)| link);
-    let of = |(id, marker)| {
-        let own = || run.calibration.judged_pairs(&run.observations).filter(move |(_, o)| o.feature == id);
-        let n = own().count();
-        let mean_mm = |sum_m: f64| sum_m / n as f64 * 1e3;
-        (n > 0).then(|| MarkerErrors {
-            marker,
-            link: link(id),
-            n,
-            nominal_mm: mean_mm(own().map(|(r, _)| r.nominal_m.norm()).sum()),
-            fitted_mm: mean_mm(own().map(|(r, _)| r.fitted_m.norm()).sum()),
-            floor_mm: mean_mm(own().map(|(r, _)| r.expected_norm_m).sum()),
+    let mut groups: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for pair in run.calibration.judged_pairs(&run.observations) {
+        groups.entry(pair.1.what()).or_default().push(pair);
+    }
+    let link = |id| model.markers().find(|(marker, ..)| *marker == id).map(|(_, _, link)| link);
+    let errors = |own: Vec<(&armcal_calibrate::Residual, &armcal_core::Observation)>| {
+        let o = own.first()?.1;
+        let mean_mm = |sum_m: f64| sum_m / own.len() as f64 * 1e3;
+        Some(MarkerErrors {
+            marker: model.measured_name(o).unwrap_or_else(|| model.feature_name(o.feature).to_owned()),
+            link: link(o.feature),
+            n: own.len(),
+            nominal_mm: mean_mm(own.iter().map(|(r, _)| r.nominal_m.norm()).sum()),
+            fitted_mm: mean_mm(own.iter().map(|(r, _)| r.fitted_m.norm()).sum()),
+            floor_mm: mean_mm(own.iter().map(|(r, _)| r.expected_norm_m).sum()),
         })
     };
-    run.model.features().filter_map(of).collect()
+    groups.into_values().filter_map(errors).collect()
 }

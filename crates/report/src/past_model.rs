@@ -8,8 +8,8 @@ use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{
-    ArmFrames, Chain, EffectSpec, EffectTable, Frame, Frames, LengthKnowledge, Marker, Model, ModelError,
-    RigidLink, Session,
+    ArmFrames, Chain, EffectSpec, EffectTable, FixedPlace, Frame, Frames, Length, LengthKnowledge, Marker,
+    Model, ModelError, Session,
 };
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -39,9 +39,12 @@ pub struct PastModel {
     /// Of several arms, base and tip of each behind the first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     more_arms: Vec<[FrameFacts; 2]>,
-    /// The rigid link between two tips before the fit [m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    link_length_m: Option<f64>,
+    /// Points and planes that stand in the world and were measured against.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    places: Vec<PlaceFacts>,
+    /// Lengths that distances count from, a rigid link between two tips among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lengths: Vec<LengthFacts>,
     boards: Vec<FrameFacts>,
     effects: Vec<EffectTable>,
     session: Session,
@@ -126,6 +129,21 @@ struct MarkerFacts {
     frame: FrameFacts,
 }
 
+/// A point or a plane that stands in the world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct PlaceFacts {
+    is_plane: bool,
+    #[serde(flatten)]
+    frame: FrameFacts,
+}
+
+/// A length before the fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct LengthFacts {
+    name: String,
+    length_m: f64,
+}
+
 /// The model without effects and with them, and their parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PastArms {
@@ -186,7 +204,17 @@ impl PastModel {
             tip: tip(0),
             markers: model.markers().map(marker).collect(),
             more_arms: further.collect(),
-            link_length_m: model.link_length_m(&start),
+            places: model
+                .places()
+                .map(|(k, name, is_plane)| PlaceFacts {
+                    is_plane,
+                    frame: facts(name, &model.place_in_world(&start, k)),
+                })
+                .collect(),
+            lengths: model
+                .lengths()
+                .map(|(name, index)| LengthFacts { name: name.to_owned(), length_m: start[index] })
+                .collect(),
             boards: boards.collect(),
             effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
             session: run.session.clone(),
@@ -228,6 +256,18 @@ impl PastModel {
 
     /// The nominal arm, or arms, in the frames.
     fn geometry(&self, chain: Chain) -> Result<Model, ModelError> {
+        let place = |p: &PlaceFacts| FixedPlace { frame: p.frame.frame(), is_plane: p.is_plane };
+        let length = |l: &LengthFacts| Length {
+            name: l.name.clone(),
+            length_m: l.length_m,
+            knowledge: LengthKnowledge::Given,
+        };
+        let places: Vec<FixedPlace> = self.places.iter().map(place).collect();
+        let lengths: Vec<Length> = self.lengths.iter().map(length).collect();
+        self.arms_in_frames(chain)?.against(&places, &lengths)
+    }
+
+    fn arms_in_frames(&self, chain: Chain) -> Result<Model, ModelError> {
         let (base, tip) = (self.base.frame(), self.tip.frame());
         if self.more_arms.is_empty() {
             let boards = self.boards.iter().map(FrameFacts::frame).collect();
@@ -237,9 +277,7 @@ impl PastModel {
         let further =
             self.more_arms.iter().map(|[base, tip]| ArmFrames { base: base.frame(), tip: tip.frame() });
         let arms = std::iter::once(ArmFrames { base, tip }).chain(further).collect();
-        let link =
-            self.link_length_m.map(|length_m| RigidLink { length_m, knowledge: LengthKnowledge::Given });
-        Model::of_arms(chain, arms, link)
+        Model::of_arms(chain, arms)
     }
 
     /// The models, made again.

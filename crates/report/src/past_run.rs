@@ -146,7 +146,7 @@ impl PastRun {
             recording: run.recording_name(r.dwell).to_owned(),
             dwell: r.dwell,
             cavity: o.cavity().unwrap_or_default().to_owned(),
-            feature: run.model.marker_name(o.feature).map(str::to_owned),
+            feature: run.model.measured_name(o),
             held_out: r.held_out,
             error_m: r.fitted_m.norm(),
         };

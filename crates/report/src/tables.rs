@@ -71,6 +71,8 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
     c.integer("time_ns", points.iter().map(|p| p.observation.time_ns));
     c.text("cavity", points.iter().map(|p| p.observation.cavity()));
     c.text("feature", points.iter().map(|p| Some(run.model.feature_name(p.observation.feature))));
+    let against = |p: &Point| p.observation.against().map(|against| run.model.against_name(against));
+    c.text("against", points.iter().map(against));
     let places: Vec<Option<&Assignment>> = points.iter().map(|p| assignment(run, p.observation)).collect();
     c.confidence(&places);
     for j in 0..run.model.joint_count() {

@@ -70,8 +70,10 @@ fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> Str
     };
     sections.push(pen.section(&format!("{} [mm]", errors_are(run)), errors));
     let markers = by_marker(run);
+    let what = if run.model.places().next().is_some() { "measurement" } else { "marker" };
     sections.extend(
-        (!markers.is_empty()).then(|| pen.section("Mean errors by marker [mm]", of_markers(&pen, &markers))),
+        (!markers.is_empty())
+            .then(|| pen.section(&format!("Mean errors by {what} [mm]"), of_markers(&pen, &markers, what))),
     );
     match detail {
         Detail::Everything => {
@@ -185,12 +187,12 @@ fn clock_drift(recording: &RecordingRun) -> String {
     }
 }
 
-fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>]) -> String {
-    let mut table = pen.table(&["marker", "n", "nominal", "calibrated", "noise floor"]);
+fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>], what: &str) -> String {
+    let mut table = pen.table(&[what, "n", "nominal", "calibrated", "noise floor"]);
     for of in markers {
         let mm = |mm: f64| number(millimetres(mm * 1e-3));
         table.add_row(vec![
-            Cell::new(printable(of.marker)),
+            Cell::new(printable(&of.marker)),
             number(of.n),
             mm(of.nominal_mm),
             mm(of.fitted_mm),

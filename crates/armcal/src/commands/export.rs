@@ -90,7 +90,11 @@ fn observation(o: &Observation) -> Value {
             json!({"cavity": cavity, "in_board_m": in_board_m.as_slice()})
         }
         Reference::Tracked { position_m, .. } => json!({"position_m": position_m.as_slice()}),
-        Reference::Joined { to, apart } => json!({"joined_to": to, "apart": apart}),
+        Reference::Joined { to } => json!({"joined_to": to}),
+        Reference::Apart { from, length, reading_m } => {
+            json!({"apart_from": from, "length": length, "reading_m": reading_m})
+        }
+        Reference::Above { plane, reading_m } => json!({"above_plane": plane, "reading_m": reading_m}),
     };
     json!({
         "recording": o.dwell.recording, "dwell": o.dwell.dwell, "joint_rad": o.joint_rad, "reference": reference,

@@ -45,7 +45,7 @@ pub(super) fn check(
     let bodies = &pipeline.streams.bodies;
     for (name, marker) in &pipeline.markers {
         let key = format!("markers.{name}");
-        if let Some(why) = no_name_of_a_marker(name) {
+        if let Some(why) = no_name(name) {
             return fail(&key, why);
         }
         if !bodies.contains_key(name) {
@@ -66,12 +66,12 @@ pub(super) fn check(
     }
 }
 
-/// Why a marker cannot have a name; it begins the names of its parameters.
-fn no_name_of_a_marker(name: &str) -> Option<String> {
+/// Why a marker, or a place, cannot have a name; it begins the names of its parameters.
+pub(super) fn no_name(name: &str) -> Option<String> {
     let taken = ["tip", "base", "board", "world", "table"].contains(&name);
     let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     match (taken, plain) {
-        (true, _) => Some("is the name of something else; give the marker another".to_owned()),
+        (true, _) => Some("is the name of something else; give it another".to_owned()),
         (_, false) => Some("is no name: use letters, digits, _ and -".to_owned()),
         _ => None,
     }

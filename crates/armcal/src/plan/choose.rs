@@ -323,6 +323,9 @@ fn assumptions(known: &Known<'_>, allowed: &Allowed) -> Vec<String> {
         None if known.observations.iter().any(armcal_core::Observation::is_joined) => {
             all.push("the tips are joined in every dwell, as they were".to_owned());
         }
+        None if known.observations.iter().any(|o| o.against().is_some()) => {
+            all.push("in every dwell the tip is measured against what it was measured against".to_owned());
+        }
         None => all.push("no tip stream: only cavities of the board can be visited".to_owned()),
     }
     all.push("the noise is as declared, and sizes are those the data ask for, else typical ones".to_owned());

@@ -178,7 +178,7 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
 /// side.
 fn joined(known: &Known<'_>, limits: &Limits) -> Vec<Possible> {
     let last = known.session.recordings.saturating_sub(1);
-    let Some(like) = known.observations.iter().rfind(|o| o.is_joined()) else { return Vec::new() };
+    let Some(like) = known.observations.iter().rfind(|o| o.against().is_some()) else { return Vec::new() };
     let clear = AWAY_RAD / 2.0;
     let closed = |draw: usize| {
         let from = later(known, like, last, limits.drawn(draw, AWAY_RAD));

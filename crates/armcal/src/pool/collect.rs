@@ -152,6 +152,7 @@ fn dwell(o: &Observation) -> Dwell {
         markers: Default::default(),
         tip: None,
         temperature_c: o.temperature_c,
+        gauges: Default::default(),
     }
 }
 

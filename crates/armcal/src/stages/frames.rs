@@ -39,7 +39,7 @@ pub fn bare(chain: &Chain, markers: Vec<Marker>) -> Result<Model, Error> {
     }
     let given = |arm: &Arm, what: &str| Frame::given(format!("{}.{what}", arm.name), Pose::identity());
     let frames = |arm: &Arm| ArmFrames { base: given(arm, "base"), tip: given(arm, "tip") };
-    Ok(Model::of_arms(chain.clone(), chain.arms().iter().map(frames).collect(), None)?)
+    Ok(Model::of_arms(chain.clone(), chain.arms().iter().map(frames).collect())?)
 }
 
 /// Reads the DH or URDF file of a model section: its text and the chain in it.
@@ -95,7 +95,7 @@ pub fn nominal_model(
         markers: markers(pipeline),
         boards,
     };
-    let mut model = Model::new(chain.clone(), frames)?;
+    let mut model = Model::new(chain.clone(), frames)?.against(&pipeline.places(), &pipeline.lengths())?;
     declare(&mut model, pipeline)?;
     let own = &pipeline.pool.per_recording;
     if seen.len() > 1 && !own.is_empty() {

@@ -1,6 +1,7 @@
 //! The stages of the story that join two crates.
 
 pub mod frames;
+pub mod measures;
 pub mod observe;
 pub mod past;
 pub mod perceive;

@@ -66,7 +66,7 @@ pub fn observations(
     board: Option<&Board>,
     seen: &[Seen],
     places: &[Option<Association>],
-) -> Result<Observed, Error> {
+) -> Observed {
     let mut observed = Observed { observations: Vec::new(), rejections: Vec::new() };
     for (seen, association) in seen.iter().zip(places) {
         for (i, dwell) in seen.dwells.iter().enumerate() {
@@ -91,20 +91,30 @@ pub fn observations(
             observed.observations.extend(markers.into_iter().map(|(feature, marker)| of(feature, marker)));
         }
     }
-    if observed.observations.is_empty() {
-        let hint = observed.rejections.first().map_or(
+    observed
+}
+
+impl Observed {
+    /// Refuses dwells of which none is an observation.
+    ///
+    /// # Errors
+    /// Why the first is none.
+    pub fn not_empty(self) -> Result<Observed, Error> {
+        if !self.observations.is_empty() {
+            return Ok(self);
+        }
+        let hint = self.rejections.first().map_or(
             "no dwell was found: lower [dwell] thresholds or check the joints stream".to_owned(),
             |r| format!("the first was rejected because {}", r.why),
         );
-        let dwells = observed.rejections.len();
+        let dwells = self.rejections.len();
         let few = if (1..FEW).contains(&dwells) {
             "; so few dwells are too few for a calibration: were the recordings cut short?"
         } else {
             ""
         };
-        return Err(Error::NoObservations { dwells, hint: hint + few });
+        Err(Error::NoObservations { dwells, hint: hint + few })
     }
-    Ok(observed)
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.

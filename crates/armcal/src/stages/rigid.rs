@@ -198,6 +198,7 @@ mod tests {
                 .map(|(m, name)| ((*name).to_owned(), seen(k, m + 1)))
                 .collect(),
             temperature_c: None,
+            gauges: Default::default(),
         };
         (0..30).map(dwell).collect()
     }

@@ -3,13 +3,14 @@
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pipeline::{
-    FramePose, FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, recording_name,
+    FramePose, FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, knowledge,
+    recording_name,
 };
 use crate::stages::frames::{frame, override_parameters};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::DwellConfig;
-use armcal_model::{Chain, EffectSpec, EffectTable, LengthKnowledge, Model, RigidLink};
+use armcal_model::{Chain, EffectSpec, EffectTable, Length, Model};
 use armcal_recording::{JointStream, Streams};
 use armcal_report::OutputConfig;
 use serde::Deserialize;
@@ -129,14 +130,9 @@ fn default_max_gap_mm() -> f64 {
 
 impl ClosedChainSection {
     /// The rigid link between the tips, where that is what joins them.
-    fn link(&self) -> Option<RigidLink> {
+    pub fn link(&self) -> Option<Length> {
         let length_m = self.length_mm.filter(|_| self.kind == ClosureKind::RigidLink)? * 1e-3;
-        let knowledge = match self.length {
-            FramePose::Given => LengthKnowledge::Given,
-            FramePose::Measured => LengthKnowledge::Measured { sigma_m: self.length_sigma_mm * 1e-3 },
-            FramePose::Estimated => LengthKnowledge::Estimated,
-        };
-        Some(RigidLink { length_m, knowledge })
+        Some(Length::of_link(length_m, knowledge(self.length, self.length_sigma_mm)))
     }
 }
 
@@ -180,6 +176,9 @@ impl TwoArms {
             dwell: file.dwell,
             table: None,
             markers: Default::default(),
+            points: Default::default(),
+            planes: Default::default(),
+            measure: Default::default(),
             sensor: Default::default(),
             model: first.model.clone(),
             frames: Default::default(),
@@ -211,7 +210,7 @@ impl TwoArms {
             tip: frame(&format!("{}.tip", arm.name), &arm.tip, false),
         };
         let all = self.arms.iter().map(frames).collect();
-        let mut model = Model::of_arms(chain.clone(), all, self.closure.link())?;
+        let mut model = Model::of_arms(chain.clone(), all)?.against(&[], self.closure.link().as_slice())?;
         for (arm, of_chain) in self.arms.iter().zip(chain.arms()) {
             let named = |p: &ParameterOverride| ParameterOverride {
                 name: of_chain.parameter_among_all(&p.name),
@@ -269,6 +268,9 @@ impl TwoArms {
                 "closed_chain.length_mm",
                 "is missing; a rigid link has a length, even if it is estimated".into(),
             )),
+            (ClosureKind::RigidLink, Some(mm)) if !positive(mm) => {
+                Some(("closed_chain.length_mm", "must be above zero".into()))
+            }
             (ClosureKind::SamePoint, Some(_)) => Some((
                 "closed_chain.length_mm",
                 "has no meaning for tips in one point; use kind = \"rigid-link\" or remove it".into(),
@@ -281,5 +283,14 @@ impl TwoArms {
 fn joints_only(joints: &JointStream) -> Streams {
     let joints = joints.clone();
     let bodies = Default::default();
-    Streams { joints, set_points: None, tip: None, bodies, base: None, table: None, temperature: None }
+    Streams {
+        joints,
+        set_points: None,
+        tip: None,
+        bodies,
+        base: None,
+        table: None,
+        temperature: None,
+        gauges: Default::default(),
+    }
 }

@@ -156,6 +156,6 @@ impl Surroundings<'_> {
     }
 
     fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {
-        Ok(observe::observations(self.pipeline, self.board, self.seen, places)?.observations)
+        Ok(observe::observations(self.pipeline, self.board, self.seen, places).not_empty()?.observations)
     }
 }

@@ -4,18 +4,21 @@ use crate::problem::Problem as _;
 use crate::{
     CalibrateError, Calibration, FitConfig, HoldoutConfig, ModelProblem, Objective, align_frames, calibrate,
 };
-use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
+use armcal_core::{Against, DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_lab::pair::{ObservedPair, PairConfig, PairTruth, observe};
-use armcal_model::{ArmFrames, Chain, Frame, LengthKnowledge, Model, ModelError, RigidLink};
+use armcal_model::{ArmFrames, Chain, Frame, Length, LengthKnowledge, Model, ModelError};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// How long a link is [m], and how well that is known.
+type Link = (f64, LengthKnowledge);
+
 const LAB: &str = include_str!("../../../../pipelines/lab/two-arms.toml");
 const RIGHT: &str = include_str!("../../../../pipelines/models/right_arm.toml");
 const LEFT: &str = include_str!("../../../../pipelines/models/left_arm.toml");
-const LINK: Option<RigidLink> = Some(RigidLink { length_m: 0.2, knowledge: LengthKnowledge::Given });
-const ONE_POINT: Option<RigidLink> = None;
+const LINK: Option<Link> = Some((0.2, LengthKnowledge::Given));
+const ONE_POINT: Option<Link> = None;
 const IN_TURN: HoldoutConfig = HoldoutConfig::CavityFolds { k: 5 };
 
 fn lab(seed: u64, poses: usize, length_mm: Option<f64>) -> ObservedPair {
@@ -27,7 +30,7 @@ fn lab(seed: u64, poses: usize, length_mm: Option<f64>) -> ObservedPair {
 }
 
 /// Two arms, each with its name, table and base.
-fn arms(arms: [(&str, &str, Frame); 2], link: Option<RigidLink>) -> Result<Model, ModelError> {
+fn arms(arms: [(&str, &str, Frame); 2], link: Option<Link>) -> Result<Model, ModelError> {
     let tip =
         |name: &str| Frame { free_rotation: false, ..Frame::given(format!("{name}.tip"), Pose::identity()) };
     let chains = arms
@@ -38,11 +41,12 @@ fn arms(arms: [(&str, &str, Frame); 2], link: Option<RigidLink>) -> Result<Model
         base: Frame { name: format!("{name}.base"), ..base },
         tip: tip(name),
     });
-    Model::of_arms(chain, frames.collect(), link)
+    let link = link.map(|(length_m, knowledge)| Length::of_link(length_m, knowledge));
+    Model::of_arms(chain, frames.collect())?.against(&[], link.as_slice())
 }
 
 /// Right arm at the world's origin; nobody knows where the left one is.
-fn pair(link: Option<RigidLink>) -> Model {
+fn pair(link: Option<Link>) -> Model {
     let given = Frame::given("base", Pose::identity());
     let estimated = Frame::estimated("base", Pose::identity());
     arms([("right", RIGHT, given), ("left", LEFT, estimated)], link).unwrap()
@@ -52,18 +56,22 @@ fn pair(link: Option<RigidLink>) -> Model {
 fn both([first, second]: &[Observation; 2], apart: bool) -> Observation {
     let mut joint_rad = first.joint_rad.clone();
     joint_rad.extend(&second.joint_rad);
-    let joined = Reference::Joined { to: FeatureId::TIP, apart };
+    let other = Against::Feature(FeatureId::TIP);
+    let joined = match apart {
+        true => Reference::Apart { from: other, length: 0, reading_m: 0.0 },
+        false => Reference::Joined { to: other },
+    };
     let mut both = Observation { feature: FeatureId(1), ..Observation::bare(first.dwell, joint_rad, joined) };
     both.joint_sigma_rad = [&first.joint_sigma_rad[..], &second.joint_sigma_rad].concat();
     both.covariance_m2 = Matrix3::identity() * 0.05e-3f64.powi(2);
     both
 }
 
-fn closed(observed: &ObservedPair, link: Option<RigidLink>) -> Vec<Observation> {
+fn closed(observed: &ObservedPair, link: Option<Link>) -> Vec<Observation> {
     observed.dwells.iter().map(|arms| both(arms, link.is_some())).collect()
 }
 
-fn placed(link: Option<RigidLink>, observations: &[Observation]) -> Model {
+fn placed(link: Option<Link>, observations: &[Observation]) -> Model {
     let mut model = pair(link);
     let aligned = align_frames(&model, observations, &FitConfig::default()).unwrap();
     let base = model.arm_base_in_world(&aligned, 1);
@@ -75,7 +83,7 @@ fn calibrated(model: &Model, observations: &[Observation], holdout: &HoldoutConf
     calibrate(model, observations, &FitConfig::default(), holdout).unwrap()
 }
 
-fn word(link: Option<RigidLink>) -> &'static str {
+fn word(link: Option<Link>) -> &'static str {
     if link.is_some() { "rigid link" } else { "same point" }
 }
 
@@ -222,7 +230,7 @@ fn without_a_known_length_the_scale_is_open_and_a_known_link_closes_it() {
     assert!(open && (1.8e-3..2.3e-3).contains(&sigma_m), "{open} {sigma_m}");
     let (open, sigma_m) = scale(LINK, Some(200.0));
     assert!(!open && sigma_m < 0.5e-3, "{open} {sigma_m}");
-    let estimated = RigidLink { length_m: 0.19, knowledge: LengthKnowledge::Estimated };
+    let estimated = (0.19, LengthKnowledge::Estimated);
     let (open, _) = scale(Some(estimated), Some(200.0));
     assert!(open, "an unmeasured link knows no scale");
 }
@@ -236,20 +244,23 @@ fn what_cannot_be_joined_is_said() {
     assert!(same.contains("both are named `left`"), "{same}");
     let adrift = says([("right", RIGHT, free()), ("left", LEFT, free())], ONE_POINT);
     assert!(adrift.contains("bases of right and left are both free"), "{adrift}");
-    let short = Some(RigidLink { length_m: -0.1, knowledge: LengthKnowledge::Given });
+    let short = Some((-0.1, LengthKnowledge::Given));
     let short = says([("right", RIGHT, given()), ("left", LEFT, free())], short);
-    assert!(short.contains("above zero"), "{short}");
+    assert!(short.contains("the length of link is -0.1 m"), "{short}");
 
     let (model, mut observations) = (pair(ONE_POINT), closed(&lab(1, 6, None), ONE_POINT));
     let fit = |o: &[Observation], holdout: &HoldoutConfig| {
         calibrate(&model, o, &FitConfig::default(), holdout).unwrap_err()
     };
     assert!(matches!(fit(&[], &HoldoutConfig::None), CalibrateError::NoObservations { .. }));
-    let linked = Reference::Joined { to: FeatureId::TIP, apart: true };
+    let linked = Reference::Apart { from: Against::Feature(FeatureId::TIP), length: 0, reading_m: 0.0 };
     observations[1].reference = linked;
     let linkless = fit(&observations, &HoldoutConfig::None).to_string();
-    assert!(linkless.contains("recording 0 dwell 1 has its tips on a rigid link"), "{linkless}");
-    observations[1].reference = Reference::Joined { to: FeatureId(2), apart: false };
+    assert!(
+        linkless.contains("recording 0 dwell 1 was measured against length 0, and the model has 0"),
+        "{linkless}"
+    );
+    observations[1].reference = Reference::Joined { to: Against::Feature(FeatureId(2)) };
     assert!(fit(&observations, &HoldoutConfig::None).to_string().contains("dwell 1"));
     observations.remove(1);
     observations[1].joint_rad[3] = f64::NAN;

@@ -195,7 +195,7 @@ pub fn problem(
             first_row: 3 * i,
             rows: 3,
             parts: vec![Part {
-                feature: FeatureId::TIP,
+                what: (FeatureId::TIP, None),
                 rows: 3,
                 tracked: p.place.is_none(),
                 metres: Matrix3xX::identity(3) * SIGMA_M,

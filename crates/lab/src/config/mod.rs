@@ -1,10 +1,12 @@
 //! `LAB.toml`: what the rig is, what it does, and how it is watched. The defaults are the paper's rig.
 
 mod arm;
+mod gauge;
 mod sensors;
 mod task;
 
 pub use arm::{ArmConfig, DeviationConfig, DhRow, DriveConfig};
+pub use gauge::{GaugeConfig, GaugeKind};
 pub use sensors::{
     BodyConfig, ClockConfig, EncoderConfig, JointFormat, MarkerConfig, PoseMessage, TableMarkers,
     TemperatureConfig, TransportConfig, ViconConfig,
@@ -57,6 +59,9 @@ pub struct LabConfig {
     /// The thermometer.
     #[serde(default)]
     pub temperature: TemperatureConfig,
+    /// Instruments that read one length of the tip.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gauges: Vec<GaugeConfig>,
     /// The recordings, in the order of the session.
     pub recordings: Vec<RecordingConfig>,
     /// What is hidden in the rig: see [`crate::mechanisms`].
@@ -150,6 +155,7 @@ impl LabConfig {
         self.joints.check()?;
         self.vicon.check()?;
         self.temperature.check()?;
+        self.gauges.iter().try_for_each(GaugeConfig::check)?;
         let board = [
             ("board.placement_sigma_mm", self.board.placement_sigma_mm),
             ("board.placement_sigma_deg", self.board.placement_sigma_deg),

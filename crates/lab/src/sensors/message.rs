@@ -13,6 +13,8 @@ pub enum Kind {
     TransformStamped,
     /// `sensor_msgs/msg/Temperature`.
     Temperature,
+    /// `std_msgs/msg/Float64`, which has no header.
+    Float64,
 }
 
 /// One channel.
@@ -67,4 +69,6 @@ pub enum Payload {
         /// Variance [K^2].
         variance: f64,
     },
+    /// One number, in the unit of its instrument.
+    Number(f64),
 }

@@ -1,7 +1,8 @@
-//! What the recorder gets to see of a session: encoders, cameras, a thermometer, each with its clock.
+//! What the recorder gets to see of a session: encoders, cameras, a thermometer, gauges, each with its clock.
 
 mod clock;
 pub(crate) mod encoder;
+pub(crate) mod gauge;
 mod message;
 pub(crate) mod outliers;
 mod temperature;
@@ -41,6 +42,7 @@ pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
     if config.temperature.published {
         temperature::readings(config, recording, session, &mut log);
     }
+    gauge::readings(config, recording, session, &mut log);
     encoder::set_points(config, recording, session, &mut log);
     // Stable: messages logged in the same nanosecond keep the order of their channels.
     log.messages.sort_by_key(|message| message.log_ns);

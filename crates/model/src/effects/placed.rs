@@ -14,7 +14,7 @@ use crate::segment::{Freedom, Geometry, Segment};
 use crate::tree::{Route, Tree, TreeAt};
 use crate::twist::Twist;
 use crate::{Model, ModelError};
-use armcal_core::{DwellId, FeatureId, Parameter, Reference, Role};
+use armcal_core::{DwellId, FeatureId, Parameter, Role};
 use nalgebra::{Matrix3, Vector3};
 use num_dual::Dual64;
 use std::ops::Range;
@@ -318,10 +318,8 @@ impl Effects {
                 *reading += value;
             }
         }
-        let in_board_m = match &x.observation.reference {
-            Reference::Seated { in_board_m, .. } => in_board_m + change.seat_m,
-            Reference::Tracked { .. } | Reference::Joined { .. } => Vector3::zeros(),
-        };
+        let seated = x.observation.in_board_m();
+        let in_board_m = seated.map_or_else(Vector3::zeros, |in_board_m| in_board_m + change.seat_m);
         (extended, q, in_board_m)
     }
 
@@ -365,7 +363,7 @@ impl Effects {
         joints: &mut [(usize, Twist)],
     ) {
         let Some(at_m) = sensed_m(x, &tip.translation_m) else { return };
-        let tracked = matches!(x.observation.reference, Reference::Tracked { .. });
+        let tracked = x.observation.is_tracked();
         let (point, base) = (at_m.map(Dual64::from), x.base_m().map(Dual64::from));
         let mut stretch = Matrix3::identity();
         let mut own = Vec::new();
@@ -432,11 +430,8 @@ fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
     (tree, places)
 }
 
-/// The point the sensor measured in the world [m]: the tip, or the board it is seated in; none of joined tips.
+/// The point the sensor measured in the world [m]: the tip, or the board it is seated in; none of what no sensor saw.
 fn sensed_m(x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Option<Vector3<f64>> {
-    match &x.observation.reference {
-        Reference::Tracked { .. } => Some(*tip_m),
-        Reference::Seated { .. } => x.board_m,
-        Reference::Joined { .. } => None,
-    }
+    let seated = || x.observation.cavity().and(x.board_m);
+    if x.observation.is_tracked() { Some(*tip_m) } else { seated() }
 }

@@ -1,6 +1,6 @@
 //! What effects need to know about the whole set of observations.
 
-use armcal_core::{Observation, Reference};
+use armcal_core::Observation;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -53,13 +53,7 @@ impl Session {
     /// Summarises observations; the order does not matter.
     pub fn of(observations: &[Observation]) -> Session {
         let times = || observations.iter().map(|o| o.time_ns);
-        let tracked: Vec<Vector3<f64>> = observations
-            .iter()
-            .filter_map(|o| match &o.reference {
-                Reference::Tracked { position_m, .. } => Some(*position_m),
-                Reference::Seated { .. } | Reference::Joined { .. } => None,
-            })
-            .collect();
+        let tracked: Vec<Vector3<f64>> = observations.iter().filter_map(|o| o.seen_m().copied()).collect();
         let centre_m = mean(&tracked);
         let extent_m = centre_m.map_or(0.0, |c| tracked.iter().map(|p| (p - c).norm()).fold(0.0, f64::max));
         let temperatures: Vec<f64> = observations.iter().filter_map(|o| o.temperature_c).collect();
@@ -100,7 +94,7 @@ fn mean(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
 fn board_centres(observations: &[Observation]) -> BTreeMap<usize, Vector3<f64>> {
     let mut points: BTreeMap<usize, Vec<Vector3<f64>>> = BTreeMap::new();
     for o in observations {
-        if let Reference::Seated { in_board_m, .. } = &o.reference {
+        if let Some(in_board_m) = o.in_board_m() {
             points.entry(o.dwell.recording).or_default().push(*in_board_m);
         }
     }

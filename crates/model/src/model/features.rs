@@ -4,7 +4,7 @@ use super::Model;
 use crate::rigid::Rigid;
 use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
-use armcal_core::{FeatureId, Observation, Pose};
+use armcal_core::{Against, FeatureId, Observation, Pose};
 use nalgebra::Matrix6xX;
 
 /// The name of a feature and the way to it.
@@ -104,6 +104,44 @@ impl Model {
     /// The name of a feature.
     pub fn feature_name(&self, feature: FeatureId) -> &str {
         self.features.get(feature.0).map_or("", |feature| feature.name.as_str())
+    }
+
+    /// The points and planes that stand fixed in the world: which place each is, its name, and whether it is a plane.
+    pub fn places(&self) -> impl Iterator<Item = (usize, &str, bool)> {
+        self.fixed.iter().enumerate().map(|(k, place)| (k, place.name.as_str(), place.is_plane))
+    }
+
+    /// Where a fixed place is; of a plane z is its normal.
+    pub fn place_in_world(&self, p: &[f64], place: usize) -> Pose {
+        Pose::from(&self.fixed[place].segment.transform(p, &[]))
+    }
+
+    /// The name of what something was measured against.
+    pub fn against_name(&self, against: Against) -> &str {
+        match against {
+            Against::Feature(feature) => self.feature_name(feature),
+            Against::Fixed(place) => self.fixed.get(place).map_or("", |place| place.name.as_str()),
+        }
+    }
+
+    /// What an observation is, in words: none of the tip where a sensor saw it or a table held it, else such as `elbow` or `tip
+    /// from post`.
+    pub fn measured_name(&self, o: &Observation) -> Option<String> {
+        let Some(Against::Fixed(place)) = o.against() else {
+            return self.marker_name(o.feature).map(str::to_owned);
+        };
+        let how = match (o.is_scalar(), self.fixed[place].is_plane) {
+            (false, _) => "in",
+            (true, true) => "above",
+            (true, false) => "from",
+        };
+        Some(format!("{} {how} {}", self.feature_name(o.feature), self.fixed[place].name))
+    }
+
+    /// The lengths that distances count from: what has each, and its index in the parameter vector.
+    pub fn lengths(&self) -> impl Iterator<Item = (&str, usize)> {
+        let name = |index: usize| self.parameters[index].name.strip_suffix(".length").unwrap_or("");
+        self.lengths.iter().map(move |&index| (name(index), index))
     }
 
     /// Where the model puts a feature, in the world, effects included.

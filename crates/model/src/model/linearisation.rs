@@ -1,15 +1,14 @@
 //! A model at one parameter vector: residual and exact Jacobian of as many observations as are asked for.
 
 use super::Model;
-use super::prediction::{Sides, measured_m, seated_m};
+use super::measurement::Sides;
+use super::prediction::{measured_m, seated_m};
 use crate::effects::Effects;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
-use crate::rigid::Rigid;
 use crate::segment::{LinearisedSegment, Segment};
 use crate::tree::TreeAt;
-use crate::twist::Twist;
-use armcal_core::{FeatureId, Observation, Reference};
-use nalgebra::{DMatrix, Vector3};
+use armcal_core::{Against, FeatureId, Observation};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 /// What is alike for all observations is worked out once.
@@ -57,13 +56,21 @@ impl<'a> Linearisation<'a> {
             }
         };
         let (predicted, in_board_m, columns, seats) = at(o.feature);
-        if let Reference::Joined { to, .. } = o.reference {
-            let (other, _, of_other, _) = at(to);
-            return self.joined(o, predicted, &columns, (other.translation_m, &of_other));
+        if let Some(against) = o.against() {
+            let (other, of_other) = match against {
+                Against::Feature(to) => {
+                    let (other, _, of_other, _) = at(to);
+                    (other, of_other)
+                }
+                Against::Fixed(place) => self.model.linearised_place(self.p, place),
+            };
+            let sides = Sides { other, predicted, expected_m: self.model.expected_m(self.p, o) };
+            let among = (self.model.parameters.len(), self.model.length_of(o));
+            return sides.linearised(o, &columns, &of_other, among);
         }
         let board = self.model.board_under(o).zip(self.boards.get(&o.dwell.recording));
         let measured_m = measured_m(o, board.map(|(_, at)| &at.transform), &in_board_m);
-        let residual = Sides { measured_m, predicted, apart_m: None }.residual(o);
+        let residual = Sides::with_point(measured_m, predicted).residual(o);
         let mut jacobian = DMatrix::zeros(residual.len(), self.model.parameters.len());
         for (column, twist) in &columns {
             add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);
@@ -85,29 +92,5 @@ impl<'a> Linearisation<'a> {
             }
         }
         (residual, jacobian)
-    }
-
-    /// Of a point whose reference is another point of the arms, where that is and how it moves.
-    fn joined(
-        &self,
-        o: &Observation,
-        predicted: Rigid<f64>,
-        columns: &[(usize, Twist)],
-        (other_m, of_other): (Vector3<f64>, &[(usize, Twist)]),
-    ) -> (ModelResidual, DMatrix<f64>) {
-        let link = self.model.link_of(o);
-        let sides = Sides { measured_m: other_m, predicted, apart_m: link.map(|link| self.p[link]) };
-        let residual = sides.residual(o);
-        let mut gap = DMatrix::zeros(3, self.model.parameters.len());
-        for (column, twist) in columns {
-            add_to_column(&mut gap, 0, *column, &-twist.translation_m);
-        }
-        for (column, twist) in of_other {
-            add_to_column(&mut gap, 0, *column, &twist.translation_m);
-        }
-        let Some((along, link)) = residual.along.zip(link) else { return (residual, gap) };
-        let mut row = DMatrix::from_fn(1, gap.ncols(), |_, column| along.dot(&gap.column(column)));
-        row[(0, link)] = -1.0;
-        (residual, row)
     }
 }

@@ -2,37 +2,28 @@
 
 use super::Model;
 use super::linearisation::Linearisation;
-use crate::residual::{ModelResidual, add_to_column, rotation_error_rad, rotation_error_rate};
+use super::measurement::Sides;
+use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::Segment;
-use armcal_core::{FeatureId, Observation, Pose, Reference};
-use nalgebra::{DMatrix, Matrix3xX, UnitQuaternion, Vector3};
-
-/// What is measured and what is predicted of one observation.
-pub(super) struct Sides {
-    pub measured_m: Vector3<f64>,
-    pub predicted: Rigid<f64>,
-    /// How far apart a link keeps both [m].
-    pub apart_m: Option<f64>,
-}
+use armcal_core::{Against, FeatureId, Observation};
+use nalgebra::{DMatrix, Matrix3xX, Vector3};
 
 impl Model {
-    /// Where the tip was, in the world: as the sensor saw it, the cavity of the board, or where the tip of the arm is that it
-    /// was joined to [m].
+    /// Where the tip was, in the world: as the sensor saw it, the cavity of the board, or where what it was
+    /// measured against has it [m].
     pub fn measured_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
         if let Some((model, p)) = self.seen(p, o) {
             return model.measured_tip_in_world(&p, o);
         }
         // Where the arm comes into it only through what effects do to the seat, it need not be followed.
-        match (&o.reference, &self.effects) {
-            (Reference::Tracked { position_m, .. }, _) => *position_m,
-            (Reference::Seated { .. }, None) => {
+        match (o.seen_m(), o.cavity(), &self.effects) {
+            (Some(seen_m), ..) => *seen_m,
+            (None, Some(_), None) => {
                 let board = self.board_under(o).map(|board| board.transform(p, &[]));
                 measured_m(o, board.as_ref(), &seated_m(o))
             }
-            (Reference::Seated { .. }, Some(_)) | (Reference::Joined { .. }, _) => {
-                self.sides(p, o).measured_m
-            }
+            _ => self.sides(p, o).measured_m(o),
         }
     }
 
@@ -41,8 +32,8 @@ impl Model {
         self.sides(p, o).predicted.translation_m
     }
 
-    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of tips
-    /// on a rigid link one, along it.
+    /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of a
+    /// distance or a height one.
     pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
         self.sides(p, o).residual(o)
     }
@@ -82,7 +73,7 @@ impl Model {
         for (column, twist) in self.joint_twists(p, o.feature, o) {
             add(column, twist.translation_m);
         }
-        if let Reference::Joined { to, .. } = o.reference {
+        if let Some(Against::Feature(to)) = o.against() {
             for (column, twist) in self.joint_twists(p, to, o) {
                 add(column, -twist.translation_m);
             }
@@ -121,28 +112,13 @@ impl Model {
             _ => (self.tree.follow(self.route(feature), p, &o.joint_rad), seated_m(o)),
         };
         let (predicted, in_board_m) = at(o.feature);
-        let other = match o.reference {
-            Reference::Joined { to, .. } => Some(at(to).0.translation_m),
-            _ => None,
-        };
-        let board = self.board_under(o).map(|board| board.transform(p, &[]));
-        let measured_m = other.unwrap_or_else(|| measured_m(o, board.as_ref(), &in_board_m));
-        Sides { measured_m, predicted, apart_m: self.apart_m(p, o) }
-    }
-
-    /// Index of the length of the link that keeps the joined points of an observation apart.
-    pub(super) fn link_of(&self, o: &Observation) -> Option<usize> {
-        self.link.filter(|_| o.is_linked())
-    }
-
-    /// How far apart they are [m].
-    fn apart_m(&self, p: &[f64], o: &Observation) -> Option<f64> {
-        self.link_of(o).map(|link| p[link])
-    }
-
-    /// The length of the link between two tips [m]; none without one.
-    pub fn link_length_m(&self, p: &[f64]) -> Option<f64> {
-        self.link.map(|link| p[link])
+        match self.other(p, o, &|feature| at(feature).0) {
+            Some(other) => Sides { other, predicted, expected_m: self.expected_m(p, o) },
+            None => {
+                let board = self.board_under(o).map(|board| board.transform(p, &[]));
+                Sides::with_point(measured_m(o, board.as_ref(), &in_board_m), predicted)
+            }
+        }
     }
 
     /// The board that the tip is seated in.
@@ -151,44 +127,17 @@ impl Model {
     }
 }
 
-impl Sides {
-    pub fn residual(&self, o: &Observation) -> ModelResidual {
-        let gap_m = self.measured_m - self.predicted.translation_m;
-        if let Some(length_m) = self.apart_m {
-            // Any axis for no gap.
-            let along = gap_m.try_normalize(0.0).unwrap_or_else(Vector3::x);
-            let position_m = along * (gap_m.norm() - length_m);
-            return ModelResidual { position_m, rotation_rad: None, along: Some(along) };
-        }
-        let rotation_rad = match &o.reference {
-            Reference::Tracked { orientation: Some(measured), .. } => {
-                let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
-                Some(rotation_error_rad(measured, &predicted))
-            }
-            _ => None,
-        };
-        ModelResidual { position_m: gap_m, rotation_rad, along: None }
-    }
-}
-
-/// Where the tip was, in the world [m]; NaN in a cavity of a board that the model does not have, and where another tip is the
-/// reference.
+/// Where the tip was, in the world [m]: as a sensor saw it, or the cavity of the board; NaN where there is no such board.
 pub(super) fn measured_m(
     o: &Observation,
     board: Option<&Rigid<f64>>,
     in_board_m: &Vector3<f64>,
 ) -> Vector3<f64> {
-    match &o.reference {
-        Reference::Tracked { position_m, .. } => *position_m,
-        Reference::Seated { .. } => board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m)),
-        Reference::Joined { .. } => Vector3::repeat(f64::NAN),
-    }
+    let in_board = || board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m));
+    o.seen_m().copied().unwrap_or_else(in_board)
 }
 
 /// The seated point as the board's file gives it [m]; zero for one that is not seated.
 pub(super) fn seated_m(o: &Observation) -> Vector3<f64> {
-    match &o.reference {
-        Reference::Seated { in_board_m, .. } => *in_board_m,
-        Reference::Tracked { .. } | Reference::Joined { .. } => Vector3::zeros(),
-    }
+    o.in_board_m().copied().unwrap_or_else(Vector3::zeros)
 }

@@ -237,7 +237,13 @@ impl View {
         let mut parameters: Vec<Parameter> = index.iter().zip(&kept).map(named).collect();
         let base = model.tree.0[0].parameters.clone();
         let mut tree = model.tree.clone();
-        let link = model.link.map(|link| kept.binary_search(&link).unwrap_or(parameters.len()));
+        let now = |old: usize| kept.binary_search(&old).unwrap_or(parameters.len());
+        let mut fixed = model.fixed.clone();
+        for place in &mut fixed {
+            let first = now(place.segment.parameters.start);
+            place.segment.parameters = first..first + place.segment.parameters.len();
+        }
+        let lengths = model.lengths.iter().map(|length| now(*length)).collect();
         // A rotation vector counts from where the frame starts: it moves with its parameters, or not at all.
         if let Some(start) = scopes.bases[recording].filter(|_| base.clone().all(|k| index[k] != k)) {
             restart(&mut tree.0[0], &mut parameters, start);
@@ -251,7 +257,8 @@ impl View {
             parameters,
             tree,
             features: model.features.clone(),
-            link,
+            fixed,
+            lengths,
             boards: model.boards.get(&recording).map(board).into_iter().collect(),
             effects: None,
             declared: model.declared.clone(),

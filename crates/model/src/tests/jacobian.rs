@@ -1,7 +1,8 @@
 //! The exact Jacobian against central differences and against the geometric Jacobian, on random arms.
 
 use super::*;
-use crate::{Frame, Knowledge};
+use crate::{FixedPlace, Frame, Knowledge, Length, LengthKnowledge};
+use armcal_core::Against;
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 
@@ -137,6 +138,33 @@ proptest! {
     fn seated_tips_agree_with_central_differences((model, p, joints) in random_case()) {
         let o = seated(&joints, Vector3::new(0.08, -0.03, 0.01));
         prop_assert!(worst_difference(&model, &p, &o) < 1e-7);
+    }
+
+    #[test]
+    fn what_is_measured_against_places_agrees_with_central_differences(
+        (model, p, joints) in random_case(),
+        (point, plane) in (random_frame("post"), random_frame("plate")),
+        off in prop::collection::vec(-0.3..0.3f64, 7),
+    ) {
+        let places = [(point, false), (plane, true)].map(|(frame, is_plane)| FixedPlace { frame, is_plane });
+        let bar = Length { name: "bar".into(), length_m: 0.4, knowledge: LengthKnowledge::Estimated };
+        let model = model.against(&places, &[bar]).expect("new names");
+        let more = model.nominal().into_iter().skip(p.len()).zip(&off).map(|(value, off)| value + off);
+        let p: Vec<f64> = p.into_iter().chain(more).collect();
+        prop_assert_eq!(p.len(), model.parameters().len());
+        let post = Against::Fixed(0);
+        for reference in [
+            Reference::Joined { to: post },
+            Reference::Apart { from: post, length: 0, reading_m: 0.03 },
+            Reference::Above { plane: 1, reading_m: -0.02 },
+        ] {
+            let o = Observation { reference, ..seated(&joints, Vector3::zeros()) };
+            model.check(std::slice::from_ref(&o)).expect("all of it is there");
+            // Far from a distance of zero, where a distance has no slope.
+            let gap_m = model.place_in_world(&p, 0).translation.vector - model.predicted_tip_in_world(&p, &o);
+            prop_assume!(gap_m.norm() > 0.05);
+            prop_assert!(worst_difference(&model, &p, &o) < 1e-7);
+        }
     }
 
     /// z x (tip - o) for a revolute joint, z for a prismatic one: Siciliano et al. 2009, eq. 3.30.

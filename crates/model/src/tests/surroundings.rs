@@ -1,8 +1,8 @@
 //! Frames, residuals and overrides.
 
 use super::*;
-use crate::{Frame, Knowledge, ModelError};
-use armcal_core::{Role, Unit};
+use crate::{FixedPlace, Frame, Knowledge, Length, LengthKnowledge, ModelError};
+use armcal_core::{Against, Role, Unit};
 use nalgebra::UnitQuaternion;
 
 fn pose(x: f64, y: f64, z: f64, yaw: f64) -> Pose {
@@ -65,6 +65,60 @@ fn measured_minus_predicted_in_world_axes() {
     assert!((residual.position_m - Vector3::new(1e-3, 0.0, 0.0)).norm() < 1e-15);
     assert!((residual.rotation_rad.expect("has one") - Vector3::new(0.0, 0.0, 0.01)).norm() < 1e-14);
     assert_eq!(residual.rows().count(), residual.len());
+}
+
+/// By hand: a tip at (0.3, 0.4, 0) from a point is 0.5 m away; above a plane through that point whose normal is turned by 30 deg
+/// from z about x it is -0.2 m high.
+#[test]
+fn distances_and_heights_are_those_of_the_geometry() {
+    let bare = on_the_rig(Knowledge::Given, Knowledge::Given);
+    let (p, q) = (bare.nominal(), [0.2, -0.4, 0.3]);
+    let tip_m = (bare.base_in_world(&p) * bare.tip_in_base(&p, &q)).translation.vector;
+    let at = tip_m - Vector3::new(0.3, 0.4, 0.0);
+    let turned = Pose::new(at, Vector3::new(30f64.to_radians(), 0.0, 0.0));
+    let places = [("post", Pose::translation(at.x, at.y, at.z), false), ("plate", turned, true)];
+    let places =
+        places.map(|(name, pose, is_plane)| FixedPlace { frame: Frame::given(name, pose), is_plane });
+    let bar = Length { name: "bar".into(), length_m: 0.45, knowledge: LengthKnowledge::Given };
+    let model = bare.against(&places, &[bar]).expect("new names");
+    let p = model.nominal();
+    let error_m = |reference| {
+        let o = Observation { reference, ..seated(&q, Vector3::zeros()) };
+        let residual = model.residual(&p, &o);
+        let rows: Vec<f64> = residual.rows().collect();
+        assert_eq!((rows.len(), residual.len()), (1, 1));
+        // What it is off in the world, along what was measured.
+        assert!((residual.position_m.norm() - rows[0].abs()).abs() < 1e-15);
+        rows[0]
+    };
+    let post = Against::Fixed(0);
+    // The bar shows 0.04 m beyond its 0.45 m, and the model has 0.01 m more.
+    assert!((error_m(Reference::Apart { from: post, length: 0, reading_m: 0.04 }) - 0.01).abs() < 1e-15);
+    assert!((error_m(Reference::Above { plane: 1, reading_m: -0.2 }) - 0.0).abs() < 1e-15);
+    assert!((error_m(Reference::Above { plane: 1, reading_m: -0.17 }) - 0.03).abs() < 1e-15);
+    // An offset of a plane is along its normal.
+    let mut lifted = p.clone();
+    lifted[model.index("plate.z").expect("a plane has an offset")] += 0.05;
+    let o = Observation {
+        reference: Reference::Above { plane: 1, reading_m: -0.2 },
+        ..seated(&q, Vector3::zeros())
+    };
+    assert!((model.residual(&lifted, &o).rows().sum::<f64>() - 0.05).abs() < 1e-15);
+    let names: Vec<&str> = model.parameters().iter().map(|p| p.name.as_str()).collect();
+    let own = ["post.x", "post.y", "post.z", "plate.z", "plate.rx", "plate.ry", "bar.length"];
+    assert_eq!(names[names.len() - 7..], own);
+}
+
+#[test]
+fn places_that_the_model_does_not_have_are_named() {
+    let model = on_the_rig(Knowledge::Given, Knowledge::Given);
+    let post = Reference::Joined { to: Against::Fixed(0) };
+    let o = Observation { reference: post, ..seated(&[0.0; 3], Vector3::zeros()) };
+    let said = model.check(&[o]).expect_err("there is no place").to_string();
+    assert!(said.contains("against place 0, and the model has 0"), "{said}");
+    let twice = FixedPlace { frame: Frame::given("tip", Pose::identity()), is_plane: false };
+    let said = model.against(&[twice], &[]).expect_err("a name that is taken").to_string();
+    assert!(said.contains("\"tip.x\""), "{said}");
 }
 
 #[test]

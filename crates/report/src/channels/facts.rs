@@ -125,7 +125,7 @@ fn residual(run: &Run, point: &Point) -> proto::Residual {
     let o = point.observation;
     proto::Residual {
         cavity: o.cavity().unwrap_or_default().to_owned(),
-        feature: run.model.marker_name(o.feature).map(str::to_owned),
+        feature: run.model.measured_name(o),
         measured_m: Some(vector(&point.measured_m)),
         predicted_m: Some(vector(&point.predicted_m)),
         step_norm_mm: point.steps_m.iter().map(|r| r.norm() * 1e3).collect(),

@@ -108,10 +108,10 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
     out.messages
 }
 
-/// The points of the tip, of the first marker where the tip was not seen: a path is that of one of them.
+/// The points of the tip, of the first marker where the tip was not seen, against one place: a path is that of one of them.
 fn of_one_feature<'p, 'r>(points: &[&'p Point<'r>]) -> Vec<&'p Point<'r>> {
-    let first = points.iter().map(|p| p.observation.feature).min();
-    points.iter().copied().filter(|p| Some(p.observation.feature) == first).collect()
+    let first = points.iter().map(|p| p.observation.what()).min();
+    points.iter().copied().filter(|p| Some(p.observation.what()) == first).collect()
 }
 
 /// When a recording begins [ns]: its first message or dwell, so that a viewer that opens the file has at once what is

@@ -33,12 +33,12 @@ pub(super) fn put(recording: &RecordingRun, points: &[&Point], out: &mut Message
 fn put_tip(recording: &RecordingRun, point: &Point, out: &mut Messages) {
     let time_ns = point.observation.time_ns;
     let (publish_ns, tip) = match &point.observation.reference {
-        Reference::Seated { .. } | Reference::Joined { .. } => (time_ns, at(&point.measured_m)),
         Reference::Tracked { orientation, .. } => {
             let stamp_ns = recording.clock.as_ref().map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
             let rotation = orientation.unwrap_or_default();
             (stamp_ns, pose(&Pose::from_parts(point.measured_m.into(), rotation)))
         }
+        _ => (time_ns, at(&point.measured_m)),
     };
     let message =
         fox::PoseInFrame { timestamp: Some(timestamp(time_ns)), frame_id: WORLD.into(), pose: Some(tip) };

@@ -180,7 +180,7 @@ fn ranking(
 }
 
 fn dwells(run: &Run) -> Dwells {
-    let marker = |o: &armcal_core::Observation| run.model.marker_name(o.feature).map(str::to_owned);
+    let marker = |o: &armcal_core::Observation| run.model.measured_name(o);
     let values = run.calibration.fit.values();
     let measured_m: Vec<_> =
         run.observations.iter().map(|o| run.model.measured_tip_in_world(&values, o)).collect();
@@ -193,10 +193,7 @@ fn dwells(run: &Run) -> Dwells {
         })
         .collect();
     let cavity_mm = |axis: usize| {
-        Column::of(run.observations.iter().map(|o| match &o.reference {
-            armcal_core::Reference::Seated { in_board_m, .. } => Some(in_board_m[axis] * 1e3),
-            armcal_core::Reference::Tracked { .. } | armcal_core::Reference::Joined { .. } => None,
-        }))
+        Column::of(run.observations.iter().map(|o| o.in_board_m().map(|in_board_m| in_board_m[axis] * 1e3)))
     };
     Dwells {
         recording: run.observations.iter().map(|o| o.dwell.recording).collect(),

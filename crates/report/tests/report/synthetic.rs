@@ -286,6 +286,7 @@ fn dwell(recording: usize, dwell: usize, joint_rad: &[f64]) -> Dwell {
         }),
         markers: Default::default(),
         temperature_c: (recording == 1).then_some(23.5),
+        gauges: Default::default(),
     }
 }
 

@@ -201,6 +201,7 @@ mod tests {
             tip: None,
             markers: Default::default(),
             temperature_c: None,
+            gauges: Default::default(),
         }
     }
 

@@ -197,7 +197,7 @@ pub fn observe(model: &Model, truth: &[f64], observations: &mut [Observation]) {
                 (Reference::Seated { in_board_m, .. }, Some(board)) => {
                     *in_board_m -= board.rotation.inverse() * residual;
                 }
-                (Reference::Seated { .. }, None) | (Reference::Joined { .. }, _) => {}
+                _ => {}
             }
         }
     }
