@@ -106,6 +106,9 @@ mod pool;
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
 
+/// Is an arm calibrated by what it is measured against: points, distances, heights, without a camera?
+mod measures;
+
 /// Are several markers a pose one pose, and one that came loose found as that?
 mod several_markers;
 

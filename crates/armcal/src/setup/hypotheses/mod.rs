@@ -6,6 +6,7 @@ mod frames;
 mod joints;
 mod model;
 mod poses;
+mod readings;
 
 use super::trial::Inputs;
 use armcal_core::Parameter;
@@ -142,6 +143,7 @@ impl Hypothesis {
 pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 2] {
     let mut all = joints::hypotheses(inputs);
     all.extend(poses::hypotheses(inputs));
+    all.extend(readings::hypotheses(inputs));
     all.extend(board::hypotheses(inputs));
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
