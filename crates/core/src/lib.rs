@@ -10,6 +10,7 @@
 pub mod dwell;
 pub mod error_stats;
 pub mod frames;
+pub mod gaps;
 pub mod observation;
 pub mod parameter;
 pub mod robust;

@@ -81,7 +81,8 @@ pub struct Observation {
     pub moved_rad: Option<Vec<f64>>,
     /// Joint velocities [rad/s] of an observation of the moving arm; `None` in a dwell, where they are zero.
     pub joint_velocity_radps: Option<Vec<f64>>,
-    /// Measured joint effort [N m], where the recording has it.
+    /// Measured effort of each joint [N m]; NaN, in JSON `null`, of one without; `None` where no joint has any.
+    #[serde(default, deserialize_with = "crate::gaps::deserialize")]
     pub effort_nm: Option<Vec<f64>>,
     /// Temperature [degC], where the recording has it.
     pub temperature_c: Option<f64>,
@@ -120,6 +121,11 @@ impl Observation {
             reference,
             covariance_m2: Matrix3::zeros(),
         }
+    }
+
+    /// Measured effort of one joint [N m], where it has one.
+    pub fn effort_of(&self, joint: usize) -> Option<f64> {
+        self.effort_nm.as_ref()?.get(joint).copied().filter(|effort| effort.is_finite())
     }
 
     /// The cavity, if the tip was seated.

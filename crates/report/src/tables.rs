@@ -41,7 +41,7 @@ fn dwells(run: &Run, points: &[Point]) -> Columns {
         c.number(format!("{joint}_rad"), rows.iter().map(|(_, d)| d.joint_rad.get(j).copied()));
         c.number(format!("{joint}_spread_rad"), rows.iter().map(|(_, d)| d.joint_spread_rad.get(j).copied()));
         c.number(format!("{joint}_sigma_rad"), rows.iter().map(|(_, d)| d.joint_sigma_rad.get(j).copied()));
-        let effort = |d: &Dwell| d.effort_nm.as_ref().and_then(|e| e.get(j).copied());
+        let effort = |d: &Dwell| d.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite());
         c.number(format!("{joint}_effort_nm"), rows.iter().map(|(_, d)| effort(d)));
         c.number(
             format!("{joint}_arrival_sign"),

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::setup;
+use crate::stages::effort;
 use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
 use crate::stages::rigid;
@@ -81,7 +82,7 @@ pub fn dwells_of_all(
 ) -> Result<Vec<Seen>, Error> {
     let speed_model = frames::bare(chain, frames::markers(pipeline))?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
-    entries
+    let mut all = entries
         .map(|(index, (entry, recording))| {
             progress.step(&format!("reading {}", entry.name()));
             let (samples, seen) =
@@ -89,7 +90,9 @@ pub fn dwells_of_all(
             keep(samples);
             Ok(seen)
         })
-        .collect()
+        .collect::<Result<Vec<Seen>, Error>>()?;
+    effort::warn_of_gaps(chain.joint_names(), &mut all);
+    Ok(all)
 }
 
 /// Every two recordings that hold the same readings, in the order of the pipeline.
