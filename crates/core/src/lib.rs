@@ -23,7 +23,7 @@ pub mod warning;
 pub use dwell::{Arrival, Dwell, DwellId, TipMeasurement};
 pub use error_stats::ErrorStats;
 pub use frames::{Pose, RollPitchYaw};
-pub use observation::{FeatureId, Observation, Reference, Rejection};
+pub use observation::{FeatureId, Load, Observation, Reference, Rejection};
 pub use parameter::{Parameter, ParameterKind, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
 pub use setup::{Certainty, SetupFinding, SetupReport, Unseen};

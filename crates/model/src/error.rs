@@ -61,6 +61,16 @@ pub enum ModelError {
         /// The file.
         path: PathBuf,
     },
+    /// Masses are wanted of a file that has none.
+    #[error(
+        "{}: no link that moves has a mass, and masses = \"urdf\" asks for them: write <inertial><mass value=\"...\"/></inertial> \
+         in its links, or leave `masses` out",
+        path.display()
+    )]
+    NoMasses {
+        /// The file.
+        path: PathBuf,
+    },
     /// The URDF is not well-formed XML.
     #[error("{}:{line}: the URDF is not well-formed XML: {cause}", path.display())]
     UrdfXml {

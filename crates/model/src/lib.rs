@@ -23,6 +23,7 @@ mod dh_toml;
 mod effects;
 mod error;
 mod frames;
+mod masses;
 mod model;
 mod residual;
 mod rigid;
@@ -44,5 +45,6 @@ pub use effects::{
 };
 pub use error::ModelError;
 pub use frames::{Frame, Frames, Knowledge, Marker};
+pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;

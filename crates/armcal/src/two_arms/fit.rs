@@ -51,8 +51,9 @@ fn observations(inputs: &Inputs, arms: &TwoArms) -> Vec<Observation> {
     let apart = arms.closure.kind == ClosureKind::RigidLink;
     let covariance_m2 = Matrix3::identity() * (arms.closure.sigma_mm * 1e-3).powi(2);
     let to = FeatureId(1);
-    let joined = |dwell| observe::observation(dwell, 0.0, Reference::Joined { to, apart }, covariance_m2);
-    inputs.seen.iter().flat_map(|seen| &seen.dwells).map(joined).collect()
+    let dwells = inputs.seen.iter().flat_map(|seen| seen.dwells.iter().map(move |dwell| (seen, dwell)));
+    let joined = Reference::Joined { to, apart };
+    dwells.map(|(seen, dwell)| observe::observation(dwell, seen, joined.clone(), covariance_m2)).collect()
 }
 
 /// The dwells of both arms, of which some are joined.

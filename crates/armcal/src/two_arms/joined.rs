@@ -71,9 +71,8 @@ fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, Stri
     }
     let columns = |of: &dyn Fn(&JointSamples, usize, usize) -> f64| -> Vec<Vec<f64>> {
         let joints = (0..2).flat_map(|arm| (0..arms[arm].joint_rad.len()).map(move |joint| (arm, joint)));
-        let column = |(arm, joint): (usize, usize)| {
-            picked.iter().map(|at| of(&arms[arm], joint, at[arm])).collect()
-        };
+        let column =
+            |(arm, joint): (usize, usize)| picked.iter().map(|at| of(&arms[arm], joint, at[arm])).collect();
         joints.map(column).collect()
     };
     // An arm that measures none leaves the other its own.

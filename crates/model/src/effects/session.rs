@@ -81,7 +81,7 @@ impl Session {
             board_centres_m: board_centres(observations),
             largest_effort_nm: largest_effort(observations),
             temperature: !temperatures.is_empty(),
-            load: observations.iter().any(|o| o.load_kg != 0.0),
+            load: observations.iter().flat_map(|o| o.loads()).any(|load| load.kg != 0.0),
             moving: observations.iter().any(|o| o.joint_velocity_radps.is_some()),
             moved: observations.iter().any(|o| o.moved_rad.is_some()),
             cavities,
