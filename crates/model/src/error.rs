@@ -105,7 +105,8 @@ pub enum ModelError {
     },
     /// An observation is of a feature that the model does not have.
     #[error(
-        "{dwell}: feature {feature} was measured, and the model has {features}: give every marker its place on the arm"
+        "{dwell}: feature {feature} was measured or bears a load, and the model has {features}: give every marker its place on \
+         the arm"
     )]
     NoFeature {
         /// The observation.

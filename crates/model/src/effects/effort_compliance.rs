@@ -50,7 +50,7 @@ struct EffortCompliance {
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
     if placing.largest_effort_nm(joint)? <= 0.0 {
-        return Err(format!("the measured effort of joint {} is zero throughout", placing.joint_name(joint)));
+        return Err(format!("the measured effort of `{}` is zero throughout", placing.joint_name(joint)));
     }
     let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;

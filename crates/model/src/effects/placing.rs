@@ -135,9 +135,7 @@ impl Placing<'_> {
     pub fn largest_effort_nm(&self, joint: usize) -> Result<f64, String> {
         let all = self.session.largest_effort_nm.as_ref();
         let known = all.and_then(|all| all.get(joint).copied()).filter(|largest| largest.is_finite());
-        known.ok_or_else(|| {
-            format!("there are observations with no measured effort of joint {}", self.joint_name(joint))
-        })
+        known.ok_or_else(|| format!("not all dwells have a measured effort of `{}`", self.joint_name(joint)))
     }
 
     /// How a joint moves.
