@@ -50,6 +50,9 @@ mod urdf_trees;
 /// Are all dwells of fresh simulated rigs associated rightly, and intervals honest?
 mod many_rigs;
 
+/// Does a joint without a measured effort, a load anywhere, a link without a mass cost what it must, and is it told by name?
+mod effort_and_loads;
+
 /// Does the tool learn from a recording which effect is missing, and does adding it help on unseen points?
 mod missing_effect;
 

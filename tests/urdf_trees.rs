@@ -1,5 +1,5 @@
 use crate::support::{python_with, root};
-use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
+use armcal_core::{DwellId, FeatureId, Load, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Marker, Model, Session};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
@@ -165,6 +165,9 @@ fn differences(model: &Model, o: &Observation, answer: &Value) -> [f64; 3] {
     let session = Session::of(std::slice::from_ref(o));
     for (j, own) in model.drivers(&session, o).torque.iter().enumerate() {
         torque = torque.max((own.links_nm - number(format!("/torques/{j}"))).abs());
+        // By virtual work: what a reading lifts of each load.
+        let lifted = |load: Load| -9.80665 * load.kg * number(format!("/motions/{}/2/{j}", load.at.0));
+        torque = torque.max((own.load_nm - o.loads().map(lifted).sum::<f64>()).abs());
     }
     [place, motion, torque]
 }
@@ -180,11 +183,11 @@ fn two_hundred_trees_move_and_weigh_as_pinocchio_says() {
         let joint_rad: Vec<f64> = (0..model.joint_count()).map(|_| rng.random_range(-1.5..1.5)).collect();
         let question = tree.question(&model, &joint_rad);
         let nowhere = Reference::position(Vector3::zeros());
-        cases.push((
-            model,
-            Observation::bare(DwellId { recording: 0, dwell: 0 }, joint_rad, nowhere),
-            question,
-        ));
+        let mut o = Observation::bare(DwellId { recording: 0, dwell: 0 }, joint_rad, nowhere);
+        o.load_kg = rng.random_range(0.0..2.0);
+        let more = model.features().skip(1).map(|(at, _)| Load { at, kg: rng.random_range(0.0..2.0) });
+        o.more_loads = more.collect();
+        cases.push((model, o, question));
     }
     let branched = cases.iter().filter(|(model, ..)| model.features().count() > 1).count();
     let following =

@@ -3,9 +3,11 @@
 //! Paths inside the file are relative to the file. Every section belongs to the crate that acts on it;
 //! this module only puts them side by side, so a key is documented where it is used.
 
+mod loads;
 mod markers;
 mod measures;
 
+pub use loads::LoadEntry;
 pub use markers::MarkerSection;
 pub(crate) use measures::knowledge;
 pub use measures::{Measure, MeasureKind, MeasureSection};
@@ -18,7 +20,7 @@ use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
-use armcal_model::{Deviation, EffectTable};
+use armcal_model::{Deviation, EffectTable, Masses};
 use armcal_recording::{Streams, input};
 use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
@@ -124,6 +126,9 @@ pub struct RecordingEntry {
     /// Load at the tip [kg].
     #[serde(default)]
     pub load_kg: f64,
+    /// Loads at any tip or marker.
+    #[serde(default)]
+    pub loads: Vec<LoadEntry>,
 }
 
 impl RecordingEntry {
@@ -208,6 +213,8 @@ pub struct ModelSection {
     pub base_link: Option<String>,
     /// Last link of the chain, with `urdf`.
     pub tip_link: Option<String>,
+    /// Where the masses of its links come from; where nothing says it, from a URDF that gives all of them.
+    pub masses: Option<Masses>,
     /// How far a joint origin may be from nominal, with `urdf`; a DH file says it itself. Learnt where nothing says it.
     pub deviation: Option<Deviation>,
 }
@@ -462,6 +469,7 @@ impl Pipeline {
                     format!("`{name}` names two recordings; give one of them another name = \"...\""),
                 );
             }
+            loads::check(self, i, entry, &fail)?;
         }
         Ok(())
     }
@@ -491,9 +499,13 @@ impl Pipeline {
         }
         self.pool.check(path)?;
         let one_file = |model: &&ModelSection| model.dh.is_some() != model.urdf.is_some();
-        match self.models().iter().all(one_file) {
-            true => Ok(()),
-            false => fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into()),
+        if !self.models().iter().all(one_file) {
+            return fail("model", "needs exactly one of dh = \"...\" or urdf = \"...\"".into());
+        }
+        let of_table = |model: &&ModelSection| model.urdf.is_none() && model.masses == Some(Masses::Urdf);
+        match self.models().iter().any(of_table) {
+            true => fail("model.masses", "is \"urdf\", but a DH table gives no masses; leave it out".into()),
+            false => Ok(()),
         }
     }
 }

@@ -244,6 +244,7 @@ impl Settled {
     pub fn into_run(self, pipeline: &Pipeline, diagnosed: Diagnosed) -> (Run, Vec<Recording>) {
         let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
         let mut warnings = closing_warnings(rounds, &calibration);
+        warnings.extend(frames::links_without_mass(pipeline, &self.inputs.chain));
         warnings.extend(diagnosed.warning);
         let mut setup = self.setup;
         if let Some(named) = diagnosed.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {

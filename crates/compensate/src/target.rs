@@ -1,7 +1,7 @@
 //! What is asked for: where the tip should be, and under which conditions the arm goes there.
 
 use crate::CompensateError;
-use armcal_core::{DwellId, Observation, Reference};
+use armcal_core::{DwellId, Load, Observation, Reference};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// A place for the tip.
@@ -81,6 +81,8 @@ pub struct Conditions {
     pub time_ns: i64,
     /// Load at the tip [kg].
     pub load_kg: f64,
+    /// Loads at other points of the arm.
+    pub more_loads: Vec<Load>,
     /// Temperature [degC]; absent: the mean of the session.
     pub temperature_c: Option<f64>,
 }
@@ -95,6 +97,7 @@ impl Conditions {
             arrival: Vec::new(),
             temperature_c: self.temperature_c,
             load_kg: self.load_kg,
+            more_loads: self.more_loads.clone(),
             covariance_m2: Matrix3::identity(),
             ..Observation::bare(dwell, vec![0.0; joints], target.place.clone())
         }

@@ -83,7 +83,7 @@ pub struct Dwell {
     pub joint_spread_rad: Vec<f64>,
     /// Standard error of each mean [rad], autocorrelation and quantisation taken into account.
     pub joint_sigma_rad: Vec<f64>,
-    /// Mean measured effort of each joint [N m], where the recording has it.
+    /// Mean measured effort of each joint [N m]; NaN of one without, `None` where no joint has any.
     pub effort_nm: Option<Vec<f64>>,
     /// Encoder readings used.
     pub samples: usize,

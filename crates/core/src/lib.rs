@@ -10,6 +10,7 @@
 pub mod dwell;
 pub mod error_stats;
 pub mod frames;
+pub mod gaps;
 pub mod observation;
 pub mod parameter;
 pub mod robust;
@@ -22,7 +23,7 @@ pub mod warning;
 pub use dwell::{Arrival, Dwell, DwellId, GaugeReading, TipMeasurement};
 pub use error_stats::ErrorStats;
 pub use frames::{Pose, RollPitchYaw};
-pub use observation::{Against, FeatureId, Measured, Observation, Reference, Rejection};
+pub use observation::{Against, FeatureId, Load, Measured, Observation, Reference, Rejection};
 pub use parameter::{Parameter, ParameterKind, Role};
 pub use samples::{JointSamples, PoseSamples, Samples, ScalarSamples};
 pub use setup::{Certainty, SetupFinding, SetupReport, Unseen};

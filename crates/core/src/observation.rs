@@ -76,6 +76,15 @@ impl FeatureId {
 /// What was measured: a feature, and against what; nothing where a sensor saw it or a table held it.
 pub type Measured = (FeatureId, Option<Against>);
 
+/// A load at a point of the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Load {
+    /// The point it hangs at.
+    pub at: FeatureId,
+    /// Its mass [kg].
+    pub kg: f64,
+}
+
 /// One row of the calibration: `measured - predicted` [m] with its covariance and provenance.
 ///
 /// A pose in which several features were measured is as many observations of one dwell, one behind the other: they share the
@@ -108,12 +117,16 @@ pub struct Observation {
     pub moved_rad: Option<Vec<f64>>,
     /// Joint velocities [rad/s] of an observation of the moving arm; `None` in a dwell, where they are zero.
     pub joint_velocity_radps: Option<Vec<f64>>,
-    /// Measured joint effort [N m], where the recording has it.
+    /// Measured effort of each joint [N m]; NaN, in JSON `null`, of one without; `None` where no joint has any.
+    #[serde(default, deserialize_with = "crate::gaps::deserialize")]
     pub effort_nm: Option<Vec<f64>>,
     /// Temperature [degC], where the recording has it.
     pub temperature_c: Option<f64>,
-    /// Load at the tip [kg].
+    /// Load at the tip, of several arms the first one's [kg].
     pub load_kg: f64,
+    /// Loads at other points of the arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub more_loads: Vec<Load>,
     /// How the true position is known.
     pub reference: Reference,
     /// Covariance of the measured position [m^2]: sensor, cavity tolerance and seat clearance.
@@ -144,9 +157,25 @@ impl Observation {
             effort_nm: None,
             temperature_c: None,
             load_kg: 0.0,
+            more_loads: Vec::new(),
             reference,
             covariance_m2: Matrix3::zeros(),
         }
+    }
+
+    /// Measured effort of one joint [N m], where it has one.
+    pub fn effort_of(&self, joint: usize) -> Option<f64> {
+        self.effort_nm.as_ref()?.get(joint).copied().filter(|effort| effort.is_finite())
+    }
+
+    /// All loads, that of the tip first.
+    pub fn loads(&self) -> impl Iterator<Item = Load> {
+        std::iter::once(Load { at: FeatureId::TIP, kg: self.load_kg }).chain(self.more_loads.iter().copied())
+    }
+
+    /// All loads together [kg].
+    pub fn all_loads_kg(&self) -> f64 {
+        self.more_loads.iter().fold(self.load_kg, |sum, load| sum + load.kg)
     }
 
     /// The cavity, if the tip was seated.

@@ -12,7 +12,7 @@ pub struct JointSamples {
     pub names: Vec<String>,
     /// Angle of each joint [rad] (a prismatic joint: [m]), one column a joint.
     pub joint_rad: Vec<Vec<f64>>,
-    /// Measured joint effort [N m], one column a joint, where the recording has it.
+    /// Measured joint effort [N m], one column a joint; NaN where it is missing, `None` where all of it is.
     pub effort_nm: Option<Vec<Vec<f64>>>,
 }
 

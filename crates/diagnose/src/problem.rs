@@ -51,7 +51,7 @@ pub struct DwellRow {
     pub arrival: Vec<f64>,
     /// Gravity torque of each joint [N m]; empty when unknown.
     pub torque_nm: Vec<f64>,
-    /// Load at the tip [kg].
+    /// All loads on the arm together [kg].
     pub load_kg: f64,
     /// Temperature [degC].
     pub temperature_c: Option<f64>,

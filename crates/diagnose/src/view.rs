@@ -287,7 +287,7 @@ impl View<'_> {
                 joint_rad: o.joint_rad.clone(),
                 arrival: drivers.arrival.clone(),
                 torque_nm: drivers.torque.iter().map(|t| t.total_nm()).collect(),
-                load_kg: o.load_kg,
+                load_kg: o.all_loads_kg(),
                 temperature_c: o.temperature_c,
                 place,
                 displaced: moved(linear, pose, &Matrix3::identity(), |_| true),

@@ -373,9 +373,21 @@ fn temperature_and_effort_are_averaged() {
     joints.effort_nm = Some((0..3).map(|j| vec![f64::from(j) * 1.5; rows]).collect());
     // 20 degC at 0 s, 24 degC at 4 s: the second dwell (2 to 3 s) lies between.
     let temperature = Some(ScalarSamples { time_ns: vec![ns(0.0), ns(4.0)], value: vec![20.0, 24.0] });
-    let (dwells, _) = detect(&Samples { joints, temperature, ..Samples::default() });
+    let samples = Samples { joints, temperature, ..Samples::default() };
+    let (dwells, _) = detect(&samples);
     assert_eq!(dwells[1].effort_nm, Some(vec![0.0, 1.5, 3.0]));
     assert_eq!(dwells[0].temperature_c, Some(20.0));
+    let without = |lost: &dyn Fn(usize, usize) -> bool| {
+        let mut samples = samples.clone();
+        for (j, column) in samples.joints.effort_nm.iter_mut().flatten().enumerate() {
+            column.iter_mut().enumerate().filter(|(i, _)| lost(j, *i)).for_each(|(_, e)| *e = f64::NAN);
+        }
+        detect(&samples).0[1].effort_nm.clone()
+    };
+    // A joint without effort keeps its place; rows without one leave the mean to the others.
+    let gap = without(&|j, i| j == 1 || i % 2 == 0).expect("two joints have theirs");
+    assert!(gap[0] == 0.0 && gap[1].is_nan() && gap[2] == 3.0, "{gap:?}");
+    assert_eq!(without(&|_, _| true), None);
     let between = dwells[1].temperature_c.expect("interpolated");
     let (b, a) = ((dwells[1].start_ns - ns(0.0)) as f64, (ns(4.0) - dwells[1].end_ns) as f64);
     assert!((between - (20.0 + 4.0 * b / (a + b))).abs() < 1e-9);

@@ -1,7 +1,7 @@
 //! What a pause is worth: means, spreads, standard errors, the tip, temperature and effort.
 
 use armcal_core::robust::median;
-use armcal_core::{GaugeReading, JointSamples, PoseSamples, ScalarSamples, TipMeasurement};
+use armcal_core::{GaugeReading, JointSamples, PoseSamples, ScalarSamples, TipMeasurement, gaps};
 use nalgebra::{Matrix3, Matrix4, SymmetricEigen, UnitQuaternion, Vector3, Vector4};
 use std::ops::Range;
 
@@ -40,15 +40,13 @@ pub(crate) fn effective_of(means: &[Mean]) -> f64 {
     if counts.is_empty() { 1.0 } else { median(&counts) }
 }
 
-/// Mean effort of each joint [N m]; none where any joint has no finite reading.
+/// Mean effort of each joint [N m]; NaN of one without a reading, none where that is all of them.
 pub(crate) fn effort_means(joints: &JointSamples, rows: &Range<usize>) -> Option<Vec<f64>> {
-    let columns = joints.effort_nm.as_ref()?.iter();
-    columns
-        .map(|column| {
-            let finite: Vec<f64> = column[rows.clone()].iter().copied().filter(|v| v.is_finite()).collect();
-            huber_mean(&finite, 0.0)
-        })
-        .collect()
+    let mean = |column: &Vec<f64>| {
+        let finite: Vec<f64> = column[rows.clone()].iter().copied().filter(|v| v.is_finite()).collect();
+        huber_mean(&finite, 0.0).unwrap_or(f64::NAN)
+    };
+    gaps::known(joints.effort_nm.as_ref()?.iter().map(mean).collect())
 }
 
 /// Temperature of a pause: the mean of its readings, else the neighbours within `max_age_s` interpolated.

@@ -5,7 +5,7 @@ use crate::pauses::{Encoders, Tip};
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::summary::temperature;
 use crate::{ClockAlignment, DwellConfig, DwellError};
-use armcal_core::{Arrival, Dwell, JointSamples, Samples};
+use armcal_core::{Arrival, Dwell, JointSamples, Samples, gaps};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ pub struct Moment {
     pub path_memory_rad: Vec<Vec<f64>>,
     /// As [`Dwell::pair_memory_rad`].
     pub pair_memory_rad: Vec<[Vec<f64>; 2]>,
-    /// Measured joint effort [N m], where the recording has it.
+    /// As [`Dwell::effort_nm`].
     pub effort_nm: Option<Vec<f64>>,
     /// Temperature [degC], where the recording has it.
     pub temperature_c: Option<f64>,
@@ -144,8 +144,7 @@ impl Reading {
     }
 
     fn effort_nm(&self, joints: &JointSamples) -> Option<Vec<f64>> {
-        let effort: Vec<f64> = joints.effort_nm.as_ref()?.iter().map(|column| self.between(column)).collect();
-        effort.iter().all(|v| v.is_finite()).then_some(effort)
+        gaps::known(joints.effort_nm.as_ref()?.iter().map(|column| self.between(column)).collect())
     }
 
     fn between(&self, column: &[f64]) -> f64 {

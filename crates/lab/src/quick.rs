@@ -114,6 +114,7 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             effort_nm: None,
             temperature_c: config.temperature.published.then(|| camera.thermometer(temperature)),
             load_kg: config.recordings[recording].load_kg,
+            more_loads: Vec::new(),
             reference,
             covariance_m2,
         });

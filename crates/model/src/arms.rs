@@ -9,6 +9,7 @@
 //! single-loop closed kinematic chains; Zhuang and Roth 1996, ch. 9).
 
 use crate::chain::Source;
+use crate::masses::Masses;
 use crate::segment::{Joint, Segment};
 use crate::{Chain, Frame, ModelError};
 use armcal_core::Parameter;
@@ -53,12 +54,15 @@ impl Chain {
             joint_names: Vec::new(),
             joint_limits: Vec::new(),
             source: Source::Arms(Vec::new()),
+            // Each arm has decided for its own.
+            masses: Some(Masses::Urdf),
         };
         let mut parts = Vec::with_capacity(arms.len());
         for (name, chain) in arms {
             let (segments, parameters) = (all.segments.len(), all.parameters.len());
             let joints = all.joint_names.len();
-            all.segments.extend(chain.segments.iter().map(|s| s.behind(&name, segments, parameters, joints)));
+            all.segments
+                .extend(chain.weighed().iter().map(|s| s.behind(&name, segments, parameters, joints)));
             let prefixed = |p: &Parameter| Parameter { name: format!("{name}.{}", p.name), ..p.clone() };
             all.parameters.extend(chain.parameters.iter().map(prefixed));
             all.joint_names.extend(chain.joint_names.iter().map(|joint| format!("{name}.{joint}")));

@@ -4,6 +4,7 @@ use crate::ModelError;
 use crate::arms::Arm;
 use crate::dh_toml::DhTable;
 use crate::error::nearest;
+use crate::masses::Masses;
 use crate::segment::{Motion, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::urdf::UrdfJoint;
@@ -23,6 +24,8 @@ pub struct Chain {
     pub(crate) joint_names: Vec<String>,
     pub(crate) joint_limits: Vec<Option<[f64; 2]>>,
     pub(crate) source: Source,
+    /// Where the masses of its links come from, where that has been said.
+    pub(crate) masses: Option<Masses>,
 }
 
 /// What the chain was read from, as far as writing it back needs it.
@@ -76,12 +79,12 @@ impl Chain {
     pub(crate) fn on(&self, bases: Vec<Segment>) -> Tree {
         let count = bases.len();
         let base_of = |at: usize| self.arms().iter().position(|arm| arm.segments.contains(&at)).unwrap_or(0);
-        let hung = |(at, segment): (usize, &Segment)| {
+        let hung = |(at, segment): (usize, Segment)| {
             let parent = segment.parent.map_or_else(|| base_of(at), |parent| parent + count);
-            Segment { parent: Some(parent), ..segment.clone() }
+            Segment { parent: Some(parent), ..segment }
         };
         let mut segments = bases;
-        segments.extend(self.segments.iter().enumerate().map(hung));
+        segments.extend(self.weighed().into_iter().enumerate().map(hung));
         Tree(segments)
     }
 

@@ -202,7 +202,8 @@ impl DhTable {
             segments.push(Segment { parent, frame, geometry, joint, parameters, body: None });
         }
         let (name, end) = (self.name.clone(), segments.len().checked_sub(1));
-        Chain { name, segments, end, parameters, joint_names, joint_limits, source: Source::Dh(self) }
+        let (source, masses) = (Source::Dh(self), None);
+        Chain { name, segments, end, parameters, joint_names, joint_limits, source, masses }
     }
 
     /// Replaces the nominal number of every entry whose value has changed, so that the others keep every digit.

@@ -77,6 +77,16 @@ pub enum ModelError {
         /// The file.
         path: PathBuf,
     },
+    /// Masses are wanted of a file that has none.
+    #[error(
+        "{}: no link that moves has a mass, and masses = \"urdf\" asks for them: write <inertial><mass value=\"...\"/></inertial> \
+         in its links, or leave `masses` out",
+        path.display()
+    )]
+    NoMasses {
+        /// The file.
+        path: PathBuf,
+    },
     /// The URDF is not well-formed XML.
     #[error("{}:{line}: the URDF is not well-formed XML: {cause}", path.display())]
     UrdfXml {
@@ -111,7 +121,8 @@ pub enum ModelError {
     },
     /// An observation is of a feature that the model does not have.
     #[error(
-        "{dwell}: feature {feature} was measured, and the model has {features}: give every marker its place on the arm"
+        "{dwell}: feature {feature} was measured or bears a load, and the model has {features}: give every marker its place on \
+         the arm"
     )]
     NoFeature {
         /// The observation.

@@ -24,6 +24,7 @@ mod effects;
 mod error;
 mod fixed;
 mod frames;
+mod masses;
 mod model;
 mod residual;
 mod rigid;
@@ -46,5 +47,6 @@ pub use effects::{
 pub use error::ModelError;
 pub use fixed::{FixedPlace, Length, LengthKnowledge};
 pub use frames::{Frame, Frames, Knowledge, Marker};
+pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;

@@ -14,7 +14,7 @@ use crate::fixed::{FixedPlace, Length, Standing};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
-use crate::{Chain, Frames, ModelError};
+use crate::{Chain, Frames, Masses, ModelError};
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
 use features::Feature;
 pub use features::LinkFrame;
@@ -230,6 +230,9 @@ impl Model {
                 return Err(ModelError::NoFeature { dwell: o.dwell, feature: unknown.0, features });
             }
             self.check_against(o)?;
+            if let Some(load) = o.more_loads.iter().find(|load| load.at.0 >= features) {
+                return Err(ModelError::NoFeature { dwell: o.dwell, feature: load.at.0, features });
+            }
             if let Some(recordings) = self.recordings().filter(|recordings| o.dwell.recording >= *recordings)
             {
                 return Err(ModelError::NoRecording { dwell: o.dwell, recordings });
@@ -351,8 +354,8 @@ impl Model {
 
     /// The nominal arm in a pose.
     pub(crate) fn nominal_pose(&self, nominal: &[f64], joint_rad: &[f64]) -> NominalPose {
-        let tips = self.features[..self.chain.bases()].iter().filter_map(|tip| tip.route.last().copied());
-        NominalPose::of(&self.tree, &tips.collect::<Vec<_>>(), nominal, joint_rad)
+        let ends: Vec<SegmentId> = self.routes().filter_map(|route| route.last().copied()).collect();
+        NominalPose::of(&self.tree, (self.chain.bases(), &ends), nominal, joint_rad)
     }
 
     /// The nominal arm with all joints at zero.
@@ -360,9 +363,14 @@ impl Model {
         self.nominal_pose(&self.nominal(), &vec![0.0; self.joint_count()])
     }
 
-    /// Whether the file of the arm tells what every link weighs; else effects take 2.5 kg a metre.
-    pub fn has_link_masses(&self) -> bool {
-        self.zero_pose().declared.iter().all(|declared| *declared)
+    /// Where the masses of all links come from; none where some weigh as in the file and others as much as they are long.
+    pub fn masses(&self) -> Option<Masses> {
+        let declared = self.zero_pose().declared;
+        match (declared.contains(&true), declared.contains(&false)) {
+            (true, true) => None,
+            (true, false) => Some(Masses::Urdf),
+            (false, _) => Some(Masses::Uniform),
+        }
     }
 
     /// The same model with these effects; `parameters` are all of its parameters.

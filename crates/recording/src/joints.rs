@@ -147,14 +147,11 @@ pub(crate) fn to_rad(table: &JointTable, rows: &[usize], stream: &JointStream) -
     (0..joints).into_par_iter().map(column).collect()
 }
 
-/// One column of efforts a joint [N m], if every row has all of them; otherwise how many rows have some.
-pub(crate) fn effort(table: &JointTable, rows: &[usize], joints: usize) -> Result<Vec<Vec<f64>>, usize> {
+/// One column of efforts a joint [N m], NaN where a row has none; `None` where no row has any.
+pub(crate) fn effort(table: &JointTable, rows: &[usize], joints: usize) -> Option<Vec<Vec<f64>>> {
     let column = |j: usize| rows.iter().map(|i| table.effort[i * joints + j]).collect::<Vec<f64>>();
     let columns: Vec<Vec<f64>> = (0..joints).map(column).collect();
-    if columns.iter().flatten().all(|e| e.is_finite()) {
-        return Ok(columns);
-    }
-    Err((0..rows.len()).filter(|i| columns.iter().any(|c| c[*i].is_finite())).count())
+    columns.iter().flatten().any(|e| e.is_finite()).then_some(columns)
 }
 
 /// Refuses readings that cannot be in the declared unit.

@@ -159,14 +159,7 @@ impl<'a> Reading<'a> {
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
         let effort_nm = joints::effort(table, &rows, n);
-        let partly = *effort_nm.as_ref().err().unwrap_or(&0) as u64;
-        self.counted(
-            Severity::Notice,
-            "effort-incomplete",
-            partly,
-            "rows have efforts, not all rows for all joints: not used",
-        );
-        Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm: effort_nm.ok() })
+        Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm })
     }
 
     fn poses(&mut self, stream: &PoseStream) -> Result<PoseSamples, RecordingError> {

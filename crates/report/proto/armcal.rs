@@ -54,7 +54,7 @@ pub struct Dwell {
     /// Standard error of the mean.
     #[prost(double, repeated, tag = "11")]
     pub joint_sigma_rad: ::prost::alloc::vec::Vec<f64>,
-    /// Mean measured effort; empty where the recording has none.
+    /// Mean measured effort; NaN of a joint without, empty where no joint has any.
     #[prost(double, repeated, tag = "12")]
     pub effort_nm: ::prost::alloc::vec::Vec<f64>,
     /// Direction in which each joint arrived: +1, -1, or 0 when the recording does not show it.

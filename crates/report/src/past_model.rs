@@ -6,10 +6,10 @@
 
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
-use armcal_core::{FeatureId, Observation, Pose, Unit, Visited};
+use armcal_core::{FeatureId, Load, Observation, Pose, Unit, Visited};
 use armcal_model::{
     ArmFrames, Chain, EffectSpec, EffectTable, FixedPlace, Frame, Frames, Length, LengthKnowledge, Marker,
-    Model, ModelError, Session,
+    Masses, Model, ModelError, Session,
 };
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -94,6 +94,9 @@ pub struct RecordingFacts {
     pub last_ns: i64,
     /// Load at the tip [kg].
     pub load_kg: f64,
+    /// Loads at other points of the arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub more_loads: Vec<Load>,
     /// Mean temperature [degC].
     pub temperature_c: Option<f64>,
 }
@@ -101,9 +104,19 @@ pub struct RecordingFacts {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "form", rename_all = "lowercase")]
 enum ChainText {
-    Dh { text: String },
-    Urdf { text: String, base_link: String, tip_link: String },
-    Arms { arms: Vec<ArmText> },
+    Dh {
+        text: String,
+    },
+    Urdf {
+        text: String,
+        base_link: String,
+        tip_link: String,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        masses: Option<Masses>,
+    },
+    Arms {
+        arms: Vec<ArmText>,
+    },
 }
 
 /// One of several arms.
@@ -336,8 +349,8 @@ impl ChainText {
     fn chain(&self, path: &Path) -> Result<Chain, ModelError> {
         match self {
             ChainText::Dh { text } => Chain::from_dh_toml(text, path),
-            ChainText::Urdf { text, base_link, tip_link } => {
-                Chain::from_urdf(text, base_link, tip_link, path)
+            ChainText::Urdf { text, base_link, tip_link, masses } => {
+                Chain::from_urdf(text, base_link, tip_link, path)?.with_masses(*masses, path)
             }
             ChainText::Arms { arms } => {
                 let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(path)?)));
@@ -357,7 +370,10 @@ fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -> ChainText
         };
         let text = text.clone();
         match chain.is_urdf() {
-            true => ChainText::Urdf { text, base_link: link("base_link"), tip_link: link("tip_link") },
+            true => {
+                let (base_link, tip_link) = (link("base_link"), link("tip_link"));
+                ChainText::Urdf { text, base_link, tip_link, masses: chain.masses() }
+            }
             false => ChainText::Dh { text },
         }
     };
@@ -382,6 +398,7 @@ fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFact
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
         last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),
         load_kg: own.last().map_or(0.0, |o| o.load_kg),
+        more_loads: own.last().map_or_else(Vec::new, |o| o.more_loads.clone()),
         temperature_c: (!temperatures.is_empty()).then(|| mean(&temperatures)),
     }
 }

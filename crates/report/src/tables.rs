@@ -41,7 +41,7 @@ fn dwells(run: &Run, points: &[Point]) -> Columns {
         c.number(format!("{joint}_rad"), rows.iter().map(|(_, d)| d.joint_rad.get(j).copied()));
         c.number(format!("{joint}_spread_rad"), rows.iter().map(|(_, d)| d.joint_spread_rad.get(j).copied()));
         c.number(format!("{joint}_sigma_rad"), rows.iter().map(|(_, d)| d.joint_sigma_rad.get(j).copied()));
-        let effort = |d: &Dwell| d.effort_nm.as_ref().and_then(|e| e.get(j).copied());
+        let effort = |d: &Dwell| d.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite());
         c.number(format!("{joint}_effort_nm"), rows.iter().map(|(_, d)| effort(d)));
         c.number(
             format!("{joint}_arrival_sign"),
@@ -82,6 +82,13 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
         c.number(format!("{joint}_arrival_sign"), points.iter().map(|p| sign(p.observation)));
     }
     c.number("load_kg", observed(|o| Some(o.load_kg)));
+    for (feature, name) in run.model.features() {
+        let load = |o: &Observation| o.more_loads.iter().find(|load| load.at == feature).map(|load| load.kg);
+        if points.iter().any(|p| load(p.observation).is_some()) {
+            let loads = points.iter().map(|p| Some(load(p.observation).unwrap_or(0.0)));
+            c.number(format!("load_{name}_kg"), loads);
+        }
+    }
     c.number("temperature_c", observed(|o| o.temperature_c));
     c.vector("measured", "_m", points.iter().map(|p| p.measured_m));
     c.vector("predicted", "_m", points.iter().map(|p| p.predicted_m));

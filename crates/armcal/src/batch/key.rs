@@ -114,8 +114,9 @@ fn settings(text: &str) -> String {
 }
 
 fn declared(entry: &RecordingEntry) -> String {
-    let RecordingEntry { tilt, load_kg, .. } = entry;
-    hash([entry.name(), format!("{:e} {:e} {load_kg:e}", tilt.roll_rad, tilt.pitch_rad)])
+    let RecordingEntry { tilt, load_kg, loads, .. } = entry;
+    let more: String = loads.iter().map(|load| format!(" {}:{:e}", load.at, load.kg)).collect();
+    hash([entry.name(), format!("{:e} {:e} {load_kg:e}{more}", tilt.roll_rad, tilt.pitch_rad)])
 }
 
 /// SHA-256 of parts that cannot run into each other.

@@ -146,7 +146,7 @@ fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
 }
 
 fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
-    RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0 }
+    RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0, loads: Vec::new() }
 }
 
 /// Names without a name after as many of their last folders as it takes to tell them apart.

@@ -7,6 +7,7 @@ use crate::compensate::{
 };
 use crate::error::Error;
 use armcal_compensate::{SetPoint, resample};
+use armcal_core::Load;
 use armcal_recording::atomic;
 use armcal_report::{PastArms, PastModel};
 use std::path::Path;
@@ -152,7 +153,10 @@ fn notes(
         format!("; the model's mean error where it was tested is {:.2} mm", mean_m * 1e3)
     });
     let temperature = conditions.temperature_c.map_or(String::new(), |t| format!(", {t:.1} degC"));
-    notes.push(format!("as in recording `{recording}`, load {} kg{temperature}{tested}", conditions.load_kg));
+    let name = |load: &Load| format!(", {} kg at {}", load.kg, arms.model.feature_name(load.at));
+    let more: String = conditions.more_loads.iter().map(name).collect();
+    let load = format!("load {} kg{more}", conditions.load_kg);
+    notes.push(format!("as in recording `{recording}`, {load}{temperature}{tested}"));
     if arms.model.effects().iter().any(|e| e.spec.kind == "effort_compliance") {
         notes.push("the effort of a motor is not known beforehand: effort_compliance is left at zero".into());
     }

@@ -81,6 +81,7 @@ pub fn prepare<'a>(
         dwell: facts.map_or(0, |f| f.last_dwell),
         time_ns: facts.map_or(0, |f| f.last_ns),
         load_kg: drive.load_kg.or(facts.map(|f| f.load_kg)).unwrap_or(0.0),
+        more_loads: facts.map_or_else(Vec::new, |f| f.more_loads.clone()),
         temperature_c: drive.temperature_c.or(facts.and_then(|f| f.temperature_c)),
     };
     let chain = arms.geometry.chain();

@@ -7,7 +7,7 @@ use crate::pipeline::{
 };
 use crate::setup::Change;
 use crate::stages::perceive::Seen;
-use armcal_core::{Observation, Pose};
+use armcal_core::{Observation, Pose, Severity, Stage, Warning, listed};
 use armcal_model::{
     Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Marker, Model, Override, RecordingStart,
     Session, is_of_effect,
@@ -53,12 +53,30 @@ fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Erro
     let path = folder.join(model.urdf.as_deref().unwrap_or(Path::new("")));
     let link = |name: &Option<String>| name.clone().unwrap_or_default();
     let text = read("URDF", &path)?;
-    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?;
+    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?
+        .with_masses(model.masses, &path)?;
     let chain = match &model.deviation {
         Some(declared) => chain.with_deviation(declared, &path)?,
         None => chain,
     };
     Ok((text, chain))
+}
+
+/// Says which links weigh nothing in a file that lets others weigh something.
+pub fn links_without_mass(pipeline: &Pipeline, chain: &Chain) -> Option<Warning> {
+    let links = chain.links_without_mass();
+    let asked = pipeline.models().iter().any(|model| model.masses.is_some());
+    let then = match asked {
+        true => "so it weighs 2.5 kg for every metre beside links with masses of their own",
+        false => {
+            "so all links of its arm weigh 2.5 kg for every metre, whatever the file says of the others; masses = \"urdf\" under \
+             [model] takes those"
+        }
+    };
+    let said = format!("the URDF gives it no mass, {then}. Write its <inertial>");
+    let warning =
+        |subject| Warning::new(Severity::Notice, Stage::Calibrate, "link-without-mass", subject, said);
+    (!links.is_empty()).then(|| warning(format!("link {}", listed(&links))))
 }
 
 /// Reads the board file, if the pipeline has a table.

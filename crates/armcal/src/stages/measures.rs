@@ -45,8 +45,8 @@ impl Measures<'_> {
                 for (measure, m) in measures.iter().enumerate().filter(|(_, m)| m.is_in(recording)) {
                     let Some((reference, sigma_m)) = m.reference(dwell) else { continue };
                     let covariance_m2 = Matrix3::identity() * sigma_m.powi(2);
-                    let seen = observation(dwell, seen.load_kg, reference, covariance_m2);
-                    let observation = Observation { feature: m.feature, ..seen };
+                    let of_tip = observation(dwell, seen, reference, covariance_m2);
+                    let observation = Observation { feature: m.feature, ..of_tip };
                     all.push(Candidate { measure, observation });
                 }
             }

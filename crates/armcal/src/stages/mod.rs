@@ -1,5 +1,6 @@
 //! The stages of the story that join two crates.
 
+pub mod effort;
 pub mod frames;
 pub mod measures;
 pub mod observe;

@@ -78,7 +78,7 @@ pub fn observations(
             };
             let of = |feature, (reference, covariance_m2): Referenced| Observation {
                 feature,
-                ..observation(dwell, seen.load_kg, reference, covariance_m2)
+                ..observation(dwell, seen, reference, covariance_m2)
             };
             let markers = markers_of(pipeline, dwell);
             let seen_of_it = !markers.is_empty();
@@ -118,7 +118,7 @@ impl Observed {
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.
-pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, load_kg: f64, m: &Moment) -> Observation {
+pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, seen: &Seen, m: &Moment) -> Observation {
     let sigma_m = pipeline.observations.sensor_sigma_mm * 1e-3;
     Observation {
         dwell: DwellId { recording, dwell: index },
@@ -133,7 +133,8 @@ pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, load_kg: f64,
         joint_velocity_radps: Some(m.joint_velocity_radps.clone()),
         effort_nm: m.effort_nm.clone(),
         temperature_c: m.temperature_c,
-        load_kg,
+        load_kg: seen.load_kg,
+        more_loads: seen.more_loads.clone(),
         reference: Reference::Tracked {
             position_m: m.position_m,
             orientation: None,
@@ -221,10 +222,10 @@ fn why_not(place: Option<&Place>, untracked: String) -> String {
     }
 }
 
-/// A dwell as an observation of this reference.
+/// A dwell of a recording as an observation of this reference.
 pub fn observation(
     dwell: &Dwell,
-    load_kg: f64,
+    seen: &Seen,
     reference: Reference,
     covariance_m2: Matrix3<f64>,
 ) -> Observation {
@@ -241,7 +242,8 @@ pub fn observation(
         joint_velocity_radps: None,
         effort_nm: dwell.effort_nm.clone(),
         temperature_c: dwell.temperature_c,
-        load_kg,
+        load_kg: seen.load_kg,
+        more_loads: seen.more_loads.clone(),
         reference,
         covariance_m2,
     }

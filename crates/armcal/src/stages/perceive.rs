@@ -1,15 +1,16 @@
 //! From files to dwells: open, read, align the clocks, find the pauses.
 
 use crate::error::Error;
-use crate::pipeline::{FramePose, Pipeline};
+use crate::pipeline::{FramePose, Pipeline, RecordingEntry};
 use crate::progress::Progress;
 use crate::setup;
+use crate::stages::effort;
 use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
 use crate::stages::rigid;
 use crate::two_arms::joined;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, FeatureId, Parameter, PoseSamples, Rejection, Samples, Warning};
+use armcal_core::{Dwell, FeatureId, Load, Parameter, PoseSamples, Rejection, Samples, Warning};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
@@ -24,8 +25,10 @@ use std::sync::Arc;
 pub struct Seen {
     /// Name in the pipeline.
     pub name: String,
-    /// Load at the tip [kg].
+    /// Load at the tip, of several arms the first one's [kg].
     pub load_kg: f64,
+    /// Loads at other points of the arm.
+    pub more_loads: Vec<Load>,
     /// Files, channels and streams.
     pub report: RecordingReport,
     /// Sensor clock against robot clock, where there is a tip stream.
@@ -81,15 +84,17 @@ pub fn dwells_of_all(
 ) -> Result<Vec<Seen>, Error> {
     let speed_model = frames::bare(chain, frames::markers(pipeline))?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
-    entries
+    let mut all = entries
         .map(|(index, (entry, recording))| {
             progress.step(&format!("reading {}", entry.name()));
             let (samples, seen) =
-                dwells_of_one(pipeline, &speed_model, index, entry.load_kg, &entry.name(), recording)?;
+                dwells_of_one(pipeline, &speed_model, index, entry, &entry.name(), recording)?;
             keep(samples);
             Ok(seen)
         })
-        .collect()
+        .collect::<Result<Vec<Seen>, Error>>()?;
+    effort::warn_of_gaps(chain.joint_names(), &mut all);
+    Ok(all)
 }
 
 /// Every two recordings that hold the same readings, in the order of the pipeline.
@@ -198,7 +203,7 @@ fn dwells_of_one(
     pipeline: &Pipeline,
     speed_model: &Model,
     index: usize,
-    load_kg: f64,
+    entry: &RecordingEntry,
     name: &str,
     recording: &Recording,
 ) -> Result<(Samples, Seen), Error> {
@@ -260,9 +265,11 @@ fn dwells_of_one(
     let fingerprint = Arc::new(Fingerprint::of(&samples));
     let name = name.to_owned();
     let readings = Readings::of(&samples.joints, repeated, &dwells);
+    let (load_kg, more_loads) = pipeline.loads_of(entry);
     let seen = Seen {
         name,
         load_kg,
+        more_loads,
         report,
         clock,
         dwells,

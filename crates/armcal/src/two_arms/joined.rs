@@ -69,19 +69,23 @@ fn join(arms: &[JointSamples; 2], names: [&str; 2]) -> Result<JointSamples, Stri
         let latest = latest.filter(|&i| seconds(other.time_ns[i], *time_ns) <= oldest_s);
         picked.extend(latest.map(|latest| if slower == 0 { [row, latest] } else { [latest, row] }));
     }
-    let columns = |of: &dyn Fn(&JointSamples) -> Option<Vec<Vec<f64>>>| -> Option<Vec<Vec<f64>>> {
-        let [first, second] = [of(&arms[0])?, of(&arms[1])?];
-        let taken = |columns: Vec<Vec<f64>>, arm: usize| -> Vec<Vec<f64>> {
-            columns.iter().map(|c| picked.iter().map(|at| c[at[arm]]).collect()).collect()
-        };
-        Some([taken(first, 0), taken(second, 1)].concat())
+    let columns = |of: &dyn Fn(&JointSamples, usize, usize) -> f64| -> Vec<Vec<f64>> {
+        let joints = (0..2).flat_map(|arm| (0..arms[arm].joint_rad.len()).map(move |joint| (arm, joint)));
+        let column =
+            |(arm, joint): (usize, usize)| picked.iter().map(|at| of(&arms[arm], joint, at[arm])).collect();
+        joints.map(column).collect()
     };
+    // An arm that measures none leaves the other its own.
+    let effort = |s: &JointSamples, joint: usize, row: usize| {
+        s.effort_nm.as_ref().map_or(f64::NAN, |columns| columns[joint][row])
+    };
+    let efforts = arms.iter().any(|s| s.effort_nm.is_some());
     let prefixed = |arm: usize| arms[arm].names.iter().map(move |joint| format!("{}.{joint}", names[arm]));
     Ok(JointSamples {
         time_ns: picked.iter().map(|at| rows.time_ns[at[slower]]).collect(),
         names: prefixed(0).chain(prefixed(1)).collect(),
-        joint_rad: columns(&|s| Some(s.joint_rad.clone())).unwrap_or_default(),
-        effort_nm: columns(&|s| s.effort_nm.clone()),
+        joint_rad: columns(&|s, joint, row| s.joint_rad[joint][row]),
+        effort_nm: efforts.then(|| columns(&effort)),
     })
 }
 

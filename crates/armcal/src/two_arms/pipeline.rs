@@ -3,7 +3,7 @@
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pipeline::{
-    FramePose, FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, knowledge,
+    FramePose, FrameSection, LoadEntry, ModelSection, ParameterOverride, Pipeline, RecordingEntry, knowledge,
     recording_name,
 };
 use crate::stages::frames::{frame, override_parameters};
@@ -62,6 +62,9 @@ struct File {
 struct RecordingPaths {
     name: Option<String>,
     paths: Vec<PathBuf>,
+    /// What hangs at the tips.
+    #[serde(default)]
+    loads: Vec<LoadEntry>,
 }
 
 /// One arm.
@@ -165,7 +168,7 @@ impl TwoArms {
         let [first, _] = &two.arms;
         let entry = |r: RecordingPaths| {
             let name = Some(recording_name(r.name.as_ref(), &r.paths));
-            RecordingEntry { name, paths: r.paths, tilt: Default::default(), load_kg: 0.0 }
+            RecordingEntry { name, paths: r.paths, tilt: Default::default(), load_kg: 0.0, loads: r.loads }
         };
         Ok(Pipeline {
             name: file.name,

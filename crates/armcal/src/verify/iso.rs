@@ -117,8 +117,8 @@ impl Shown<'_> {
     }
 
     fn commanded_m(&self, side: Side, recording: usize, dwell: &Dwell, joint_rad: Vec<f64>) -> Vector3<f64> {
-        let (load_kg, nowhere) = (self.seen[recording].load_kg, Reference::position(Vector3::zeros()));
-        let o = Observation { joint_rad, ..observe::observation(dwell, load_kg, nowhere, Matrix3::zeros()) };
+        let (seen, nowhere) = (&self.seen[recording], Reference::position(Vector3::zeros()));
+        let o = Observation { joint_rad, ..observe::observation(dwell, seen, nowhere, Matrix3::zeros()) };
         let p = match side {
             Side::Nominal => &self.placed.nominal,
             Side::Calibrated => &self.placed.calibrated,

@@ -62,6 +62,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     warnings.extend(told.iter().map(told::not_held_out));
     warnings.extend(once);
     warnings.extend(told::beyond_calibrated(placed.model.chain(), &past.visited, &observations, &samples));
+    warnings.extend(told::effort_unknown(&placed.model, &observations));
     warnings.extend(seen.iter().flat_map(of_recording));
     warnings.extend(placed.warnings.iter().cloned());
     Ok(Verification {

@@ -153,7 +153,7 @@ impl Recorded<'_> {
     }
 
     fn observation(&self, pipeline: &Pipeline, index: usize, m: &Moment) -> Observation {
-        observe::moving(pipeline, self.recording, index, self.seen.load_kg, m)
+        observe::moving(pipeline, self.recording, index, self.seen, m)
     }
 
     fn motion(&self, m: &Moment) -> DwellId {

@@ -2,7 +2,7 @@
 
 use crate::stages::perceive::Seen;
 use armcal_core::{Observation, Samples, Severity, Stage, Unit, Visited, Warning};
-use armcal_model::Chain;
+use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_report::{DwellMark, PastModel, Told, also_in};
 
 /// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.
@@ -73,6 +73,23 @@ pub fn beyond_calibrated(
         ))
     };
     visited.iter().enumerate().filter_map(of_joint).collect()
+}
+
+/// What follows a measured effort, in dwells that have none.
+pub fn effort_unknown(model: &Model, observations: &[Observation]) -> Vec<Warning> {
+    let of = |effect: &PlacedEffect| {
+        let joint = effect.spec.target.filter(|_| effect.spec.kind == "effort_compliance")?;
+        let without = observations.iter().filter(|o| o.effort_of(joint).is_none()).count();
+        let message = format!(
+            "{without} of {} dwells have no measured effort of `{}`, which it follows: there it is left at zero",
+            observations.len(),
+            model.chain().joint_names()[joint],
+        );
+        let (severity, stage) = (Severity::Notice, Stage::Calibrate);
+        let warning = || Warning::new(severity, stage, "effort-unknown", effect.spec.to_string(), message);
+        (without > 0).then(warning)
+    };
+    model.effects().iter().filter_map(of).collect()
 }
 
 fn intervals(visited: &Visited, unit: Unit) -> String {

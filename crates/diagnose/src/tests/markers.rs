@@ -170,7 +170,7 @@ fn noise_that_remembers_is_that_of_each_marker_and_goes_on_while_it_is_hidden() 
     let of: Vec<(usize, FeatureId, usize)> = p
         .dwells
         .iter()
-        .flat_map(|d| d.parts.iter().flat_map(|part| (0..3).map(|axis| (d.id.dwell, part.what, axis))))
+        .flat_map(|d| d.parts.iter().flat_map(|part| (0..3).map(|axis| (d.id.dwell, part.what.0, axis))))
         .collect();
     let b: f64 = 1.7;
     let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| {

@@ -98,7 +98,9 @@ impl Physics for BaseCompliance {
         let (gravity, all) = (&x.gravity_mps2, x.pose.links_of(self.arm));
         let links = x.pose.moment_nm(&base.translation_m, all.clone(), gravity);
         let outer = x.pose.moment_nm(&base.translation_m, (all.start + OUTER).min(all.end)..all.end, gravity);
-        let load = (x.pose.tips_m[self.arm] - base.translation_m).cross(gravity) * x.observation.load_kg;
+        let load = x
+            .pose
+            .over_loads(x.observation, &all, |at_m, kg| (at_m - base.translation_m).cross(gravity) * kg);
         let turn = [0, 1, 2].map(|k| {
             let axis = base.rotation.column(k);
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))

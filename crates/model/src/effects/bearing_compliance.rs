@@ -75,9 +75,10 @@ impl Physics for BearingCompliance {
         let across = |moment: Vector3<f64>| moment - joint.axis * joint.axis.dot(&moment);
         let links = across(pose.moment_nm(&joint.origin_m, joint.links.clone(), gravity));
         let outer = across(pose.moment_nm(&joint.origin_m, pose.outer(self.joint), gravity));
-        let load = across(
-            (joint.tip_m.unwrap_or(joint.origin_m) - joint.origin_m).cross(gravity) * x.observation.load_kg,
-        );
+        let load =
+            across(pose.over_loads(x.observation, &joint.links, |at_m, kg| {
+                (at_m - joint.origin_m).cross(gravity) * kg
+            }));
         let slot = &joint.before;
         let turn = [0, 1, 2].map(|k| {
             let axis = slot.rotation.column(k);

@@ -4,7 +4,7 @@
 
 use super::nominal_pose::NominalPose;
 use super::session::Session;
-use armcal_core::Observation;
+use armcal_core::{Load, Observation};
 use nalgebra::Vector3;
 
 /// Gravity torque on one joint at the nominal chain, split so that unknown masses can be told apart.
@@ -14,7 +14,7 @@ pub struct Torque {
     pub links_nm: f64,
     /// The part of it that the links beyond the joint's own cause.
     pub outer_nm: f64,
-    /// Of the load at the tip.
+    /// Of the loads that hang on what it moves.
     pub load_nm: f64,
 }
 
@@ -59,7 +59,7 @@ impl<'o> Drivers<'o> {
             .map(|j| Torque {
                 links_nm: pose.torque_nm(j, false, &gravity),
                 outer_nm: pose.torque_nm(j, true, &gravity),
-                load_nm: pose.tip_torque_nm(j, &gravity) * o.load_kg,
+                load_nm: load_nm(&pose, j, &gravity, o),
             })
             .collect();
         let time_s = (o.time_ns - session.start_ns) as f64 * 1e-9;
@@ -95,9 +95,9 @@ impl<'o> Drivers<'o> {
         self.observation.moved_rad.as_ref().and_then(|all| all.get(joint)).copied().unwrap_or(0.0)
     }
 
-    /// Generalised force on a joint of one kilogram at the tip [N m] (prismatic: [N]).
+    /// Generalised force on a joint of one kilogram at the tip of its arm [N m] (prismatic: [N]).
     pub(crate) fn kilogram_nm(&self, joint: usize) -> f64 {
-        self.pose.tip_torque_nm(joint, &self.gravity_mps2)
+        self.pose.kilogram_nm(joint, self.pose.tip_of(joint), &self.gravity_mps2)
     }
 
     /// What the joint's encoder went through before it came to rest; empty where that is not known.
@@ -111,6 +111,12 @@ impl<'o> Drivers<'o> {
         let pair = joint.checked_sub(1).and_then(|before| pairs?.get(before));
         pair.map_or(&[], |[sum, difference]| if sense < 0.0 { difference } else { sum })
     }
+}
+
+/// Generalised force of all loads on a joint.
+fn load_nm(pose: &NominalPose, joint: usize, gravity: &Vector3<f64>, o: &Observation) -> f64 {
+    let of = |load: Load| pose.kilogram_nm(joint, load.at, gravity) * load.kg;
+    o.loads().map(of).reduce(|sum, one| sum + one).unwrap_or(0.0)
 }
 
 pub(crate) fn gravity_in_world(session: &Session, pose: &NominalPose) -> Vector3<f64> {

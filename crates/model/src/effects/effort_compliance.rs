@@ -49,9 +49,8 @@ struct EffortCompliance {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
-    let efforts = placing.session.largest_effort_nm.as_ref();
-    if efforts.and_then(|efforts| efforts.get(joint)).is_none_or(|largest_nm| *largest_nm <= 0.0) {
-        return Err("the observations have no measured effort of this joint".to_owned());
+    if placing.largest_effort_nm(joint)? <= 0.0 {
+        return Err(format!("the measured effort of `{}` is zero throughout", placing.joint_name(joint)));
     }
     let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;
@@ -61,8 +60,6 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for EffortCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let efforts = x.observation.effort_nm.as_ref();
-        let effort_nm = efforts.and_then(|efforts| efforts.get(self.joint).copied()).unwrap_or(0.0);
-        change.joint(self.joint, theta[0] * effort_nm);
+        change.joint(self.joint, theta[0] * x.observation.effort_of(self.joint).unwrap_or(0.0));
     }
 }

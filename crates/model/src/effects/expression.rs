@@ -203,8 +203,8 @@ fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Va
         return Ok(Variable::Torque(joint));
     }
     if let Some(joint) = numbered("effort") {
-        let known = session.largest_effort_nm.is_some();
-        return if known { Ok(Variable::Effort(joint)) } else { missing("measured effort") };
+        let known = placing.largest_effort_nm(joint).map(|_| Variable::Effort(joint));
+        return known.map_err(|why| format!("the formula needs {name}, and {why}"));
     }
     let of_joints =
         (1..=joints).flat_map(|j| ["q", "s", "tau", "effort"].map(|prefix| format!("{prefix}{j}")));
@@ -286,9 +286,7 @@ impl Variable {
             Variable::Reading(joint) => x.joint_rad(joint),
             Variable::Arrival(joint) => x.arrival[joint],
             Variable::Torque(joint) => x.torque[joint].total_nm(),
-            Variable::Effort(joint) => {
-                o.effort_nm.as_ref().and_then(|efforts| efforts.get(joint).copied()).unwrap_or(f64::NAN)
-            }
+            Variable::Effort(joint) => o.effort_of(joint).unwrap_or(f64::NAN),
             Variable::Temperature => o.temperature_c.unwrap_or(f64::NAN),
             Variable::Time => x.time_s,
             Variable::Load => o.load_kg,

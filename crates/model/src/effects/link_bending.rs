@@ -105,8 +105,12 @@ impl Physics for LinkBending {
         let outer_kg: f64 = pose.outer(self.link).map(|k| pose.link_mass_kg(k)).sum();
         let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(own));
         let links_nm = pose.moment_nm(&end, pose.outer(self.link), gravity);
-        let load_n = gravity * x.observation.load_kg;
-        let load_nm = (pose.joints[self.link].tip_m.unwrap_or(end) - end).cross(&load_n);
+        // What hangs on the beam itself bends it less than it bends what holds it.
+        let loads = |of: &dyn Fn(&Vector3<f64>, f64) -> Vector3<f64>| {
+            pose.over_loads(x.observation, &pose.outer(self.link), of)
+        };
+        let load_n = loads(&|_, kg| gravity * kg);
+        let load_nm = loads(&|at_m, kg| (at_m - end).cross(&(gravity * kg)));
         let links = bend(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
         let outer = bend(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
         let load = bend(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);

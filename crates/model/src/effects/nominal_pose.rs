@@ -1,13 +1,14 @@
 //! The nominal arm in one pose: its axes, and what its links weigh where.
 //!
-//! Links have the masses and centres of their URDF, where it gives all of them; else each weighs 2.5 kg for every metre
-//! from its joint to the next ones (the last: to the tip), evenly spread. A joint carries its own link and all behind it,
-//! on every branch. Only the proportions matter, because the amplitude of an effect absorbs the scale and a second amplitude
-//! the share of the outer links.
+//! Links have the masses and centres of their URDF, as far as they count ([`crate::Masses`]); else each weighs 2.5 kg for
+//! every metre from its joint to the next ones (the last: to the tip), evenly spread. A joint carries its own link and all
+//! behind it, on every branch. Only the proportions matter, because the amplitude of an effect absorbs the scale and a second
+//! amplitude the share of the outer links.
 
 use crate::rigid::Rigid;
 use crate::segment::{Body, Geometry, Motion, Segment};
 use crate::tree::{SegmentId, Tree};
+use armcal_core::{FeatureId, Load, Observation};
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -31,8 +32,6 @@ pub(crate) struct JointAxis {
     pub before: Rigid<f64>,
     /// The links it moves: its own, then those behind it.
     pub links: Range<usize>,
-    /// The tip that it moves [m], of its own arm.
-    pub tip_m: Option<Vector3<f64>>,
 }
 
 /// A link: what one joint moves and no other joint behind it.
@@ -48,6 +47,13 @@ struct Link {
     to_m: Vec<Vector3<f64>>,
 }
 
+/// A point of the arm and the link that carries it; none of a point that no joint moves.
+#[derive(Debug, Clone, PartialEq)]
+struct Hook {
+    at_m: Vector3<f64>,
+    link: Option<usize>,
+}
+
 /// The nominal arm in one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NominalPose {
@@ -57,23 +63,28 @@ pub(crate) struct NominalPose {
     pub joints: Vec<JointAxis>,
     /// Joints that follow the reading of another: that reading, the change per change of it, and the joint.
     mimics: Vec<(usize, f64, JointAxis)>,
-    /// The tip of each arm [m].
-    pub tips_m: Vec<Vector3<f64>>,
+    /// Where a load can hang: the tip of each arm, then the markers.
+    hooks: Vec<Hook>,
     /// What each joint moves, branch after branch, arm after arm.
     links: Vec<Link>,
-    /// Whether the links of each arm weigh what its file declares.
+    /// Whether each link weighs what its file declares.
     pub declared: Vec<bool>,
 }
 
 impl NominalPose {
-    /// Of a tree whose first segments end at the bases, one an arm, and the tips of these.
-    pub fn of(tree: &Tree, tips: &[SegmentId], p: &[f64], joint_rad: &[f64]) -> NominalPose {
+    /// Of a tree whose first segments end at the bases, one an arm, and the features on it, the tips of these arms first.
+    pub fn of(
+        tree: &Tree,
+        (arms, features): (usize, &[SegmentId]),
+        p: &[f64],
+        joint_rad: &[f64],
+    ) -> NominalPose {
         let ends = tree.ends(p, joint_rad);
         let mut pose = NominalPose {
-            bases: ends[..tips.len().min(ends.len())].to_vec(),
+            bases: ends[..arms].to_vec(),
             joints: Vec::new(),
             mimics: Vec::new(),
-            tips_m: tips.iter().map(|tip| ends[*tip].translation_m).collect(),
+            hooks: Vec::new(),
             links: Vec::new(),
             declared: Vec::new(),
         };
@@ -97,8 +108,9 @@ impl NominalPose {
                 Some(mimic) => pose.mimics.push((joint.index, mimic.ratio, axis)),
             }
         }
-        let of_tips: Vec<Option<usize>> = tips.iter().map(|tip| part_of[*tip].1).collect();
-        pose.end_links(&of_tips);
+        let hook = |end: &SegmentId| Hook { at_m: ends[*end].translation_m, link: part_of[*end].1 };
+        pose.hooks = features.iter().map(hook).collect();
+        pose.end_links();
         pose.weigh(tree, &ends, &part_of);
         pose
     }
@@ -112,28 +124,31 @@ impl NominalPose {
         self.links.push(Link { body, parent, arm, from_m: joint.start_m, to_m: Vec::new() });
     }
 
-    /// Ends the link of each tip at the tip, and lets every joint know what it moves.
-    fn end_links(&mut self, of_tips: &[Option<usize>]) {
+    /// Ends the link of each tip at the tip, those of other branches at the marker farthest out, and lets every joint know
+    /// what it moves.
+    fn end_links(&mut self) {
         let mut ends: Vec<usize> = (1..=self.links.len()).collect();
         for k in (0..self.links.len()).rev() {
             if let Some(parent) = self.links[k].parent {
                 ends[parent] = ends[parent].max(ends[k]);
             }
         }
-        for (link, tip_m) in of_tips.iter().zip(&self.tips_m) {
-            if let Some(link) = link {
-                self.links[*link].to_m.push(*tip_m);
-            }
+        let (tips, markers) = self.hooks.split_at(self.bases.len());
+        for tip in tips {
+            tip.link.into_iter().for_each(|link| self.links[link].to_m.push(tip.at_m));
+        }
+        for (k, link) in self.links.iter_mut().enumerate().filter(|(_, link)| link.to_m.is_empty()) {
+            let ends = markers.iter().filter(|marker| marker.link == Some(k)).map(|marker| marker.at_m);
+            let far = |m: &Vector3<f64>| (m - link.from_m).norm();
+            let end = ends.max_by(|a, b| far(a).total_cmp(&far(b)));
+            link.to_m.extend(end);
         }
         for joint in self.joints.iter_mut().chain(self.mimics.iter_mut().map(|(_, _, joint)| joint)) {
             joint.links.end = ends[joint.links.start];
-            let moved = of_tips.iter().position(|link| link.is_some_and(|link| joint.links.contains(&link)));
-            joint.tip_m = moved.map(|arm| self.tips_m[arm]);
         }
     }
 
-    /// Lets the links of each arm weigh what its file declares, or as much as they are long where it leaves one without a
-    /// mass.
+    /// Lets the links weigh what their file declares, or as much as they are long where it leaves them without a mass.
     fn weigh(&mut self, tree: &Tree, ends: &[Rigid<f64>], part_of: &[(usize, Option<usize>)]) {
         let mut declared: Vec<Body> = vec![Body::NONE; self.links.len()];
         for ((segment, end), (_, link)) in tree.0.iter().zip(ends).zip(part_of) {
@@ -141,10 +156,9 @@ impl NominalPose {
             let Some((body, k)) = segment.body.as_ref().zip(*link) else { continue };
             declared[k].add(&Body { centre_m: end.point(&body.centre_m), ..*body });
         }
-        let known = |links: Range<usize>| declared[links].iter().all(|link| link.mass_kg > 0.0);
-        self.declared = (0..self.bases.len()).map(|arm| known(self.links_of(arm))).collect();
+        self.declared = declared.iter().map(|body| body.mass_kg > 0.0).collect();
         for (link, body) in self.links.iter_mut().zip(declared) {
-            link.body = if self.declared[link.arm] { body } else { spread(link) };
+            link.body = if body.mass_kg > 0.0 { body } else { spread(link) };
         }
     }
 
@@ -247,13 +261,35 @@ impl NominalPose {
         self.over_joints(joint, of)
     }
 
-    /// Generalised force on a reading of one kilogram at the tip of its arm.
-    pub fn tip_torque_nm(&self, joint: usize, gravity: &Vector3<f64>) -> f64 {
-        self.over_joints(joint, |j| match (j.motion, j.tip_m) {
-            (_, None) => 0.0,
-            (Motion::Revolute, Some(tip_m)) => j.axis.dot(&(tip_m - j.origin_m).cross(gravity)),
-            (Motion::Prismatic, Some(_)) => j.axis.dot(gravity),
+    /// The feature that is the tip of a joint's arm.
+    pub fn tip_of(&self, joint: usize) -> FeatureId {
+        FeatureId(self.links[self.joints[joint].links.start].arm)
+    }
+
+    /// Generalised force on a reading of one kilogram at a feature; none where the joint does not move it.
+    pub fn kilogram_nm(&self, joint: usize, at: FeatureId, gravity: &Vector3<f64>) -> f64 {
+        let Some((hook, link)) = self.hooks.get(at.0).and_then(|hook| Some((hook, hook.link?))) else {
+            return 0.0;
+        };
+        self.over_joints(joint, |j| match j.motion {
+            _ if !j.links.contains(&link) => 0.0,
+            Motion::Revolute => j.axis.dot(&(hook.at_m - j.origin_m).cross(gravity)),
+            Motion::Prismatic => j.axis.dot(gravity),
         })
+    }
+
+    /// The sum of `of` over the loads of an observation that some links carry, each with where it hangs [m] and its mass [kg].
+    pub fn over_loads(
+        &self,
+        o: &Observation,
+        links: &Range<usize>,
+        of: impl Fn(&Vector3<f64>, f64) -> Vector3<f64>,
+    ) -> Vector3<f64> {
+        let carried = |load: Load| {
+            let hook = self.hooks.get(load.at.0)?;
+            hook.link.filter(|link| links.contains(link)).map(|_| of(&hook.at_m, load.kg))
+        };
+        o.loads().filter_map(carried).reduce(|sum, one| sum + one).unwrap_or_else(Vector3::zeros)
     }
 
     /// The joint of a reading, and those that follow it by their ratios.
@@ -286,7 +322,7 @@ fn axis(
     let motion = segment.joint.map_or(Motion::Revolute, |joint| joint.motion);
     let slid_m = if motion == Motion::Prismatic { value } else { 0.0 };
     let start_m = origin_m + axis * slid_m;
-    JointAxis { origin_m, start_m, axis, motion, segment: id, before, links: 0..0, tip_m: None }
+    JointAxis { origin_m, start_m, axis, motion, segment: id, before, links: 0..0 }
 }
 
 /// What a link weighs that weighs as much as it is long.

@@ -126,6 +126,18 @@ impl Placing<'_> {
         Err("it grows with time, and all observations are of one moment".to_owned())
     }
 
+    /// The name of a joint.
+    pub fn joint_name(&self, joint: usize) -> &str {
+        &self.model.chain().joint_names()[joint]
+    }
+
+    /// The largest measured effort of a joint [N m], where every observation has one.
+    pub fn largest_effort_nm(&self, joint: usize) -> Result<f64, String> {
+        let all = self.session.largest_effort_nm.as_ref();
+        let known = all.and_then(|all| all.get(joint).copied()).filter(|largest| largest.is_finite());
+        known.ok_or_else(|| format!("not all dwells have a measured effort of `{}`", self.joint_name(joint)))
+    }
+
     /// How a joint moves.
     pub fn motion(&self, joint: usize) -> Motion {
         self.zero.joints[joint].motion

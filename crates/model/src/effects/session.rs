@@ -1,6 +1,6 @@
 //! What effects need to know about the whole set of observations.
 
-use armcal_core::Observation;
+use armcal_core::{Observation, gaps};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -29,7 +29,8 @@ pub struct Session {
     pub volume_half_extent_m: f64,
     /// Mean seated point of each recording that has any, in its board's frame [m].
     pub board_centres_m: BTreeMap<usize, Vector3<f64>>,
-    /// Largest absolute effort of each joint [N m], where every observation has one.
+    /// Largest absolute effort of each joint [N m]; NaN, in JSON `null`, unless every observation has one.
+    #[serde(default, deserialize_with = "gaps::deserialize")]
     pub largest_effort_nm: Option<Vec<f64>>,
     /// Whether any observation has a temperature.
     pub temperature: bool,
@@ -74,7 +75,7 @@ impl Session {
             board_centres_m: board_centres(observations),
             largest_effort_nm: largest_effort(observations),
             temperature: !temperatures.is_empty(),
-            load: observations.iter().any(|o| o.load_kg != 0.0),
+            load: observations.iter().flat_map(|o| o.loads()).any(|load| load.kg != 0.0),
             moving: observations.iter().any(|o| o.joint_velocity_radps.is_some()),
             moved: observations.iter().any(|o| o.moved_rad.is_some()),
             cavities,
@@ -102,12 +103,9 @@ fn board_centres(observations: &[Observation]) -> BTreeMap<usize, Vector3<f64>> 
 }
 
 fn largest_effort(observations: &[Observation]) -> Option<Vec<f64>> {
-    let mut efforts = observations.iter().map(|o| o.effort_nm.as_ref());
-    let mut largest: Vec<f64> = efforts.next()??.iter().map(|e| e.abs()).collect();
-    for effort in efforts {
-        for (all, one) in largest.iter_mut().zip(effort?) {
-            *all = all.max(one.abs());
-        }
-    }
-    Some(largest)
+    let largest = |joint| {
+        let mut sizes = observations.iter().map(|o| Some(o.effort_of(joint)?.abs()));
+        sizes.try_fold(0.0, |largest: f64, size| Some(largest.max(size?))).unwrap_or(f64::NAN)
+    };
+    gaps::known((0..observations.first()?.joint_rad.len()).map(largest).collect())
 }

@@ -205,6 +205,7 @@ impl<'a> Built<'a> {
             joint_names: self.joint_names,
             joint_limits: self.joint_limits,
             source: Source::Urdf(self.sources),
+            masses: None,
         }
     }
 }

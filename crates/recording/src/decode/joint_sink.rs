@@ -68,16 +68,17 @@ impl<'r> JointSink<'r, '_> {
         Ok(())
     }
 
-    /// Names and efforts are either absent or as many as there are positions.
+    /// Names are either absent or as many as there are positions; efforts may be fewer, of the joints that come first.
     fn check(&self) -> Result<(), DecodeError> {
         let positions = self.rows.position.len() - self.position_start;
         let efforts = self.rows.effort.len() - self.effort_start;
-        for (others, of) in [(self.names, "names"), (efforts, "efforts")] {
-            if positions != 0 && others != 0 && others != positions {
-                return Err(DecodeError::Lengths { positions, others, of });
-            }
+        let lengths = |others, of| Err(DecodeError::Lengths { positions, others, of });
+        match positions {
+            0 => Ok(()),
+            _ if self.names != 0 && self.names != positions => lengths(self.names, "names"),
+            _ if efforts > positions => lengths(efforts, "efforts"),
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 

@@ -129,7 +129,7 @@ fn joints_without_names_are_read_by_index() {
 }
 
 #[test]
-fn efforts_are_read_when_every_row_has_them() {
+fn efforts_are_read_joint_by_joint() {
     let with = |i: i64, effort: &[f64]| {
         let header = Header { stamp_ns: START_NS + i * STEP_NS, frame_id: "" };
         let log = (START_NS + i * STEP_NS) as u64;
@@ -139,13 +139,22 @@ fn efforts_are_read_when_every_row_has_them() {
     let (samples, ..) = ok(&[joint_track(messages.clone())], &two_joints());
     let effort = samples.joints.effort_nm.expect("every row has efforts");
     assert_eq!((effort[0][7], effort[1][7]), (-1.0, 7.0));
+    // A list that ends early is of the joints that come first: here of the elbow, which is wanted last.
     messages[3] = with(3, &[]);
-    let (samples, _, warnings) = ok(&[joint_track(messages)], &two_joints());
-    assert!(samples.joints.effort_nm.is_none());
-    assert!(
-        warnings.iter().any(|w| w.code == "effort-incomplete" && w.message.starts_with("49 ")),
-        "{warnings:?}"
-    );
+    messages[4] = with(4, &[4.0]);
+    messages[5] = with(5, &[f64::NAN, -1.0]);
+    let (samples, reports, _) = ok(&[joint_track(messages)], &two_joints());
+    assert_eq!((samples.joints.len(), reports[0].undecodable), (50, 0));
+    let effort = samples.joints.effort_nm.expect("most rows have efforts");
+    let without = |j: usize| (0..50).filter(|i| effort[j][*i].is_nan()).collect::<Vec<_>>();
+    assert_eq!([without(0), without(1)], [vec![3, 4], vec![3, 5]]);
+    assert_eq!((effort[1][4], effort[0][5]), (4.0, -1.0));
+    let none = (0..50).map(|i| with(i, &[f64::NAN; 2])).collect();
+    assert!(ok(&[joint_track(none)], &two_joints()).0.joints.effort_nm.is_none());
+    // More efforts than joints belong to nobody.
+    let long = (0..50).map(|i| with(i, &[1.0, 2.0, 3.0])).collect();
+    let said = refusal(&[joint_track(long)], &two_joints());
+    assert!(said.contains("2 positions but 3 efforts"), "{said}");
 }
 
 #[test]

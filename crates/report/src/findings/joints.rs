@@ -5,7 +5,6 @@ use crate::channels::count;
 use crate::points::Point;
 use crate::proto::JointErrors;
 use crate::run::Run;
-use armcal_core::Observation;
 use armcal_core::robust::median;
 use armcal_diagnose::{BLURRED, ImpliedError, implied_joint_errors};
 use nalgebra::Vector3;
@@ -111,7 +110,7 @@ fn joint(
         number: count(j + 1),
         unit: unit.display_symbol().into(),
         left_out: count(points.len() - drawn.len()),
-        effort_nm: drawn.iter().filter_map(|&i| effort_nm(points[i].observation, j)).collect(),
+        effort_nm: drawn.iter().filter_map(|&i| points[i].observation.effort_of(j)).collect(),
         ..Default::default()
     };
     if m.effort_nm.len() < drawn.len() {
@@ -144,10 +143,6 @@ fn joint(
 /// The errors of one direction of arrival, NaN in the place of the others: a plot has one x for all its series.
 fn of_arrival(sign: i32, arrival: &[i32], error: &[f64]) -> Vec<f64> {
     error.iter().zip(arrival).map(|(e, s)| if *s == sign { *e } else { f64::NAN }).collect()
-}
-
-fn effort_nm(o: &Observation, j: usize) -> Option<f64> {
-    o.effort_nm.as_ref()?.get(j).copied().filter(|e| e.is_finite())
 }
 
 #[cfg(test)]

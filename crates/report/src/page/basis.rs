@@ -5,6 +5,7 @@ use super::numbers::Column;
 use crate::findings::feels_gravity;
 use crate::run::Run;
 use armcal_core::Unit;
+use armcal_model::Masses;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -92,7 +93,11 @@ fn drivers(run: &Run) -> Vec<Driver> {
             values: Column::of_all(driven.iter().map(|d| unit.to_display(d.joint_rad(j)))),
         });
     }
-    let masses = if run.model.has_link_masses() { "links as in the URDF" } else { "links of 2.5 kg/m" };
+    let masses = match run.model.masses() {
+        Some(Masses::Urdf) => "links as in the URDF",
+        Some(Masses::Uniform) => "links of 2.5 kg/m",
+        None => "links as in the URDF or of 2.5 kg/m",
+    };
     let of_joint = |j: usize| driven.iter().map(|d| d.torque[j].total_nm()).collect();
     let torques_nm: Vec<Vec<f64>> = (0..names.len()).map(of_joint).collect();
     let felt = feels_gravity(&torques_nm);
@@ -114,11 +119,9 @@ fn drivers(run: &Run) -> Vec<Driver> {
     all.push(whole("time", label, Column::of_all(run.observations.iter().map(|o| time.at_min(o)))));
     let temperature = Column::of(run.observations.iter().map(|o| o.temperature_c));
     all.push(whole("temperature", "temperature [°C]", temperature));
-    all.push(whole(
-        "load",
-        "load at the tip [kg]",
-        Column::of_all(run.observations.iter().map(|o| o.load_kg)),
-    ));
+    let elsewhere = run.observations.iter().any(|o| !o.more_loads.is_empty());
+    let label = if elsewhere { "all loads on the arm [kg]" } else { "load at the tip [kg]" };
+    all.push(whole("load", label, Column::of_all(run.observations.iter().map(|o| o.all_loads_kg()))));
     all.retain(varies);
     all
 }

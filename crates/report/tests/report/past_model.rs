@@ -94,6 +94,11 @@ fn the_session_is_written_in_the_words_of_the_format() {
                 \"moved\":false,\"cavities\":[\"c1\"]}";
     assert_eq!(serde_json::to_string(&session).unwrap(), text);
     assert_eq!(serde_json::from_str::<armcal_model::Session>(text).unwrap(), session);
+    // A joint without an effort is a gap there and back.
+    let text = text.replace("[4.0,5.0]", "[null,5.0]");
+    let gappy = serde_json::from_str::<armcal_model::Session>(&text).unwrap();
+    assert!(gappy.largest_effort_nm.as_ref().unwrap()[0].is_nan());
+    assert_eq!(serde_json::to_string(&gappy).unwrap(), text);
 }
 
 #[test]

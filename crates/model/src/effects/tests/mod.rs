@@ -2,6 +2,7 @@
 
 mod contract;
 mod declared;
+mod gravity;
 mod neighbours;
 mod physics;
 mod rig;

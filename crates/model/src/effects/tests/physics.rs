@@ -3,7 +3,7 @@
 use super::super::{EffectSpec, NominalPose, Session, Since};
 use super::rig::{observations, panda, paper, scara, ur10};
 use crate::tests::{RIGHT_ARM, bare, dh, tracked};
-use crate::{Chain, Model};
+use crate::{Chain, Masses, Model};
 use armcal_core::{Arrival, Observation, Pose};
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
@@ -14,7 +14,8 @@ const G: f64 = 9.80665;
 fn energy_j(model: &Model, joints: &[f64], load_kg: f64) -> f64 {
     let pose: NominalPose = model.nominal_pose(&model.nominal(), joints);
     let links: f64 = (0..joints.len()).map(|k| pose.link_mass_kg(k) * G * pose.link_centre_m(k).z).sum();
-    links + load_kg * G * pose.tips_m[0].z
+    let tip = model.base_in_world(&model.nominal()) * model.tip_in_base(&model.nominal(), joints);
+    links + load_kg * G * tip.translation.z
 }
 
 /// Two links that turn about y, level at zero, with a tool on the second.
@@ -59,7 +60,7 @@ fn masses_and_centres_of_a_urdf_make_the_torque() {
     assert!((torque[0].outer_nm - outer(0.5)).abs() < 1e-9, "{torque:?}");
     // Without masses: 2.5 kg a metre.
     let plain = weighed(false);
-    assert!(model.has_link_masses() && !plain.has_link_masses());
+    assert_eq!((model.masses(), plain.masses()), (Some(Masses::Urdf), Some(Masses::Uniform)));
     let torque = plain.drivers(&session, &o).torque;
     assert!((torque[1].total_nm() - G * 2.5 * 0.4 * 0.2).abs() < 1e-9, "{torque:?}");
 }

@@ -158,7 +158,7 @@ fn what_is_wrong_with_a_formula_is_named() {
         (said("k * sin(q1", "joint3", k), ["cannot be read", "k * sin(q1"]),
         (said("k * sin(q1)", "jiont3", k), ["\"jiont3\"", "did you mean \"joint3\"?"]),
         (said("k * temperature", "joint3", k), ["temperature", "observations have no"]),
-        (said("k * effort1", "joint3", k), ["effort1", "no measured effort"]),
+        (said("k * effort1", "joint3", k), ["effort1", "not all dwells have a measured effort of `joint1`"]),
         (said("k * tau2", "joint3", k), ["units", "N*m"]),
         (said("k + tau2", "joint3", k), ["units", "adds N*m"]),
         (said("k * sin(tau2)", "joint3", k), ["units", "sin of N*m"]),
