@@ -55,6 +55,11 @@ impl Chain {
         [low.min(recorded[0]), high.max(recorded[1])]
     }
 
+    /// Whether it is more than one line of joints.
+    pub fn is_branched(&self) -> bool {
+        self.segments.iter().enumerate().any(|(id, segment)| segment.parent != id.checked_sub(1))
+    }
+
     /// Unit of a joint's reading: radian, or metre where it slides.
     pub fn joint_unit(&self, joint: usize) -> Unit {
         let own = |s: &Segment| s.joint.filter(|j| j.index == joint && j.mimic.is_none());

@@ -63,9 +63,16 @@ impl Model {
     /// Errors when two parameters share a name, a marker is on a link that the chain does not have, or a frame's pose or standard
     /// error is not a number.
     pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
+        Model::linked(chain, frames, None)
+    }
+
+    /// The same where a link may join two of its features.
+    ///
+    /// # Errors
+    /// A length that is no positive number too.
+    pub fn linked(chain: Chain, frames: Frames, link: Option<RigidLink>) -> Result<Model, ModelError> {
         let Frames { base, tip, markers, boards } = frames;
-        let around = Around { arms: vec![ArmFrames { base, tip }], markers, boards, link: None };
-        Model::between(chain, around)
+        Model::between(chain, Around { arms: vec![ArmFrames { base, tip }], markers, boards, link })
     }
 
     /// Puts joined chains ([`Chain::joined`]), each between its own frames, into one world; a link may join two tips.

@@ -9,6 +9,7 @@ use crate::rigid::Rigid;
 use crate::segment::{Body, Geometry, Motion, Segment};
 use crate::tree::{SegmentId, Tree};
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Mass of a link per length between its joints [kg/m].
@@ -99,6 +100,7 @@ impl NominalPose {
         }
         let of_tips: Vec<Option<usize>> = tips.iter().map(|tip| part_of[*tip].1).collect();
         pose.end_links(&of_tips);
+        pose.end_branches(tree, &ends, &part_of);
         pose.weigh(tree, &ends, &part_of);
         pose
     }
@@ -129,6 +131,18 @@ impl NominalPose {
             joint.links.end = ends[joint.links.start];
             let moved = of_tips.iter().position(|link| link.is_some_and(|link| joint.links.contains(&link)));
             joint.tip_m = moved.map(|arm| self.tips_m[arm]);
+        }
+    }
+
+    /// Ends the last link of a branch without a tip where it carries a marker, such as the other hand.
+    fn end_branches(&mut self, tree: &Tree, ends: &[Rigid<f64>], part_of: &[(usize, Option<usize>)]) {
+        let parents: BTreeSet<SegmentId> = tree.0.iter().filter_map(|segment| segment.parent).collect();
+        for leaf in (0..tree.0.len()).filter(|id| !parents.contains(id)) {
+            let Some(link) = part_of[leaf].1.map(|link| &mut self.links[link]) else { continue };
+            let to_m = ends[leaf].translation_m;
+            if link.to_m.is_empty() && to_m != link.from_m {
+                link.to_m.push(to_m);
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
 use armcal_core::{FeatureId, Observation, Pose};
 use nalgebra::Matrix6xX;
+use std::collections::BTreeSet;
 
 /// The name of a feature and the way to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +78,20 @@ impl Model {
             None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
             Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
         }
+    }
+
+    /// The joints whose readings move a feature, rising.
+    pub fn joints_to(&self, feature: FeatureId) -> BTreeSet<usize> {
+        let joints = self.route(feature).iter().filter_map(|id| self.tree.0[*id].joint);
+        joints.map(|joint| joint.index).collect()
+    }
+
+    /// Those of them that move another branch too, such as the waist of a torso with two arms.
+    pub fn joints_shared_by(&self, feature: FeatureId) -> BTreeSet<usize> {
+        let own = self.joints_to(feature);
+        let beside = |theirs: &BTreeSet<usize>| !theirs.is_subset(&own) && !own.is_subset(theirs);
+        let others = self.features().map(|(other, _)| self.joints_to(other)).filter(beside);
+        others.flat_map(|theirs| own.intersection(&theirs).copied().collect::<Vec<usize>>()).collect()
     }
 
     /// The names of what can be measured of the arm: its tip, then its markers.
