@@ -70,6 +70,8 @@ pub enum Purpose {
     TransportMarker = 28,
     /// Readings of the markers on the quick path.
     QuickMarker = 29,
+    /// Turns of a torso that carries two arms.
+    Torso = 30,
 }
 
 /// One stream of random numbers.
