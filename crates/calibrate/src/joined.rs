@@ -1,34 +1,40 @@
-//! What joint angles leave open of arms whose tips are joined to each other and to nothing else.
+//! What joint angles leave open of tips that are joined to each other and to nothing else.
 
 use crate::problem::Symmetry;
-use armcal_core::Unit;
+use armcal_core::{Parameter, Unit};
 use armcal_model::Model;
 
-/// All lengths growing by one factor about the base that is fixed: joint angles alone give shapes, not sizes. None for a
-/// single arm.
+/// All lengths growing by one factor about the base that is fixed: joint angles alone give shapes, not sizes.
 pub(crate) fn scale(model: &Model, p: &[f64]) -> Option<Symmetry> {
-    let arms = model.chain().arms();
-    let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
-    let [first, .., last] = names.as_slice() else { return None };
-    let base_m: Vec<_> =
-        (0..arms.len()).map(|arm| model.arm_base_in_world(p, arm).translation.vector).collect();
-    let is_free = |name: &&&str| {
-        let of_base = format!("{name}.base.");
-        model.parameters().iter().any(|p| p.free && p.name.starts_with(&of_base))
+    let bases: Vec<String> = match model.chain().arms() {
+        [] => vec!["base".to_owned()],
+        arms => arms.iter().map(|arm| format!("{}.base", arm.name)).collect(),
     };
-    let fixed = names.iter().position(|name| !is_free(&name)).unwrap_or(0);
-    let grows = |(parameter, value): (&armcal_core::Parameter, &f64)| {
-        let of_base = names.iter().enumerate().find_map(|(arm, name)| {
-            let quantity = parameter.name.strip_prefix(name)?.strip_prefix(".base.")?;
-            let axis = ["x", "y", "z"].iter().position(|axis| *axis == quantity)?;
-            Some((base_m[arm] - base_m[fixed])[axis])
-        });
-        of_base.unwrap_or(if parameter.unit == Unit::Metre { *value } else { 0.0 })
+    let base_m: Vec<_> =
+        (0..bases.len()).map(|arm| model.arm_base_in_world(p, arm).translation.vector).collect();
+    // Which base a parameter is of, and which coordinate of it.
+    let of_base = |p: &Parameter| {
+        let (frame, quantity) = p.name.rsplit_once('.')?;
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == quantity);
+        Some((bases.iter().position(|base| base == frame)?, axis))
+    };
+    let is_free = |base: &usize| {
+        model.parameters().iter().any(|p| p.free && of_base(p).is_some_and(|(of, _)| of == *base))
+    };
+    let fixed = (0..bases.len()).find(|base| !is_free(base)).unwrap_or(0);
+    let grows = |(parameter, value): (&Parameter, &f64)| match of_base(parameter) {
+        Some((base, Some(axis))) => (base_m[base] - base_m[fixed])[axis],
+        None if parameter.unit == Unit::Metre => *value,
+        _ => 0.0,
     };
     let direction = model.parameters().iter().zip(p).map(grows).collect();
+    let of = match model.chain().arms() {
+        [first, .., last] => format!("of {}, of {} and between their bases", first.name, last.name),
+        _ => "of the robot".to_owned(),
+    };
     let text = format!(
-        "scale (every length of {first}, of {last} and between their bases, in proportion): growing together changes no joint \
-         angle, and no length is known; measure one, such as a rigid link between the tips"
+        "scale (every length {of}, in proportion): growing together changes no joint angle, and no length is known; measure \
+         one, such as a rigid link between the tips"
     );
     Some(Symmetry { direction, text })
 }

@@ -1,13 +1,15 @@
-//! Errors by what was measured of the arm: its tip, and each of its markers.
+//! Errors by what was measured of the arm: its tip, each of its markers, and points that are joined.
 
 use crate::run::Run;
+use crate::two_arms::about;
+use armcal_core::Observation;
 use serde::Serialize;
 
-/// Errors of the tip or of one marker, on the side by which the calibration is judged.
+/// Errors of the tip, of one marker or of joined points, on the side by which the calibration is judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MarkerErrors<'a> {
-    /// Its name.
-    pub marker: &'a str,
+    /// Its name; of joined points both.
+    pub marker: String,
     /// The link it is on; none of the tip.
     pub link: Option<&'a str>,
     /// Observations of it.
@@ -20,24 +22,29 @@ pub(crate) struct MarkerErrors<'a> {
     pub floor_mm: f64,
 }
 
-/// The errors of each; nothing of an arm without markers, whose errors are those of its tip.
+/// The errors of each; nothing where all are of one kind: of an arm without markers, of tips that are joined only.
 pub(crate) fn by_marker(run: &Run) -> Vec<MarkerErrors<'_>> {
-    if run.model.markers().next().is_none() {
+    if run.model.markers().next().is_none() || run.observations.iter().all(Observation::is_joined) {
         return Vec::new();
     }
     let link = |id| run.model.markers().find(|(marker, ..)| *marker == id).map(|(_, _, link)| link);
-    let of = |(id, marker)| {
-        let own = || run.calibration.judged_pairs(&run.observations).filter(move |(_, o)| o.feature == id);
+    let of = |marker, link, is_own: &dyn Fn(&Observation) -> bool| {
+        let own = || run.calibration.judged_pairs(&run.observations).filter(|(_, o)| is_own(o));
         let n = own().count();
         let mean_mm = |sum_m: f64| sum_m / n as f64 * 1e3;
         (n > 0).then(|| MarkerErrors {
             marker,
-            link: link(id),
+            link,
             n,
             nominal_mm: mean_mm(own().map(|(r, _)| r.nominal_m.norm()).sum()),
             fitted_mm: mean_mm(own().map(|(r, _)| r.fitted_m.norm()).sum()),
             floor_mm: mean_mm(own().map(|(r, _)| r.expected_norm_m).sum()),
         })
     };
-    run.model.features().filter_map(of).collect()
+    let features = run
+        .model
+        .features()
+        .filter_map(|(id, name)| of(name.to_owned(), link(id), &|o| o.feature == id && !o.is_joined()));
+    let joined = about(run).and_then(|points| of(points, None, &Observation::is_joined));
+    features.chain(joined).collect()
 }

@@ -229,16 +229,16 @@ impl PastModel {
     /// The nominal arm, or arms, in the frames.
     fn geometry(&self, chain: Chain) -> Result<Model, ModelError> {
         let (base, tip) = (self.base.frame(), self.tip.frame());
+        let link =
+            self.link_length_m.map(|length_m| RigidLink { length_m, knowledge: LengthKnowledge::Given });
         if self.more_arms.is_empty() {
             let boards = self.boards.iter().map(FrameFacts::frame).collect();
             let markers = self.markers.iter().map(MarkerFacts::marker).collect();
-            return Model::new(chain, Frames { base, tip, markers, boards });
+            return Model::linked(chain, Frames { base, tip, markers, boards }, link);
         }
         let further =
             self.more_arms.iter().map(|[base, tip]| ArmFrames { base: base.frame(), tip: tip.frame() });
         let arms = std::iter::once(ArmFrames { base, tip }).chain(further).collect();
-        let link =
-            self.link_length_m.map(|length_m| RigidLink { length_m, knowledge: LengthKnowledge::Given });
         Model::of_arms(chain, arms, link)
     }
 
@@ -247,7 +247,8 @@ impl PastModel {
     /// # Errors
     /// Contents that contradict each other, as only a file changed by hand has them.
     pub fn arms(&self) -> Result<PastArms, ModelError> {
-        let geometry = self.geometry(self.chain.chain(Path::new(FILE))?)?;
+        let measured: Vec<&str> = self.markers.iter().map(|marker| marker.link.as_str()).collect();
+        let geometry = self.geometry(self.chain.chain(&measured, Path::new(FILE))?)?;
         let joints = geometry.chain().joint_names();
         let specs = self.effects.iter().map(|e| e.spec(joints)).collect::<Result<Vec<_>, _>>()?;
         let model = geometry.with_effects(&specs, &self.session)?;
@@ -294,15 +295,15 @@ fn attached(path: &Path) -> Result<String, PastRunError> {
 }
 
 impl ChainText {
-    /// The arm, or arms, that the text is of.
-    fn chain(&self, path: &Path) -> Result<Chain, ModelError> {
+    /// The arm, or arms, that the text is of, with the branches to what is measured.
+    fn chain(&self, measured: &[&str], path: &Path) -> Result<Chain, ModelError> {
         match self {
             ChainText::Dh { text } => Chain::from_dh_toml(text, path),
             ChainText::Urdf { text, base_link, tip_link } => {
-                Chain::from_urdf(text, base_link, tip_link, path)
+                Chain::from_urdf_branches(text, base_link, tip_link, measured, path)
             }
             ChainText::Arms { arms } => {
-                let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(path)?)));
+                let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(measured, path)?)));
                 Chain::joined(chains.collect::<Result<Vec<_>, ModelError>>()?)
             }
         }

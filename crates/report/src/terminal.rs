@@ -190,7 +190,7 @@ fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>]) -> String {
     for of in markers {
         let mm = |mm: f64| number(millimetres(mm * 1e-3));
         table.add_row(vec![
-            Cell::new(printable(of.marker)),
+            Cell::new(printable(&of.marker)),
             number(of.n),
             mm(of.nominal_mm),
             mm(of.fitted_mm),

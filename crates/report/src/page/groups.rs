@@ -2,7 +2,9 @@
 
 use super::basis::Basis;
 use crate::run::Run;
+use crate::two_arms::about;
 use armcal_calibrate::{grouped_ci95, independent_groups};
+use armcal_core::Observation;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -35,7 +37,13 @@ pub(crate) fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<
         all.extend(table.group("recording", recording.name.clone(), own));
     }
     for (feature, name) in run.model.features().filter(|_| run.model.markers().next().is_some()) {
-        all.extend(table.group("marker", name.to_owned(), |i| run.observations[i].feature == feature));
+        let is_of = |o: &Observation| o.feature == feature && !o.is_joined();
+        all.extend(table.group("marker", name.to_owned(), |i| is_of(&run.observations[i])));
+    }
+    if run.observations.iter().any(|o| !o.is_joined()) {
+        let joined =
+            about(run).and_then(|points| table.group("marker", points, |i| run.observations[i].is_joined()));
+        all.extend(joined);
     }
     let names = run.model.chain().joint_names();
     for (j, name) in names.iter().enumerate() {

@@ -130,7 +130,7 @@ impl MarkerRow {
     fn of(errors: &MarkerErrors<'_>) -> MarkerRow {
         let mm = |mm: f64| millimetres(mm * 1e-3);
         MarkerRow {
-            marker: errors.marker.to_owned(),
+            marker: errors.marker.clone(),
             link: errors.link.unwrap_or("the last").to_owned(),
             n: errors.n,
             nominal: mm(errors.nominal_mm),
