@@ -106,6 +106,9 @@ mod pool;
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
 
+/// Are the two arms of one torso one robot, and is its waist told only where something sees the hands?
+mod humanoid;
+
 /// Are several markers a pose one pose, and one that came loose found as that?
 mod several_markers;
 

@@ -182,7 +182,7 @@ fn what_two_arms_cannot_show_is_told_in_words() {
     let shipped = root().join("pipelines/two-arms.toml");
     let output = armcal(["pool".as_ref(), shipped.as_os_str(), folder.path().as_os_str()]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("is about two arms"), "{said}");
+    assert!(said.contains("is about joined tips"), "{said}");
 }
 
 #[test]

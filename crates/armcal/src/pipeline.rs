@@ -10,7 +10,7 @@ pub use markers::MarkerSection;
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pool::PoolSection;
-use crate::two_arms::TwoArms;
+use crate::two_arms::{ClosedChainSection, TwoArms};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
@@ -86,8 +86,9 @@ pub struct Pipeline {
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,
-    /// The two arms whose tips are joined, of a pipeline with a `[closed_chain]`; `streams` and `model` are those of the first
-    /// then.
+    /// Two points of the robot that are joined to each other.
+    pub closed_chain: Option<ClosedChainSection>,
+    /// The two arms whose tips are joined, of a pipeline with `[[arms]]`; `model` is that of the first then.
     #[serde(skip)]
     pub two_arms: Option<TwoArms>,
     /// Folder of the pipeline file.
@@ -328,7 +329,7 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
 
 /// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
 fn is_of_two_arms(text: &str) -> bool {
-    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("closed_chain"))
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms"))
 }
 
 impl Pipeline {
@@ -407,9 +408,11 @@ impl Pipeline {
     /// # Errors
     /// Two arms, with why.
     pub fn one_arm(&self, needs: &str) -> Result<(), Error> {
-        match &self.two_arms {
+        match &self.closed_chain {
             None => Ok(()),
-            Some(_) => Err(Error::TwoArms { problem: format!("`{}` is about two arms; {needs}", self.name) }),
+            Some(_) => {
+                Err(Error::TwoArms { problem: format!("`{}` is about joined tips; {needs}", self.name) })
+            }
         }
     }
 
@@ -464,10 +467,13 @@ impl Pipeline {
             return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
         }
         let tracked = self.streams.tip.is_some() || !self.markers.is_empty();
-        if self.two_arms.is_none() && self.table.is_none() && !tracked {
+        if self.closed_chain.is_none() && self.table.is_none() && !tracked {
             return fail("table", "is absent and so is [streams.tip]: nothing says where the tip was".into());
         }
         markers::check(self, &fail)?;
+        if let Some((key, said)) = self.closed_chain.as_ref().and_then(|chain| chain.contradiction(self)) {
+            return fail(key, said);
+        }
         if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
             return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }

@@ -163,8 +163,8 @@ fn without_setup(source: Error, inputs: &Inputs) -> Error {
 /// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
 pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
     let Inputs { pipeline, chain, board, seen, changes, .. } = inputs;
-    if let Some(two) = &pipeline.two_arms {
-        return two_arms::fit::fit_joined(inputs, two, told);
+    if let Some(closure) = &pipeline.closed_chain {
+        return two_arms::fit::fit_joined(inputs, closure, told);
     }
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;

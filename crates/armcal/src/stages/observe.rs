@@ -76,19 +76,17 @@ pub fn observations(
                 (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
                 (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
             };
-            let of = |feature, (reference, covariance_m2): Referenced| Observation {
-                feature,
-                ..observation(dwell, seen.load_kg, reference, covariance_m2)
-            };
             let markers = markers_of(pipeline, dwell);
             let seen_of_it = !markers.is_empty();
             match outcome {
-                Ok(tip) => observed.observations.push(of(FeatureId::TIP, tip)),
+                Ok(tip) => observed.observations.push(of_feature(seen, dwell, FeatureId::TIP, tip)),
                 // Of a dwell without its tip, the markers are left.
                 Err(_) if seen_of_it => {}
                 Err(why) => observed.rejections.push(Rejection { dwell: dwell.id, why }),
             }
-            observed.observations.extend(markers.into_iter().map(|(feature, marker)| of(feature, marker)));
+            observed.observations.extend(
+                markers.into_iter().map(|(feature, marker)| of_feature(seen, dwell, feature, marker)),
+            );
         }
     }
     if observed.observations.is_empty() {
@@ -105,6 +103,25 @@ pub fn observations(
         return Err(Error::NoObservations { dwells, hint: hint + few });
     }
     Ok(observed)
+}
+
+/// What the sensor saw of tip and markers in any dwell.
+pub fn seen_by_sensor(pipeline: &Pipeline, seen: &[Seen]) -> Vec<Observation> {
+    let of_dwell = |(seen, dwell): (&Seen, &Dwell)| -> Vec<Observation> {
+        let tip = tracked(pipeline, dwell).ok().map(|tip| (FeatureId::TIP, tip));
+        let all = tip.into_iter().chain(markers_of(pipeline, dwell));
+        all.map(|(feature, at)| of_feature(seen, dwell, feature, at)).collect()
+    };
+    seen.iter().flat_map(|s| s.dwells.iter().map(move |dwell| (s, dwell))).flat_map(of_dwell).collect()
+}
+
+fn of_feature(
+    seen: &Seen,
+    dwell: &Dwell,
+    feature: FeatureId,
+    (reference, covariance_m2): Referenced,
+) -> Observation {
+    Observation { feature, ..observation(dwell, seen.load_kg, reference, covariance_m2) }
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.

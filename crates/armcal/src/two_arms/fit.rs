@@ -1,7 +1,7 @@
 //! From dwells of both arms to a calibration: which dwells are joined -> where the other base is -> fit.
 
-use super::joined::check_moves;
-use super::pipeline::{ClosureKind, TwoArms};
+use super::ClosedChainSection;
+use super::closure::ClosureKind;
 use crate::error::Error;
 use crate::setup::Inputs;
 use crate::stages::{frames, observe};
@@ -27,39 +27,52 @@ const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// the arms, they close.
 const LEAST_SPREAD: f64 = 0.03;
 
-/// Calibrates both arms on the dwells in which their tips are joined.
+/// Calibrates on the dwells in which the tips are joined, and on what a sensor saw in any.
 ///
 /// # Errors
 /// An arm that never moves, too few dwells that are joined, a calibration that cannot be made.
-pub fn fit_joined(inputs: &Inputs, arms: &TwoArms, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
+pub fn fit_joined(
+    inputs: &Inputs,
+    closure: &ClosedChainSection,
+    told: &mut dyn FnMut(usize),
+) -> Result<Fitted, Error> {
     let Inputs { pipeline, chain, seen, changes, .. } = inputs;
     let mut geometry = frames::nominal_model(pipeline, chain, None, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
-    let search = Search { inputs, arms, all: observations(inputs, arms) };
+    let joins = closure.joins(&geometry);
+    let seen = observe::seen_by_sensor(pipeline, seen);
+    let search = Search { inputs, closure, joins, all: joined(inputs, closure, joins), seen };
     search.check_both_move(&geometry, &search.all)?;
     let near = search.near(&mut geometry)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let model = match effects.is_empty() {
         true => geometry.clone(),
-        false => geometry.with_effects(&effects, &frames::session(pipeline, &search.chosen(&near)))?,
+        false => geometry.with_effects(&effects, &frames::session(pipeline, &search.with_seen(&near)))?,
     };
     search.settled(geometry, model, near, told)
 }
 
-/// Every dwell, as if its tips were joined: the tip of the second arm is the reference for that of the first.
-fn observations(inputs: &Inputs, arms: &TwoArms) -> Vec<Observation> {
-    let apart = arms.closure.kind == ClosureKind::RigidLink;
-    let covariance_m2 = Matrix3::identity() * (arms.closure.sigma_mm * 1e-3).powi(2);
-    let to = FeatureId(1);
-    let joined = |dwell| observe::observation(dwell, 0.0, Reference::Joined { to, apart }, covariance_m2);
-    inputs.seen.iter().flat_map(|seen| &seen.dwells).map(joined).collect()
+/// Every dwell, as if its tips were joined: the second is the reference for the first.
+fn joined(inputs: &Inputs, closure: &ClosedChainSection, [feature, to]: [FeatureId; 2]) -> Vec<Observation> {
+    let apart = closure.kind == ClosureKind::RigidLink;
+    let covariance_m2 = Matrix3::identity() * (closure.sigma_mm * 1e-3).powi(2);
+    let joined = |(dwell, load_kg)| Observation {
+        feature,
+        ..observe::observation(dwell, load_kg, Reference::Joined { to, apart }, covariance_m2)
+    };
+    let dwells = inputs.seen.iter().flat_map(|seen| seen.dwells.iter().map(|dwell| (dwell, seen.load_kg)));
+    dwells.map(joined).collect()
 }
 
-/// The dwells of both arms, of which some are joined.
+/// The dwells, in some of which the tips are joined.
 struct Search<'a> {
     inputs: &'a Inputs,
-    arms: &'a TwoArms,
+    closure: &'a ClosedChainSection,
+    /// The two points.
+    joins: [FeatureId; 2],
     all: Vec<Observation>,
+    /// What a sensor saw beside.
+    seen: Vec<Observation>,
 }
 
 impl Search<'_> {
@@ -69,11 +82,11 @@ impl Search<'_> {
         let (fit, limit_m) = (&self.inputs.pipeline.fit, self.limit_m());
         let mut near = vec![true; self.all.len()];
         for _ in 0..MAX_ROUNDS {
-            let joined = self.chosen(&near);
-            self.enough(&joined)?;
-            place_bases(geometry, &align_frames(geometry, &joined, fit)?);
+            self.enough(&self.chosen(&near))?;
+            let known = self.with_seen(&near);
+            place_bases(geometry, &align_frames(geometry, &known, fit)?);
             // A link's length must not pull the base: the frames alone are fitted before a dwell is judged.
-            let start = fit_frames(geometry, &joined, fit)?;
+            let start = fit_frames(geometry, &known, fit)?;
             let again: Vec<bool> =
                 self.all.iter().map(|o| closing_error_m(geometry, &start, o) <= limit_m).collect();
             if again == near {
@@ -84,7 +97,7 @@ impl Search<'_> {
         let joined = self.chosen(&near);
         self.enough(&joined)?;
         self.check_both_move(geometry, &joined)?;
-        check_spread(geometry, &joined)?;
+        self.check_spread(geometry, &joined)?;
         Ok(near)
     }
 
@@ -102,10 +115,10 @@ impl Search<'_> {
         loop {
             rounds += 1;
             told(rounds);
-            let joined = self.chosen(&is_joined);
-            self.enough(&joined)?;
+            self.enough(&self.chosen(&is_joined))?;
+            let known = self.with_seen(&is_joined);
             // Only the last fit is judged; those on the way to it need no hold-out.
-            let search = calibrate(&model, &joined, &pipeline.fit, &HoldoutConfig::None)?;
+            let search = calibrate(&model, &known, &pipeline.fit, &HoldoutConfig::None)?;
             let (p, scale) = (search.fit.values(), search.fit.sigma_scale.max(1.0));
             let expected_m =
                 |o: &Observation| expected_norm_m(&position_covariance_m2(&model, &p, o)) * scale;
@@ -124,17 +137,19 @@ impl Search<'_> {
                     closing_error_m(&model, &p, o) * 1e3,
                     expected_m(o) * 1e3
                 );
-                (!joined).then_some(Rejection { dwell: o.dwell, why })
+                let is_seen = self.seen.iter().any(|seen| seen.dwell == o.dwell);
+                // A dwell that a sensor saw is used all the same.
+                (!joined && !is_seen).then_some(Rejection { dwell: o.dwell, why })
             };
             let rejections = self.all.iter().zip(&is_joined).filter_map(open).collect();
-            let calibration = calibrate(&model, &joined, &pipeline.fit, &pipeline.holdout)?;
+            let calibration = calibrate(&model, &known, &pipeline.fit, &pipeline.holdout)?;
             let places = vec![None; self.inputs.seen.len()];
             // What is looked at here has settled, whatever the rounds.
             let rounds = 1;
             return Ok(Fitted {
                 geometry,
                 model,
-                observations: joined,
+                observations: known,
                 calibration,
                 places,
                 rejections,
@@ -144,23 +159,82 @@ impl Search<'_> {
     }
 
     fn limit_m(&self) -> f64 {
-        self.arms.closure.max_gap_mm * 1e-3
+        self.closure.max_gap_mm * 1e-3
     }
 
     fn chosen(&self, which: &[bool]) -> Vec<Observation> {
         self.all.iter().zip(which).filter(|(_, chosen)| **chosen).map(|(o, _)| o.clone()).collect()
     }
 
+    /// The chosen dwells with what a sensor saw, dwell by dwell.
+    fn with_seen(&self, which: &[bool]) -> Vec<Observation> {
+        let mut all = self.chosen(which);
+        all.extend(self.seen.iter().cloned());
+        all.sort_by_key(|o| o.dwell);
+        all
+    }
+
+    /// What is at one of the points: an arm, or a branch.
+    fn name(&self, geometry: &Model, end: usize) -> String {
+        let arm = geometry.chain().arms().get(end).map(|arm| format!("the {} arm", arm.name));
+        arm.unwrap_or_else(|| format!("what carries {}", geometry.feature_name(self.joins[end])))
+    }
+
+    /// Refuses joints at one end that are held in one pose throughout: nothing can be learnt of them.
     fn check_both_move(&self, geometry: &Model, dwells: &[Observation]) -> Result<(), Error> {
-        let of = |joints: std::ops::Range<usize>| dwells.iter().map(move |o| &o.joint_rad[joints.clone()]);
-        let mut arms = geometry.chain().arms().iter();
-        arms.try_for_each(|arm| check_moves(&arm.name, of(arm.joints.clone()), LEAST_MOTION_RAD))
+        for end in 0..2 {
+            let [own, other] = [end, 1 - end].map(|k| geometry.joints_to(self.joins[k]));
+            let range = |joint: &usize| {
+                let of = dwells.iter().map(|o| o.joint_rad[*joint]);
+                of.clone().fold(f64::NEG_INFINITY, f64::max) - of.fold(f64::INFINITY, f64::min)
+            };
+            let own = own.iter().filter(|joint| !other.contains(joint));
+            let widest_rad = own.map(range).fold(0.0, f64::max);
+            if dwells.len() < 2 || widest_rad >= LEAST_MOTION_RAD {
+                continue;
+            }
+            let problem = format!(
+                "{} never moves: over {} dwells none of its joints changes by more than {:.3} deg; lead both through many poses, \
+                 or check its topic and joint names",
+                self.name(geometry, end),
+                dwells.len(),
+                widest_rad.to_degrees()
+            );
+            return Err(Error::TwoArms { problem });
+        }
+        Ok(())
+    }
+
+    /// Refuses tips that hardly move: readings in another unit close as well as any.
+    fn check_spread(&self, geometry: &Model, joined: &[Observation]) -> Result<(), Error> {
+        let p = geometry.nominal();
+        for end in 0..2 {
+            let tip_m = |o: &Observation| {
+                geometry.feature_in_base(&p, self.joins[end], &o.joint_rad).translation.vector
+            };
+            let tips_m: Vec<Vector3<f64>> = joined.iter().map(tip_m).collect();
+            let mean_m = tips_m.iter().sum::<Vector3<f64>>() / tips_m.len() as f64;
+            let square =
+                tips_m.iter().map(|m| (m - mean_m).norm_squared()).sum::<f64>() / tips_m.len() as f64;
+            let reach_m = tips_m.iter().map(|m| m.norm()).fold(0.0, f64::max);
+            if square.sqrt() < LEAST_SPREAD * reach_m {
+                let problem = format!(
+                    "the tip of {} is within {:.1} mm of one point in all joined dwells, {:.0} mm from its base: lead both through \
+                     poses that differ more, or check the unit of its readings",
+                    self.name(geometry, end),
+                    square.sqrt() * 1e3,
+                    reach_m * 1e3
+                );
+                return Err(Error::TwoArms { problem });
+            }
+        }
+        Ok(())
     }
 
     /// Three points place a base, six distances do; twice as many also show which dwells do not belong. A pose held twice
     /// counts once.
     fn enough(&self, joined: &[Observation]) -> Result<(), Error> {
-        let least = match self.arms.closure.kind {
+        let least = match self.closure.kind {
             ClosureKind::SamePoint => 6,
             ClosureKind::RigidLink => 12,
         };
@@ -171,37 +245,14 @@ impl Search<'_> {
         let problem = format!(
             "{} of {} dwells of both arms have their tips within {:.0} mm of closing, in {poses} different poses; {least} are \
              the least that place one arm against the other and show which dwells do not belong: record more poses with the \
-             tips joined, or check joint names, signs and units, arms.base, closed_chain.length_mm and closed_chain.max_gap_mm",
+             tips joined, or check joint names, signs and units, {}closed_chain.length_mm and closed_chain.max_gap_mm",
             joined.len(),
             self.all.len(),
-            self.limit_m() * 1e3
+            self.limit_m() * 1e3,
+            if self.inputs.pipeline.two_arms.is_some() { "arms.base, " } else { "" },
         );
         Err(Error::TwoArms { problem })
     }
-}
-
-/// Refuses arms whose tips hardly move: readings in another unit close as well as any.
-fn check_spread(geometry: &Model, joined: &[Observation]) -> Result<(), Error> {
-    let p = geometry.nominal();
-    for (at, arm) in geometry.chain().arms().iter().enumerate() {
-        let tip_m =
-            |o: &Observation| geometry.feature_in_base(&p, FeatureId(at), &o.joint_rad).translation.vector;
-        let tips_m: Vec<Vector3<f64>> = joined.iter().map(tip_m).collect();
-        let mean_m = tips_m.iter().sum::<Vector3<f64>>() / tips_m.len() as f64;
-        let square = tips_m.iter().map(|m| (m - mean_m).norm_squared()).sum::<f64>() / tips_m.len() as f64;
-        let reach_m = tips_m.iter().map(|m| m.norm()).fold(0.0, f64::max);
-        if square.sqrt() < LEAST_SPREAD * reach_m {
-            let problem = format!(
-                "the tip of the {} arm is within {:.1} mm of one point in all joined dwells, {:.0} mm from its base: lead both arms \
-                 through poses that differ more, or check the unit of its readings",
-                arm.name,
-                square.sqrt() * 1e3,
-                reach_m * 1e3
-            );
-            return Err(Error::TwoArms { problem });
-        }
-    }
-    Ok(())
 }
 
 /// How far the joined tips are from where each arm puts the other [m].

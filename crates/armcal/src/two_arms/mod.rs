@@ -1,11 +1,12 @@
-//! Two arms in one recording, their tips joined: each calibrates the other, without a camera.
+//! Two tips in one recording that are joined: each calibrates the other, without a camera.
 //!
-//! [`pipeline`] is what a user writes (recognised by its `[closed_chain]`), [`joined`] reads the two joint streams as one,
-//! [`fit`] finds the dwells in which the tips are joined and calibrates on them. Everything else is as with one arm: the model
-//! is one, with both arms in it.
+//! [`closure`] is what a user writes of that. The tips are those of two arms with a model file each ([`pipeline`], recognised by
+//! its `[[arms]]`), or two points of one robot, such as the hands of a torso with two arms. [`fit`] finds the dwells in which they
+//! are joined and calibrates on them. Everything else is as with one arm: the model is one, with all joints in it.
 
+pub mod closure;
 pub mod fit;
-pub mod joined;
 pub mod pipeline;
 
+pub use closure::ClosedChainSection;
 pub use pipeline::TwoArms;
