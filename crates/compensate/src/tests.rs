@@ -73,5 +73,6 @@ fn compensator<'a>(nominal: &'a Model, (model, values): (&'a Model, &[f64])) -> 
 }
 
 fn unloaded() -> Conditions {
-    Conditions { recording: 0, dwell: 0, time_ns: 0, load_kg: 0.0, temperature_c: None }
+    let feature = armcal_core::FeatureId::TIP;
+    Conditions { feature, recording: 0, dwell: 0, time_ns: 0, load_kg: 0.0, temperature_c: None }
 }

@@ -72,8 +72,8 @@ impl Chain {
         &self.parameters
     }
 
-    /// The number of bases that it needs: one an arm.
-    pub(crate) fn bases(&self) -> usize {
+    /// The number of bases that it needs: one an arm with a file of its own.
+    pub fn bases(&self) -> usize {
         self.arms().len().max(1)
     }
 

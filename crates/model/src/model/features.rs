@@ -7,6 +7,7 @@ use crate::twist::Twist;
 use armcal_core::{FeatureId, Observation, Pose};
 use nalgebra::Matrix6xX;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// The name of a feature and the way to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,9 +147,9 @@ impl Model {
         jacobian
     }
 
-    /// Index of the first parameter of a feature's place on its link.
-    pub(crate) fn first_of_feature(&self, feature: FeatureId) -> usize {
-        self.route(feature).last().map_or(0, |end| self.tree.0[*end].parameters.start)
+    /// Indices of the parameters of a feature's place on its link.
+    pub fn feature_parameters(&self, feature: FeatureId) -> Range<usize> {
+        self.route(feature).last().map_or(0..0, |end| self.tree.0[*end].parameters.clone())
     }
 
     /// The segments from the world to a feature.
