@@ -46,13 +46,34 @@ pub(crate) fn about(run: &Run) -> Option<String> {
     })
 }
 
+/// How much of some observations is of joined tips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Closing {
+    /// Nothing.
+    None,
+    /// Some, beside what a sensor saw.
+    Some,
+    /// All.
+    All,
+}
+
+impl Closing {
+    /// Of these.
+    pub fn of(observations: &[Observation]) -> Closing {
+        match observations.iter().filter(|o| o.is_joined()).count() {
+            0 => Closing::None,
+            all if all == observations.len() => Closing::All,
+            _ => Closing::Some,
+        }
+    }
+}
+
 /// What an error is.
 pub(crate) fn errors_are(run: &Run) -> &'static str {
-    let joined = run.observations.iter().filter(|o| o.is_joined()).count();
-    match joined {
-        0 => "Position errors",
-        all if all == run.observations.len() => "Closing errors",
-        _ => "Position and closing errors",
+    match Closing::of(&run.observations) {
+        Closing::None => "Position errors",
+        Closing::Some => "Position and closing errors",
+        Closing::All => "Closing errors",
     }
 }
 

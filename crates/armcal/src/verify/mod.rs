@@ -14,9 +14,10 @@ use crate::progress::Progress;
 use crate::stages::past::{Placed, place};
 use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe, perceive};
+use crate::two_arms::fit::Search;
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
-use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
+use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -71,6 +72,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
         recordings,
         told,
         recognises_copies: past.recordings.iter().all(|r| r.dwells.is_some()),
+        closing: Closing::of(&observations),
         points: armcal_verify::points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
         paths: rows(motions, &names),
@@ -135,6 +137,11 @@ impl Surroundings<'_> {
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
+        if let Some(closure) = &self.pipeline.closed_chain {
+            let search = Search::of(self.pipeline, closure, &placed.model, self.seen);
+            let (observations, said) = search.judged(&mut placed)?;
+            return Ok((placed, observations, said));
+        }
         let mut places = self.associate(&placed, false)?;
         if self.pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated) {
             frames::start_frames(self.pipeline, &mut model, &places);

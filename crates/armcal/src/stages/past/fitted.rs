@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use armcal_calibrate::fit_frames_from;
 use armcal_core::{Observation, Parameter, Role, Severity, Stage, Warning};
-use armcal_model::Model;
+use armcal_model::{Model, RigidLink};
 use armcal_report::TipMount;
 
 impl Placed {
@@ -19,7 +19,9 @@ impl Placed {
         let (model, fit) = (&self.model, &pipeline.fit);
         let kept = pipeline.verify.tip == TipMount::Kept;
         let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        let fitted = |p: &Parameter| estimated(p) && !(kept && p.name.starts_with("tip."));
+        let of_tip =
+            |name: &str| name.starts_with("tip.") || name.contains(".tip.") || name == RigidLink::LENGTH;
+        let fitted = |p: &Parameter| estimated(p) && !(kept && of_tip(&p.name));
         let mut said = Vec::new();
         if model.parameters().iter().any(fitted) {
             self.nominal = fit_frames_from(model, observations, self.nominal.clone(), fit, &fitted)?;
