@@ -106,6 +106,9 @@ mod pool;
 /// Do two arms with joined tips calibrate each other from one recording, and is what they cannot know told?
 mod two_arms;
 
+/// What do verify, compensate and pool say of two arms with joined tips?
+mod joined_tips;
+
 /// Are the two arms of one torso one robot, and is its waist told only where something sees the hands?
 mod humanoid;
 

@@ -193,8 +193,8 @@ pub enum Error {
         /// Why.
         source: armcal_table::TableError,
     },
-    /// Two arms that cannot be calibrated against each other.
-    #[error("two arms: {problem}")]
+    /// Joined tips that cannot be calibrated against each other.
+    #[error("joined tips: {problem}")]
     TwoArms {
         /// What was seen, and what to do.
         problem: String,

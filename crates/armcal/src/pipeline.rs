@@ -403,19 +403,6 @@ impl Pipeline {
         names.into_iter().zip(self.models()).map(|(name, model)| (name, model.urdf.is_some())).collect()
     }
 
-    /// Refuses a pipeline of two arms for a command that needs more than their joined tips.
-    ///
-    /// # Errors
-    /// Two arms, with why.
-    pub fn one_arm(&self, needs: &str) -> Result<(), Error> {
-        match &self.closed_chain {
-            None => Ok(()),
-            Some(_) => {
-                Err(Error::TwoArms { problem: format!("`{}` is about joined tips; {needs}", self.name) })
-            }
-        }
-    }
-
     /// A path of the pipeline file, resolved against its folder; a URL stays as it is.
     pub fn resolve(&self, path: &Path) -> PathBuf {
         armcal_recording::resolve(&self.folder, path)

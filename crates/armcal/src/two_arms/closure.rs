@@ -2,9 +2,11 @@
 
 use crate::pipeline::{FramePose, Pipeline};
 use armcal_calibrate::HoldoutConfig;
-use armcal_core::FeatureId;
+use armcal_core::{FeatureId, Reference};
 use armcal_model::{LengthKnowledge, Model, RigidLink};
+use armcal_report::PastObservations;
 use serde::Deserialize;
+use std::collections::BTreeSet;
 
 /// How two tips are joined.
 #[derive(Debug, Clone, Deserialize)]
@@ -55,6 +57,25 @@ impl ClosedChainSection {
             model.features().find(|(_, own)| own == name).map_or(FeatureId::TIP, |(feature, _)| feature)
         };
         self.between.as_ref().map_or([FeatureId::TIP, FeatureId(1)], |names| names.each_ref().map(of))
+    }
+
+    /// Why observations of a result cannot be pooled under this.
+    pub fn differs(closure: Option<&ClosedChainSection>, past: &PastObservations) -> Option<String> {
+        let all = past.recordings.iter().flat_map(|recording| &recording.observations);
+        let joined = all.filter_map(|o| match o.reference {
+            Reference::Joined { apart, .. } => Some(apart),
+            _ => None,
+        });
+        let said: BTreeSet<bool> = joined.collect();
+        match (said.first(), closure) {
+            (None, None) => None,
+            (Some(_), None) => Some("its tips are joined and the pipeline has no [closed_chain]".into()),
+            (None, Some(_)) => {
+                Some("none of its tips are joined and the pipeline has a [closed_chain]".into())
+            }
+            (Some(apart), Some(closure)) => (*apart != (closure.kind == ClosureKind::RigidLink))
+                .then(|| "its tips are joined in another way (closed_chain.kind)".into()),
+        }
     }
 
     /// The rigid link between the tips, where that is what joins them.

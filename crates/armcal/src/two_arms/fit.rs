@@ -3,13 +3,16 @@
 use super::ClosedChainSection;
 use super::closure::ClosureKind;
 use crate::error::Error;
+use crate::pipeline::Pipeline;
 use crate::setup::Inputs;
+use crate::stages::past::Placed;
+use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe};
 use crate::story::Fitted;
 use armcal_calibrate::{
     HoldoutConfig, align_frames, calibrate, expected_norm_m, fit_frames, position_covariance_m2,
 };
-use armcal_core::{FeatureId, Observation, Parameter, Reference, Rejection, Role};
+use armcal_core::{FeatureId, Observation, Reference, Rejection, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::{Matrix3, Vector3};
 
@@ -30,18 +33,22 @@ const LEAST_SPREAD: f64 = 0.03;
 /// Calibrates on the dwells in which the tips are joined, and on what a sensor saw in any.
 ///
 /// # Errors
-/// An arm that never moves, too few dwells that are joined, a calibration that cannot be made.
+/// An arm that never moves, too few dwells that are joined, a calibration that cannot be made, parameters that each recording is
+/// to have for itself.
 pub fn fit_joined(
     inputs: &Inputs,
     closure: &ClosedChainSection,
     told: &mut dyn FnMut(usize),
 ) -> Result<Fitted, Error> {
     let Inputs { pipeline, chain, seen, changes, .. } = inputs;
+    if seen.len() > 1 && !pipeline.pool.per_recording.is_empty() {
+        let problem = "which dwells are joined is found with one base for all recordings, so that [pool] per_recording is for \
+                       `armcal pool`: run each recording by itself, and pool the results";
+        return Err(Error::TwoArms { problem: problem.to_owned() });
+    }
     let mut geometry = frames::nominal_model(pipeline, chain, None, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
-    let joins = closure.joins(&geometry);
-    let seen = observe::seen_by_sensor(pipeline, seen);
-    let search = Search { inputs, closure, joins, all: joined(inputs, closure, joins), seen };
+    let search = Search::of(pipeline, closure, &geometry, seen);
     search.check_both_move(&geometry, &search.all)?;
     let near = search.near(&mut geometry)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
@@ -53,20 +60,20 @@ pub fn fit_joined(
 }
 
 /// Every dwell, as if its tips were joined: the second is the reference for the first.
-fn joined(inputs: &Inputs, closure: &ClosedChainSection, [feature, to]: [FeatureId; 2]) -> Vec<Observation> {
+fn joined(seen: &[Seen], closure: &ClosedChainSection, [feature, to]: [FeatureId; 2]) -> Vec<Observation> {
     let apart = closure.kind == ClosureKind::RigidLink;
     let covariance_m2 = Matrix3::identity() * (closure.sigma_mm * 1e-3).powi(2);
     let joined = |(dwell, load_kg)| Observation {
         feature,
         ..observe::observation(dwell, load_kg, Reference::Joined { to, apart }, covariance_m2)
     };
-    let dwells = inputs.seen.iter().flat_map(|seen| seen.dwells.iter().map(|dwell| (dwell, seen.load_kg)));
+    let dwells = seen.iter().flat_map(|seen| seen.dwells.iter().map(|dwell| (dwell, seen.load_kg)));
     dwells.map(joined).collect()
 }
 
 /// The dwells, in some of which the tips are joined.
-struct Search<'a> {
-    inputs: &'a Inputs,
+pub struct Search<'a> {
+    pipeline: &'a Pipeline,
     closure: &'a ClosedChainSection,
     /// The two points.
     joins: [FeatureId; 2],
@@ -75,11 +82,68 @@ struct Search<'a> {
     seen: Vec<Observation>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// Of all dwells.
+    pub fn of(
+        pipeline: &'a Pipeline,
+        closure: &'a ClosedChainSection,
+        model: &Model,
+        seen: &[Seen],
+    ) -> Search<'a> {
+        let joins = closure.joins(model);
+        let all = joined(seen, closure, joins);
+        Search { pipeline, closure, joins, all, seen: observe::seen_by_sensor(pipeline, seen) }
+    }
+
+    /// The dwells that a calibrated model shows to be joined, with what a sensor saw; frames that nobody knows are fitted to them.
+    /// And what was fitted, and left out.
+    pub fn judged(&self, placed: &mut Placed) -> Result<(Vec<Observation>, Vec<Warning>), Error> {
+        let (mut is_joined, mut said) = (vec![true; self.all.len()], Vec::new());
+        for round in 0..MAX_ROUNDS {
+            self.enough(&self.chosen(&is_joined))?;
+            said = placed.fit_frames(self.pipeline, &self.with_seen(&is_joined))?;
+            let (model, p) = (&placed.model, &placed.calibrated);
+            let closes = |o: &Observation| match round {
+                // Open dwells may still pull the frames.
+                0 => closing_error_m(model, p, o) <= self.limit_m(),
+                _ => self.closes(model, p, 1.0, o),
+            };
+            let again: Vec<bool> = self.all.iter().map(closes).collect();
+            let settled = round > 0 && again == is_joined;
+            is_joined = again;
+            if settled {
+                break;
+            }
+        }
+        said.extend(self.told_open(placed, &is_joined));
+        Ok((self.with_seen(&is_joined), said))
+    }
+
+    /// How many dwells are not judged, and why.
+    fn told_open(&self, placed: &Placed, is_joined: &[bool]) -> Option<Warning> {
+        let open = self.all.iter().zip(is_joined).filter(|(_, joined)| !**joined);
+        let apart_m: Vec<f64> =
+            open.map(|(o, _)| closing_error_m(&placed.model, &placed.calibrated, o)).collect();
+        let least_m = apart_m.iter().copied().reduce(f64::min)?;
+        let message = format!(
+            "{} of {} dwells are not judged as joined: by the calibrated model their tips are {:.1} mm from closing or more",
+            apart_m.len(),
+            self.all.len(),
+            least_m * 1e3
+        );
+        Some(Warning::new(Severity::Notice, Stage::Calibrate, "tips-open", "closed_chain", message))
+    }
+
+    /// Whether a calibrated model brings the tips together, as far as noise and a joint's play let it.
+    fn closes(&self, model: &Model, p: &[f64], scale: f64, o: &Observation) -> bool {
+        let noise_m = expected_norm_m(&position_covariance_m2(model, p, o)) * scale;
+        closing_error_m(model, p, o) <= (OPEN_SHARE * self.limit_m()).max(OPEN_FACTOR * noise_m)
+    }
+
     /// Places the base that nobody knows, and finds the dwells that the nominal arms may have closed: both together, because
     /// an open dwell would pull the base away.
     fn near(&self, geometry: &mut Model) -> Result<Vec<bool>, Error> {
-        let (fit, limit_m) = (&self.inputs.pipeline.fit, self.limit_m());
+        let (fit, limit_m) = (&self.pipeline.fit, self.limit_m());
         let mut near = vec![true; self.all.len()];
         for _ in 0..MAX_ROUNDS {
             self.enough(&self.chosen(&near))?;
@@ -109,7 +173,7 @@ impl Search<'_> {
         near: Vec<bool>,
         told: &mut dyn FnMut(usize),
     ) -> Result<Fitted, Error> {
-        let pipeline = &self.inputs.pipeline;
+        let pipeline = self.pipeline;
         let mut is_joined = near.clone();
         let mut rounds = 0;
         loop {
@@ -122,10 +186,7 @@ impl Search<'_> {
             let (p, scale) = (search.fit.values(), search.fit.sigma_scale.max(1.0));
             let expected_m =
                 |o: &Observation| expected_norm_m(&position_covariance_m2(&model, &p, o)) * scale;
-            let allowed_m = OPEN_SHARE * self.limit_m();
-            let closes = |o: &Observation| {
-                closing_error_m(&model, &p, o) <= allowed_m.max(OPEN_FACTOR * expected_m(o))
-            };
+            let closes = |o: &Observation| self.closes(&model, &p, scale, o);
             let again: Vec<bool> = self.all.iter().zip(&near).map(|(o, near)| *near && closes(o)).collect();
             if again != is_joined && rounds < MAX_ROUNDS {
                 is_joined = again;
@@ -143,7 +204,7 @@ impl Search<'_> {
             };
             let rejections = self.all.iter().zip(&is_joined).filter_map(open).collect();
             let calibration = calibrate(&model, &known, &pipeline.fit, &pipeline.holdout)?;
-            let places = vec![None; self.inputs.seen.len()];
+            let places = vec![None; pipeline.recordings.len()];
             // What is looked at here has settled, whatever the rounds.
             let rounds = 1;
             return Ok(Fitted {
@@ -249,7 +310,7 @@ impl Search<'_> {
             joined.len(),
             self.all.len(),
             self.limit_m() * 1e3,
-            if self.inputs.pipeline.two_arms.is_some() { "arms.base, " } else { "" },
+            if self.pipeline.two_arms.is_some() { "arms.base, " } else { "" },
         );
         Err(Error::TwoArms { problem })
     }
@@ -261,12 +322,10 @@ fn closing_error_m(model: &Model, p: &[f64], o: &Observation) -> f64 {
 }
 
 /// Lets every estimated base start where it was aligned.
-fn place_bases(geometry: &mut Model, aligned: &[f64]) {
-    let names: Vec<String> =
-        geometry.chain().arms().iter().map(|arm| format!("{}.base.", arm.name)).collect();
-    for (arm, name) in names.iter().enumerate() {
-        let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && p.name.starts_with(name);
-        if geometry.parameters().iter().any(estimated) {
+pub fn place_bases(geometry: &mut Model, aligned: &[f64]) {
+    for arm in 0..geometry.chain().bases() {
+        let own = &geometry.parameters()[geometry.base_parameters(arm)];
+        if own.iter().any(|p| p.free && p.role == Role::EstimatedFrame) {
             let base = geometry.arm_base_in_world(aligned, arm);
             geometry.set_arm_base_start(arm, base);
         }

@@ -6,13 +6,14 @@ use crate::error::Error;
 use crate::pipeline::{
     FrameSection, ModelSection, ParameterOverride, Pipeline, RecordingEntry, recording_name,
 };
+use crate::pool::PoolSection;
 use crate::stages::frames::{frame, override_parameters};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::DwellConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Model, RigidLink};
 use armcal_recording::{JointStream, Streams};
-use armcal_report::OutputConfig;
+use armcal_report::{OutputConfig, VerifyConfig};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +48,11 @@ struct File {
     #[serde(default)]
     holdout: HoldoutConfig,
     #[serde(default)]
+    pool: PoolSection,
+    #[serde(default)]
     diagnosis: DiagnosisConfig,
+    #[serde(default)]
+    verify: VerifyConfig,
     #[serde(default)]
     check: CheckSection,
     #[serde(default)]
@@ -130,9 +135,9 @@ impl TwoArms {
             observations: Default::default(),
             fit: file.fit,
             holdout: file.holdout,
-            pool: Default::default(),
+            pool: file.pool,
             diagnosis: file.diagnosis,
-            verify: Default::default(),
+            verify: file.verify,
             check: file.check,
             output: file.output,
             two_arms: Some(two),
