@@ -5,7 +5,7 @@ use armcal_core::{Parameter, Unit};
 use armcal_model::Model;
 
 /// All lengths growing by one factor about the base that is fixed: joint angles alone give shapes, not sizes.
-pub(crate) fn scale(model: &Model, p: &[f64]) -> Option<Symmetry> {
+pub(crate) fn scale(model: &Model, p: &[f64]) -> Symmetry {
     let bases: Vec<String> = match model.chain().arms() {
         [] => vec!["base".to_owned()],
         arms => arms.iter().map(|arm| format!("{}.base", arm.name)).collect(),
@@ -36,5 +36,5 @@ pub(crate) fn scale(model: &Model, p: &[f64]) -> Option<Symmetry> {
         "scale (every length {of}, in proportion): growing together changes no joint angle, and no length is known; measure \
          one, such as a rigid link between the tips"
     );
-    Some(Symmetry { direction, text })
+    Symmetry { direction, text }
 }

@@ -59,7 +59,8 @@ pub fn points(errors: &[PointError], recordings: &[String], joints: &[String]) -
     for (index, name) in recordings.iter().enumerate() {
         rows.extend(row(errors, name, By::Recording, |e| e.dwell.recording == index, norm));
     }
-    let kinds: [(&str, fn(&PointError) -> bool); 3] = [
+    type IsOf = fn(&PointError) -> bool;
+    let kinds: [(&str, IsOf); 3] = [
         ("seated in a cavity", |e| e.cavity.is_some()),
         ("tracked", |e| e.cavity.is_none() && !e.joined),
         ("tip to joined tip", |e| e.joined),

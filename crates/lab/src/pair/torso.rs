@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::{Pair, PairArmConfig, PairConfig};
-use crate::config::{not_negative, positive, range};
+use crate::config::{not_negative, positive, range, value};
 use crate::random::{Purpose, Stream};
 use crate::sensors::transport::Transport;
 use crate::sensors::{Channel, Kind, Log, Message, Payload};
@@ -40,6 +40,9 @@ pub struct TipsSeenConfig {
 impl TorsoConfig {
     pub(super) fn check(&self, recordings: usize) -> Result<(), LabError> {
         range("torso.range_deg", self.range_deg)?;
+        if self.arm.home_deg.len() != 1 {
+            return Err(value("torso.arm.home_deg", "is not of one joint; a torso has one".into()));
+        }
         if let Some(seen) = &self.seen {
             positive("torso.seen.rate_hz", seen.rate_hz)?;
             not_negative("torso.seen.sigma_mm", seen.sigma_mm)?;
