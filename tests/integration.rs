@@ -112,6 +112,12 @@ mod two_arms;
 /// Is an arm calibrated by what it is measured against: points, distances, heights, without a camera?
 mod measures;
 
+/// What do verify, compensate and pool say of two arms with joined tips?
+mod joined_tips;
+
+/// Are the two arms of one torso one robot, and is its waist told only where something sees the hands?
+mod humanoid;
+
 /// Are several markers a pose one pose, and one that came loose found as that?
 mod several_markers;
 

@@ -178,11 +178,6 @@ fn what_two_arms_cannot_show_is_told_in_words() {
     std::fs::write(&path, text).expect("writable");
     let cavity = String::from_utf8(armcal(["run".as_ref(), path.as_os_str()]).stderr).expect("text");
     assert!(cavity.contains("holdout.kind") && cavity.contains("none in common"), "{cavity}");
-
-    let shipped = root().join("pipelines/two-arms.toml");
-    let output = armcal(["pool".as_ref(), shipped.as_os_str(), folder.path().as_os_str()]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("is about two arms"), "{said}");
 }
 
 #[test]

@@ -162,6 +162,23 @@ fn differences(model: &Model, o: &Observation, answer: &Value) -> [f64; 3] {
             motion = motion.max((jacobian[(r, c)] - number(format!("/motions/{k}/{r}/{c}"))).abs());
         }
     }
+    // A second link joined to the first: what closes is the difference of both, joints that both have in common included.
+    if model.features().count() > 1 {
+        let o = Observation {
+            reference: Reference::Joined { to: armcal_core::Against::Feature(FeatureId(1)) },
+            ..o.clone()
+        };
+        let (gap_m, jacobian) = (model.residual(&p, &o).position_m, model.joint_jacobian(&p, &o));
+        let between = |what: &str, r: usize, c: usize| {
+            number(format!("/{what}/0/{r}/{c}")) - number(format!("/{what}/1/{r}/{c}"))
+        };
+        for r in 0..3 {
+            place = place.max((gap_m[r] + between("places", r, 3)).abs());
+            for c in 0..jacobian.ncols() {
+                motion = motion.max((jacobian[(r, c)] - between("motions", r, c)).abs());
+            }
+        }
+    }
     let session = Session::of(std::slice::from_ref(o));
     for (j, own) in model.drivers(&session, o).torque.iter().enumerate() {
         torque = torque.max((own.links_nm - number(format!("/torques/{j}"))).abs());

@@ -342,6 +342,9 @@ pub struct Compensate {
     /// MCAP for the set-points as sensor_msgs/JointState.
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
+    /// Which tip, of several: the name of an arm, or of a marker; the tip when absent, of one robot.
+    #[arg(long, value_name = "NAME")]
+    tip: Option<String>,
     /// Frame of the targets: world, base, or board.RECORDING.
     #[arg(long, default_value = "world")]
     frame: String,
@@ -383,6 +386,7 @@ impl Compensate {
             targets: &self.targets,
             out: &self.out,
             mcap: self.mcap.as_deref(),
+            tip: self.tip.as_deref(),
             frame: &self.frame,
             start: self.from.as_deref(),
             recording: self.as_in.as_deref(),

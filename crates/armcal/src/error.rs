@@ -86,6 +86,19 @@ pub enum Error {
         /// `table`, `base`.
         role: &'static str,
     },
+    /// A joint of the model that none of several streams has.
+    #[error(
+        "recording `{recording}`: no [[streams.joints]] reads the joint `{joint}` of the model; several streams are put together by \
+         the names of the model file: they read {read}"
+    )]
+    JointUnread {
+        /// Name of the recording.
+        recording: String,
+        /// The joint.
+        joint: String,
+        /// What is read.
+        read: String,
+    },
     /// Another number of joints is read than the model has.
     #[error(
         "recording `{recording}`: {read} joints are read for a model of {expected}; mend `names` in [streams.joints], or the rows of the model file: the number of joints differs"
@@ -188,8 +201,8 @@ pub enum Error {
         /// What was seen, and what to do.
         problem: String,
     },
-    /// Two arms that cannot be calibrated against each other.
-    #[error("two arms: {problem}")]
+    /// Joined tips that cannot be calibrated against each other.
+    #[error("joined tips: {problem}")]
     TwoArms {
         /// What was seen, and what to do.
         problem: String,

@@ -15,7 +15,7 @@ pub use measures::{Measure, MeasureKind, MeasureSection};
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pool::PoolSection;
-use crate::two_arms::TwoArms;
+use crate::two_arms::{ClosedChainSection, TwoArms};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
@@ -100,8 +100,9 @@ pub struct Pipeline {
     /// What is written.
     #[serde(default)]
     pub output: OutputConfig,
-    /// The two arms whose tips are joined, of a pipeline with a `[closed_chain]`; `streams` and `model` are those of the first
-    /// then.
+    /// Two points of the robot that are joined to each other.
+    pub closed_chain: Option<ClosedChainSection>,
+    /// The two arms whose tips are joined, of a pipeline with `[[arms]]`; `model` is that of the first then.
     #[serde(skip)]
     pub two_arms: Option<TwoArms>,
     /// Folder of the pipeline file.
@@ -347,7 +348,7 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
 
 /// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
 fn is_of_two_arms(text: &str) -> bool {
-    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("closed_chain"))
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms"))
 }
 
 impl Pipeline {
@@ -424,17 +425,6 @@ impl Pipeline {
         names.into_iter().zip(self.models()).map(|(name, model)| (name, model.urdf.is_some())).collect()
     }
 
-    /// Refuses a pipeline of two arms for a command that needs more than their joined tips.
-    ///
-    /// # Errors
-    /// Two arms, with why.
-    pub fn one_arm(&self, needs: &str) -> Result<(), Error> {
-        match &self.two_arms {
-            None => Ok(()),
-            Some(_) => Err(Error::TwoArms { problem: format!("`{}` is about two arms; {needs}", self.name) }),
-        }
-    }
-
     /// A path of the pipeline file, resolved against its folder; a URL stays as it is.
     pub fn resolve(&self, path: &Path) -> PathBuf {
         armcal_recording::resolve(&self.folder, path)
@@ -487,13 +477,17 @@ impl Pipeline {
             return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
         }
         let tracked = self.streams.tip.is_some() || !self.markers.is_empty();
-        if self.two_arms.is_none() && self.table.is_none() && !tracked && self.measure.is_empty() {
+        let measured = self.closed_chain.is_some() || !self.measure.is_empty();
+        if !measured && self.table.is_none() && !tracked {
             let problem =
                 "is absent and so are [streams.tip] and [[measure]]: nothing says where the tip was";
             return fail("table", problem.into());
         }
         markers::check(self, &fail)?;
         measures::check(self, &fail)?;
+        if let Some((key, said)) = self.closed_chain.as_ref().and_then(|chain| chain.contradiction(self)) {
+            return fail(key, said);
+        }
         if self.sensor.scale_sigma_ppm.is_some_and(|ppm| !(ppm >= 0.0 && ppm.is_finite())) {
             return fail("sensor.scale_sigma_ppm", "must be 0 or more".into());
         }

@@ -169,7 +169,7 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
     frames::change_nominals(&mut geometry, changes)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let mut places = observe::associate_all(pipeline, board, &geometry, &geometry.nominal(), false, seen)?;
-    let measures = Measures::of(inputs);
+    let measures = Measures::of(pipeline, seen);
     let seen_first = observe::observations(pipeline, board, seen, &places).observations;
     let near = measures.near(&mut geometry, &seen_first)?;
     let mut measured = near.clone();

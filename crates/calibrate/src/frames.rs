@@ -117,7 +117,11 @@ fn aligned(
 /// recordings have copies of.
 pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Vec<String> {
     let (names, tips) = (frame_names(model), tips_at(model));
-    let measured: BTreeSet<usize> = observations.iter().map(|o| tips + o.feature.0).collect();
+    let of = |o: &&Observation| match o.against() {
+        Some(Against::Feature(to)) => [o.feature, to],
+        _ => [o.feature; 2],
+    };
+    let measured: BTreeSet<usize> = observations.iter().flat_map(of).map(|k| tips + k.0).collect();
     let known = |k: &usize| *k < 2 * tips || measured.contains(k);
     let features = tips + model.features().count();
     let arm = names.iter().enumerate().take(features).filter(|(k, _)| known(k));
@@ -302,7 +306,11 @@ impl<'a> Alignment<'a> {
         }
         let in_link = self.in_links(p);
         let placed: BTreeSet<usize> = boards.iter().map(|(recording, _)| *recording).collect();
-        let is_own = |o: &Observation| o.is_joined() || self.model.arm_of(o.feature) == arm;
+        // Points that one base carries say nothing of where it is.
+        let is_own = |o: &Observation| match o.against() {
+            Some(Against::Feature(to)) => self.model.arm_of(to) != self.model.arm_of(o.feature),
+            _ => self.model.arm_of(o.feature) == arm,
+        };
         let anchored = |o: &Observation| o.cavity().is_none() || !placed.contains(&o.dwell.recording);
         let in_world = |o: &Observation| self.model.feature_in_world(p, o.feature, o).translation.vector;
         let pair = |(o, link): (&&Observation, &Pose)| match o.against() {

@@ -340,7 +340,7 @@ impl Problem for ModelProblem<'_> {
         if self.observations.iter().any(|o| o.against().is_none()) {
             return Vec::new();
         }
-        scale(self.model, p).into_iter().collect()
+        vec![scale(self.model, p)]
     }
 
     fn known(&self) -> Vec<Known> {

@@ -25,7 +25,8 @@ impl Compensator<'_> {
     ) -> Vec<String> {
         let mut out = Vec::new();
         let names = self.nominal.model.chain().joint_names();
-        for (j, q) in found.joint_rad.iter().enumerate() {
+        let moving = self.nominal.model.joints_to(self.conditions.feature);
+        for (j, q) in found.joint_rad.iter().enumerate().filter(|(j, _)| moving.contains(j)) {
             let [low, high] = self.recorded_rad[j];
             let beyond = (low - q).max(q - high);
             if beyond > BEYOND_RAD {

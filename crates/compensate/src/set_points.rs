@@ -247,8 +247,14 @@ impl Compensator<'_> {
             return None;
         }
         let off = |past: &Past| {
-            let signs = past.signs(nominal).into_iter().take(nominal.len());
-            signs.map(|sign| if sign < 0.0 { -self.approach_rad } else { self.approach_rad }).collect()
+            let signs = past.signs(nominal).into_iter().zip(&self.limits.0);
+            let off = |(sign, [low, high]): (f64, &[f64; 2])| match low == high {
+                // A joint that is held does not travel.
+                true => 0.0,
+                false if sign < 0.0 => -self.approach_rad,
+                false => self.approach_rad,
+            };
+            signs.map(off).collect()
         };
         Some(pasts.map(off))
     }

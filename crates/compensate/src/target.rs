@@ -1,7 +1,7 @@
 //! What is asked for: where the tip should be, and under which conditions the arm goes there.
 
 use crate::CompensateError;
-use armcal_core::{DwellId, Load, Observation, Reference};
+use armcal_core::{DwellId, FeatureId, Load, Observation, Reference};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// A place for the tip.
@@ -73,6 +73,8 @@ impl Target {
 /// Under which conditions the arm will be driven.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditions {
+    /// What is brought to the targets: the tip, the tip of another arm or branch, a marker.
+    pub feature: FeatureId,
     /// The recording as in which the arm is, from 0: whose board stands there, and which events have happened.
     pub recording: usize,
     /// The last dwell of that recording: events that begin at a dwell have happened.
@@ -93,6 +95,7 @@ impl Conditions {
         let after_ns = (target.time_s.unwrap_or(0.0) * 1e9).round() as i64;
         let dwell = DwellId { recording: self.recording, dwell: self.dwell };
         Observation {
+            feature: self.feature,
             time_ns: self.time_ns.saturating_add(after_ns),
             arrival: Vec::new(),
             temperature_c: self.temperature_c,

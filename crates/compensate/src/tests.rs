@@ -74,6 +74,7 @@ fn compensator<'a>(nominal: &'a Model, (model, values): (&'a Model, &[f64])) -> 
 
 fn unloaded() -> Conditions {
     Conditions {
+        feature: armcal_core::FeatureId::TIP,
         recording: 0,
         dwell: 0,
         time_ns: 0,

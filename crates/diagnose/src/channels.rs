@@ -79,6 +79,10 @@ impl View<'_> {
             let rocked = |i: usize, axis: usize| {
                 let (o, about) = (&self.observations[i], Vector3::ith(axis, 1.0));
                 let moved = match o.against() {
+                    // Both rock with it.
+                    Some(Against::Feature(to)) if self.model.arm_of(to) == self.model.arm_of(o.feature) => {
+                        Vector3::zeros()
+                    }
                     // The other tip is that of this arm: it moves away from where it was.
                     Some(Against::Feature(to)) if self.model.arm_of(to) == arm => {
                         about.cross(&(centre - self.model.measured_tip_in_world(self.values, o)))

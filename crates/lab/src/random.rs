@@ -70,8 +70,10 @@ pub enum Purpose {
     TransportMarker = 28,
     /// Readings of the markers on the quick path.
     QuickMarker = 29,
+    /// Turns of a torso that carries two arms.
+    Torso = 30,
     /// Where instruments stand, and their noise.
-    Gauge = 30,
+    Gauge = 31,
 }
 
 /// One stream of random numbers.

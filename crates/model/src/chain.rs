@@ -58,6 +58,11 @@ impl Chain {
         [low.min(recorded[0]), high.max(recorded[1])]
     }
 
+    /// Whether it is more than one line of joints.
+    pub fn is_branched(&self) -> bool {
+        self.segments.iter().enumerate().any(|(id, segment)| segment.parent != id.checked_sub(1))
+    }
+
     /// Unit of a joint's reading: radian, or metre where it slides.
     pub fn joint_unit(&self, joint: usize) -> Unit {
         let own = |s: &Segment| s.joint.filter(|j| j.index == joint && j.mimic.is_none());
@@ -70,8 +75,8 @@ impl Chain {
         &self.parameters
     }
 
-    /// The number of bases that it needs: one an arm.
-    pub(crate) fn bases(&self) -> usize {
+    /// The number of bases that it needs: one an arm with a file of its own.
+    pub fn bases(&self) -> usize {
         self.arms().len().max(1)
     }
 

@@ -273,6 +273,11 @@ impl Model {
         Pose::from(&self.tree.0[arm].transform(p, &[]))
     }
 
+    /// Indices of the parameters of an arm's base.
+    pub fn base_parameters(&self, arm: usize) -> std::ops::Range<usize> {
+        self.tree.0[arm].parameters.clone()
+    }
+
     /// last link_from_tip.
     pub fn tip_in_last_link(&self, p: &[f64]) -> Pose {
         self.feature_in_link(p, FeatureId::TIP)

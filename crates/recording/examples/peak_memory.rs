@@ -78,7 +78,7 @@ fn read(how: &str, path: &Path) {
     let recording = Recording::open_with(&[PathBuf::from(path)], access).unwrap();
     let names = ["j1", "j2", "j3"].map(str::to_owned).to_vec();
     let joints = JointStream { topic: "/joint_states".to_owned(), names, ..JointStream::default() };
-    let streams = Streams { joints, ..Streams::default() };
+    let streams = Streams { joints: vec![joints], ..Streams::default() };
     let samples = match how {
         "extract" => {
             let thin = path.with_extension("thin.mcap");

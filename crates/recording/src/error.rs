@@ -99,6 +99,12 @@ pub enum RecordingError {
         /// Reason for each channel of the topic.
         why: String,
     },
+    /// Several joint streams that cannot be read as one.
+    #[error("the joint streams {what}; record them together, and stamp all by one clock")]
+    NotTogether {
+        /// What is wrong.
+        what: String,
+    },
     /// The topic exists, but no usable row came out of it.
     #[error("stream `{role}`: topic {topic:?} has {messages} messages, but no usable row: {why}")]
     NoRows {

@@ -52,6 +52,7 @@ mod scalars;
 mod streams;
 mod sweep;
 mod temperature;
+mod together;
 mod url;
 
 pub use bytes::{Access, identity_of};

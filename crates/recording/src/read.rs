@@ -9,7 +9,7 @@ use crate::{
     Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
     StreamReport, Streams,
 };
-use crate::{joints, poses};
+use crate::{joints, poses, together};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
 
 impl Recording {
@@ -27,15 +27,15 @@ impl Recording {
         &self,
         streams: &Streams,
     ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {
-        joints::check_config(&streams.joints)?;
-        streams.set_points.as_ref().map(joints::check_config).transpose()?;
+        streams.joints.iter().chain(&streams.set_points).try_for_each(joints::check_config)?;
         let requests = requests(streams);
         let gathered = gather(self, &requests)?;
         let (mut samples, mut reports, mut warnings) = (Samples::default(), Vec::new(), Vec::new());
+        let (mut of_joints, mut joints) = (streams.joints.iter(), Vec::new());
         for (request, stream) in requests.iter().zip(&gathered) {
             let mut stage = Reading::new(request, stream, &mut warnings);
             match request.role {
-                "joints" => samples.joints = stage.joints(&streams.joints)?,
+                "joints" => joints.extend(of_joints.next().map(|s| stage.joints(s)).transpose()?),
                 "set_points" => {
                     samples.set_points = streams.set_points.as_ref().map(|s| stage.joints(s)).transpose()?
                 }
@@ -63,21 +63,22 @@ impl Recording {
             }
             reports.push(stage.report);
         }
+        samples.joints = together::as_one(&streams.joints, joints)?;
         Ok((samples, reports, warnings))
     }
 }
 
 fn requests(streams: &Streams) -> Vec<Request<'_>> {
-    let joints = [("joints", Some(&streams.joints)), ("set_points", streams.set_points.as_ref())];
-    let mut requests = Vec::new();
-    for (role, stream) in joints {
-        requests.extend(stream.map(|s| Request {
+    let joints = streams.joints.iter().map(|s| ("joints", s));
+    let joints = joints.chain(streams.set_points.iter().map(|s| ("set_points", s)));
+    let mut requests: Vec<Request<'_>> = joints
+        .map(|(role, s)| Request {
             role,
             name: None,
             topic: &s.topic,
             kind: Kind::Joints { wanted: &s.names },
-        }));
-    }
+        })
+        .collect();
     for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
         requests.extend(stream.iter().map(|s| Request {
             role,
@@ -138,7 +139,7 @@ impl<'a> Reading<'a> {
     }
 
     fn joints(&mut self, stream: &JointStream) -> Result<JointSamples, RecordingError> {
-        let (role, table) = (self.role, &self.gathered.joints);
+        let (role, table, first) = (self.role, &self.gathered.joints, self.warnings.len());
         self.refuse_undecoded(role)?;
         if self.gathered.messages > 0 && table.position.is_empty() {
             return Err(table.none_selected(stream, self.gathered.messages));
@@ -159,6 +160,11 @@ impl<'a> Reading<'a> {
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
         let effort_nm = joints::effort(table, &rows, n);
+        for (said, arm) in
+            self.warnings[first..].iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?)))
+        {
+            said.subject = format!("{arm}: {}", said.subject);
+        }
         Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm })
     }
 

@@ -1,15 +1,19 @@
 //! Which streams of a recording the pipeline uses: the `[streams]` section of a pipeline file.
 
 use crate::Clock;
-use serde::{Deserialize, Serialize};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// The streams to read. Only `joints` is required.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Streams {
-    /// Encoder readings.
-    pub joints: JointStream,
+    /// Encoder readings: one stream, or several (`[[streams.joints]]`), which are read as one.
+    #[serde(deserialize_with = "one_or_more")]
+    pub joints: Vec<JointStream>,
     /// What the controller asked of the joints; where it is recorded, paths are compared with what was planned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set_points: Option<JointStream>,
@@ -36,9 +40,8 @@ pub struct Streams {
 impl Streams {
     /// Topics of all streams, each once, in order.
     pub fn topics(&self) -> Vec<&str> {
-        let joints = [Some(&self.joints), self.set_points.as_ref()];
         let poses = [&self.tip, &self.base, &self.table];
-        let topics = joints.into_iter().flatten().map(|s| s.topic.as_str());
+        let topics = self.joints.iter().chain(&self.set_points).map(|s| s.topic.as_str());
         let poses = poses.into_iter().flatten().chain(self.bodies.values());
         let gauges = self.gauges.values().map(|s| s.topic.as_str());
         let topics = topics.chain(poses.map(|s| s.topic.as_str())).chain(gauges);
@@ -71,6 +74,16 @@ pub struct JointStream {
     /// Turns from zero beyond which the unit is taken to be wrong; default 2, raise it for joints that wind.
     #[serde(default = "default_max_turns")]
     pub max_turns: f64,
+    /// The arm that it is of, where there are several: prefix of its joints' names.
+    #[serde(skip)]
+    pub arm: Option<String>,
+}
+
+impl JointStream {
+    /// What it is called beside others.
+    pub(crate) fn called(&self) -> &str {
+        self.arm.as_deref().unwrap_or(&self.topic)
+    }
 }
 
 impl Default for JointStream {
@@ -82,8 +95,27 @@ impl Default for JointStream {
             encoders: Vec::new(),
             clock: None,
             max_turns: default_max_turns(),
+            arm: None,
         }
     }
+}
+
+/// A table, or an array of tables.
+fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<JointStream>, D::Error> {
+    struct Either;
+    impl<'de> Visitor<'de> for Either {
+        type Value = Vec<JointStream>;
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("[streams.joints], or one [[streams.joints]] for each of several streams")
+        }
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            Ok(vec![JointStream::deserialize(MapAccessDeserializer::new(map))?])
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+            Vec::deserialize(SeqAccessDeserializer::new(seq))
+        }
+    }
+    deserializer.deserialize_any(Either)
 }
 
 fn default_max_turns() -> f64 {
@@ -214,8 +246,8 @@ mod tests {
     fn a_pipeline_section_reads_and_refuses_unknown_keys() {
         let text = "[joints]\ntopic = \"/joint_states\"\nnames = [\"a\"]\nunit = \"deg\"\n[tip]\ntopic = \"/t\"\nunit = \"mm\"\nclock = \"publish\"";
         let streams: Streams = toml::from_str(text).expect("a valid section");
-        assert_eq!(streams.joints.unit, JointUnit::Deg);
-        assert_eq!(streams.joints.max_turns, 2.0);
+        assert_eq!(streams.joints[0].unit, JointUnit::Deg);
+        assert_eq!(streams.joints[0].max_turns, 2.0);
         let tip = streams.tip.expect("tip is there");
         assert_eq!((tip.unit, tip.clock), (LengthUnit::Mm, Some(Clock::Publish)));
         let error =

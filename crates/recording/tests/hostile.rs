@@ -229,7 +229,7 @@ fn a_topic_of_megabytes_is_neither_compared_nor_shown_whole() {
         names: vec!["joint1".into()],
         ..Default::default()
     };
-    let streams = armcal_recording::Streams { joints, ..Default::default() };
+    let streams = armcal_recording::Streams { joints: vec![joints], ..Default::default() };
     let said = measured("long topic", 8 * bytes.len(), || {
         recordings::on_disk(&bytes, |path| {
             let recording = Recording::open(&[path.to_owned()]).expect("an MCAP file");

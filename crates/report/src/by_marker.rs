@@ -4,7 +4,7 @@ use crate::run::Run;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Errors of the tip or of one marker, on the side by which the calibration is judged.
+/// Errors of the tip, of one marker or of joined points, on the side by which the calibration is judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct MarkerErrors<'a> {
     /// Its name; of what was measured against a fixed place that too (`tip from post`).
@@ -21,9 +21,10 @@ pub(crate) struct MarkerErrors<'a> {
     pub floor_mm: f64,
 }
 
-/// Whether more than the tip was measured, or against more than sensor and table.
+/// Whether more than the tip was measured, or against more than sensor and table; not where all are tips that are joined.
 pub(crate) fn is_told(run: &Run) -> bool {
-    run.model.markers().next().is_some() || run.model.places().next().is_some()
+    let more = run.model.markers().next().is_some() || run.model.places().next().is_some();
+    more && !run.observations.iter().all(armcal_core::Observation::is_joined)
 }
 
 /// The errors of each; nothing of an arm without markers and places, whose errors are those of its tip.

@@ -187,10 +187,10 @@ pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
     run.in_words(&as_spelt(d)) + &joints_told(run, d)
 }
 
-/// Which arm the joints are of that a headline numbers through both; nothing for one arm.
+/// The names of the joints that a headline numbers through all branches; nothing for an arm without any.
 fn joints_told(run: &Run, d: &Diagnosis) -> String {
     let names = run.model.chain().joint_names();
-    if run.model.chain().arms().is_empty() {
+    if !run.model.chain().is_branched() {
         return String::new();
     }
     let of_effects =

@@ -77,6 +77,7 @@ pub use sizes::size as amplitude_text;
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{Detail, terminal};
 pub use text::{conclusion, millimetres, printable};
+pub use two_arms::Closing;
 pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
     verification_files, verification_json, verification_paths, verification_text,

@@ -298,7 +298,8 @@ impl PastModel {
     /// # Errors
     /// Contents that contradict each other, as only a file changed by hand has them.
     pub fn arms(&self) -> Result<PastArms, ModelError> {
-        let geometry = self.geometry(self.chain.chain(Path::new(FILE))?)?;
+        let measured: Vec<&str> = self.markers.iter().map(|marker| marker.link.as_str()).collect();
+        let geometry = self.geometry(self.chain.chain(&measured, Path::new(FILE))?)?;
         let joints = geometry.chain().joint_names();
         let specs = self.effects.iter().map(|e| e.spec(joints)).collect::<Result<Vec<_>, _>>()?;
         let model = geometry.with_effects(&specs, &self.session)?;
@@ -345,15 +346,16 @@ fn attached(path: &Path) -> Result<String, PastRunError> {
 }
 
 impl ChainText {
-    /// The arm, or arms, that the text is of.
-    fn chain(&self, path: &Path) -> Result<Chain, ModelError> {
+    /// The arm, or arms, that the text is of, with the branches to what is measured.
+    fn chain(&self, measured: &[&str], path: &Path) -> Result<Chain, ModelError> {
         match self {
             ChainText::Dh { text } => Chain::from_dh_toml(text, path),
             ChainText::Urdf { text, base_link, tip_link, masses } => {
-                Chain::from_urdf(text, base_link, tip_link, path)?.with_masses(*masses, path)
+                let chain = Chain::from_urdf_branches(text, base_link, tip_link, measured, path)?;
+                chain.with_masses(*masses, path)
             }
             ChainText::Arms { arms } => {
-                let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(path)?)));
+                let chains = arms.iter().map(|arm| Ok((arm.name.clone(), arm.chain.chain(measured, path)?)));
                 Chain::joined(chains.collect::<Result<Vec<_>, ModelError>>()?)
             }
         }

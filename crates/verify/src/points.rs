@@ -11,8 +11,10 @@ use serde::Serialize;
 pub struct PointError {
     /// The dwell.
     pub dwell: DwellId,
-    /// Cavity; absent when the tip was tracked.
+    /// Cavity; absent when the tip was tracked or joined to another.
     pub cavity: Option<String>,
+    /// Whether it is from one tip to another that it was joined to.
+    pub joined: bool,
     /// Direction of arrival of each joint.
     pub arrival: Vec<Arrival>,
     /// Measured minus predicted by the nominal model, base axes [m].
@@ -41,7 +43,7 @@ pub enum By {
     All,
     /// One recording, that is, one tilt of the board.
     Recording,
-    /// Dwells in a cavity, or tracked in free space.
+    /// Dwells in a cavity, tracked in free space, or with joined tips.
     Reference,
     /// A joint that arrived from one side.
     Arrival,
@@ -57,10 +59,15 @@ pub fn points(errors: &[PointError], recordings: &[String], joints: &[String]) -
     for (index, name) in recordings.iter().enumerate() {
         rows.extend(row(errors, name, By::Recording, |e| e.dwell.recording == index, norm));
     }
-    let seated = errors.iter().filter(|e| e.cavity.is_some()).count();
-    if seated > 0 && seated < errors.len() {
-        rows.extend(row(errors, "seated in a cavity", By::Reference, |e| e.cavity.is_some(), norm));
-        rows.extend(row(errors, "tracked", By::Reference, |e| e.cavity.is_none(), norm));
+    type IsOf = fn(&PointError) -> bool;
+    let kinds: [(&str, IsOf); 3] = [
+        ("seated in a cavity", |e| e.cavity.is_some()),
+        ("tracked", |e| e.cavity.is_none() && !e.joined),
+        ("tip to joined tip", |e| e.joined),
+    ];
+    // All of one kind are the first row.
+    for (name, is_of) in kinds.into_iter().filter(|(_, is_of)| !errors.iter().all(is_of)) {
+        rows.extend(row(errors, name, By::Reference, is_of, norm));
     }
     for (joint, name) in joints.iter().enumerate() {
         for (way, sign) in [(Arrival::Positive, "+"), (Arrival::Negative, "-")] {
@@ -101,6 +108,7 @@ mod tests {
         PointError {
             dwell: DwellId { recording, dwell },
             cavity: None,
+            joined: false,
             arrival: vec![way],
             before_m: before_m.into(),
             after_m: Vector3::from(before_m) * 0.1,

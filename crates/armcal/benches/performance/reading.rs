@@ -139,11 +139,11 @@ fn row(table: &mut Table, name: &str, threads: usize, it: Spent, bytes: u64, our
 /// The two streams as a pipeline reads them.
 pub fn read(path: &Path) -> Result<Samples> {
     let streams = Streams {
-        joints: JointStream {
+        joints: vec![JointStream {
             topic: JOINTS.to_owned(),
             names: JOINT_NAMES.map(str::to_owned).into(),
             ..JointStream::default()
-        },
+        }],
         tip: Some(PoseStream { topic: TIP.to_owned(), ..PoseStream::default() }),
         ..Streams::default()
     };

@@ -7,7 +7,8 @@ use crate::compensate::{
 };
 use crate::error::Error;
 use armcal_compensate::{SetPoint, resample};
-use armcal_core::Load;
+use armcal_core::{FeatureId, Load};
+use armcal_model::Model;
 use armcal_recording::atomic;
 use armcal_report::{PastArms, PastModel};
 use std::path::Path;
@@ -23,6 +24,8 @@ pub struct Request<'a> {
     pub out: &'a Path,
     /// MCAP to write.
     pub mcap: Option<&'a Path>,
+    /// Which tip, of several.
+    pub tip: Option<&'a str>,
     /// `world`, `base`, `board.NAME`.
     pub frame: &'a str,
     /// Joints before the first target, joined by commas [deg].
@@ -49,23 +52,24 @@ pub struct Request<'a> {
 pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let past = PastModel::open(request.result)?;
     let arms = past.arms()?;
-    if !arms.geometry.chain().arms().is_empty() {
-        let problem =
-            "`armcal compensate` finds set-points of one arm, and this result is about two".to_owned();
-        return Err(Error::TwoArms { problem });
-    }
+    let tip = tip(&arms.geometry, request.tip)?;
     let frame = target_frame(&past, request.frame)?;
     let wanted = targets::read(request.targets)?;
     may_write([Some(request.out), request.mcap].into_iter().flatten())?;
-    let compensator = prepare(&past, &arms, frame, &drive(request, &past, &arms)?)?;
-    let mut targets = placed(&arms, frame, &wanted)?;
+    let start = request.start.map(|words| joints(words, &arms)).transpose()?;
+    let drive = drive(request, &past, &arms)?;
+    let held = held(&arms.geometry, tip, &drive, start.as_deref())?;
+    let mut compensator = prepare(&past, &arms, (tip, frame), &drive)?;
+    for (joint, at_rad) in &held {
+        compensator.limits.0[*joint] = [*at_rad; 2];
+    }
+    let mut targets = placed(&arms, (tip, frame), &wanted)?;
     if let Some(rate_hz) = request.rate_hz {
         if !(rate_hz > 0.0 && rate_hz <= 1e4) {
             return Err(bad("--rate", rate_hz.to_string(), "give points a second, up to 10000"));
         }
         targets = resample(&targets, rate_hz)?;
     }
-    let start = request.start.map(|words| joints(words, &arms)).transpose()?;
     let points = compensator.set_points(&targets, start.as_deref())?;
 
     let chain = arms.geometry.chain();
@@ -74,7 +78,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         chain,
         points: &points,
         in_world_m,
-        notes: notes(&past, &arms, frame, &compensator.conditions),
+        notes: notes(&past, &arms, (frame, held.as_slice()), &compensator.conditions),
     };
     atomic::write(request.out, &sheet.csv().map_err(Error::Csv)?).map_err(Error::Output)?;
     if let Some(path) = request.mcap {
@@ -86,6 +90,53 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()))?;
     }
     Ok(if past.missing.is_empty() && points.iter().all(settled) { Outcome::Done } else { Outcome::Doubtful })
+}
+
+/// The tip that is meant: by its name, or by that of its arm.
+fn tip(model: &Model, asked: Option<&str>) -> Result<FeatureId, Error> {
+    let arms = model.chain().arms();
+    let called = |name: &str| match asked {
+        Some(asked) => name == asked || name == format!("{asked}.tip"),
+        // Neither of two arms comes first.
+        None => arms.is_empty(),
+    };
+    let found = model.features().find(|(_, name)| called(name)).map(|(feature, _)| feature);
+    found.ok_or_else(|| {
+        let names = model.features().map(|(_, name)| name.strip_suffix(".tip").unwrap_or(name));
+        let names = names.collect::<Vec<_>>().join(", ");
+        bad(
+            "--tip",
+            asked.unwrap_or("nothing").to_owned(),
+            &format!("the tips and markers of this result are {names}; name one"),
+        )
+    })
+}
+
+/// The joints that stay where they are, and where [rad]: those off the way to the tip, and those that move another branch too,
+/// unless a range is given for them.
+fn held(
+    model: &Model,
+    tip: FeatureId,
+    drive: &Drive,
+    start: Option<&[f64]>,
+) -> Result<Vec<(usize, f64)>, Error> {
+    let (own, shared) = (model.joints_to(tip), model.joints_shared_by(tip));
+    let moves = |joint: &usize| {
+        own.contains(joint) && (!shared.contains(joint) || drive.ranges.iter().any(|(j, _)| j == joint))
+    };
+    let held: Vec<usize> = (0..model.joint_count()).filter(|joint| !moves(joint)).collect();
+    match (held.first(), start) {
+        (None, _) => Ok(Vec::new()),
+        (Some(_), Some(start)) => Ok(held.into_iter().map(|joint| (joint, start[joint])).collect()),
+        (Some(first), None) => {
+            let name = &model.chain().joint_names()[*first];
+            let problem = format!(
+                "joints off the way to the tip, and those that it shares with another, such as {name}, stay where they are: say \
+                 where, all joints in degrees"
+            );
+            Err(bad("--from", "nothing".to_owned(), &problem))
+        }
+    }
 }
 
 /// Whether the model predicts the tip at a stop. On a path links wait while a gap is crossed.
@@ -137,10 +188,19 @@ fn joints(words: &str, arms: &PastArms) -> Result<Vec<f64>, Error> {
 fn notes(
     past: &PastModel,
     arms: &PastArms,
-    frame: TargetFrame,
+    (frame, held): (TargetFrame, &[(usize, f64)]),
     conditions: &armcal_compensate::Conditions,
 ) -> Vec<String> {
     let mut notes = Vec::new();
+    if !held.is_empty() {
+        let chain = arms.geometry.chain();
+        let names: Vec<&str> = held.iter().map(|(joint, _)| chain.joint_names()[*joint].as_str()).collect();
+        let tip = arms.geometry.feature_name(conditions.feature);
+        notes.push(format!(
+            "{tip} is brought to the targets; {} stay where --from has them",
+            names.join(", ")
+        ));
+    }
     if !past.missing.is_empty() {
         notes.push(format!(
             "the diagnosis of `{}` would add {}: what the model lacks stays in the error; `armcal add suggested` first",
@@ -149,14 +209,21 @@ fn notes(
         ));
     }
     let recording = past.recordings.get(conditions.recording).map_or("none", |r| r.name.as_str());
+    let of_arms = !arms.geometry.chain().arms().is_empty();
     let tested = past.mean_error_m.map_or(String::new(), |mean_m| {
-        format!("; the model's mean error where it was tested is {:.2} mm", mean_m * 1e3)
+        let error = if of_arms { "mean closing error" } else { "mean error" };
+        format!("; the model's {error} where it was tested is {:.2} mm", mean_m * 1e3)
     });
     let temperature = conditions.temperature_c.map_or(String::new(), |t| format!(", {t:.1} degC"));
     let name = |load: &Load| format!(", {} kg at {}", load.kg, arms.model.feature_name(load.at));
     let more: String = conditions.more_loads.iter().map(name).collect();
     let load = format!("load {} kg{more}", conditions.load_kg);
     notes.push(format!("as in recording `{recording}`, {load}{temperature}{tested}"));
+    if arms.geometry.chain().is_branched() {
+        notes.push(
+            "what the run lists as undetermined, such as all that joined tips have in common, is near nominal".into(),
+        );
+    }
     if arms.model.effects().iter().any(|e| e.spec.kind == "effort_compliance") {
         notes.push("the effort of a motor is not known beforehand: effort_compliance is left at zero".into());
     }

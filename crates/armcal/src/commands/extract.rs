@@ -50,11 +50,7 @@ pub fn run(asked: &Request<'_>) -> Result<Outcome, Error> {
 /// The topics that a pipeline reads, as patterns that match nothing else.
 fn topics_of(path: &Path) -> Result<Vec<String>, Error> {
     let literal = |topic: &str| glob::Pattern::escape(topic);
-    let pipeline = Pipeline::load(path)?;
-    Ok(match &pipeline.two_arms {
-        None => pipeline.streams.topics().into_iter().map(literal).collect(),
-        Some(two) => two.arms.iter().map(|arm| literal(&arm.joints.topic)).collect(),
-    })
+    Ok(Pipeline::load(path)?.streams.topics().into_iter().map(literal).collect())
 }
 
 fn text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {

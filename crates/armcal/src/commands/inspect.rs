@@ -3,7 +3,6 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
-use crate::two_arms::joined;
 use armcal_core::Severity;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::{RULED, printable};
@@ -47,12 +46,9 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
             let name = entry.name();
             let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.resolve(p)).collect();
             let recording = open(&name, &paths).map_err(|e| pipeline.where_data_come_from(e))?;
-            let (_, streams, warnings) = match &pipeline.two_arms {
-                Some(two) => joined::read(two, &name, &recording)?,
-                None => recording
-                    .read(&pipeline.streams)
-                    .map_err(|source| Error::Recording { recording: name.clone(), source })?,
-            };
+            let read = recording.read(&pipeline.streams);
+            let (_, streams, warnings) =
+                read.map_err(|source| Error::Recording { recording: name.clone(), source })?;
             let mut report = recording.report().clone();
             report.streams = streams;
             report.warnings.extend(warnings);

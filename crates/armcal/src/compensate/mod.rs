@@ -9,7 +9,7 @@ pub mod targets;
 
 use crate::error::Error;
 use armcal_compensate::{Arm, Compensator, Conditions, Limits, Target};
-use armcal_core::Unit;
+use armcal_core::{FeatureId, Unit};
 use armcal_report::{PastArms, PastModel};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use targets::Wanted;
@@ -19,7 +19,7 @@ use targets::Wanted;
 pub enum TargetFrame {
     /// The sensor's frame.
     World,
-    /// The robot's base, as calibrated.
+    /// The base of the arm whose tip it is, as calibrated.
     Base,
     /// The board of this recording, as calibrated.
     Board(usize),
@@ -69,7 +69,7 @@ pub fn recording_index(past: &PastModel, name: &str) -> Result<usize, String> {
 pub fn prepare<'a>(
     past: &PastModel,
     arms: &'a PastArms,
-    frame: TargetFrame,
+    (feature, frame): (FeatureId, TargetFrame),
     drive: &Drive,
 ) -> Result<Compensator<'a>, Error> {
     let last = past.recordings.len().saturating_sub(1);
@@ -77,6 +77,7 @@ pub fn prepare<'a>(
     let recording = on_board.or(drive.recording).unwrap_or(last);
     let facts = past.recordings.get(recording);
     let conditions = Conditions {
+        feature,
         recording,
         dwell: facts.map_or(0, |f| f.last_dwell),
         time_ns: facts.map_or(0, |f| f.last_ns),
@@ -96,8 +97,7 @@ pub fn prepare<'a>(
     let mut nominal_values = arms.nominal_values.clone();
     if frame == TargetFrame::Base {
         // The controller's own base is where it is: only the arm beyond it is nominal.
-        let parameters = arms.geometry.parameters().iter().enumerate();
-        for (index, _) in parameters.filter(|(_, p)| p.name.starts_with("base.")) {
+        for index in arms.geometry.base_parameters(arms.geometry.arm_of(feature)) {
             nominal_values[index] = arms.values[index];
         }
     }
@@ -114,8 +114,12 @@ pub fn prepare<'a>(
 }
 
 /// Targets as the model takes them.
-pub fn placed(arms: &PastArms, frame: TargetFrame, wanted: &[Wanted]) -> Result<Vec<Target>, Error> {
-    let base = arms.model.base_in_world(&arms.values);
+pub fn placed(
+    arms: &PastArms,
+    (feature, frame): (FeatureId, TargetFrame),
+    wanted: &[Wanted],
+) -> Result<Vec<Target>, Error> {
+    let base = arms.model.arm_base_in_world(&arms.values, arms.model.arm_of(feature));
     let place = |w: &Wanted| {
         let at_m = Vector3::from(w.xyz_m);
         let target = match (frame, w.orientation()) {

@@ -5,7 +5,8 @@ use crate::error::Error;
 use armcal_core::RollPitchYaw;
 use serde::Deserialize;
 
-/// A marker on a link of the arm; `[streams.bodies]` says by its name where it is read.
+/// A marker on a link of the arm; `[streams.bodies]` says by its name where it is read. One that `[closed_chain]` names need
+/// not be: the tip of another branch.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MarkerSection {
@@ -48,7 +49,8 @@ pub(super) fn check(
         if let Some(why) = no_name(name) {
             return fail(&key, why);
         }
-        if !bodies.contains_key(name) {
+        let joined = pipeline.closed_chain.iter().flat_map(|chain| &chain.between).flatten();
+        if !bodies.contains_key(name) && !joined.into_iter().any(|point| point == name) {
             return fail(&key, format!("has no [streams.bodies.{name}] that says where it is read"));
         }
         if marker.pose == FramePose::Measured && marker.sigma_mm == 0.0 {

@@ -2,7 +2,7 @@
 
 use super::{FramePose, FrameSection, Pipeline};
 use crate::error::Error;
-use crate::two_arms::pipeline::ClosureKind;
+use crate::two_arms::closure::{ClosedChainSection, ClosureKind};
 use armcal_core::{Against, FeatureId, Pose};
 use armcal_model::{FixedPlace, Frame, Length, LengthKnowledge};
 use armcal_recording::GaugeStream;
@@ -114,27 +114,30 @@ impl Pipeline {
     /// The lengths that distances count from, in the order of the measurements.
     pub fn lengths(&self) -> Vec<Length> {
         let distances = self.measure.iter().filter(|m| m.kind == MeasureKind::Distance);
-        let link = self.two_arms.iter().filter_map(|two| two.closure.link());
+        let link = self.closed_chain.iter().filter_map(ClosedChainSection::link);
         link.chain(distances.map(MeasureSection::length)).collect()
     }
 
     /// What is measured between places: each `[[measure]]`, and the joined tips of two arms.
     pub fn measures(&self) -> Vec<Measure> {
-        let joined = self.two_arms.iter().map(|two| Measure {
-            name: "the other tip".into(),
-            kind: match two.closure.kind {
-                ClosureKind::SamePoint => MeasureKind::Coincide,
-                ClosureKind::RigidLink => MeasureKind::Distance,
-            },
-            feature: FeatureId::TIP,
-            against: Against::Feature(FeatureId(1)),
-            length: 0,
-            sigma_m: two.closure.sigma_mm * 1e-3,
-            reading_m: None,
-            recordings: None,
-            max_gap_m: two.closure.max_gap_mm * 1e-3,
+        let joined = self.closed_chain.iter().map(|closure| {
+            let [feature, to] = self.joins(closure);
+            Measure {
+                name: "the other tip".into(),
+                kind: match closure.kind {
+                    ClosureKind::SamePoint => MeasureKind::Coincide,
+                    ClosureKind::RigidLink => MeasureKind::Distance,
+                },
+                feature,
+                against: Against::Feature(to),
+                length: 0,
+                sigma_m: closure.sigma_mm * 1e-3,
+                reading_m: None,
+                recordings: None,
+                max_gap_m: closure.max_gap_mm * 1e-3,
+            }
         });
-        let mut lengths = 0..;
+        let mut lengths = usize::from(self.closed_chain.iter().any(|closure| closure.link().is_some()))..;
         let mut next = |kind| if kind == MeasureKind::Distance { lengths.next().unwrap_or(0) } else { 0 };
         let of_section = self.measure.iter().map(|section| Measure {
             name: section.name().to_owned(),
@@ -153,6 +156,12 @@ impl Pipeline {
             max_gap_m: section.max_gap_mm * 1e-3,
         });
         joined.chain(of_section).collect()
+    }
+
+    /// The joined features of the model: of two arms their tips.
+    fn joins(&self, closure: &ClosedChainSection) -> [FeatureId; 2] {
+        let of = |name: &String| self.feature(name).unwrap_or_default();
+        closure.between.as_ref().map_or([FeatureId::TIP, FeatureId(1)], |names| names.each_ref().map(of))
     }
 
     fn feature(&self, name: &str) -> Option<FeatureId> {

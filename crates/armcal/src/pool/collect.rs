@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
+use crate::two_arms::ClosedChainSection;
 use armcal_core::{Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_report::{
@@ -218,6 +219,9 @@ fn contradiction(
     if then != pipeline.observations {
         let now = &pipeline.observations;
         return Some(format!("its [observations] were {then:?}, the pipeline's are {now:?}"));
+    }
+    if let Some(difference) = ClosedChainSection::differs(pipeline.closed_chain.as_ref(), past) {
+        return Some(difference);
     }
     let boards_estimated = pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated);
     let base_estimated = pipeline.frames.base.pose == FramePose::Estimated;

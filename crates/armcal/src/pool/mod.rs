@@ -13,7 +13,8 @@ use crate::pipeline::{BoardPose, FramePose, Pipeline};
 use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story;
-use armcal_calibrate::{HoldoutConfig, calibrate};
+use crate::two_arms::check::place_bases;
+use armcal_calibrate::{HoldoutConfig, align_frames, calibrate};
 use armcal_core::{Pose, SetupReport};
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_report::{Run, Undiagnosed};
@@ -37,7 +38,6 @@ pub struct Pooled {
 /// go wrong in a fit.
 pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<Pooled, Error> {
     progress.step("reading results");
-    pipeline.one_arm("`armcal pool` pools the recordings of one arm")?;
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
 
     let board = frames::board(pipeline)?;
@@ -87,6 +87,16 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
 
 /// The nominal arm among the frames of all recordings, as one run of them together would have it.
 fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, Error> {
+    let own =
+        |r: &CollectedRecording, base_in_world| RecordingStart { name: r.run.name.clone(), base_in_world };
+    let per_recording = pipeline.pool.per_recording.clone();
+    if pipeline.closed_chain.is_some() {
+        let mut model = frames::nominal_model(pipeline, &chain, None, &[])?;
+        let aligned = align_frames(&model, &collected.observations, &pipeline.fit)?;
+        place_bases(&mut model, &aligned);
+        model.ask_own(collected.recordings.iter().map(|r| own(r, None)).collect(), per_recording);
+        return Ok(model);
+    }
     let mut base = frames::frame("base", &pipeline.frames.base, true);
     let measured = pipeline.frames.base.pose == FramePose::Measured;
     let bases: Vec<Pose> = collected.recordings.iter().filter(|_| measured).map(|r| r.base).collect();
@@ -103,11 +113,8 @@ fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<
     let boards = collected.recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
     frames::declare(&mut model, pipeline)?;
-    let start = |r: &CollectedRecording| RecordingStart {
-        name: r.run.name.clone(),
-        base_in_world: measured.then_some(r.base),
-    };
+    let start = |r: &CollectedRecording| own(r, measured.then_some(r.base));
     // Each recording knows its own board alone, so that work grows with their number and no faster.
-    model.ask_own(collected.recordings.iter().map(start).collect(), pipeline.pool.per_recording.clone());
+    model.ask_own(collected.recordings.iter().map(start).collect(), per_recording);
     Ok(model)
 }

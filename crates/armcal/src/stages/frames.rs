@@ -22,7 +22,9 @@ const SURELY: f64 = 5.0;
 
 /// Reads the DH or URDF file of the pipeline, of two arms both: the texts and the chain in them.
 pub fn nominal_chain(pipeline: &Pipeline) -> Result<(Vec<String>, Chain), Error> {
-    let read = |model| chain_of(model, &pipeline.folder).map_err(|e| pipeline.where_data_come_from(e));
+    let measured: Vec<&str> = pipeline.markers.values().map(|marker| marker.link.as_str()).collect();
+    let read =
+        |model| chain_of(model, &measured, &pipeline.folder).map_err(|e| pipeline.where_data_come_from(e));
     let chains = pipeline.models().into_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
     let (texts, mut chains): (Vec<String>, Vec<Chain>) = chains.into_iter().unzip();
     let chain = match &pipeline.two_arms {
@@ -42,8 +44,8 @@ pub fn bare(chain: &Chain, markers: Vec<Marker>) -> Result<Model, Error> {
     Ok(Model::of_arms(chain.clone(), chain.arms().iter().map(frames).collect())?)
 }
 
-/// Reads the DH or URDF file of a model section: its text and the chain in it.
-fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Error> {
+/// Reads the DH or URDF file of a model section: its text and the chain in it, of a URDF with the branches to what is measured.
+fn chain_of(model: &ModelSection, measured: &[&str], folder: &Path) -> Result<(String, Chain), Error> {
     if let Some(dh) = &model.dh {
         let path = folder.join(dh);
         let text = read("DH model", &path)?;
@@ -53,8 +55,9 @@ fn chain_of(model: &ModelSection, folder: &Path) -> Result<(String, Chain), Erro
     let path = folder.join(model.urdf.as_deref().unwrap_or(Path::new("")));
     let link = |name: &Option<String>| name.clone().unwrap_or_default();
     let text = read("URDF", &path)?;
-    let chain = Chain::from_urdf(&text, &link(&model.base_link), &link(&model.tip_link), &path)?
-        .with_masses(model.masses, &path)?;
+    let (base, tip) = (link(&model.base_link), link(&model.tip_link));
+    let chain =
+        Chain::from_urdf_branches(&text, &base, &tip, measured, &path)?.with_masses(model.masses, &path)?;
     let chain = match &model.deviation {
         Some(declared) => chain.with_deviation(declared, &path)?,
         None => chain,
@@ -94,8 +97,9 @@ pub fn nominal_model(
     board: Option<&Board>,
     seen: &[Seen],
 ) -> Result<Model, Error> {
+    let (places, lengths) = (pipeline.places(), pipeline.lengths());
     if let Some(two) = &pipeline.two_arms {
-        let mut model = two.model(chain)?;
+        let mut model = two.model(chain)?.against(&places, &lengths)?;
         override_parameters(&mut model, &pipeline.parameters)?;
         return Ok(model);
     }
@@ -113,7 +117,7 @@ pub fn nominal_model(
         markers: markers(pipeline),
         boards,
     };
-    let mut model = Model::new(chain.clone(), frames)?.against(&pipeline.places(), &pipeline.lengths())?;
+    let mut model = Model::new(chain.clone(), frames)?.against(&places, &lengths)?;
     declare(&mut model, pipeline)?;
     let own = &pipeline.pool.per_recording;
     if seen.len() > 1 && !own.is_empty() {

@@ -1,18 +1,21 @@
-//! Which dwells were measured against places of the model: fixed points and planes, or the tip of the other arm.
+//! Which dwells were measured against places of the model: fixed points and planes, or another tip.
 //!
 //! An instrument says it by reading something. Without one, dwells whose nominal tips are near belong, of several points to the
 //! nearest, and the calibration shows which of them were not measured after all.
 
 use crate::error::Error;
-use crate::pipeline::{Measure, MeasureKind};
-use crate::setup::Inputs;
+use crate::pipeline::{Measure, MeasureKind, Pipeline};
 use crate::stages::observe::{Observed, observation};
-use crate::two_arms;
+use crate::stages::past::Placed;
+use crate::stages::perceive::Seen;
+use crate::two_arms::check;
 use armcal_calibrate::{Calibration, align_frames, expected_norm_m, fit_frames, position_covariance_m2};
-use armcal_core::{Against, Dwell, DwellId, Observation, Reference, Rejection};
+use armcal_core::{
+    Against, Dwell, DwellId, FeatureId, Observation, Reference, Rejection, Severity, Stage, Warning,
+};
 use armcal_model::Model;
 use nalgebra::Matrix3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is near and where the places are depend on each other.
 const MAX_ROUNDS: usize = 5;
@@ -24,7 +27,7 @@ const OPEN_SHARE: f64 = 0.1;
 
 /// Every measurement that each dwell may be.
 pub struct Measures<'a> {
-    inputs: &'a Inputs,
+    pipeline: &'a Pipeline,
     measures: Vec<Measure>,
     all: Vec<Candidate>,
 }
@@ -35,12 +38,12 @@ struct Candidate {
     observation: Observation,
 }
 
-impl Measures<'_> {
+impl<'a> Measures<'a> {
     /// Of the dwells of all recordings.
-    pub fn of(inputs: &Inputs) -> Measures<'_> {
-        let measures = inputs.pipeline.measures();
+    pub fn of(pipeline: &'a Pipeline, seen: &[Seen]) -> Measures<'a> {
+        let measures = pipeline.measures();
         let mut all = Vec::new();
-        for (recording, seen) in inputs.seen.iter().enumerate() {
+        for (recording, seen) in seen.iter().enumerate() {
             for dwell in &seen.dwells {
                 for (measure, m) in measures.iter().enumerate().filter(|(_, m)| m.is_in(recording)) {
                     let Some((reference, sigma_m)) = m.reference(dwell) else { continue };
@@ -51,7 +54,7 @@ impl Measures<'_> {
                 }
             }
         }
-        Measures { inputs, measures, all }
+        Measures { pipeline, measures, all }
     }
 
     /// Whether nothing is measured against a place.
@@ -63,17 +66,23 @@ impl Measures<'_> {
     /// dwell that does not belong would pull a frame away. `sure` are observations by sensor and table.
     ///
     /// # Errors
-    /// A measurement that no dwell is near to; arms that do not move, or too few dwells of them.
+    /// A measurement that no dwell is near to; joined tips that do not move, or too few dwells of them; parameters that each
+    /// recording is to have for itself.
     pub fn near(&self, geometry: &mut Model, sure: &[Observation]) -> Result<Vec<bool>, Error> {
         if self.is_empty() {
             return Ok(Vec::new());
         }
-        let fit = &self.inputs.pipeline.fit;
-        two_arms::check::both_move(geometry, &self.chosen(&vec![true; self.all.len()]))?;
+        let fit = &self.pipeline.fit;
+        if self.pipeline.recordings.len() > 1 && !self.pipeline.pool.per_recording.is_empty() {
+            let problem = "which dwells are joined, or at a place, is found with one base for all recordings, so that [pool] \
+                           per_recording is for `armcal pool`: run each recording by itself, and pool the results";
+            return Err(Error::TwoArms { problem: problem.to_owned() });
+        }
+        self.check_joined(geometry, &vec![true; self.all.len()], check::both_move)?;
         let mut near = self.at_first(geometry, sure)?;
         for _ in 0..MAX_ROUNDS {
             let used = self.enough(geometry, &near, sure)?;
-            two_arms::check::place_bases(geometry, &align_frames(geometry, &used, fit)?);
+            check::place_bases(geometry, &align_frames(geometry, &used, fit)?);
             // A length must not pull the base: the frames alone are fitted before a dwell is judged.
             let start = fit_frames(geometry, &used, fit)?;
             let again = self.nearest(geometry, &start, &|_| true);
@@ -82,18 +91,18 @@ impl Measures<'_> {
             }
             near = again;
         }
-        let used = self.enough(geometry, &near, sure)?;
-        two_arms::check::both_move(geometry, &self.chosen(&near))?;
-        two_arms::check::spread(geometry, &used)?;
+        self.enough(geometry, &near, sure)?;
+        self.check_joined(geometry, &near, check::both_move)?;
+        self.check_joined(geometry, &near, check::spread)?;
         Ok(near)
     }
 
     /// Before any of it is fitted: a dwell may be at a place where the start of that says so, once what a sensor saw has placed the
-    /// arm. How two arms stand to each other is not known yet.
+    /// arm. How joined tips stand to each other is not known yet.
     fn at_first(&self, geometry: &Model, sure: &[Observation]) -> Result<Vec<bool>, Error> {
         let start = match sure.is_empty() {
             true => geometry.nominal(),
-            false => fit_frames(geometry, sure, &self.inputs.pipeline.fit)?,
+            false => fit_frames(geometry, sure, &self.pipeline.fit)?,
         };
         Ok(self.nearest(geometry, &start, &|m| matches!(m.against, Against::Fixed(_))))
     }
@@ -118,12 +127,62 @@ impl Measures<'_> {
     /// Of the candidates that are near, those that the calibrated model closes.
     pub fn closing(&self, model: &Model, calibration: &Calibration, near: &[bool]) -> Vec<bool> {
         let (p, scale) = (calibration.fit.values(), calibration.fit.sigma_scale.max(1.0));
-        let closes = |c: &Candidate| {
-            let allowed_m = OPEN_SHARE * self.measures[c.measure].max_gap_m;
-            let o = &c.observation;
-            error_m(model, &p, o) <= allowed_m.max(OPEN_FACTOR * expected_m(model, &p, o) * scale)
-        };
-        self.all.iter().zip(near).map(|(c, near)| *near && closes(c)).collect()
+        self.all.iter().zip(near).map(|(c, near)| *near && self.closes(model, &p, scale, c)).collect()
+    }
+
+    /// Whether a calibrated model has a tip where it was measured, as far as noise and a joint's play let it.
+    fn closes(&self, model: &Model, p: &[f64], scale: f64, c: &Candidate) -> bool {
+        let allowed_m = OPEN_SHARE * self.measures[c.measure].max_gap_m;
+        let o = &c.observation;
+        error_m(model, p, o) <= allowed_m.max(OPEN_FACTOR * expected_m(model, p, o) * scale)
+    }
+
+    /// The dwells that a calibrated model shows to be measured, with those of sensor and table; frames that nobody knows are
+    /// fitted to them. And what was fitted, and left out.
+    ///
+    /// # Errors
+    /// A measurement that no dwell is near to, too few dwells of joined tips.
+    pub fn judged(
+        &self,
+        placed: &mut Placed,
+        sure: &[Observation],
+    ) -> Result<(Vec<Observation>, Vec<Warning>), Error> {
+        let mut which =
+            self.nearest(&placed.model, &placed.calibrated, &|m| matches!(m.against, Against::Fixed(_)));
+        let mut round = 1;
+        loop {
+            let known = self.enough(&placed.model, &which, sure)?;
+            let mut said = placed.fit_frames(self.pipeline, &known)?;
+            let (model, p) = (&placed.model, &placed.calibrated);
+            // What does not belong may still pull the frames at first.
+            let again: Vec<bool> = match round {
+                1 => self.nearest(model, p, &|_| true),
+                _ => self.all.iter().map(|c| self.closes(model, p, 1.0, c)).collect(),
+            };
+            if (again != which || round == 1) && round < MAX_ROUNDS {
+                (which, round) = (again, round + 1);
+                continue;
+            }
+            said.extend(self.left_out(model, p, &which));
+            return Ok((known, said));
+        }
+    }
+
+    /// What a verification says of dwells that it does not judge: of joined tips, which could have been closed in any.
+    fn left_out(&self, model: &Model, p: &[f64], which: &[bool]) -> Option<Warning> {
+        let joined = |c: &Candidate| matches!(self.measures[c.measure].against, Against::Feature(_));
+        let open = self.all.iter().zip(which).filter(|(c, chosen)| joined(c) && !**chosen);
+        let least_m =
+            open.clone().map(|(c, _)| error_m(model, p, &c.observation)).fold(f64::INFINITY, f64::min);
+        let count = open.count();
+        let message = format!(
+            "{count} of {} dwells are not judged as joined: by the calibrated model their tips are {:.1} mm from closing or more",
+            self.all.iter().filter(|c| joined(c)).count(),
+            least_m * 1e3
+        );
+        let notice =
+            || Warning::new(Severity::Notice, Stage::Calibrate, "tips-open", "closed_chain", message);
+        (count > 0).then(notice)
     }
 
     /// Adds what was chosen to the observations by sensor and table, dwell by dwell.
@@ -133,15 +192,14 @@ impl Measures<'_> {
         }
         observed.observations.extend(self.chosen(which));
         observed.observations.sort_by_key(|o| o.dwell);
-        let used: std::collections::BTreeSet<DwellId> =
-            observed.observations.iter().map(|o| o.dwell).collect();
+        let used: BTreeSet<DwellId> = observed.observations.iter().map(|o| o.dwell).collect();
         observed.rejections.retain(|r| !used.contains(&r.dwell));
     }
 
     /// Why the dwells that were not chosen were not, as the calibrated model has them.
-    pub fn explain(&self, observed: &mut Vec<Rejection>, model: &Model, calibration: &Calibration) {
+    pub fn explain(&self, rejections: &mut [Rejection], model: &Model, calibration: &Calibration) {
         let (p, scale) = (calibration.fit.values(), calibration.fit.sigma_scale.max(1.0));
-        for rejection in observed {
+        for rejection in rejections {
             let own = self.all.iter().filter(|c| c.observation.dwell == rejection.dwell);
             let off = own.map(|c| (c, error_m(model, &p, &c.observation)));
             let Some((c, off_m)) = off.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
@@ -170,41 +228,45 @@ impl Measures<'_> {
             .collect()
     }
 
-    /// What the frames are placed by, if every measurement was made.
-    fn enough(
+    /// Holds the chosen dwells of joined tips to a check, where there are any.
+    fn check_joined(
         &self,
-        geometry: &Model,
-        near: &[bool],
-        sure: &[Observation],
-    ) -> Result<Vec<Observation>, Error> {
-        let joined = self.chosen(near);
-        if let Some(arms) = &self.inputs.pipeline.two_arms {
-            two_arms::check::enough(&arms.closure, &joined, self.all.len())?;
-        }
-        let p = geometry.nominal();
+        model: &Model,
+        which: &[bool],
+        check: fn(&Model, [FeatureId; 2], &[Observation]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let Some((at, joins)) = self.joins() else { return Ok(()) };
+        let joined = self.all.iter().zip(which).filter(|(c, chosen)| **chosen && c.measure == at);
+        let joined: Vec<Observation> = joined.map(|(c, _)| c.observation.clone()).collect();
+        check(model, joins, &joined)
+    }
+
+    /// The measurement of joined tips, and these.
+    fn joins(&self) -> Option<(usize, [FeatureId; 2])> {
+        let joins = |(at, m): (usize, &Measure)| match m.against {
+            Against::Feature(to) => Some((at, [m.feature, to])),
+            Against::Fixed(_) => None,
+        };
+        self.measures.iter().enumerate().find_map(joins)
+    }
+
+    /// What the frames are placed by, if every measurement was made.
+    fn enough(&self, model: &Model, near: &[bool], sure: &[Observation]) -> Result<Vec<Observation>, Error> {
+        let p = model.nominal();
         for (at, m) in self.measures.iter().enumerate() {
-            let mut own = self.all.iter().zip(near).filter(|(c, _)| c.measure == at);
-            if own.clone().any(|(_, near)| *near) {
-                continue;
+            let own = || self.all.iter().zip(near).filter(|(c, _)| c.measure == at);
+            let chosen: Vec<Observation> =
+                own().filter(|(_, near)| **near).map(|(c, _)| c.observation.clone()).collect();
+            let closure = self.pipeline.closed_chain.as_ref();
+            if let (Against::Feature(_), Some(closure)) = (m.against, closure) {
+                check::enough(closure, &chosen, (own().count(), self.pipeline.two_arms.is_some()))?;
+            } else if chosen.is_empty() {
+                let off = own().map(|(c, _)| error_m(model, &p, &c.observation));
+                return Err(m.never_made(off.fold(f64::INFINITY, f64::min)));
             }
-            let least_m =
-                own.clone().map(|(c, _)| error_m(geometry, &p, &c.observation)).fold(f64::INFINITY, f64::min);
-            let problem = match own.next() {
-                Some(_) => format!(
-                    "the nominal arm is nowhere nearer to it than {:.0} mm, and {:.0} mm are allowed: say where it is (`at`), or \
-                     raise max_gap_mm",
-                    least_m * 1e3,
-                    m.max_gap_m * 1e3
-                ),
-                None => {
-                    "its instrument reads nothing in any dwell: check `reading`, `range_mm` and `recordings`"
-                        .into()
-                }
-            };
-            return Err(Error::Measure { name: m.name.clone(), problem });
         }
         let mut all = sure.to_vec();
-        all.extend(joined);
+        all.extend(self.chosen(near));
         all.sort_by_key(|o| o.dwell);
         Ok(all)
     }
@@ -231,6 +293,23 @@ impl Measure {
             (MeasureKind::Plane, Against::Feature(_)) => return None,
         };
         Some((reference, self.sigma_m.hypot(own_m)))
+    }
+
+    /// The error of a measurement that no dwell is, the nearest being this far off [m].
+    fn never_made(&self, least_m: f64) -> Error {
+        let problem = match least_m.is_finite() {
+            true => format!(
+                "the nominal arm is nowhere nearer to it than {:.0} mm, and {:.0} mm are allowed: say where it is (`at`), or raise \
+                 max_gap_mm",
+                least_m * 1e3,
+                self.max_gap_m * 1e3
+            ),
+            false => {
+                "its instrument reads nothing in any dwell: check `reading`, `range_mm` and `recordings`"
+                    .into()
+            }
+        };
+        Error::Measure { name: self.name.clone(), problem }
     }
 }
 

@@ -76,19 +76,17 @@ pub fn observations(
                 (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
                 (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
             };
-            let of = |feature, (reference, covariance_m2): Referenced| Observation {
-                feature,
-                ..observation(dwell, seen, reference, covariance_m2)
-            };
             let markers = markers_of(pipeline, dwell);
             let seen_of_it = !markers.is_empty();
             match outcome {
-                Ok(tip) => observed.observations.push(of(FeatureId::TIP, tip)),
+                Ok(tip) => observed.observations.push(of_feature(seen, dwell, FeatureId::TIP, tip)),
                 // Of a dwell without its tip, the markers are left.
                 Err(_) if seen_of_it => {}
                 Err(why) => observed.rejections.push(Rejection { dwell: dwell.id, why }),
             }
-            observed.observations.extend(markers.into_iter().map(|(feature, marker)| of(feature, marker)));
+            observed.observations.extend(
+                markers.into_iter().map(|(feature, marker)| of_feature(seen, dwell, feature, marker)),
+            );
         }
     }
     observed
@@ -115,6 +113,15 @@ impl Observed {
         };
         Err(Error::NoObservations { dwells, hint: hint + few })
     }
+}
+
+fn of_feature(
+    seen: &Seen,
+    dwell: &Dwell,
+    feature: FeatureId,
+    (reference, covariance_m2): Referenced,
+) -> Observation {
+    Observation { feature, ..observation(dwell, seen, reference, covariance_m2) }
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.

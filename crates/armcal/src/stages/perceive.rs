@@ -8,9 +8,10 @@ use crate::stages::effort;
 use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
 use crate::stages::rigid;
-use crate::two_arms::joined;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{Dwell, FeatureId, Load, Parameter, PoseSamples, Rejection, Samples, Warning};
+use armcal_core::{
+    Dwell, FeatureId, JointSamples, Load, Parameter, PoseSamples, Rejection, Samples, Warning,
+};
 use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
@@ -210,10 +211,7 @@ fn dwells_of_one(
     let in_recording = |source| Error::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
-    let (samples, streams, mut warnings) = match &pipeline.two_arms {
-        None => recording.read(&pipeline.streams).map_err(in_recording)?,
-        Some(two) => joined::read(two, name, recording)?,
-    };
+    let (mut samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
     let expected = speed_model.chain().joint_names().len();
     if samples.joints.joint_rad.len() != expected {
         return Err(Error::JointCount {
@@ -221,6 +219,9 @@ fn dwells_of_one(
             read: samples.joints.joint_rad.len(),
             expected,
         });
+    }
+    if pipeline.two_arms.is_none() && pipeline.streams.joints.len() > 1 {
+        in_order_of(speed_model.chain(), &mut samples.joints, name)?;
     }
     // Readings that are held leap too: told once, by their cause.
     match readings::stale(&samples.joints, name) {
@@ -281,6 +282,22 @@ fn dwells_of_one(
         readings,
     };
     Ok((samples, seen))
+}
+
+/// Puts the joints of several streams into the order of the chain, by their names: no list of the pipeline gives it.
+fn in_order_of(chain: &Chain, joints: &mut JointSamples, recording: &str) -> Result<(), Error> {
+    let place = |name: &String| {
+        joints.names.iter().position(|read| read == name).ok_or_else(|| Error::JointUnread {
+            recording: recording.to_owned(),
+            joint: name.clone(),
+            read: joints.names.join(", "),
+        })
+    };
+    let order = chain.joint_names().iter().map(place).collect::<Result<Vec<usize>, Error>>()?;
+    let sorted = |columns: &Vec<Vec<f64>>| order.iter().map(|k| columns[*k].clone()).collect();
+    (joints.joint_rad, joints.effort_nm) = (sorted(&joints.joint_rad), joints.effort_nm.as_ref().map(sorted));
+    joints.names = chain.joint_names().to_vec();
+    Ok(())
 }
 
 /// What the clocks are aligned by: the tip, or the first marker where nothing saw the tip.

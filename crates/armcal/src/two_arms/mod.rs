@@ -1,12 +1,12 @@
-//! Two arms in one recording, their tips joined: each calibrates the other, without a camera.
+//! Two tips in one recording that are joined: each calibrates the other, without a camera.
 //!
-//! [`pipeline`] is what a user writes (recognised by its `[closed_chain]`), [`joined`] reads the two joint streams as one,
-//! [`check`] refuses dwells that place no arm against the
-//! other. Everything else is as with one arm: the model
-//! is one, with both arms in it.
+//! [`closure`] is what a user writes of that. The tips are those of two arms with a model file each ([`pipeline`], recognised by
+//! its `[[arms]]`), or two points of one robot, such as the hands of a torso with two arms. [`check`] refuses dwells that place
+//! neither against the other. Everything else is as with one arm: the model is one, with all joints in it.
 
 pub mod check;
-pub mod joined;
+pub mod closure;
 pub mod pipeline;
 
+pub use closure::ClosedChainSection;
 pub use pipeline::TwoArms;

@@ -1,28 +1,27 @@
-//! The pipeline file of two arms, and what it becomes: a pipeline like any other.
+//! The pipeline file of two arms with a model file each, and what it becomes: a pipeline like any other.
 
+use super::ClosedChainSection;
 use crate::check::CheckSection;
 use crate::error::Error;
 use crate::pipeline::{
-    FramePose, FrameSection, LoadEntry, ModelSection, ParameterOverride, Pipeline, RecordingEntry, knowledge,
-    recording_name,
+    FrameSection, LoadEntry, ModelSection, ParameterOverride, Pipeline, RecordingEntry, recording_name,
 };
+use crate::pool::PoolSection;
 use crate::stages::frames::{frame, override_parameters};
 use armcal_calibrate::{FitConfig, HoldoutConfig};
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::DwellConfig;
-use armcal_model::{Chain, EffectSpec, EffectTable, Length, Model};
+use armcal_model::{Chain, EffectSpec, EffectTable, Model};
 use armcal_recording::{JointStream, Streams};
-use armcal_report::OutputConfig;
+use armcal_report::{OutputConfig, VerifyConfig};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// The two arms of a pipeline, and how their tips are joined.
+/// The two arms of a pipeline.
 #[derive(Debug, Clone)]
 pub struct TwoArms {
     /// The arms.
     pub arms: [ArmSection; 2],
-    /// How their tips are joined.
-    pub closure: ClosedChainSection,
 }
 
 /// A pipeline of two arms, as written.
@@ -49,7 +48,11 @@ struct File {
     #[serde(default)]
     holdout: HoldoutConfig,
     #[serde(default)]
+    pool: PoolSection,
+    #[serde(default)]
     diagnosis: DiagnosisConfig,
+    #[serde(default)]
+    verify: VerifyConfig,
     #[serde(default)]
     check: CheckSection,
     #[serde(default)]
@@ -91,54 +94,6 @@ pub struct ArmSection {
     pub effects: Vec<EffectTable>,
 }
 
-/// How the tips are joined.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ClosedChainSection {
-    /// `"same-point"` or `"rigid-link"`.
-    pub kind: ClosureKind,
-    /// With a rigid link: the distance of the two tips [mm].
-    pub length_mm: Option<f64>,
-    /// How well that is known: `"given"` (default), `"measured"` with `length_sigma_mm`, `"estimated"`.
-    #[serde(default)]
-    pub length: FramePose,
-    /// Standard error of a measured length [mm].
-    #[serde(default)]
-    pub length_sigma_mm: f64,
-    /// How far apart the joined points may be all the same, 1 sigma per axis [mm]; default 0.1.
-    #[serde(default = "default_sigma_mm")]
-    pub sigma_mm: f64,
-    /// Dwells in which the nominal arms have their tips further from closing than this are not joined [mm]; default 100.
-    #[serde(default = "default_max_gap_mm")]
-    pub max_gap_mm: f64,
-}
-
-/// How tips can be joined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ClosureKind {
-    /// Both in one point.
-    SamePoint,
-    /// On a rigid link with a ball joint at either end.
-    RigidLink,
-}
-
-fn default_sigma_mm() -> f64 {
-    0.1
-}
-
-fn default_max_gap_mm() -> f64 {
-    100.0
-}
-
-impl ClosedChainSection {
-    /// The rigid link between the tips, where that is what joins them.
-    pub fn link(&self) -> Option<Length> {
-        let length_m = self.length_mm.filter(|_| self.kind == ClosureKind::RigidLink)? * 1e-3;
-        Some(Length::of_link(length_m, knowledge(self.length, self.length_sigma_mm)))
-    }
-}
-
 impl TwoArms {
     /// Reads and checks the text of a pipeline of two arms; its paths are not resolved yet.
     ///
@@ -156,14 +111,9 @@ impl TwoArms {
         let arms = <[ArmSection; 2]>::try_from(file.arms).map_err(|_| {
             problem("arms", format!("has {count} entries; a closed chain is made of two [[arms]]"))
         })?;
-        let two = TwoArms { arms, closure: file.closed_chain };
+        let two = TwoArms { arms };
         if let Some((key, said)) = two.contradiction() {
             return Err(problem(key, said));
-        }
-        if let HoldoutConfig::Cavities { .. } | HoldoutConfig::EveryNthCavity { .. } = file.holdout {
-            let said = "goes by cavity, but two arms have none in common that armcal knows; use \"random\", \"cavity-folds\" \
-                        (dwells are dealt out) or \"dwells\"";
-            return Err(problem("holdout.kind", said.to_owned()));
         }
         let [first, _] = &two.arms;
         let entry = |r: RecordingPaths| {
@@ -174,7 +124,7 @@ impl TwoArms {
             name: file.name,
             data: file.data,
             recordings: file.recordings.into_iter().map(entry).collect(),
-            streams: joints_only(&first.joints),
+            streams: two.streams(),
             clock: Default::default(),
             dwell: file.dwell,
             table: None,
@@ -182,6 +132,7 @@ impl TwoArms {
             points: Default::default(),
             planes: Default::default(),
             measure: Default::default(),
+            closed_chain: Some(file.closed_chain),
             sensor: Default::default(),
             model: first.model.clone(),
             frames: Default::default(),
@@ -190,9 +141,9 @@ impl TwoArms {
             observations: Default::default(),
             fit: file.fit,
             holdout: file.holdout,
-            pool: Default::default(),
+            pool: file.pool,
             diagnosis: file.diagnosis,
-            verify: Default::default(),
+            verify: file.verify,
             check: file.check,
             output: file.output,
             two_arms: Some(two),
@@ -201,9 +152,10 @@ impl TwoArms {
         })
     }
 
-    /// What to read of each arm.
-    pub fn streams(&self) -> [Streams; 2] {
-        self.arms.each_ref().map(|arm| joints_only(&arm.joints))
+    /// What to read of both arms.
+    fn streams(&self) -> Streams {
+        let of = |arm: &ArmSection| JointStream { arm: Some(arm.name.clone()), ..arm.joints.clone() };
+        Streams { joints: self.arms.iter().map(of).collect(), ..Streams::default() }
     }
 
     /// Both nominal arms in one world, their chains read already.
@@ -213,7 +165,7 @@ impl TwoArms {
             tip: frame(&format!("{}.tip", arm.name), &arm.tip, false),
         };
         let all = self.arms.iter().map(frames).collect();
-        let mut model = Model::of_arms(chain.clone(), all)?.against(&[], self.closure.link().as_slice())?;
+        let mut model = Model::of_arms(chain.clone(), all)?;
         for (arm, of_chain) in self.arms.iter().zip(chain.arms()) {
             let named = |p: &ParameterOverride| ParameterOverride {
                 name: of_chain.parameter_among_all(&p.name),
@@ -242,7 +194,7 @@ impl TwoArms {
 
     /// What serde cannot see.
     fn contradiction(&self) -> Option<(&'static str, String)> {
-        let (arms, chain) = (&self.arms, &self.closure);
+        let arms = &self.arms;
         // They name files.
         let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_');
         let taken = ["parameters", "pipeline", "calibrated"];
@@ -256,44 +208,6 @@ impl TwoArms {
                 "is the same for both arms; give each its own topic, or its own joint names on a topic they share".into(),
             ));
         }
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        if !positive(chain.sigma_mm) {
-            return Some((
-                "closed_chain.sigma_mm",
-                "must be above zero: no joint holds a point exactly".into(),
-            ));
-        }
-        if !positive(chain.max_gap_mm) {
-            return Some(("closed_chain.max_gap_mm", "must be above zero".into()));
-        }
-        match (chain.kind, chain.length_mm) {
-            (ClosureKind::RigidLink, None) => Some((
-                "closed_chain.length_mm",
-                "is missing; a rigid link has a length, even if it is estimated".into(),
-            )),
-            (ClosureKind::RigidLink, Some(mm)) if !positive(mm) => {
-                Some(("closed_chain.length_mm", "must be above zero".into()))
-            }
-            (ClosureKind::SamePoint, Some(_)) => Some((
-                "closed_chain.length_mm",
-                "has no meaning for tips in one point; use kind = \"rigid-link\" or remove it".into(),
-            )),
-            _ => None,
-        }
-    }
-}
-
-fn joints_only(joints: &JointStream) -> Streams {
-    let joints = joints.clone();
-    let bodies = Default::default();
-    Streams {
-        joints,
-        set_points: None,
-        tip: None,
-        bodies,
-        base: None,
-        table: None,
-        temperature: None,
-        gauges: Default::default(),
+        None
     }
 }

@@ -11,12 +11,13 @@ mod told;
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
 use crate::progress::Progress;
+use crate::stages::measures::Measures;
 use crate::stages::past::{Placed, place};
 use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe, perceive};
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
-use armcal_report::{PastModel, PathSample, Verification, VerifiedRecording};
+use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -72,6 +73,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
         recordings,
         told,
         recognises_copies: past.recordings.iter().all(|r| r.dwells.is_some()),
+        closing: Closing::of(&observations),
         points: armcal_verify::points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
         paths: rows(motions, &names),
@@ -136,6 +138,17 @@ impl Surroundings<'_> {
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
+        let measures = Measures::of(self.pipeline, self.seen);
+        if !measures.is_empty() {
+            if self.pipeline.table.is_some() {
+                let problem = "stands beside a [table]: verify the dwells of the table and those of the measurements apart";
+                return Err(Error::Measure { name: "all".to_owned(), problem: problem.to_owned() });
+            }
+            let none = self.seen.iter().map(|_| None).collect::<Vec<_>>();
+            let sure = observe::observations(self.pipeline, None, self.seen, &none).observations;
+            let (observations, said) = measures.judged(&mut placed, &sure)?;
+            return Ok((placed, observations, said));
+        }
         let mut places = self.associate(&placed, false)?;
         if self.pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated) {
             frames::start_frames(self.pipeline, &mut model, &places);

@@ -13,6 +13,7 @@ pub fn errors(placed: &Placed, observations: &[Observation]) -> Vec<PointError> 
         .map(|o| PointError {
             dwell: o.dwell,
             cavity: o.cavity().map(str::to_owned),
+            joined: o.is_joined(),
             arrival: o.arrival.clone(),
             before_m: error(&placed.nominal, o),
             after_m: error(&placed.calibrated, o),

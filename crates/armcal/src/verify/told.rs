@@ -1,9 +1,10 @@
 //! What the result knows of the new recordings, and where they go beyond it.
 
 use crate::stages::perceive::Seen;
-use armcal_core::{Observation, Samples, Severity, Stage, Unit, Visited, Warning};
+use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
 use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_report::{DwellMark, PastModel, Told, also_in};
+use std::collections::BTreeMap;
 
 /// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.
 pub fn told(past: &PastModel, seen: &[Seen]) -> Vec<Told> {
@@ -45,7 +46,10 @@ pub fn beyond_calibrated(
         let name = chain.joint_names().get(joint)?;
         let unit = chain.joint_unit(joint);
         let outside = |q: &f64| !visited.is_near(*q);
-        let dwells: Vec<f64> = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied()).collect();
+        // What was seen of several points in a dwell is one dwell.
+        let of_dwell = |o: &Observation| Some((o.dwell, *o.joint_rad.get(joint)?));
+        let dwells: BTreeMap<DwellId, f64> = observations.iter().filter_map(of_dwell).collect();
+        let dwells: Vec<f64> = dwells.into_values().collect();
         let readings = || samples.iter().filter_map(|s| s.joints.joint_rad.get(joint)).flatten();
         let (far_dwells, all) = (dwells.iter().filter(|q| outside(q)).count(), readings().count());
         let far = readings().filter(|q| outside(q)).count();

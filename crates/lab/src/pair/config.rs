@@ -1,6 +1,7 @@
 //! The lab file of two arms: recognised by its `[[arms]]`.
 
 use super::drives::acts_on_drives;
+use super::torso::TorsoConfig;
 use crate::LabError;
 use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, positive, range, value};
 use crate::mechanisms::{Keys, MechanismConfig};
@@ -21,6 +22,9 @@ pub struct PairConfig {
     pub start_unix_s: u64,
     /// The arms.
     pub arms: [PairArmConfig; 2],
+    /// A torso that carries both; none by default, and each stands by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torso: Option<TorsoConfig>,
     /// How the tips are joined.
     #[serde(default)]
     pub joined: JoinConfig,
@@ -127,9 +131,15 @@ impl PairConfig {
         (self.start_unix_s as i64 + 900 * recording as i64) * 1_000_000_000
     }
 
+    /// The arms, then the torso.
+    pub(super) fn carriers(&self) -> Vec<&PairArmConfig> {
+        self.arms.iter().chain(self.torso.as_ref().map(|torso| &torso.arm)).collect()
+    }
+
     /// Checks every value the simulation divides by, indexes with or waits for.
     pub fn check(&self) -> Result<(), LabError> {
         self.arms.iter().try_for_each(|arm| arm.check(self.recordings.len()))?;
+        self.torso.iter().try_for_each(|torso| torso.check(self.recordings.len()))?;
         if self.arms[0].name == self.arms[1].name || self.arms[0].joints.topic == self.arms[1].joints.topic {
             return Err(value("arms", "the two need names and topics of their own".into()));
         }
@@ -162,7 +172,7 @@ impl PairConfig {
 }
 
 impl PairArmConfig {
-    fn check(&self, recordings: usize) -> Result<(), LabError> {
+    pub(super) fn check(&self, recordings: usize) -> Result<(), LabError> {
         let joints = self.rows.iter().filter(|row| row.joint).count();
         for (key, size) in
             [("arms.home_deg", self.home_deg.len()), ("arms.joints.names", self.joints.names.len())]

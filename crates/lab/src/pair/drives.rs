@@ -1,6 +1,6 @@
 //! The drives of one arm of a pair: what the encoders read while a hand leads the links.
 
-use super::{Pair, PairConfig};
+use super::{BuiltArm, PairArmConfig};
 use crate::mechanisms::MechanismConfig;
 use crate::{LabError, Mechanism, Moment};
 use nalgebra::Vector3;
@@ -10,9 +10,8 @@ const GRAVITY_M_S2: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
 /// The gears, belts and encoders of one arm through one recording; the moments must come in order of time.
 pub(super) struct Drives<'a> {
-    config: &'a PairConfig,
-    pair: &'a Pair,
-    arm: usize,
+    config: &'a PairArmConfig,
+    built: &'a BuiltArm,
     recording: usize,
     mechanisms: Vec<Box<dyn Mechanism>>,
     /// Time [s], link and motor angles [rad] of the moment before.
@@ -20,9 +19,9 @@ pub(super) struct Drives<'a> {
 }
 
 impl<'a> Drives<'a> {
-    pub fn new(config: &'a PairConfig, pair: &'a Pair, recording: usize, arm: usize) -> Drives<'a> {
-        let mechanisms = config.arms[arm].mechanisms.iter().map(|m| m.hidden().mechanism()).collect();
-        Drives { config, pair, arm, recording, mechanisms, before: None }
+    pub fn new(config: &'a PairArmConfig, built: &'a BuiltArm, recording: usize) -> Drives<'a> {
+        let mechanisms = config.mechanisms.iter().map(|m| m.hidden().mechanism()).collect();
+        Drives { config, built, recording, mechanisms, before: None }
     }
 
     /// What the encoders see of links at these angles [rad], before they count.
@@ -30,7 +29,7 @@ impl<'a> Drives<'a> {
         if self.mechanisms.is_empty() {
             return link_rad.to_vec();
         }
-        let (built, own) = (&self.pair.arms[self.arm], &self.config.arms[self.arm]);
+        let (built, own) = (self.built, self.config);
         let gravity_m_s2 = built.world_from_base.rotation.inverse() * GRAVITY_M_S2;
         let masses_kg = vec![own.link_kg; link_rad.len()];
         let gravity_nm = built.arm.gravity_torque(link_rad, &gravity_m_s2, &masses_kg, 0.0);

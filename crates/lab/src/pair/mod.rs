@@ -9,9 +9,11 @@ mod config;
 mod drives;
 mod motion;
 mod recorded;
+mod torso;
 mod truth;
 
 pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig};
+pub use torso::{TipsSeenConfig, TorsoConfig};
 pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
 
 use crate::LabError;
@@ -28,6 +30,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone)]
 pub(crate) struct Pair {
     pub arms: [BuiltArm; 2],
+    /// What carries both, where something does: their world is the frame at its tip.
+    pub torso: Option<BuiltArm>,
     /// Distance of the joined points; 0 for tips in one point [m].
     pub link_m: f64,
 }
@@ -85,7 +89,7 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, La
 /// Observes a pair without recording it.
 pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
     config.check()?;
-    if config.arms.iter().any(|arm| !arm.mechanisms.is_empty()) {
+    if config.carriers().iter().any(|arm| !arm.mechanisms.is_empty()) {
         let why = "what is in the drives depends on the way to a rest: simulate a recording".to_owned();
         return Err(crate::config::value("arms.mechanisms", why));
     }
@@ -113,8 +117,7 @@ pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
 impl Pair {
     /// Builds both arms of the configured seed and places them.
     pub fn build(config: &PairConfig) -> Pair {
-        let built = |which: usize| {
-            let arm = &config.arms[which];
+        let built = |which: usize, arm: &PairArmConfig| {
             let mut geometry = Stream::new(config.seed, Purpose::Geometry, which);
             let rows = build_rows(&arm.rows, &arm.deviation, &mut geometry);
             let mut placing = Stream::new(config.seed, Purpose::Mounting, which);
@@ -127,11 +130,22 @@ impl Pair {
             None => 0.0,
             Some(length_mm) => (length_mm + joined.length_sigma_mm * making.normal()) * 1e-3,
         };
-        Pair { arms: [built(0), built(1)], link_m }
+        let arms = [0, 1].map(|which: usize| built(which, &config.arms[which]));
+        Pair { arms, torso: config.torso.as_ref().map(|torso| built(2, &torso.arm)), link_m }
+    }
+
+    /// The arms, then the torso.
+    pub fn carriers(&self) -> Vec<&BuiltArm> {
+        self.arms.iter().chain(&self.torso).collect()
     }
 }
 
 impl BuiltArm {
+    /// The frame at the tip of an arm of one joint, in the world.
+    pub fn tip_frame(&self, joint_rad: f64) -> Pose {
+        self.world_from_base * self.arm.tip_pose(&[joint_rad])
+    }
+
     /// The tip in the world [m].
     pub fn tip_in_world(&self, joint_rad: &[f64]) -> Vector3<f64> {
         (self.world_from_base * nalgebra::Point3::from(self.arm.tip(joint_rad))).coords

@@ -1,6 +1,6 @@
 //! Where the joined tips are, when: home, the meeting, pose after pose with a rest in each, home again.
 
-use super::{Pair, PairConfig};
+use super::{Pair, PairConfig, TorsoConfig};
 use crate::LabError;
 use crate::hand::{Tremor, minimum_jerk};
 use crate::random::{Purpose, Stream};
@@ -34,6 +34,8 @@ pub(crate) struct Phase {
     from_rad: [Vec<f64>; 2],
     /// Joint angles of both arms at its end [rad].
     pub to_rad: [Vec<f64>; 2],
+    /// The torso at its two ends [rad]; zero without one.
+    torso_rad: [f64; 2],
     moves: bool,
 }
 
@@ -105,24 +107,31 @@ impl Motion {
             held: None,
             from_rad: home.clone(),
             to_rad: home.clone(),
+            torso_rad: [0.0; 2],
             moves: false,
         }];
+        let turns = |torso: &TorsoConfig| torso.turns_rad(config.seed, recording, task.poses);
+        let turns_rad = config.torso.as_ref().map_or_else(|| vec![0.0; task.poses], turns);
         let mut before: Option<Pose> = None;
-        let add = |phases: &mut Vec<Phase>, last_s: f64, held, to_rad: &[Vec<f64>; 2], moves| {
+        let add = |phases: &mut Vec<Phase>,
+                   last_s: f64,
+                   held,
+                   (to_rad, turn_rad): (&[Vec<f64>; 2], f64),
+                   moves| {
             let Some(last) = phases.last() else { return };
             let (start_s, from_rad) = (last.end_s, last.to_rad.clone());
-            let end_s = start_s + last_s;
-            phases.push(Phase { start_s, end_s, held, from_rad, to_rad: to_rad.clone(), moves });
+            let (end_s, torso_rad) = (start_s + last_s, [last.torso_rad[1], turn_rad]);
+            phases.push(Phase { start_s, end_s, held, from_rad, to_rad: to_rad.clone(), torso_rad, moves });
         };
-        for _ in 0..task.poses {
+        for turn_rad in turns_rad {
             let next = draw_pose(config, pair, recording, &mut draw, before.as_ref(), &home)?;
             let way = before.as_ref().map(|(grip, _)| [*grip, next.0]);
-            add(&mut phases, pauses.uniform(task.move_s), way, &next.1, true);
-            add(&mut phases, pauses.uniform(task.rest_s), Some([next.0; 2]), &next.1, false);
+            add(&mut phases, pauses.uniform(task.move_s), way, (&next.1, turn_rad), true);
+            add(&mut phases, pauses.uniform(task.rest_s), Some([next.0; 2]), (&next.1, turn_rad), false);
             before = Some(next);
         }
-        add(&mut phases, 2.0, None, &home, true);
-        add(&mut phases, 1.5, None, &home, false);
+        add(&mut phases, 2.0, None, (&home, 0.0), true);
+        add(&mut phases, 1.5, None, (&home, 0.0), false);
         let duration_s = phases.last().map_or(0.0, |p| p.end_s);
         let mut hand =
             Tremor::new(Stream::new(config.seed, Purpose::Hand, recording), TREMOR_S[0], TREMOR_S[1]);
@@ -136,10 +145,24 @@ impl Motion {
         self.phases.last().map_or(0.0, |p| p.end_s)
     }
 
-    /// Joint angles of one arm [rad]; `near_rad` are those a moment before.
-    pub fn joint_rad(&self, pair: &Pair, arm: usize, time_s: f64, near_rad: &[f64]) -> Result<Vec<f64>, f64> {
+    /// The angle of the torso [rad].
+    pub fn torso_rad(&self, time_s: f64) -> f64 {
+        let phase = self.phase(time_s);
+        let [from, to] = phase.torso_rad;
+        from + (to - from) * minimum_jerk(phase.share(time_s))
+    }
+
+    fn phase(&self, time_s: f64) -> &Phase {
         let at = self.phases.partition_point(|p| p.end_s < time_s).min(self.phases.len() - 1);
-        let phase = &self.phases[at];
+        &self.phases[at]
+    }
+
+    /// Joint angles of one arm [rad], or behind the arms of the torso; `near_rad` are those a moment before.
+    pub fn joint_rad(&self, pair: &Pair, arm: usize, time_s: f64, near_rad: &[f64]) -> Result<Vec<f64>, f64> {
+        if arm == pair.arms.len() {
+            return Ok(vec![self.torso_rad(time_s)]);
+        }
+        let phase = self.phase(time_s);
         if !phase.moves {
             return Ok(phase.to_rad[arm].clone());
         }

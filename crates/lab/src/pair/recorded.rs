@@ -2,7 +2,7 @@
 
 use super::drives::Drives;
 use super::motion::Motion;
-use super::{Pair, PairConfig};
+use super::{Pair, PairConfig, torso};
 use crate::LabError;
 use crate::random::{Purpose, Stream};
 use crate::sensors::encoder::payload;
@@ -19,9 +19,15 @@ pub(crate) fn log(
     let reference_ns = config.start_ns(recording);
     let clock = SensorClock { offset_s: 0.0, latency_s: 0.0, drift: 0.0, reference_ns };
     let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
-    for arm in [0, 1] {
+    for arm in 0..pair.carriers().len() {
         joint_states(config, pair, motion, recording, arm, &mut log)?;
     }
+    let seen = torso::tips_seen(config, pair, motion, recording, &mut log);
+    seen.map_err(|short_by_m| LabError::JoinedOutOfReach {
+        recording: config.recordings[recording].clone(),
+        what: "the joined tips on their way".into(),
+        short_by_mm: short_by_m * 1e3,
+    })?;
     // Stable: messages logged in the same nanosecond keep the order of their channels.
     log.messages.sort_by_key(|message| message.log_ns);
     Ok(log)
@@ -35,19 +41,21 @@ fn joint_states(
     arm: usize,
     log: &mut Log,
 ) -> Result<(), LabError> {
-    let joints = &config.arms[arm].joints;
+    let (own, built) = (config.carriers()[arm], pair.carriers()[arm]);
+    let joints = &own.joints;
     log.channels.push(Channel {
         topic: joints.topic.clone(),
         kind: Kind::JointState,
         frame_id: String::new(),
         names: joints.names.clone(),
     });
-    let stream = 2 * recording + arm;
+    // The torso's come behind those of the arms in all recordings.
+    let stream = if arm < 2 { 2 * recording + arm } else { 2 * config.recordings.len() + recording };
     let mut noise = Stream::new(config.seed, Purpose::Encoder, stream);
     let draw = Stream::new(config.seed, Purpose::JointTransport, stream);
     let mut transport = Transport::new(&joints.transport, draw);
-    let mut drives = Drives::new(config, pair, recording, arm);
-    let mut near = motion.phases[0].to_rad[arm].clone();
+    let mut drives = Drives::new(own, built, recording);
+    let mut near = motion.phases[0].to_rad.get(arm).cloned().unwrap_or_else(|| vec![0.0]);
     let last = (motion.duration_s() * joints.rate_hz).floor() as u32;
     for sequence in 0..=last {
         // The two computers do not sample together: half a period apart.

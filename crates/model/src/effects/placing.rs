@@ -71,8 +71,11 @@ impl Placing<'_> {
 
     /// The marker the spec names: its name, and the index of the first of its parameters.
     pub fn marker(&self) -> Result<(&str, usize), String> {
-        let known: Vec<(&str, usize)> =
-            self.model.markers().map(|(id, name, _)| (name, self.model.first_of_feature(id))).collect();
+        let known: Vec<(&str, usize)> = self
+            .model
+            .markers()
+            .map(|(id, name, _)| (name, self.model.feature_parameters(id).start))
+            .collect();
         if known.is_empty() {
             return Err("it acts at a marker, and there are none: declare them under [markers]".to_owned());
         }

@@ -6,6 +6,8 @@ use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
 use armcal_core::{Against, FeatureId, Observation, Pose};
 use nalgebra::Matrix6xX;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// The name of a feature and the way to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +81,20 @@ impl Model {
         }
     }
 
+    /// The joints whose readings move a feature, rising.
+    pub fn joints_to(&self, feature: FeatureId) -> BTreeSet<usize> {
+        let joints = self.route(feature).iter().filter_map(|id| self.tree.0[*id].joint);
+        joints.map(|joint| joint.index).collect()
+    }
+
+    /// Those of them that move another branch too, such as the waist of a torso with two arms.
+    pub fn joints_shared_by(&self, feature: FeatureId) -> BTreeSet<usize> {
+        let own = self.joints_to(feature);
+        let beside = |theirs: &BTreeSet<usize>| !theirs.is_subset(&own) && !own.is_subset(theirs);
+        let others = self.features().map(|(other, _)| self.joints_to(other)).filter(beside);
+        others.flat_map(|theirs| own.intersection(&theirs).copied().collect::<Vec<usize>>()).collect()
+    }
+
     /// The names of what can be measured of the arm: its tip, then its markers.
     pub fn features(&self) -> impl Iterator<Item = (FeatureId, &str)> {
         self.features.iter().enumerate().map(|(k, feature)| (FeatureId(k), feature.name.as_str()))
@@ -127,8 +143,13 @@ impl Model {
     /// What an observation is, in words: none of the tip where a sensor saw it or a table held it, else such as `elbow` or `tip
     /// from post`.
     pub fn measured_name(&self, o: &Observation) -> Option<String> {
-        let Some(Against::Fixed(place)) = o.against() else {
-            return self.marker_name(o.feature).map(str::to_owned);
+        let place = match o.against() {
+            Some(Against::Fixed(place)) => place,
+            // Of two arms the tips are joined in every observation.
+            Some(Against::Feature(to)) if self.chain.arms().is_empty() => {
+                return Some(format!("{} and {}", self.feature_name(o.feature), self.feature_name(to)));
+            }
+            _ => return self.marker_name(o.feature).map(str::to_owned),
         };
         let how = match (o.is_scalar(), self.fixed[place].is_plane) {
             (false, _) => "in",
@@ -169,9 +190,9 @@ impl Model {
         jacobian
     }
 
-    /// Index of the first parameter of a feature's place on its link.
-    pub(crate) fn first_of_feature(&self, feature: FeatureId) -> usize {
-        self.route(feature).last().map_or(0, |end| self.tree.0[*end].parameters.start)
+    /// Indices of the parameters of a feature's place on its link.
+    pub fn feature_parameters(&self, feature: FeatureId) -> Range<usize> {
+        self.route(feature).last().map_or(0..0, |end| self.tree.0[*end].parameters.clone())
     }
 
     /// The segments from the world to a feature.

@@ -44,7 +44,7 @@ fn streams(report: &RecordingReport) -> Option<Streams> {
     };
     let names = ["joint1", "joint2"].map(str::to_owned).to_vec();
     Some(Streams {
-        joints: JointStream { topic: topic(Role::Joints)?, names, ..JointStream::default() },
+        joints: vec![JointStream { topic: topic(Role::Joints)?, names, ..JointStream::default() }],
         tip: topic(Role::Pose).map(|topic| PoseStream { topic, ..PoseStream::default() }),
         temperature: topic(Role::Scalar).map(|topic| ScalarStream { topic, clock: None }),
         ..Streams::default()

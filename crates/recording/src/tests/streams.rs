@@ -59,7 +59,7 @@ fn pose_track(messages: Vec<(u64, u64, Vec<u8>)>) -> Track {
 fn two_joints() -> Streams {
     let names = vec!["shoulder".to_owned(), "elbow".to_owned()];
     let joints = JointStream { topic: "/joint_states".into(), names, ..JointStream::default() };
-    Streams { joints, ..Streams::default() }
+    Streams { joints: vec![joints], ..Streams::default() }
 }
 
 fn with_tip() -> Streams {
@@ -86,7 +86,7 @@ fn refusal(tracks: &[Track], streams: &Streams) -> String {
 #[test]
 fn columns_hold_what_was_written_in_the_order_asked_for() {
     let mut streams = two_joints();
-    streams.joints.names.reverse();
+    streams.joints[0].names.reverse();
     let (samples, reports, warnings) = ok(&[joint_track(moving())], &streams);
     assert_eq!(samples.joints.names, ["elbow", "shoulder"]);
     assert_eq!(samples.joints.len(), 500);
@@ -160,11 +160,11 @@ fn efforts_are_read_joint_by_joint() {
 #[test]
 fn misspelt_names_are_met_with_the_nearest() {
     let mut streams = two_joints();
-    streams.joints.topic = "/joint_state".into();
+    streams.joints[0].topic = "/joint_state".into();
     let error = refusal(&[joint_track(moving()), pose_track(vec![])], &streams);
     assert!(error.contains("did you mean \"/joint_states\"") && error.contains("/vicon/tip/tip"), "{error}");
     let mut streams = two_joints();
-    streams.joints.names[1] = "elbw".into();
+    streams.joints[0].names[1] = "elbw".into();
     let error = refusal(&[joint_track(moving())], &streams);
     assert!(
         error.contains("no joint \"elbw\" (did you mean \"elbow\"?)") && error.contains("shoulder"),
@@ -178,7 +178,7 @@ fn misspelt_names_are_met_with_the_nearest() {
 #[test]
 fn a_topic_of_another_kind_is_refused_with_the_reason() {
     let mut streams = two_joints();
-    streams.joints.topic = "/vicon/tip/tip".into();
+    streams.joints[0].topic = "/vicon/tip/tip".into();
     let poses = (0..9).map(|i| pose_message(i, pose_at(i), [0.0, 0.0, 0.0, 1.0])).collect();
     let error = refusal(&[pose_track(poses)], &streams);
     assert!(error.contains("cannot be read") && error.contains("PoseStamped"), "{error}");
@@ -218,7 +218,7 @@ fn clocks_are_chosen_or_obeyed_and_the_reason_recorded() {
     let (_, reports, _) = ok(&[joint_track(moving())], &two_joints());
     assert!(reports[0].clock_reason.contains("follow log time"), "{}", reports[0].clock_reason);
     let mut streams = two_joints();
-    streams.joints.clock = Some(Clock::Log);
+    streams.joints[0].clock = Some(Clock::Log);
     let (samples, reports, _) = ok(&[joint_track(moving())], &streams);
     assert_eq!(samples.joints.time_ns[1], START_NS + STEP_NS + 3_000_000 + 7919);
     assert_eq!(reports[0].clock_reason, "set in the pipeline");
@@ -236,7 +236,7 @@ fn clocks_are_chosen_or_obeyed_and_the_reason_recorded() {
     let tracks = [joint_track((0..100).map(unstamped).collect())];
     let (samples, reports, _) = ok(&tracks, &two_joints());
     assert_eq!((reports[0].clock, samples.joints.time_ns[0]), (Clock::Publish, START_NS - 2_000_000));
-    streams.joints.clock = Some(Clock::Header);
+    streams.joints[0].clock = Some(Clock::Header);
     let error = refusal(&tracks, &streams);
     assert!(error.contains("all zero") && error.contains("\"publish\""), "{error}");
 }
@@ -251,16 +251,16 @@ fn wrong_units_are_recognised_and_the_right_ones_convert() {
     let error = refusal(&degrees, &two_joints());
     assert!(error.contains("looks like degrees") && error.contains("unit = \"deg\""), "{error}");
     let mut streams = two_joints();
-    streams.joints.unit = JointUnit::Deg;
+    streams.joints[0].unit = JointUnit::Deg;
     let (samples, ..) = ok(&degrees, &streams);
     assert!((samples.joints.row_rad(7)[1] - 1.2).abs() < 1e-12);
     let (.., warnings) = ok(&sweep(1.0), &streams);
     assert!(warnings.iter().any(|w| w.message.contains("unit = \"rad\"")), "{warnings:?}");
     assert!(refusal(&sweep(20_000.0), &two_joints()).contains("encoder counts"));
-    streams.joints.unit = JointUnit::Counts;
+    streams.joints[0].unit = JointUnit::Counts;
     assert!(refusal(&degrees, &streams).contains("one entry of `encoders` a joint"));
     let encoder = Encoder { counts_per_turn: 4096.0, direction: -1, zero_counts: 100.0 };
-    streams.joints.encoders = vec![encoder; 2];
+    streams.joints[0].encoders = vec![encoder; 2];
     let counts =
         (0..200).map(|i| joints_at(i, &["shoulder", "elbow"], &[100.0 + i as f64, 1124.0])).collect();
     let (samples, reports, _) = ok(&[joint_track(counts)], &streams);

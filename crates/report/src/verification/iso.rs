@@ -15,10 +15,10 @@ pub(super) const NO_REPEATS: &str =
 const STAND_IN: &str = "Set-points are not recorded: encoder readings stand for commands.";
 
 /// The section; one sentence where no criterion could be computed.
-pub(super) fn section(pen: &Pen, report: &IsoReport) -> String {
+pub(super) fn section(pen: &Pen, report: &IsoReport, none: &str) -> String {
     let title = "ISO 9283, the worst place of each criterion (verification.json has all)";
     if report.calibrated.criteria.is_empty() {
-        return pen.section(title, format!(" {NO_REPEATS}\n"));
+        return pen.section(title, format!(" {none}\n"));
     }
     let mut table = pen.table(&HEADER);
     for row in rows(report) {

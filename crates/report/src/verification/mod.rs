@@ -11,6 +11,7 @@ pub use terminal::verification_text;
 
 use crate::past_model::Value;
 use crate::run::Status;
+use crate::two_arms::Closing;
 use armcal_core::{Severity, Warning};
 use armcal_iso9283::Assessment;
 use armcal_verify::{PathError, PathRow, PointsRow};
@@ -33,6 +34,8 @@ pub struct Verification {
     pub told: Vec<Told>,
     /// Whether the result would recognise a copy of a recording it was calibrated on, by its dwells; else by its bytes alone.
     pub recognises_copies: bool,
+    /// How many of them are of tips that are joined: errors from tip to tip.
+    pub closing: Closing,
     /// Errors at points (Table 4 of the source paper).
     pub points: Vec<PointsRow>,
     /// Errors along paths (Table 6, figures 6, 7 and 10).
@@ -168,6 +171,26 @@ impl PathSample {
 }
 
 impl Verification {
+    /// What the errors at points are.
+    fn points_are(&self) -> &'static str {
+        match self.closing {
+            Closing::None => "Error at points",
+            Closing::Some => "Error at points, and from tip to tip",
+            Closing::All => "Closing error of joined tips",
+        }
+    }
+
+    /// Why no criterion of ISO 9283 is told.
+    fn no_criteria(&self) -> &'static str {
+        match self.closing {
+            Closing::All => {
+                "The criteria compare what was commanded with where a sensor saw the tip; joined tips are led by hand and seen \
+                 by none, so they have no meaning here."
+            }
+            Closing::None | Closing::Some => iso::NO_REPEATS,
+        }
+    }
+
     /// The gravest thing any warning says.
     pub fn status(&self) -> Status {
         match self.warnings.iter().map(|w| w.severity).max() {

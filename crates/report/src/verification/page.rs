@@ -38,10 +38,10 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
             ..shell.saying(conclusion(v))
         },
         tables: vec![
-            ("Error at points", v.points.iter().map(point_row).collect()),
+            (v.points_are(), v.points.iter().map(point_row).collect()),
             ("Error along paths", v.paths.iter().map(path_row).collect()),
         ],
-        iso_none: iso::NO_REPEATS,
+        iso_none: v.no_criteria(),
         iso_header: iso::HEADER,
         iso_rows: iso::rows(&v.iso9283),
         iso_remarks: iso::remarks(&v.iso9283),

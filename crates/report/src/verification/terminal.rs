@@ -5,6 +5,7 @@ use super::{On, Published, Told, Verification, VerifiedRecording};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::text::{millimetres, printable};
+use crate::two_arms::Closing;
 use armcal_verify::{Against, By, Compared, PathRow, Plane, PointsRow};
 use comfy_table::Cell;
 
@@ -23,7 +24,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
     sections.push(pen.section("Recordings", recordings(&pen, &v.recordings)));
     if !v.points.is_empty() {
         let published = v.published.iter().filter(|p| p.on == On::Points);
-        sections.push(pen.section("Error at points [mm]", points(&pen, &v.points, published)));
+        sections.push(pen.section(&format!("{} [mm]", v.points_are()), points(&pen, &v.points, published)));
     }
     let of = |against| v.paths.iter().filter(move |r: &&PathRow| r.against == against);
     for (against, title) in [
@@ -35,7 +36,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
             sections.push(pen.section(title, paths(&pen, of(against), published)));
         }
     }
-    sections.push(super::iso::section(&pen, &v.iso9283));
+    sections.push(super::iso::section(&pen, &v.iso9283, v.no_criteria()));
     if !v.warnings.is_empty() {
         let texts = v.warnings.iter().map(|w| (w.severity.word(), printable(&w.to_string())));
         sections.push(pen.section("Warnings", pen.list(texts)));
@@ -46,7 +47,8 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
 
 /// What it comes to, in one sentence.
 pub(super) fn conclusion(v: &Verification) -> String {
-    let points = v.points.iter().find(|r| r.by == By::All).map(|r| ("points", &r.errors));
+    let what = if v.closing == Closing::All { "joined dwells" } else { "points" };
+    let points = v.points.iter().find(|r| r.by == By::All).map(|r| (what, &r.errors));
     let along =
         |r: &&PathRow| r.subject == "all" && r.plane == Plane::Space && r.against == Against::Encoders;
     let path = v.paths.iter().find(along).map(|r| ("frames of moving paths", &r.errors));

@@ -5,7 +5,8 @@ use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::DEGREES;
 use crate::setup::trial::{Change, Inputs};
 use armcal_core::{Parameter, Unit};
-use armcal_model::{Arm, Chain};
+use armcal_model::Arm;
+use armcal_recording::Streams;
 
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
 /// A parameter on its bound is let go this many times as far.
@@ -36,7 +37,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             }
         }
     }
-    let files = files(&inputs.chain);
+    let files = files(inputs);
     for (unit, factor, what, words) in [
         (Unit::Metre, 1e-3, "lengths", "a thousandth (micrometres given as millimetres)"),
         (Unit::Metre, 1e3, "lengths", "a thousand times as long (metres given as millimetres)"),
@@ -113,12 +114,16 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     all
 }
 
-/// The parameters of each model file. Of two arms joined to each other no change of both files at once is tried: arms that are
-/// all smaller, or seen in a mirror, close just as well.
-fn files(chain: &Chain) -> Vec<(String, &[Parameter])> {
+/// The parameters of each model file. Of tips joined to each other and seen by no sensor no change of all lengths at once is
+/// tried: a robot that is smaller, or seen in a mirror, closes just as well.
+fn files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
+    let Inputs { pipeline, chain, .. } = inputs;
+    let Streams { tip, bodies, .. } = &pipeline.streams;
+    let is_unseen = pipeline.closed_chain.is_some() && tip.is_none() && bodies.is_empty();
     let of_arm =
         |arm: &Arm| (format!("the model of {}", arm.name), &chain.parameters()[arm.parameters.clone()]);
     match chain.arms() {
+        [] if is_unseen => Vec::new(),
         [] => vec![("the model".to_owned(), chain.parameters())],
         arms => arms.iter().map(of_arm).collect(),
     }
@@ -127,7 +132,7 @@ fn files(chain: &Chain) -> Vec<(String, &[Parameter])> {
 /// A model of another size, or of an arm with another tool. Rarer.
 pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
     let mut all = Vec::new();
-    for (model, parameters) in files(&inputs.chain) {
+    for (model, parameters) in files(inputs) {
         let lengths: Vec<String> =
             parameters.iter().filter(|p| p.unit == Unit::Metre).map(|p| p.name.clone()).collect();
         if lengths.is_empty() {

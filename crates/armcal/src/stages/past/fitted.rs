@@ -19,7 +19,9 @@ impl Placed {
         let (model, fit) = (&self.model, &pipeline.fit);
         let kept = pipeline.verify.tip == TipMount::Kept;
         let estimated = |p: &Parameter| p.free && p.role == Role::EstimatedFrame;
-        let fitted = |p: &Parameter| estimated(p) && !(kept && p.name.starts_with("tip."));
+        let is_length = |name: &str| model.lengths().any(|(_, at)| model.parameters()[at].name == name);
+        let of_tip = |name: &str| name.starts_with("tip.") || name.contains(".tip.") || is_length(name);
+        let fitted = |p: &Parameter| estimated(p) && !(kept && of_tip(&p.name));
         let mut said = Vec::new();
         if model.parameters().iter().any(fitted) {
             self.nominal = fit_frames_from(model, observations, self.nominal.clone(), fit, &fitted)?;

@@ -8,6 +8,7 @@ use armcal_core::{Observation, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
 use armcal_report::{PastArms, PastModel, TipMount};
 use nalgebra::Vector3;
+use std::ops::Range;
 use std::path::Path;
 
 /// The model of the past in new surroundings.
@@ -106,11 +107,14 @@ pub fn place_arms(
         calibrated[at] = then.values[known];
     }
     if pipeline.verify.tip == TipMount::Kept {
-        put_frame(&model, "tip", &then.geometry.tip_in_last_link(&then.nominal_values), &mut nominal);
-        put_frame(&model, "tip", &then.model.tip_in_last_link(&then.values), &mut calibrated);
+        keep_tips(&model, (&then.geometry, &then.nominal_values), &mut nominal);
+        keep_tips(&model, (&then.model, &then.values), &mut calibrated);
     }
     warnings.extend(tip_overruled(then, pipeline, &model));
-    put_frame(&model, "base", &base(then, pipeline, &model.base_in_world(&nominal)), &mut calibrated);
+    for arm in 0..model.chain().bases() {
+        let now = model.arm_base_in_world(&nominal, arm);
+        put_frame(model.base_parameters(arm), (now, base(then, pipeline, arm, &now)), &mut calibrated);
+    }
     Ok(Placed { model, nominal, calibrated, warnings })
 }
 
@@ -153,34 +157,37 @@ pub fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
     true
 }
 
-/// The base as far as calibration and the new recordings know it together.
-fn base(then: &PastArms, pipeline: &Pipeline, now: &Pose) -> Pose {
-    let measured = then.model.base_in_world(&then.model.nominal());
-    let calibrated = then.model.base_in_world(&then.values);
-    match pipeline.frames.base.pose {
+/// The base of an arm as far as calibration and the new recordings know it together.
+fn base(then: &PastArms, pipeline: &Pipeline, arm: usize, now: &Pose) -> Pose {
+    let measured = then.model.arm_base_in_world(&then.model.nominal(), arm);
+    let calibrated = then.model.arm_base_in_world(&then.values, arm);
+    let of_arm = pipeline.two_arms.as_ref().and_then(|two| two.arms.get(arm));
+    match of_arm.map_or(&pipeline.frames.base, |arm| &arm.base).pose {
         FramePose::Given => *now,
         FramePose::Measured => now * measured.inverse() * calibrated,
         FramePose::Estimated => calibrated,
     }
 }
 
-/// Writes a pose into the parameters of base or tip: position, and the rotation vector that turns nominal into it.
-fn put_frame(model: &Model, frame: &str, pose: &Pose, values: &mut [f64]) {
+/// Puts the tips, what is joined to one, and the length of a link between them where another model has them.
+fn keep_tips(model: &Model, (then, values_then): (&Model, &[f64]), values: &mut [f64]) {
     let start = model.nominal();
-    let nominal = if frame == "tip" { model.tip_in_last_link(&start) } else { model.base_in_world(&start) };
-    let turn_rad = (nominal.rotation.inverse() * pose.rotation).scaled_axis();
-    let at_m = pose.translation.vector;
-    let entries = [
-        ("x", at_m.x),
-        ("y", at_m.y),
-        ("z", at_m.z),
-        ("rx", turn_rad.x),
-        ("ry", turn_rad.y),
-        ("rz", turn_rad.z),
-    ];
-    for (quantity, value) in entries {
-        if let Some(at) = model.index(&format!("{frame}.{quantity}")) {
-            values[at] = value;
-        }
+    for (feature, name) in model.features() {
+        let Some((before, _)) = then.features().find(|(_, before)| *before == name) else { continue };
+        let (now, kept) = (model.feature_in_link(&start, feature), then.feature_in_link(values_then, before));
+        put_frame(model.feature_parameters(feature), (now, kept), values);
     }
+    for (name, now) in model.lengths().filter(|(_, now)| model.parameters()[*now].free) {
+        let before = then.lengths().find(|(before, _)| *before == name);
+        before.into_iter().for_each(|(_, before)| values[now] = values_then[before]);
+    }
+}
+
+/// Writes a pose into the parameters of a frame that is at `now`: position, and the rotation vector that turns it.
+fn put_frame(own: Range<usize>, (now, pose): (Pose, Pose), values: &mut [f64]) {
+    let turn_rad = (now.rotation.inverse() * pose.rotation).scaled_axis();
+    let at_m = pose.translation.vector;
+    let entries = at_m.iter().chain(turn_rad.iter());
+    // Of a frame whose rotation is none of its parameters, the position.
+    own.clone().zip(entries).for_each(|(at, value)| values[at] = *value);
 }
