@@ -13,6 +13,7 @@ use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
+use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -20,17 +21,21 @@ use std::path::{Path, PathBuf};
 const SUGGESTED: &str = "suggested";
 
 /// What `armcal add` is asked to do.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// Specs of effects, or `suggested`.
-    pub effects: &'a [String],
-    /// The pipeline to extend.
-    pub pipeline: &'a Path,
-    /// Where the extended pipeline goes; beside the original when absent.
-    pub write: Option<&'a Path>,
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Effects such as backlash:1 (see `armcal effects`), or `suggested` for what the diagnosis found.
+    #[arg(required = true)]
+    pub effects: Vec<String>,
+    /// Pipeline file to extend.
+    pub pipeline: PathBuf,
+    /// File for the extended pipeline; beside the original when absent.
+    #[arg(long)]
+    pub write: Option<PathBuf>,
     /// Folder for the results of the extended pipeline.
-    pub out: &'a Path,
-    /// JSON instead of tables.
+    #[arg(long, default_value = "out")]
+    pub out: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
     pub json: bool,
 }
 
@@ -58,19 +63,19 @@ struct Chosen {
 }
 
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(request.pipeline)?;
-    may_write(results(&pipeline, request.out))?;
-    let named = named(request.effects, &pipeline)?;
+pub fn run(request: &Request) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(&request.pipeline)?;
+    may_write(results(&pipeline, &request.out))?;
+    let named = named(&request.effects, &pipeline)?;
     if let Some(new) = &named {
-        extend(&pipeline, request.pipeline, request.write, new)?;
+        extend(&pipeline, &request.pipeline, request.write.as_deref(), new)?;
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     let Chosen { new, transfer, left_out, nested } = chosen(named, &pipeline, &settled, &effects, &progress)?;
-    let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
+    let extended = extend(&pipeline, &request.pipeline, request.write.as_deref(), &new)?;
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
@@ -81,8 +86,8 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
 
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
-    write_all(&run, &recordings, request.out, &extended.pipeline.output)?;
-    view::remember(request.out, &extended.path, &[])?;
+    write_all(&run, &recordings, &request.out, &extended.pipeline.output)?;
+    view::remember(&request.out, &extended.path, &[])?;
     progress.finish();
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
