@@ -9,12 +9,12 @@ use crate::stages::frames;
 use crate::story::{self, Diagnosed, Fitted, Settled};
 use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
-use armcal_diagnose::{Diagnosis, Nested};
+use armcal_diagnose::Nested;
 use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// The word for "whatever the diagnosis suggests".
@@ -37,21 +37,6 @@ pub struct Request {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// What a program reads of it.
-#[derive(Debug, Serialize)]
-struct Added<'a> {
-    added: Vec<String>,
-    /// What the diagnosis suggests and another session or recording contradicts.
-    left_out: &'a [LeftOut],
-    /// Each effect fitted on all recordings but one and judged on that one.
-    transfer: &'a [Transfer],
-    /// What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
-    nested: &'a Option<Nested>,
-    pipeline: &'a Path,
-    comparison: &'a Comparison,
-    remaining: &'a Option<Diagnosis>,
 }
 
 /// What is added, what it does to recordings that did not teach it, and what is left out for that.
@@ -92,15 +77,18 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
     if request.json {
-        let value = Added {
-            added,
-            left_out: &left_out,
-            transfer: &transfer,
-            nested: &nested,
-            pipeline: &extended.path,
-            comparison: &comparison,
-            remaining: &run.diagnosis,
-        };
+        let value = json!({
+            "added": added,
+            // What the diagnosis suggests and another session or recording contradicts.
+            "left_out": left_out,
+            // Each effect fitted on all recordings but one and judged on that one.
+            "transfer": transfer,
+            // What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
+            "nested": nested,
+            "pipeline": extended.path,
+            "comparison": comparison,
+            "remaining": run.diagnosis,
+        });
         print(&super::json_text(&value)?)?;
     } else {
         let added = run.in_words(&added.join(", "));
