@@ -77,6 +77,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
     if request.json {
+        // A name that is no Unicode cannot be told in JSON.
+        let pipeline = serde_json::to_value(&extended.path).map_err(Error::Json)?;
         let value = json!({
             "added": added,
             // What the diagnosis suggests and another session or recording contradicts.
@@ -85,7 +87,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             "transfer": transfer,
             // What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
             "nested": nested,
-            "pipeline": extended.path,
+            "pipeline": pipeline,
             "comparison": comparison,
             "remaining": run.diagnosis,
         });

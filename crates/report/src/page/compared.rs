@@ -86,7 +86,9 @@ fn document(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Value
     let change = |k: &usize| pairs[*k].1.error_m * 1e3 - pairs[*k].0.error_m * 1e3;
     let mut by_change: Vec<usize> = (0..pairs.len()).collect();
     by_change.sort_by(|a, b| change(a).total_cmp(&change(b)));
-    let named = |(name, d): (String, Difference)| json!({ "name": name, "difference_mm": d.difference_mm, "ci95_mm": d.ci95_mm });
+    let named = |(name, d): (String, Difference)| -> Value {
+        json!({ "name": name, "difference_mm": d.difference_mm, "ci95_mm": d.ci95_mm })
+    };
     json!({
         "recordings": recordings.iter().map(|name| json!({ "name": name })).collect::<Value>(),
         "pairs": rows,
