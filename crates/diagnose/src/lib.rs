@@ -1,8 +1,8 @@
 //! Which physical effect is missing from a calibrated model, with error control and honest refusals.
 //!
 //! Two rooms. The inner one ([`diagnose_problem`], [`plan()`]) is linear algebra on a [`Problem`]: whitened residuals, what
-//! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`], [`plan_dwells`])
-//! builds problems from a model and refits it. In the order of the story:
+//! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`]) builds problems from
+//! a model and refits it. In the order of the story:
 //!
 //! * `projection`: what the geometry could do is taken out, prior rows and all;
 //! * `noise`, `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete under every kind of noise;
@@ -61,7 +61,6 @@ mod outliers;
 mod pairs;
 mod places;
 mod plan;
-mod planned;
 mod problem;
 mod projection;
 mod refit;
@@ -102,7 +101,6 @@ pub use knowledge::Knowledge;
 pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
 pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
-pub use planned::plan_dwells;
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 pub use refit::{LinearRefit, Refit};
 pub use ripple::Ripple;

@@ -1,8 +1,9 @@
 //! Two results on the same dwells, for the terminal and for programs.
 
 use crate::pairing::{Paired, Unpaired, paired};
-use crate::past_run::{PastParameter, PastResidual, PastRun};
+use crate::past_run::{PastResidual, PastRun};
 use crate::pen::{Pen, TerminalStyle, number};
+use crate::proto;
 use crate::text::{millimetres, printable};
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
 use comfy_table::Cell;
@@ -274,7 +275,7 @@ fn moved(before: &PastRun, after: &PastRun) -> Vec<Moved> {
     moved
 }
 
-fn in_half_widths(b: &PastParameter, a: &PastParameter) -> f64 {
+fn in_half_widths(b: &proto::Parameter, a: &proto::Parameter) -> f64 {
     let change = (a.display_value - b.display_value).abs();
     let width = a.display_ci95_half.hypot(b.display_ci95_half);
     if change == 0.0 { 0.0 } else { change / width }

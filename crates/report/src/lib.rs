@@ -67,7 +67,7 @@ pub use past_observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedFile, ObservedRecording, PastObservations, StartFrame,
     observations_json, sha256,
 };
-pub use past_run::{PastDwell, PastParameter, PastRecording, PastResidual, PastRun, PastRunError};
+pub use past_run::{PastDwell, PastRecording, PastResidual, PastRun, PastRunError};
 pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pool_json::{POOL_SCHEMA, pool_json};
 pub use recording_names::RecordingNames;

@@ -1,9 +1,10 @@
 //! A run read back from its `run.mcap`: what comparing and re-reading need, without the recordings it came from.
 
+use crate::channels::parameter;
 use crate::mcap_file::INPUT_METADATA;
 use crate::run::{RecordingRun, Run, effects};
 use crate::{DwellMark, proto};
-use armcal_calibrate::{Estimate, Residual};
+use armcal_calibrate::Residual;
 use armcal_core::{Dwell, DwellId, Observation};
 use armcal_recording::{RawMetadata, Recording, RecordingError};
 use prost::Message as _;
@@ -24,7 +25,7 @@ pub struct PastRun {
     /// One entry an observation, in the order of the file.
     pub residuals: Vec<PastResidual>,
     /// All parameters, free and fixed.
-    pub parameters: Vec<PastParameter>,
+    pub parameters: Vec<proto::Parameter>,
     /// Its `summary.json`; null for a run that has not been written.
     pub summary: serde_json::Value,
 }
@@ -68,23 +69,6 @@ pub struct PastResidual {
     pub held_out: bool,
     /// Norm of measured minus predicted [m].
     pub error_m: f64,
-}
-
-/// One parameter, in the unit shown to people.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PastParameter {
-    /// Its name.
-    pub name: String,
-    /// Unit of the numbers.
-    pub display_unit: String,
-    /// Value after the fit.
-    pub display_value: f64,
-    /// Half the width of its 95 % interval.
-    pub display_ci95_half: f64,
-    /// Whether the fit was allowed to change it.
-    pub free: bool,
-    /// Whether the data, rather than the prior, decide its value.
-    pub determined: bool,
 }
 
 /// Why a result cannot be read back.
@@ -150,17 +134,6 @@ impl PastRun {
             held_out: r.held_out,
             error_m: r.fitted_m.norm(),
         };
-        let parameter = |e: &Estimate| {
-            let shown = |si: f64| e.parameter.unit.to_display(si);
-            PastParameter {
-                name: e.parameter.name.clone(),
-                display_unit: e.parameter.unit.display_symbol().into(),
-                display_value: shown(e.value),
-                display_ci95_half: shown((e.ci95[1] - e.ci95[0]) / 2.0),
-                free: e.parameter.free,
-                determined: e.determined,
-            }
-        };
         let recording = |r: &RecordingRun| PastRecording {
             name: r.name.clone(),
             identities: r.files().into_iter().map(|f| f.sha256).collect(),
@@ -218,7 +191,7 @@ impl PastRun {
             pipeline: report.pipeline,
             effects: report.effects,
             residuals: residuals.into_iter().map(PastResidual::from).collect(),
-            parameters: parameters.into_iter().flat_map(|p| p.parameters).map(PastParameter::from).collect(),
+            parameters: parameters.into_iter().flat_map(|p| p.parameters).collect(),
             summary: summary.unwrap_or_default(),
             path,
         })
@@ -276,19 +249,6 @@ impl From<proto::Residual> for PastResidual {
             feature: r.feature,
             held_out: r.held_out,
             error_m: r.fitted_norm_mm * 1e-3,
-        }
-    }
-}
-
-impl From<proto::Parameter> for PastParameter {
-    fn from(p: proto::Parameter) -> PastParameter {
-        PastParameter {
-            name: p.name,
-            display_unit: p.display_unit,
-            display_value: p.display_value,
-            display_ci95_half: p.display_ci95_half,
-            free: p.free,
-            determined: p.determined,
         }
     }
 }

@@ -1,17 +1,16 @@
 //! Messages of `proto/armcal.proto`, which Foxglove has no schema for.
 //!
-//! The code and the descriptor set are generated from the .proto and checked in; a test keeps the three
-//! together, so building armcal needs no code generator.
+//! The code and the descriptor set are made of it when the crate is built.
 
 #![allow(missing_docs)] // The .proto documents the fields whose names do not.
 
 use foxglove::{Encode, Schema};
 use prost::bytes::BufMut;
 
-include!("../proto/armcal.rs");
+include!(concat!(env!("OUT_DIR"), "/armcal.rs"));
 
 /// `google.protobuf.FileDescriptorSet` of the messages and what they import.
-const DESCRIPTORS: &[u8] = include_bytes!("../proto/armcal.binpb");
+const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/armcal.binpb"));
 
 macro_rules! impl_encode {
     ($($message:ident),+) => {

@@ -9,44 +9,34 @@ use crate::stages::frames;
 use crate::story::{self, Diagnosed, Fitted, Settled};
 use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
-use armcal_diagnose::{Diagnosis, Nested};
+use armcal_diagnose::Nested;
 use armcal_model::{EffectSpec, effects_toml};
 use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
-use serde::Serialize;
+use clap::Args;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// The word for "whatever the diagnosis suggests".
 const SUGGESTED: &str = "suggested";
 
 /// What `armcal add` is asked to do.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// Specs of effects, or `suggested`.
-    pub effects: &'a [String],
-    /// The pipeline to extend.
-    pub pipeline: &'a Path,
-    /// Where the extended pipeline goes; beside the original when absent.
-    pub write: Option<&'a Path>,
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Effects such as backlash:1 (see `armcal effects`), or `suggested` for what the diagnosis found.
+    #[arg(required = true)]
+    pub effects: Vec<String>,
+    /// Pipeline file to extend.
+    pub pipeline: PathBuf,
+    /// File for the extended pipeline; beside the original when absent.
+    #[arg(long)]
+    pub write: Option<PathBuf>,
     /// Folder for the results of the extended pipeline.
-    pub out: &'a Path,
-    /// JSON instead of tables.
+    #[arg(long, default_value = "out")]
+    pub out: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
     pub json: bool,
-}
-
-/// What a program reads of it.
-#[derive(Debug, Serialize)]
-struct Added<'a> {
-    added: Vec<String>,
-    /// What the diagnosis suggests and another session or recording contradicts.
-    left_out: &'a [LeftOut],
-    /// Each effect fitted on all recordings but one and judged on that one.
-    transfer: &'a [Transfer],
-    /// What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
-    nested: &'a Option<Nested>,
-    pipeline: &'a Path,
-    comparison: &'a Comparison,
-    remaining: &'a Option<Diagnosis>,
 }
 
 /// What is added, what it does to recordings that did not teach it, and what is left out for that.
@@ -58,19 +48,19 @@ struct Chosen {
 }
 
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(request.pipeline)?;
-    may_write(results(&pipeline, request.out))?;
-    let named = named(request.effects, &pipeline)?;
+pub fn run(request: &Request) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(&request.pipeline)?;
+    may_write(results(&pipeline, &request.out))?;
+    let named = named(&request.effects, &pipeline)?;
     if let Some(new) = &named {
-        extend(&pipeline, request.pipeline, request.write, new)?;
+        extend(&pipeline, &request.pipeline, request.write.as_deref(), new)?;
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     let Chosen { new, transfer, left_out, nested } = chosen(named, &pipeline, &settled, &effects, &progress)?;
-    let extended = extend(&pipeline, request.pipeline, request.write, &new)?;
+    let extended = extend(&pipeline, &request.pipeline, request.write.as_deref(), &new)?;
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
@@ -81,21 +71,26 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
 
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
-    write_all(&run, &recordings, request.out, &extended.pipeline.output)?;
-    view::remember(request.out, &extended.path, &[])?;
+    write_all(&run, &recordings, &request.out, &extended.pipeline.output)?;
+    view::remember(&request.out, &extended.path, &[])?;
     progress.finish();
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
     if request.json {
-        let value = Added {
-            added,
-            left_out: &left_out,
-            transfer: &transfer,
-            nested: &nested,
-            pipeline: &extended.path,
-            comparison: &comparison,
-            remaining: &run.diagnosis,
-        };
+        // A name that is no Unicode cannot be told in JSON.
+        let pipeline = serde_json::to_value(&extended.path).map_err(Error::Json)?;
+        let value = json!({
+            "added": added,
+            // What the diagnosis suggests and another session or recording contradicts.
+            "left_out": left_out,
+            // Each effect fitted on all recordings but one and judged on that one.
+            "transfer": transfer,
+            // What the choice is worth on points that had no part in it; null where the user chose, or nothing was held out.
+            "nested": nested,
+            "pipeline": pipeline,
+            "comparison": comparison,
+            "remaining": run.diagnosis,
+        });
         print(&super::json_text(&value)?)?;
     } else {
         let added = run.in_words(&added.join(", "));

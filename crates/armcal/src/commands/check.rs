@@ -9,34 +9,39 @@ use crate::progress::Progress;
 use crate::{story, view};
 use armcal_recording::atomic;
 use armcal_report::{printable, write_all};
+use clap::Args;
 use serde_json::json;
-use std::path::Path;
+use std::path::PathBuf;
 
 /// What `armcal check` is asked to do.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// The pipeline.
-    pub pipeline: &'a Path,
-    /// Where the JUnit XML goes.
-    pub junit: Option<&'a Path>,
-    /// Where the Markdown goes.
-    pub markdown: Option<&'a Path>,
-    /// Folder for the results of the run, if they are wanted.
-    pub out: Option<&'a Path>,
-    /// JSON instead of the table.
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Pipeline file with a [check] section.
+    pub pipeline: PathBuf,
+    /// Write JUnit XML: a suite with a case for each limit, or an error where the run failed.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Write Markdown, for the summary page of a job.
+    #[arg(long, value_name = "FILE")]
+    pub markdown: Option<PathBuf>,
+    /// Write all results of the run to this folder too, as `armcal run` does.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
     pub json: bool,
 }
 
 /// Runs the pipeline and judges it. A run that fails leaves its error in the files too, so that CI shows it where it
 /// shows the checks.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+pub fn run(request: &Request) -> Result<Outcome, Error> {
     // Loaded first: the files it names are inputs.
-    let pipeline = Pipeline::load(request.pipeline);
-    may_write([request.junit, request.markdown].into_iter().flatten())?;
+    let pipeline = Pipeline::load(&request.pipeline);
+    may_write([&request.junit, &request.markdown].into_iter().flatten())?;
     match pipeline.and_then(|pipeline| judged(request, &pipeline)) {
         Ok(judged) => {
-            write(request.junit, || junit::junit(&judged))?;
-            write(request.markdown, || Ok(markdown::markdown(&judged)))?;
+            write(&request.junit, || junit::junit(&judged))?;
+            write(&request.markdown, || Ok(markdown::markdown(&judged)))?;
             print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) })?;
             Ok(match judged.judgement {
                 Judgement::Holds => Outcome::Done,
@@ -51,28 +56,28 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     }
 }
 
-fn judged(request: &Request<'_>, pipeline: &Pipeline) -> Result<Judged, Error> {
-    let limits = Limits::of(pipeline, request.pipeline)?;
-    may_write(request.out.map(|out| results(pipeline, out)).into_iter().flatten())?;
+fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
+    let limits = Limits::of(pipeline, &request.pipeline)?;
+    may_write(request.out.as_deref().map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
     let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &progress)?, pipeline, &progress)?;
     let judged = judge(&run, &limits)?;
-    if let Some(out) = request.out {
+    if let Some(out) = &request.out {
         story::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
-        view::remember(out, request.pipeline, &[])?;
+        view::remember(out, &request.pipeline, &[])?;
     }
     progress.finish();
     Ok(judged)
 }
 
 /// Says wherever a result was wanted that there is none; the error itself goes to stderr as every command's does.
-fn report_failure(request: &Request<'_>, error: &Error) -> Result<(), Error> {
+fn report_failure(request: &Request, error: &Error) -> Result<(), Error> {
     let name = request.pipeline.file_stem().unwrap_or_default().to_string_lossy();
     let error = error.to_string();
-    write(request.junit, || junit::junit_failed(&name, &error))?;
-    write(request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
+    write(&request.junit, || junit::junit_failed(&name, &error))?;
+    write(&request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
     let line = format!("{}: no check was made, the run failed", printable(&name));
     if request.json {
         let value = json!({ "schema": SCHEMA, "judgement": "failed", "line": line, "error": error });
@@ -83,7 +88,7 @@ fn report_failure(request: &Request<'_>, error: &Error) -> Result<(), Error> {
     Ok(())
 }
 
-fn write(path: Option<&Path>, content: impl FnOnce() -> Result<String, Error>) -> Result<(), Error> {
+fn write(path: &Option<PathBuf>, content: impl FnOnce() -> Result<String, Error>) -> Result<(), Error> {
     let Some(path) = path else { return Ok(()) };
     atomic::write(path, content()?.as_bytes()).map_err(Error::Output)
 }

@@ -11,52 +11,68 @@ use armcal_core::{FeatureId, Load};
 use armcal_model::Model;
 use armcal_recording::atomic;
 use armcal_report::{PastArms, PastModel};
-use std::path::Path;
+use clap::Args;
+use std::path::PathBuf;
 
 /// What `armcal compensate` is asked to do.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// Results of a run.
-    pub result: &'a Path,
-    /// CSV or TOML.
-    pub targets: &'a Path,
-    /// CSV to write.
-    pub out: &'a Path,
-    /// MCAP to write.
-    pub mcap: Option<&'a Path>,
-    /// Which tip, of several.
-    pub tip: Option<&'a str>,
-    /// `world`, `base`, `board.NAME`.
-    pub frame: &'a str,
-    /// Joints before the first target, joined by commas [deg].
-    pub start: Option<&'a str>,
-    /// Recording as in which the arm is.
-    pub recording: Option<&'a str>,
-    /// Load [kg].
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Results of `armcal run` or `armcal add`: their folder, run.mcap or model.json.
+    pub result: PathBuf,
+    /// CSV with a header (x_m, y_m, z_m; name, qx, qy, qz, qw, t_s where wanted) or TOML with [[targets]]. With t_s in
+    /// every row it is a path, otherwise the arm stops at each.
+    pub targets: PathBuf,
+    /// CSV for the set-points.
+    #[arg(long, default_value = "set-points.csv")]
+    pub out: PathBuf,
+    /// MCAP for the set-points as sensor_msgs/JointState.
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
+    /// Which tip, of several: the name of an arm, or of a marker; the tip when absent, of one robot.
+    #[arg(long, value_name = "NAME")]
+    pub tip: Option<String>,
+    /// Frame of the targets: world, base, or board.RECORDING.
+    #[arg(long, default_value = "world")]
+    pub frame: String,
+    /// Joints where the arm waits before the first target [deg], such as 0,-30,10: decides from where each arrives.
+    #[arg(long = "from", value_name = "DEG,..", allow_hyphen_values = true)]
+    pub start: Option<String>,
+    /// The recording as in which the arm is: its load, temperature, board, what has happened until then. The last when
+    /// absent.
+    #[arg(long = "as-in", value_name = "RECORDING")]
+    pub recording: Option<String>,
+    /// Load at the tip [kg], instead of that recording's.
+    #[arg(long = "load", value_name = "KG")]
     pub load_kg: Option<f64>,
-    /// Temperature [degC].
+    /// Temperature [degC], instead of that recording's.
+    #[arg(long = "temperature", value_name = "DEGC", allow_hyphen_values = true)]
     pub temperature_c: Option<f64>,
-    /// Approach [deg].
+    /// Come to every stop from a point this far before it, all joints in their direction of travel [deg].
+    #[arg(long = "approach", default_value_t = 0.0, value_name = "DEG")]
     pub approach_deg: f64,
-    /// Time to cross a gap [s].
+    /// Time in which a joint that turns back on a path crosses its gap [s]; 0 for a leap.
+    #[arg(long = "crossing", default_value_t = 0.4, value_name = "S")]
     pub crossing_s: f64,
-    /// Points a second of a path.
+    /// Points a second of a path, by cubic splines through the targets; the targets themselves when absent.
+    #[arg(long = "rate", value_name = "HZ")]
     pub rate_hz: Option<f64>,
-    /// `JOINT=LOW..HIGH`.
-    pub ranges: &'a [String],
-    /// JSON instead of a table.
+    /// What a joint can do, such as 2=-75..20 [deg]; may be given again.
+    #[arg(long = "range", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+    pub ranges: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
     pub json: bool,
 }
 
 /// Reads model and targets, computes, writes, prints.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    let past = PastModel::open(request.result)?;
+pub fn run(request: &Request) -> Result<Outcome, Error> {
+    let past = PastModel::open(&request.result)?;
     let arms = past.arms()?;
-    let tip = tip(&arms.geometry, request.tip)?;
-    let frame = target_frame(&past, request.frame)?;
-    let wanted = targets::read(request.targets)?;
-    may_write([Some(request.out), request.mcap].into_iter().flatten())?;
-    let start = request.start.map(|words| joints(words, &arms)).transpose()?;
+    let tip = tip(&arms.geometry, request.tip.as_deref())?;
+    let frame = target_frame(&past, &request.frame)?;
+    let wanted = targets::read(&request.targets)?;
+    may_write([Some(&request.out), request.mcap.as_ref()].into_iter().flatten())?;
+    let start = request.start.as_deref().map(|words| joints(words, &arms)).transpose()?;
     let drive = drive(request, &past, &arms)?;
     let held = held(&arms.geometry, tip, &drive, start.as_deref())?;
     let mut compensator = prepare(&past, &arms, (tip, frame), &drive)?;
@@ -80,8 +96,8 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
         in_world_m,
         notes: notes(&past, &arms, (frame, held.as_slice()), &compensator.conditions),
     };
-    atomic::write(request.out, &sheet.csv().map_err(Error::Csv)?).map_err(Error::Output)?;
-    if let Some(path) = request.mcap {
+    atomic::write(&request.out, &sheet.csv().map_err(Error::Csv)?).map_err(Error::Output)?;
+    if let Some(path) = &request.mcap {
         recording::write(path, chain.joint_names(), &points).map_err(Error::Output)?;
     }
     if request.json {
@@ -144,7 +160,7 @@ fn settled(point: &SetPoint) -> bool {
     point.target.time_s.is_some() || point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
 }
 
-fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Drive, Error> {
+fn drive(request: &Request, past: &PastModel, arms: &PastArms) -> Result<Drive, Error> {
     if request.load_kg.is_some_and(|l| !(l.is_finite() && l >= 0.0)) {
         return Err(bad("--load", format!("{:?}", request.load_kg), "give a mass in kg, zero or more"));
     }
@@ -161,6 +177,7 @@ fn drive(request: &Request<'_>, past: &PastModel, arms: &PastArms) -> Result<Dri
     };
     let recording = request
         .recording
+        .as_deref()
         .map(|name| recording_index(past, name).map_err(|problem| bad("--as-in", name.to_owned(), &problem)));
     Ok(Drive {
         recording: recording.transpose()?,

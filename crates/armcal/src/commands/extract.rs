@@ -6,43 +6,51 @@ use crate::pipeline::Pipeline;
 use armcal_core::Severity;
 use armcal_recording::{Extract, Extracted, Recording, RecordingError, RecordingReport, extract, input};
 use armcal_report::printable;
+use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// What the command is asked to do.
-pub struct Request<'a> {
-    /// Files of one recording.
-    pub inputs: &'a [PathBuf],
-    /// Where the thin recording goes.
-    pub out: &'a Path,
-    /// Pipeline whose channels are kept.
-    pub pipeline: Option<&'a Path>,
-    /// Topics that are kept besides.
-    pub topics: &'a [String],
-    /// Whether attachments are kept.
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// MCAP files (parts of one recording), or s3://BUCKET/KEY.
+    #[arg(required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// File for the thin recording.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Keep the channels that this pipeline reads.
+    #[arg(long, required_unless_present = "topics")]
+    pub pipeline: Option<PathBuf>,
+    /// Keep this topic; `*` stands for any characters. May be given again.
+    #[arg(long = "topic", value_name = "TOPIC")]
+    pub topics: Vec<String>,
+    /// Keep attachments too.
+    #[arg(long)]
     pub attachments: bool,
     /// Print JSON.
+    #[arg(long)]
     pub json: bool,
 }
 
 /// Writes the thin recording, and says what is in it and what of the input was lost.
-pub fn run(asked: &Request<'_>) -> Result<Outcome, Error> {
-    let mut topics = asked.pipeline.map_or(Ok(Vec::new()), topics_of)?;
-    topics.extend_from_slice(asked.topics);
+pub fn run(asked: &Request) -> Result<Outcome, Error> {
+    let mut topics = asked.pipeline.as_deref().map_or(Ok(Vec::new()), topics_of)?;
+    topics.extend_from_slice(&asked.topics);
     let name = asked.inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
     asked.inputs.iter().for_each(|path| input::note(path));
-    super::may_write([asked.out])?;
-    let recording = Recording::open(asked.inputs)
+    super::may_write([&asked.out])?;
+    let recording = Recording::open(&asked.inputs)
         .map_err(|source| Error::Recording { recording: name.clone(), source })?;
     let wanted = Extract { topics: &topics, attachments: asked.attachments };
-    let extracted = extract(&recording, &wanted, asked.out).map_err(|source| match source {
+    let extracted = extract(&recording, &wanted, &asked.out).map_err(|source| match source {
         RecordingError::NoSuchTopic { ref pattern, .. } if asked.topics.contains(pattern) => {
             Error::of_usage(Error::Recording { recording: name, source })
         }
         source => Error::Recording { recording: name, source },
     })?;
     let report = recording.report();
-    print(&if asked.json { json(&extracted, report)? } else { text(asked.out, &extracted, report) })?;
+    print(&if asked.json { json(&extracted, report)? } else { text(&asked.out, &extracted, report) })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
 }

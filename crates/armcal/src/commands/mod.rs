@@ -2,24 +2,22 @@
 
 pub mod add;
 mod batch;
-mod check;
+pub mod check;
 mod compare;
-mod compensate;
+pub mod compensate;
 mod diagnose;
 mod effects;
 mod export;
-mod extract;
+pub mod extract;
 mod inspect;
-mod plan;
+pub mod plan;
 mod pool;
 mod run;
-mod score;
+pub mod score;
 mod simulate;
 mod transfer;
 mod verify;
 mod view;
-
-pub(crate) use compensate::Request as CompensateRequest;
 
 use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
@@ -45,10 +43,7 @@ pub enum Outcome {
 /// Runs the command a user typed.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
-        Command::Check { pipeline, junit, markdown, out, json } => {
-            let (junit, markdown, out) = (junit.as_deref(), markdown.as_deref(), out.as_deref());
-            check::run(&check::Request { pipeline, junit, markdown, out, json: *json })
-        }
+        Command::Check(asked) => check::run(asked),
         Command::Batch { inputs, pipeline, out, full, jobs, json } => {
             let manifest = Manifest::of(inputs, out)?;
             batch::run(
@@ -63,23 +58,12 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         }
         Command::Reduce { out, json } => batch::reduce(out, *json),
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
-        Command::Compensate(asked) => compensate::run(&asked.request()),
+        Command::Compensate(asked) => compensate::run(asked),
         Command::Diagnose { input, json } => diagnose::run(input, *json),
-        Command::Add { effects, pipeline, write, out, json } => {
-            add::run(&add::Request { effects, pipeline, write: write.as_deref(), out, json: *json })
-        }
+        Command::Add(asked) => add::run(asked),
         Command::Effects { name, json } => effects::run(name.as_deref(), *json),
-        Command::Score { families, designs, size, seeds, from, sealed, page, sealed_seeds, json } => {
-            let (seeds, from, sealed, sealed_seeds, json) = (*seeds, *from, *sealed, *sealed_seeds, *json);
-            let page = page.as_deref();
-            let request =
-                score::Request { families, designs, size, seeds, from, sealed, page, sealed_seeds, json };
-            score::run(&request)
-        }
-        Command::Plan { pipeline, dwells, effects, loads, margin, ranges, json } => {
-            let (dwells, margin_deg, json) = (*dwells, *margin, *json);
-            plan::run(&plan::Request { pipeline, dwells, effects, loads_kg: loads, margin_deg, ranges, json })
-        }
+        Command::Score(asked) => score::run(asked),
+        Command::Plan(asked) => plan::run(asked),
         Command::Pool { pipeline, results, out, verbose, json } => {
             pool::run(pipeline, results, out, detail(*verbose), *json)
         }
@@ -95,10 +79,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         }
         Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
-        Command::Extract { inputs, out, pipeline, topics, attachments, json } => {
-            let (pipeline, attachments, json) = (pipeline.as_deref(), *attachments, *json);
-            extract::run(&extract::Request { inputs, out, pipeline, topics, attachments, json })
-        }
+        Command::Extract(asked) => extract::run(asked),
     }
 }
 

@@ -11,35 +11,43 @@ use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
 use armcal_report::{number, plain_table, table_text};
+use clap::Args;
 use comfy_table::Cell;
 use nalgebra::Matrix3;
-use std::path::Path;
+use std::path::PathBuf;
 
 /// Standard error of a tracked tip that no recording shows and no pipeline declares [m].
 const UNSEEN_SIGMA_M: f64 = 3e-4;
 
 /// What `armcal plan` is asked to do.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// The pipeline whose diagnosis leaves something open.
-    pub pipeline: &'a Path,
-    /// Most dwells.
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Pipeline file.
+    pub pipeline: PathBuf,
+    /// Most dwells to propose.
+    #[arg(long, default_value_t = 6)]
     pub dwells: usize,
-    /// Specs of effects, joined by commas.
-    pub effects: &'a Option<String>,
-    /// Loads at hand [kg].
-    pub loads_kg: &'a [f64],
-    /// How far free poses may go beyond the recorded range [deg].
+    /// Effects to tell apart, such as compliance:2,belt_coupling; one alone is told from nothing. What the diagnosis
+    /// leaves open when absent.
+    #[arg(long)]
+    pub effects: Option<String>,
+    /// A load at hand [kg]; may be given again.
+    #[arg(long = "load", value_name = "KG")]
+    pub loads_kg: Vec<f64>,
+    /// How far free poses may go beyond the recorded range of a joint [deg].
+    #[arg(long = "margin", default_value_t = 30.0, value_name = "DEG")]
     pub margin_deg: f64,
-    /// `JOINT=LOW..HIGH` [deg].
-    pub ranges: &'a [String],
-    /// JSON instead of a table.
+    /// Range of one joint instead of that, such as 2=-75..20 [deg]; may be given again.
+    #[arg(long = "range", value_name = "JOINT=LOW..HIGH", allow_hyphen_values = true)]
+    pub ranges: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
     pub json: bool,
 }
 
 /// Calibrates, diagnoses, and proposes the dwells that tell apart what stands.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(request.pipeline)?;
+pub fn run(request: &Request) -> Result<Outcome, Error> {
+    let pipeline = Pipeline::load(&request.pipeline)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let joints = chain.joint_names();
     let allowed = allowed(request, joints)?;
@@ -86,7 +94,7 @@ fn split(words: &str) -> Vec<String> {
     all
 }
 
-fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
+fn allowed(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
     let bad = |option, value: String, problem: &str| {
         Err(Error::BadOption { option, value, problem: problem.to_owned() })
     };
@@ -97,7 +105,7 @@ fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
         return bad("--margin", request.margin_deg.to_string(), "give an angle in degrees, zero or more");
     }
     let mut ranges_deg = Vec::new();
-    for words in request.ranges {
+    for words in &request.ranges {
         match joint_range(words, joints) {
             Some(range) => ranges_deg.push(range),
             None => {
@@ -106,7 +114,7 @@ fn allowed(request: &Request<'_>, joints: &[String]) -> Result<Allowed, Error> {
             }
         }
     }
-    let (dwells, loads_kg) = (request.dwells, request.loads_kg.to_vec());
+    let (dwells, loads_kg) = (request.dwells, request.loads_kg.clone());
     Ok(Allowed { dwells, loads_kg, margin_deg: request.margin_deg, ranges_deg })
 }
 

@@ -7,38 +7,48 @@ use crate::score::{Campaign, Judgement, page, rows, score, table};
 use armcal_lab::LabError;
 use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs};
 use armcal_recording::atomic;
+use clap::Args;
 use serde::de::DeserializeOwned;
 use serde_json::json;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What to score.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// Families, or the words `catalogue`, `nothing`, `outside`, `pairs`.
-    pub families: &'a [String],
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// Families, or `catalogue`, `nothing`, `outside`, `pairs`; several hidden at once are joined by +.
+    #[arg(default_values = ["catalogue", "nothing", "outside"])]
+    pub families: Vec<String>,
     /// Designs of motion.
-    pub designs: &'a [String],
-    /// `small`, `medium`, `large`, `drawn`.
-    pub size: &'a str,
-    /// Seeds for each.
+    #[arg(long = "design", default_values = ["free-poses"])]
+    pub designs: Vec<String>,
+    /// Size of what is hidden: small, medium, large, drawn.
+    #[arg(long, default_value = "drawn")]
+    pub size: String,
+    /// Seeds for each family and design.
+    #[arg(long, default_value_t = 10)]
     pub seeds: u64,
     /// First seed.
+    #[arg(long, default_value_t = 1)]
     pub from: u64,
-    /// Recordings on disk and the whole pipeline.
+    /// Write recordings to disk and run the whole pipeline on them, instead of handing over observations.
+    #[arg(long)]
     pub sealed: bool,
-    /// File for the tables as Markdown.
-    pub page: Option<&'a Path>,
-    /// Seeds of the catalogue's families that go the whole way beside, for the page.
+    /// Write the tables, with intervals and every miss, as Markdown: docs/confusion.md.
+    #[arg(long, value_name = "FILE")]
+    pub page: Option<PathBuf>,
+    /// For the page: so many of the seeds of what is in the catalogue also the whole way, as recordings on disk.
+    #[arg(long, default_value_t = 0, requires = "page", conflicts_with = "sealed")]
     pub sealed_seeds: u64,
-    /// One JSON document.
+    /// Print JSON, every scenario with its answer.
+    #[arg(long)]
     pub json: bool,
 }
 
 /// Runs the scenarios and prints the confusion table.
-pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
+pub fn run(request: &Request) -> Result<Outcome, Error> {
     let scenarios = scenarios(request)?;
-    may_write(request.page)?;
+    may_write(&request.page)?;
     let whole_way = whole_way(request, &scenarios);
     let progress = Progress::new();
     let (finished, all) = (AtomicUsize::new(0), scenarios.len() + whole_way.len());
@@ -49,7 +59,7 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     let scored = score(&scenarios, request.sealed, &done)?;
     let whole_way = score(&whole_way, true, &done)?;
     progress.finish();
-    if let Some(file) = request.page {
+    if let Some(file) = &request.page {
         let campaign = Campaign { command: command(request), scored: &scored, whole_way: &whole_way };
         atomic::write(file, page(&campaign).as_bytes()).map_err(Error::Output)?;
     }
@@ -71,9 +81,9 @@ pub fn run(request: &Request<'_>) -> Result<Outcome, Error> {
     Ok(Outcome::Done)
 }
 
-fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
+fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
     let mut names: Vec<String> = Vec::new();
-    for word in request.families {
+    for word in &request.families {
         match word.as_str() {
             "catalogue" => names.extend(families().into_iter().map(str::to_owned)),
             "nothing" => names.extend(nothing().into_iter().map(str::to_owned)),
@@ -85,9 +95,9 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
             }
         }
     }
-    let size: Size = word("size", request.size)?;
+    let size: Size = word("size", &request.size)?;
     let mut all = Vec::new();
-    for design in request.designs {
+    for design in &request.designs {
         let design: Design = word("design", design)?;
         for name in &names {
             for seed in request.from..request.from + request.seeds {
@@ -99,7 +109,7 @@ fn scenarios(request: &Request<'_>) -> Result<Vec<Scenario>, Error> {
 }
 
 /// The first seeds of single effects of the catalogue, again.
-fn whole_way(request: &Request<'_>, scenarios: &[Scenario]) -> Vec<Scenario> {
+fn whole_way(request: &Request, scenarios: &[Scenario]) -> Vec<Scenario> {
     let last = request.from + request.sealed_seeds.min(request.seeds);
     let listed = families();
     let again = scenarios.iter().filter(|s| s.seed < last && listed.contains(&s.family.as_str()));
@@ -107,7 +117,7 @@ fn whole_way(request: &Request<'_>, scenarios: &[Scenario]) -> Vec<Scenario> {
 }
 
 /// The command that makes the page again.
-fn command(request: &Request<'_>) -> String {
+fn command(request: &Request) -> String {
     let mut words = vec!["armcal".to_owned(), "score".to_owned()];
     words.extend(request.families.iter().cloned());
     if request.designs != ["free-poses"] {

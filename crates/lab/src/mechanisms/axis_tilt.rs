@@ -1,10 +1,7 @@
 //! An axis that is not parallel to the one before it, askew in the plane of the link and that axis.
 
-use super::{Hidden, Keys};
-use crate::arm::AxisArm;
+use super::*;
 use crate::screw::Line;
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
 
 /// `kind = "axis_tilt"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,9 +35,5 @@ impl Hidden for AxisTilt {
             return Err(keys.wrong("joint", "must be 2 or later: there is no axis before the first".into()));
         }
         keys.within("tilt_deg", self.tilt_deg, [-20.0, 20.0])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

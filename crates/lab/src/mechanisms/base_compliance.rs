@@ -1,10 +1,7 @@
 //! The plate under the arm stands on springs: the arm's weight, hanging out to one side, rocks it.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use armcal_core::Pose;
-use nalgebra::{UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use super::*;
+use nalgebra::UnitQuaternion;
 
 /// `kind = "base_compliance"`. The markers of the base rock with it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,9 +43,5 @@ impl Mechanism for BaseCompliance {
 impl Hidden for BaseCompliance {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         keys.stiff("stiffness_nm_rad", self.stiffness_nm_rad)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

@@ -4,9 +4,7 @@
 //! In the angles (q2, q2 + q3) gravity does the work `(t2 - t3) dq2 + t3 d(q2 + q3)`: this joint's spring sees
 //! the difference of the two torques, the belt sees the second one.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "belt_compliance"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,9 +51,5 @@ impl Hidden for BeltCompliance {
         keys.joint("joint", self.joint + 1)?;
         keys.stiff("stiffness_nm_rad", self.stiffness_nm_rad)?;
         keys.stiff("belt_stiffness_nm_rad", self.belt_stiffness_nm_rad.unwrap_or(1.0))
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

@@ -1,9 +1,7 @@
 //! A belt that runs around another joint's axis: where the two pulleys there differ, turning that joint pulls
 //! the belt, and the joint it drives turns along.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "belt_coupling"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,9 +47,5 @@ impl Hidden for BeltCoupling {
             return Err(keys.wrong("by", "must be another joint".into()));
         }
         keys.within("share_percent", self.share_percent, [-100.0, 100.0])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

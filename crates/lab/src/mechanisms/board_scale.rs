@@ -1,10 +1,6 @@
 //! A board printed, or cut, to a wrong scale.
 
-use super::{Hidden, Keys};
-use crate::board::Board;
-use crate::{LabError, Mechanism};
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "board_scale"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,10 +19,6 @@ impl Mechanism for BoardScale {
 impl Hidden for BoardScale {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         self.percent.iter().try_for_each(|v| keys.within("percent", *v, [-20.0, 20.0]))
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 
     fn machine_board(&self, board: &mut Board) {

@@ -1,14 +1,9 @@
 //! Something is knocked, once, and stays where it came to rest until it is put back, if it is: a rigid motion of
 //! everything after that moment.
 
-use super::{Hidden, Keys, happened};
-use crate::arm::AxisArm;
-use crate::mechanism::Body;
+use super::*;
 use crate::screw::turn;
-use crate::{LabError, Mechanism, Moment};
-use armcal_core::Pose;
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
 /// `kind = "bump"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,9 +115,5 @@ impl Hidden for Bump {
         self.shift_mm.iter().try_for_each(|v| keys.within("shift_mm", *v, [-100.0, 100.0]))?;
         self.turn_deg.iter().try_for_each(|v| keys.within("turn_deg", *v, [-30.0, 30.0]))?;
         keys.event(self.recording, self.at_s, self.until_s)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

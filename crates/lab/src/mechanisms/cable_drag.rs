@@ -1,9 +1,7 @@
 //! A cable from the base to a link: slack while one joint is near the anchor, taut beyond, and then it pulls at
 //! another joint against the spring of that joint's gear.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "cable_drag"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,9 +51,5 @@ impl Hidden for CableDrag {
         keys.not_negative("slack_deg", self.slack_deg)?;
         keys.finite("anchor_deg", self.anchor_deg)?;
         keys.stiff("gear_nm_rad", self.gear_nm_rad)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

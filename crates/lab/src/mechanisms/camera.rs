@@ -1,11 +1,6 @@
 //! A motion capture system that was calibrated badly: every body it reports is displaced.
 
-use super::{Hidden, Keys};
-use crate::mechanism::Body;
-use crate::{LabError, Mechanism, Moment};
-use armcal_core::Pose;
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "camera_scale"`: the wand had the wrong length, or axes differ.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,19 +53,11 @@ impl Hidden for CameraScale {
         self.centre_m.iter().try_for_each(|v| keys.finite("centre_m", *v))?;
         self.percent.iter().try_for_each(|v| keys.within("percent", *v, [-10.0, 10.0]))
     }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
-    }
 }
 
 impl Hidden for CameraDistortion {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         self.centre_m.iter().try_for_each(|v| keys.finite("centre_m", *v))?;
         keys.within("mm_at_1m", self.mm_at_1m, [-100.0, 100.0])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

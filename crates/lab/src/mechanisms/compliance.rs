@@ -2,9 +2,7 @@
 //!
 //! The link turns until the spring's torque `K x + H x^3` holds gravity's.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "compliance"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,9 +56,5 @@ impl Hidden for Compliance {
         keys.joint("joint", self.joint)?;
         keys.stiff("stiffness_nm_rad", self.stiffness_nm_rad)?;
         keys.not_negative("hardening_nm_rad3", self.hardening_nm_rad3)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

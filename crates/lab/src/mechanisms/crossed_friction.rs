@@ -1,9 +1,7 @@
 //! One joint's drive rubs on another's: as the one moves it drags the other along against its spring, and
 //! leaves it wound up in the direction of its last motion.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "crossed_friction"`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -53,9 +51,5 @@ impl Hidden for CrossedFriction {
         keys.joint("by", self.by)?;
         keys.not_negative("friction_nm", self.friction_nm)?;
         keys.stiff("stiffness_nm_rad", self.stiffness_nm_rad)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(CrossedFriction { before: None, ..self.clone() })
     }
 }

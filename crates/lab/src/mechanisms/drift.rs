@@ -1,11 +1,7 @@
 //! Slow and steady: a zero that wanders, a stand that creeps.
 
-use super::{Hidden, Keys};
-use crate::mechanism::Body;
-use crate::{LabError, Mechanism, Moment};
-use armcal_core::Pose;
-use nalgebra::{Translation3, Vector3};
-use serde::{Deserialize, Serialize};
+use super::*;
+use nalgebra::Translation3;
 
 /// `kind = "zero_drift"`: a potentiometer whose zero wanders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -81,18 +77,10 @@ impl Hidden for ZeroDrift {
         keys.joint("joint", self.joint)?;
         keys.within("deg_per_hour", self.deg_per_hour, [-100.0, 100.0])
     }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
-    }
 }
 
 impl Hidden for FrameDrift {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         self.mm_per_hour.iter().try_for_each(|v| keys.within("mm_per_hour", *v, [-1e3, 1e3]))
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

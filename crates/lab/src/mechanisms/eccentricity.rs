@@ -4,10 +4,8 @@
 //! centre, the fixed point is not where it would be seen from the axis, and by that angle the count is off. The
 //! angle is not a pure sine: the same offset gives a small second harmonic.
 
-use super::gear::{Geared, Lead};
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::gear::Lead;
+use super::*;
 
 /// `kind = "eccentricity"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -77,7 +75,7 @@ impl Hidden for Eccentricity {
 
     fn mechanism(&self) -> Box<dyn Mechanism> {
         match self.on {
-            MountedOn::Gear => Box::new(Geared(self.clone())),
+            MountedOn::Gear => self.untouched(),
             MountedOn::Encoder => Box::new(Disc(self.clone())),
         }
     }

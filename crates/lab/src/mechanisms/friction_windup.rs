@@ -3,9 +3,7 @@
 //! The end stays where it is while the torque in the shaft is below the friction, and slips at that torque
 //! beyond. Friction in the bearing grows with the load it carries: `friction_nm + load_share |gravity|`.
 
-use super::{Hidden, Keys, motor_of_play};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "friction_windup"`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -70,9 +68,5 @@ impl Hidden for FrictionWindup {
         keys.stiff("stiffness_nm_rad", self.stiffness_nm_rad)?;
         keys.not_negative("friction_nm", self.friction_nm)?;
         keys.within("load_share", self.load_share, [0.0, 100.0])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(FrictionWindup { before: None, ..self.clone() })
     }
 }

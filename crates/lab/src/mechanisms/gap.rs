@@ -5,9 +5,7 @@
 //! closed from then on. Under the guiding hand the motors carry the arm's weight: gravity presses the same
 //! flank, but it is the link that leads.
 
-use super::{Hidden, Keys, motor_of_play};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "gap"`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -100,9 +98,5 @@ impl Hidden for Gap {
         keys.finite("worn_centre_deg", self.worn_centre_deg)?;
         keys.within("worn_span_deg", self.worn_span_deg, [0.1, 360.0])?;
         keys.not_negative("friction_nm", self.friction_nm.unwrap_or(0.0))
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(Gap { before: None, ..self.clone() })
     }
 }

@@ -13,18 +13,12 @@ pub(super) trait Lead: std::fmt::Debug + Send {
 
     /// Motor less link where the link is at `link_rad` [rad].
     fn lead_rad(&self, link_rad: f64) -> f64;
-}
 
-/// The mechanism around it.
-#[derive(Debug)]
-pub(super) struct Geared<L>(pub(super) L);
-
-impl<L: Lead> Geared<L> {
     /// The link's angle for a motor's: the error changes slowly with the angle, so the fixed point is near.
-    pub(super) fn link_rad(&self, motor_rad: f64) -> f64 {
+    fn link_rad(&self, motor_rad: f64) -> f64 {
         let mut link = motor_rad;
         for _ in 0..100 {
-            let next = motor_rad - self.0.lead_rad(link);
+            let next = motor_rad - self.lead_rad(link);
             if (next - link).abs() < 1e-14 {
                 return next;
             }
@@ -34,18 +28,18 @@ impl<L: Lead> Geared<L> {
     }
 }
 
-impl<L: Lead> Mechanism for Geared<L> {
+impl<L: Lead> Mechanism for L {
     fn name(&self) -> &str {
         L::KIND
     }
 
     fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        let q = &mut joint_rad[self.0.joint() - 1];
+        let q = &mut joint_rad[self.joint() - 1];
         *q = self.link_rad(*q);
     }
 
     fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        let q = &mut joint_rad[self.0.joint() - 1];
-        *q += self.0.lead_rad(*q);
+        let q = &mut joint_rad[self.joint() - 1];
+        *q += self.lead_rad(*q);
     }
 }

@@ -1,10 +1,7 @@
 //! Links that grow as they get warm: `dL = L alpha (T - T0)`, with `T` from the thermometer or from a heat
 //! balance of their own, `C dT/dt = P - G (T - T_room)`, integrated in time.
 
-use super::{Hidden, Keys};
-use crate::arm::AxisArm;
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// Longest step of the heat balance [s].
 const STEP_S: f64 = 5.0;
@@ -150,10 +147,6 @@ impl Hidden for ThermalGrowth {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         check_links(keys, &self.links, self.per_kelvin_ppm)
     }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(ThermalGrowth { grown_ppm: 0.0, ..self.clone() })
-    }
 }
 
 impl Hidden for WarmUp {
@@ -161,10 +154,6 @@ impl Hidden for WarmUp {
         check_links(keys, &self.links, self.per_kelvin_ppm)?;
         keys.within("rise_k", self.rise_k, [-100.0, 100.0])?;
         keys.within("time_constant_s", self.time_constant_s, [STEP_S, 1e6])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(WarmUp { heat: Heat::default(), ..self.clone() })
     }
 }
 
@@ -174,9 +163,5 @@ impl Hidden for RoomTemperature {
         keys.within("swing_k", self.swing_k, [0.0, 100.0])?;
         keys.within("period_s", self.period_s, [4.0 * STEP_S, 1e6])?;
         keys.within("time_constant_s", self.time_constant_s, [STEP_S, 1e6])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(RoomTemperature { heat: Heat::default(), ..self.clone() })
     }
 }

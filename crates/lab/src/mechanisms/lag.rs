@@ -3,9 +3,7 @@
 //!
 //! Where motors jog the tip to a place, they wait until it is there.
 
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "lag"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,9 +52,5 @@ impl Hidden for Lag {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         keys.joint("joint", self.joint)?;
         keys.stiff("time_constant_s", self.time_constant_s)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(Lag { before: None, ..self.clone() })
     }
 }

@@ -2,12 +2,8 @@
 //!
 //! The beam is cut into slices; each bends by its moment over its stiffness, and the slopes add up to the end.
 
-use super::{Hidden, Keys};
-use crate::arm::AxisArm;
+use super::*;
 use crate::screw::{Line, turn};
-use crate::{LabError, Mechanism, Moment};
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
 /// Slices of the beam.
 const SLICES: usize = 48;
@@ -91,9 +87,5 @@ impl Hidden for LinkBending {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         keys.joint("link", self.link)?;
         keys.stiff("stiffness_nm2", self.stiffness_nm2)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

@@ -88,21 +88,39 @@ pub use twist::Twist;
 pub use wobble::AxisWobble;
 pub use zero_slip::ZeroSlip;
 
+use crate::arm::AxisArm;
 use crate::board::Board;
-use crate::config::value;
+use crate::config::{not_negative, positive, value};
+use crate::mechanism::Body;
 use crate::{LabError, Mechanism, Moment};
+use armcal_core::Pose;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Settings of a mechanism: they can be checked, and built in its initial state.
-pub trait Hidden {
+pub trait Hidden: Untouched {
     /// Checks the values.
     fn check(&self, keys: &Keys) -> Result<(), LabError>;
 
     /// The mechanism at the start of a recording.
-    fn mechanism(&self) -> Box<dyn Mechanism>;
+    fn mechanism(&self) -> Box<dyn Mechanism> {
+        self.untouched()
+    }
 
     /// What it does to the board while that is made.
     fn machine_board(&self, _board: &mut Board) {}
+}
+
+/// Settings that are the mechanism themselves, as long as nothing has happened to it.
+pub trait Untouched {
+    /// That mechanism.
+    fn untouched(&self) -> Box<dyn Mechanism>;
+}
+
+impl<M: Mechanism + Clone + 'static> Untouched for M {
+    fn untouched(&self) -> Box<dyn Mechanism> {
+        Box::new(self.clone())
+    }
 }
 
 macro_rules! mechanisms {
@@ -171,7 +189,11 @@ pub struct Keys {
 
 impl Keys {
     fn wrong(&self, key: &str, why: String) -> LabError {
-        value(&format!("mechanisms[{}].{key}", self.table), why)
+        value(&self.path(key), why)
+    }
+
+    fn path(&self, key: &str) -> String {
+        format!("mechanisms[{}].{key}", self.table)
     }
 
     fn joint(&self, key: &str, number: usize) -> Result<(), LabError> {
@@ -203,18 +225,11 @@ impl Keys {
     }
 
     fn stiff(&self, key: &str, v: f64) -> Result<(), LabError> {
-        if v > 0.0 && v.is_finite() {
-            Ok(())
-        } else {
-            Err(self.wrong(key, format!("must be above 0, is {v}")))
-        }
+        positive(&self.path(key), v)
     }
 
     fn not_negative(&self, key: &str, v: f64) -> Result<(), LabError> {
-        if v >= 0.0 && v.is_finite() {
-            return Ok(());
-        }
-        Err(self.wrong(key, format!("must not be negative, is {v}")))
+        not_negative(&self.path(key), v)
     }
 
     fn event(&self, recording: usize, at_s: f64, until_s: Option<f64>) -> Result<(), LabError> {

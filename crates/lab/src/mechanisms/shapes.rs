@@ -1,9 +1,7 @@
 //! Shapes of transmission error: rings, pinions, ratios, damage, buffers.
 
-use super::gear::{Geared, Lead};
-use super::{Hidden, Keys};
-use crate::{LabError, Mechanism};
-use serde::{Deserialize, Serialize};
+use super::gear::Lead;
+use super::*;
 
 /// `kind = "second_harmonic"`: a ring pressed oval reads ahead twice a turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -175,10 +173,6 @@ macro_rules! geared {
                 keys.joint("joint", self.joint)?;
                 $(keys.within(stringify!($key), self.$key, [$low, $high])?;)*
                 Ok(())
-            }
-
-            fn mechanism(&self) -> Box<dyn Mechanism> {
-                Box::new(Geared(self.clone()))
             }
         }
     };

@@ -1,10 +1,7 @@
 //! A clamp that lets a link twist about its own length as another joint swings the arm round.
 
-use super::{Hidden, Keys};
-use crate::arm::AxisArm;
+use super::*;
 use crate::screw::Line;
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
 
 /// `kind = "twist"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,9 +35,5 @@ impl Hidden for Twist {
         keys.joint("link", self.link)?;
         keys.joint("by", self.by)?;
         keys.within("deg_at_45", self.deg_at_45, [-10.0, 10.0])
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

@@ -1,11 +1,7 @@
 //! A worn bearing: the axis of a joint nods as the joint turns, round a small circle in the frame it is held in.
 
-use super::{Hidden, Keys};
-use crate::arm::AxisArm;
+use super::*;
 use crate::screw::{Line, turn};
-use crate::{LabError, Mechanism, Moment};
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
 /// `kind = "axis_wobble"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,9 +42,5 @@ impl Hidden for AxisWobble {
         keys.within("tilt_deg", self.tilt_deg, [0.0, 10.0])?;
         keys.within("per_turn", self.per_turn, [0.0, 1e3])?;
         keys.finite("phase_deg", self.phase_deg)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

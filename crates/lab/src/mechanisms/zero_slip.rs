@@ -1,8 +1,6 @@
 //! A pulley slips on its shaft, once.
 
-use super::{Hidden, Keys, happened};
-use crate::{LabError, Mechanism, Moment};
-use serde::{Deserialize, Serialize};
+use super::*;
 
 /// `kind = "zero_slip"`: from the event on the link is further than the motor says, to the end of the session
 /// or until it is put back.
@@ -48,9 +46,5 @@ impl Hidden for ZeroSlip {
         keys.joint("joint", self.joint)?;
         keys.within("slip_deg", self.slip_deg, [-30.0, 30.0])?;
         keys.event(self.recording, self.at_s, self.until_s)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
     }
 }

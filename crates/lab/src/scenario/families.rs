@@ -18,7 +18,7 @@ pub(super) struct Family {
     /// Unit of that.
     pub unit: &'static str,
     /// Makes it.
-    pub build: fn(&mut Draw, &mut LabConfig) -> Result<Made, LabError>,
+    pub build: Build,
 }
 
 /// What a family made.
@@ -215,112 +215,52 @@ fn shape_relatives(joint: usize) -> Vec<String> {
     ["eccentricity", "second_harmonic", "gear_ratio"].map(|name| format!("{name}:{joint}")).to_vec()
 }
 
+type Build = fn(&mut Draw, &mut LabConfig) -> Result<Made, LabError>;
+
+const fn family(
+    name: &'static str,
+    joints: &'static [usize],
+    range: [f64; 2],
+    unit: &'static str,
+    build: Build,
+) -> Family {
+    Family { name, joints, range, unit, build }
+}
+
 /// Every family.
 pub(super) const FAMILIES: &[Family] = &[
-    Family { name: "backlash", joints: &[1, 2, 3], range: [0.2, 1.2], unit: "deg", build: backlash },
-    Family {
-        name: "gravity_backlash",
-        joints: &[2, 3],
-        range: [0.2, 1.2],
-        unit: "deg",
-        build: gravity_backlash,
-    },
-    Family { name: "belt_backlash", joints: &[3], range: [0.2, 1.2], unit: "deg", build: belt_backlash },
-    Family {
-        name: "crossed_backlash",
-        joints: &[2],
-        range: [0.2, 1.0],
-        unit: "deg",
-        build: crossed_backlash,
-    },
-    Family {
-        name: "friction_windup",
-        joints: &[2, 3],
-        range: [0.1, 0.8],
-        unit: "deg",
-        build: friction_windup,
-    },
-    Family { name: "compliance", joints: &[2, 3], range: [0.1, 0.8], unit: "deg", build: compliance },
-    Family {
-        name: "hardening_compliance",
-        joints: &[2, 3],
-        range: [0.1, 0.8],
-        unit: "deg",
-        build: hardening_compliance,
-    },
-    Family { name: "belt_compliance", joints: &[3], range: [0.1, 0.8], unit: "deg", build: belt_compliance },
-    Family { name: "link_bending", joints: &[2], range: [0.3, 3.0], unit: "mm", build: link_bending },
-    Family { name: "base_compliance", joints: &[], range: [0.1, 0.6], unit: "deg", build: base_compliance },
-    Family { name: "axis_tilt", joints: &[3], range: [0.1, 1.5], unit: "deg", build: axis_tilt },
-    Family { name: "eccentricity", joints: &[1, 2, 3], range: [0.1, 1.0], unit: "deg", build: eccentricity },
-    Family {
-        name: "second_harmonic",
-        joints: &[1, 2, 3],
-        range: [0.1, 0.5],
-        unit: "deg",
-        build: second_harmonic,
-    },
-    Family { name: "periodic", joints: &[1, 2, 3], range: [0.05, 0.4], unit: "deg", build: periodic },
-    Family { name: "gear_ratio", joints: &[1, 2, 3], range: [0.2, 2.0], unit: "%", build: gear_ratio },
-    Family { name: "belt_coupling", joints: &[3], range: [0.3, 3.0], unit: "%", build: belt_coupling },
-    Family { name: "zero_slip", joints: &[1, 2, 3], range: [0.1, 1.0], unit: "deg", build: zero_slip },
-    Family {
-        name: "zero_slip@dwell",
-        joints: &[1, 2, 3],
-        range: [0.1, 1.0],
-        unit: "deg",
-        build: zero_slip_within,
-    },
-    Family {
-        name: "zero_slip@dwells",
-        joints: &[1, 2, 3],
-        range: [0.3, 2.0],
-        unit: "deg",
-        build: zero_slip_passing,
-    },
-    Family { name: "tool_shift", joints: &[], range: [0.3, 3.0], unit: "mm", build: tool_shift },
-    Family { name: "tool_shift@dwell", joints: &[], range: [1.0, 5.0], unit: "mm", build: tool_shift_within },
-    Family {
-        name: "tool_shift@dwells",
-        joints: &[],
-        range: [1.0, 5.0],
-        unit: "mm",
-        build: tool_shift_passing,
-    },
-    Family { name: "frame_shift", joints: &[], range: [0.3, 3.0], unit: "mm", build: frame_shift },
-    Family {
-        name: "frame_shift@dwell",
-        joints: &[],
-        range: [1.0, 5.0],
-        unit: "mm",
-        build: frame_shift_within,
-    },
-    Family {
-        name: "unsettled_reading",
-        joints: &[1, 2, 3],
-        range: [0.01, 0.06],
-        unit: "of a move",
-        build: unsettled_reading,
-    },
-    Family {
-        name: "zero_drift",
-        joints: &[1, 2, 3],
-        range: [0.1, 0.8],
-        unit: "deg/session",
-        build: zero_drift,
-    },
-    Family { name: "frame_drift", joints: &[], range: [0.2, 2.0], unit: "mm/session", build: frame_drift },
-    Family { name: "thermal_growth", joints: &[], range: [0.03, 0.15], unit: "%", build: thermal_growth },
-    Family { name: "warm_up", joints: &[], range: [0.03, 0.15], unit: "%", build: warm_up },
-    Family { name: "sensor_scale", joints: &[], range: [0.1, 1.0], unit: "%", build: sensor_scale },
-    Family {
-        name: "volume_distortion",
-        joints: &[],
-        range: [0.5, 3.0],
-        unit: "mm at the edge",
-        build: volume_distortion,
-    },
-    Family { name: "board_scale", joints: &[], range: [0.1, 0.5], unit: "%", build: board_scale },
+    family("backlash", &[1, 2, 3], [0.2, 1.2], "deg", backlash),
+    family("gravity_backlash", &[2, 3], [0.2, 1.2], "deg", gravity_backlash),
+    family("belt_backlash", &[3], [0.2, 1.2], "deg", belt_backlash),
+    family("crossed_backlash", &[2], [0.2, 1.0], "deg", crossed_backlash),
+    family("friction_windup", &[2, 3], [0.1, 0.8], "deg", friction_windup),
+    family("compliance", &[2, 3], [0.1, 0.8], "deg", compliance),
+    family("hardening_compliance", &[2, 3], [0.1, 0.8], "deg", hardening_compliance),
+    family("belt_compliance", &[3], [0.1, 0.8], "deg", belt_compliance),
+    family("link_bending", &[2], [0.3, 3.0], "mm", link_bending),
+    family("base_compliance", &[], [0.1, 0.6], "deg", base_compliance),
+    family("axis_tilt", &[3], [0.1, 1.5], "deg", axis_tilt),
+    family("eccentricity", &[1, 2, 3], [0.1, 1.0], "deg", eccentricity),
+    family("second_harmonic", &[1, 2, 3], [0.1, 0.5], "deg", second_harmonic),
+    family("periodic", &[1, 2, 3], [0.05, 0.4], "deg", periodic),
+    family("gear_ratio", &[1, 2, 3], [0.2, 2.0], "%", gear_ratio),
+    family("belt_coupling", &[3], [0.3, 3.0], "%", belt_coupling),
+    family("zero_slip", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| slip(d, c, Timing::Before)),
+    family("zero_slip@dwell", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| slip(d, c, Timing::Within)),
+    family("zero_slip@dwells", &[1, 2, 3], [0.3, 2.0], "deg", |d, c| slip(d, c, Timing::Passing)),
+    family("tool_shift", &[], [0.3, 3.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Before)),
+    family("tool_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Within)),
+    family("tool_shift@dwells", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Passing)),
+    family("frame_shift", &[], [0.3, 3.0], "mm", |d, c| bump(d, c, BumpedBody::Base, Timing::Before)),
+    family("frame_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Base, Timing::Within)),
+    family("unsettled_reading", &[1, 2, 3], [0.01, 0.06], "of a move", unsettled_reading),
+    family("zero_drift", &[1, 2, 3], [0.1, 0.8], "deg/session", zero_drift),
+    family("frame_drift", &[], [0.2, 2.0], "mm/session", frame_drift),
+    family("thermal_growth", &[], [0.03, 0.15], "%", thermal_growth),
+    family("warm_up", &[], [0.03, 0.15], "%", warm_up),
+    family("sensor_scale", &[], [0.1, 1.0], "%", sensor_scale),
+    family("volume_distortion", &[], [0.5, 3.0], "mm at the edge", volume_distortion),
+    family("board_scale", &[], [0.1, 0.5], "%", board_scale),
 ];
 
 mod elastic;

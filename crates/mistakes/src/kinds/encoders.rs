@@ -1,6 +1,6 @@
 //! Encoders and drivers that fail, and readings that are no readings.
 
-use super::{ALL, Kind, about, anything, kind, set_points};
+use super::{ALL, Kind, about, kind, set_points, whole};
 use crate::session::{Rest, Session};
 use crate::{Draw, Error};
 
@@ -8,18 +8,18 @@ pub const KINDS: &[Kind] = &[
     kind("joint-frozen-throughout", "joint-stuck", ALL, |s, d| frozen(s, d, 0.0)),
     kind("joint-frozen-from-the-middle", "joint-stuck", ALL, |s, d| frozen(s, d, 0.45)),
     kind("joint-always-zero", "joint-stuck", ALL, always_zero),
-    kind("set-points-recorded", "setpoints-recorded", ALL, set_points::recorded),
-    kind("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::named),
+    whole("set-points-recorded", "setpoints-recorded", ALL, set_points::recorded),
+    whole("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::named),
     kind("encoder-slips-once", "joint-zero-event", ALL, slips),
     kind("encoder-wraps-early", "encoder-wrap", ALL, wraps),
     kind("encoder-saturates", "saturated-joint", ALL, saturates),
-    kind("encoder-coarse", "quantised", ALL, coarse),
-    kind("encoder-stale", "stale-encoder", ALL, stale),
-    kind("encoder-filtered", "filtered-encoder", ALL, filtered),
-    kind("encoder-noisy", "noise-underdeclared", ALL, noisy),
+    whole("encoder-coarse", "quantised", ALL, coarse),
+    whole("encoder-stale", "stale-encoder", ALL, stale),
+    whole("encoder-filtered", "filtered-encoder", ALL, filtered),
+    whole("encoder-noisy", "noise-underdeclared", ALL, noisy),
     kind("encoder-spikes", "outliers", ALL, spikes),
-    kind("driver-resets-to-zero", "outliers", ALL, resets),
-    kind("encoder-not-a-number", "non-finite", ALL, not_a_number),
+    whole("driver-resets-to-zero", "outliers", ALL, resets),
+    whole("encoder-not-a-number", "non-finite", ALL, not_a_number),
 ];
 
 fn some_joint(session: &Session, draw: &mut Draw) -> usize {
@@ -82,14 +82,13 @@ fn quantiles<const N: usize>(session: &mut Session, joint: usize, shares: [f64; 
     shares.map(|share| readings[((readings.len() as f64 * share) as usize).min(readings.len() - 1)])
 }
 
-fn coarse(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn coarse(session: &mut Session, draw: &mut Draw) {
     let step = draw.uniform(0.4, 1.0).to_radians();
     session.joints(|_, q| q.iter_mut().for_each(|q| *q = (*q / step).round() * step));
-    anything()
 }
 
 /// The driver refreshes its readings every second or so and publishes the old ones in between.
-fn stale(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn stale(session: &mut Session, draw: &mut Draw) {
     let period_ns = (1e9 * draw.uniform(0.9, 1.4)) as i64;
     let mut held: Vec<Option<(i64, Vec<f64>)>> = Vec::new();
     session.joints(|at, q| {
@@ -100,11 +99,10 @@ fn stale(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
             _ => *slot = Some((at.stamp_ns / period_ns, q.clone())),
         }
     });
-    anything()
 }
 
 /// A low-pass that has not settled when the rest is over.
-fn filtered(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn filtered(session: &mut Session, draw: &mut Draw) {
     let time_s = draw.uniform(0.4, 0.9);
     let mut state: Vec<Option<(i64, Vec<f64>)>> = Vec::new();
     session.joints(|at, q| {
@@ -116,11 +114,10 @@ fn filtered(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error
         }
         *slot = Some((at.stamp_ns, q.clone()));
     });
-    anything()
 }
 
 /// Errors of a quarter of a degree that are constant through a rest: no reading tells of them.
-fn noisy(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn noisy(session: &mut Session, draw: &mut Draw) {
     let sigma = draw.uniform(0.15, 0.4).to_radians();
     let rests: Vec<Vec<Rest>> = session.recordings.iter().map(|r| r.rests.clone()).collect();
     let joints = session.joint_names().len();
@@ -132,7 +129,6 @@ fn noisy(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
             .get_or_insert_with(|| (0..joints).map(|_| sigma * draw.normal()).collect::<Vec<f64>>());
         q.iter_mut().zip(error).for_each(|(q, e)| *q += *e);
     });
-    anything()
 }
 
 fn spikes(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
@@ -146,17 +142,16 @@ fn spikes(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> 
     about(session, &[joint])
 }
 
-fn resets(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn resets(session: &mut Session, draw: &mut Draw) {
     let share = draw.uniform(0.005, 0.03);
     session.joints(|_, q| {
         if draw.chance(share) {
             q.fill(0.0);
         }
     });
-    anything()
 }
 
-fn not_a_number(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn not_a_number(session: &mut Session, draw: &mut Draw) {
     let joint = some_joint(session, draw);
     let share = draw.uniform(0.1, 0.3);
     session.joints(|_, q| {
@@ -164,5 +159,4 @@ fn not_a_number(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, E
             q[joint] = f64::NAN;
         }
     });
-    anything()
 }

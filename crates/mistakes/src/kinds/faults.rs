@@ -1,53 +1,52 @@
 //! Recordings that are incomplete, damaged, doubled, or of something else.
 
-use super::{ALL, Kind, SEEN, anything, kind};
+use super::{ALL, Kind, SEEN, whole};
+use crate::Draw;
 use crate::session::{Body, Damage, JOINTS, Session};
-use crate::{Draw, Error};
 use armcal_lab::sensors::Message;
 use nalgebra::{Quaternion, Vector3};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
-    kind("same-file-twice", "recording-twice", ALL, same_file),
-    kind("same-recording-under-another-name", "recording-twice", ALL, other_name),
-    kind("same-recording-encoded-again", "recording-twice", ALL, encoded_again),
-    kind("recording-and-its-part", "recording-twice", ALL, part_of_it),
-    kind("file-cut", "truncated-file", ALL, |s, d| {
+    whole("same-file-twice", "recording-twice", ALL, same_file),
+    whole("same-recording-under-another-name", "recording-twice", ALL, other_name),
+    whole("same-recording-encoded-again", "recording-twice", ALL, encoded_again),
+    whole("recording-and-its-part", "recording-twice", ALL, part_of_it),
+    whole("file-cut", "truncated-file", ALL, |s, d| {
         let share = d.uniform(0.3, 0.8);
         damaged(s, Damage::Cut(share))
     }),
-    kind("file-zeroed-in-the-middle", "damaged-file", ALL, |s, d| {
+    whole("file-zeroed-in-the-middle", "damaged-file", ALL, |s, d| {
         let from = d.uniform(0.3, 0.5);
         damaged(s, Damage::Zeros(from, from + 0.1))
     }),
-    kind("file-empty", "truncated-file", ALL, |s, _| damaged(s, Damage::Emptied)),
-    kind("file-missing", "missing-file", ALL, missing_file),
-    kind("topic-misspelt", "missing-topic", ALL, |s, _| topic(s, "joints", "/joint_state")),
-    kind("tip-topic-misspelt", "missing-topic", SEEN, |s, _| topic(s, "tip", "/vicon/Tip/Tip")),
-    kind("joint-name-misspelt", "missing-joint", ALL, joint_name),
-    kind("half-of-the-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.5)),
-    kind("most-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.96)),
-    kind("joint-stream-with-gaps", "dropped-messages", ALL, gaps),
-    kind("messages-doubled", "duplicated-messages", ALL, doubled),
-    kind("messages-shuffled", "shuffled-order", ALL, shuffled),
-    kind("joints-at-two-hertz", "low-rate", ALL, |s, _| thinned(s, JOINTS, 500_000_000)),
-    kind("sensor-at-one-hertz", "low-rate", SEEN, |s, _| {
+    whole("file-empty", "truncated-file", ALL, |s, _| damaged(s, Damage::Emptied)),
+    whole("file-missing", "missing-file", ALL, missing_file),
+    whole("topic-misspelt", "missing-topic", ALL, |s, _| topic(s, "joints", "/joint_state")),
+    whole("tip-topic-misspelt", "missing-topic", SEEN, |s, _| topic(s, "tip", "/vicon/Tip/Tip")),
+    whole("joint-name-misspelt", "missing-joint", ALL, joint_name),
+    whole("half-of-the-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.5)),
+    whole("most-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.96)),
+    whole("joint-stream-with-gaps", "dropped-messages", ALL, gaps),
+    whole("messages-doubled", "duplicated-messages", ALL, doubled),
+    whole("messages-shuffled", "shuffled-order", ALL, shuffled),
+    whole("joints-at-two-hertz", "low-rate", ALL, |s, _| thinned(s, JOINTS, 500_000_000)),
+    whole("sensor-at-one-hertz", "low-rate", SEEN, |s, _| {
         let topic = s.topic(Body::Tip);
         thinned(s, topic, 1_000_000_000)
     }),
-    kind("recording-stopped-early", "too-few-dwells", ALL, stopped_early),
-    kind("arm-never-at-rest", "no-dwells", ALL, never_at_rest),
-    kind("sensor-frozen-from-the-middle", "stuck-sensor", SEEN, sensor_frozen),
-    kind("sensor-repeats-the-last-when-blind", "stuck-sensor", SEEN, repeats),
-    kind("sensor-zeros-when-blind", "stuck-sensor", SEEN, zeros),
-    kind("sensor-outliers", "outliers", SEEN, sensor_outliers),
-    kind("markers-swapped-for-a-while", "marker-swapped", SEEN, markers_swapped),
-    kind("sensor-filtered", "latency", SEEN, sensor_filtered),
+    whole("recording-stopped-early", "too-few-dwells", ALL, stopped_early),
+    whole("arm-never-at-rest", "no-dwells", ALL, never_at_rest),
+    whole("sensor-frozen-from-the-middle", "stuck-sensor", SEEN, sensor_frozen),
+    whole("sensor-repeats-the-last-when-blind", "stuck-sensor", SEEN, repeats),
+    whole("sensor-zeros-when-blind", "stuck-sensor", SEEN, zeros),
+    whole("sensor-outliers", "outliers", SEEN, sensor_outliers),
+    whole("markers-swapped-for-a-while", "marker-swapped", SEEN, markers_swapped),
+    whole("sensor-filtered", "latency", SEEN, sensor_filtered),
 ];
 
-fn damaged(session: &mut Session, damage: Damage) -> Result<Vec<String>, Error> {
+fn damaged(session: &mut Session, damage: Damage) {
     session.damage.push((1, damage));
-    anything()
 }
 
 fn add_entry(session: &mut Session, file: &str, name: &str) {
@@ -58,49 +57,44 @@ fn add_entry(session: &mut Session, file: &str, name: &str) {
     }
 }
 
-fn same_file(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn same_file(session: &mut Session, _: &mut Draw) {
     let file = session.recordings[0].name.clone();
     add_entry(session, &file, "again");
-    anything()
 }
 
-fn copy(session: &mut Session, change: impl FnOnce(&mut Vec<Message>)) -> Result<Vec<String>, Error> {
+fn copy(session: &mut Session, change: impl FnOnce(&mut Vec<Message>)) {
     let mut twin = session.recordings[0].clone();
     "copy".clone_into(&mut twin.name);
     change(&mut twin.log.messages);
     session.recordings.push(twin);
     add_entry(session, "copy", "copy");
-    anything()
 }
 
-fn other_name(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
-    copy(session, |_| ())
+fn other_name(session: &mut Session, _: &mut Draw) {
+    copy(session, |_| ());
 }
 
 /// Played back and recorded again: log times a day later, stamps as they were.
-fn encoded_again(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
-    copy(session, |messages| messages.iter_mut().for_each(|m| m.log_ns += 86_400_000_000_000))
+fn encoded_again(session: &mut Session, _: &mut Draw) {
+    copy(session, |messages| messages.iter_mut().for_each(|m| m.log_ns += 86_400_000_000_000));
 }
 
-fn part_of_it(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
-    copy(session, |messages| messages.truncate(messages.len() * 2 / 3))
+fn part_of_it(session: &mut Session, _: &mut Draw) {
+    copy(session, |messages| messages.truncate(messages.len() * 2 / 3));
 }
 
-fn missing_file(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn missing_file(session: &mut Session, _: &mut Draw) {
     session.recordings.remove(1);
-    anything()
 }
 
-fn topic(session: &mut Session, stream: &str, topic: &str) -> Result<Vec<String>, Error> {
+fn topic(session: &mut Session, stream: &str, topic: &str) {
     session.set(&["streams", stream, "topic"], topic);
-    anything()
 }
 
-fn joint_name(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn joint_name(session: &mut Session, _: &mut Draw) {
     let mut names = session.joint_names();
     names[1].insert(1, 'x');
     session.set(&["streams", "joints", "names"], names.into_iter().map(Value::String).collect::<Vec<_>>());
-    anything()
 }
 
 fn keep(
@@ -113,40 +107,36 @@ fn keep(
     }
 }
 
-fn lost(session: &mut Session, draw: &mut Draw, share: f64) -> Result<Vec<String>, Error> {
+fn lost(session: &mut Session, draw: &mut Draw, share: f64) {
     keep(session, 0..usize::MAX, |_, _| !draw.chance(share));
-    anything()
 }
 
-fn gaps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn gaps(session: &mut Session, draw: &mut Draw) {
     let joints: Vec<Option<usize>> =
         session.recordings.iter().map(|r| r.log.channels.iter().position(|c| c.topic == JOINTS)).collect();
     let (period_s, gap_s) = (draw.uniform(25.0, 40.0), draw.uniform(6.0, 12.0));
     keep(session, 0..usize::MAX, |i, m| {
         Some(m.channel) != joints[i] || (m.stamp_ns as f64 * 1e-9) % period_s > gap_s
     });
-    anything()
 }
 
-fn doubled(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn doubled(session: &mut Session, _: &mut Draw) {
     for recorded in &mut session.recordings {
         recorded.log.messages = recorded.log.messages.iter().flat_map(|m| [m.clone(), m.clone()]).collect();
     }
-    anything()
 }
 
 /// Written in any order by a recorder with many threads, log times in the order of writing.
-fn shuffled(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn shuffled(session: &mut Session, draw: &mut Draw) {
     for recorded in &mut session.recordings {
         let messages = &mut recorded.log.messages;
         let log: Vec<i64> = messages.iter().map(|m| m.log_ns).collect();
         messages.chunks_mut(200).for_each(|chunk| draw.shuffle(chunk));
         messages.iter_mut().zip(log).for_each(|(m, log_ns)| m.log_ns = log_ns);
     }
-    anything()
 }
 
-fn thinned(session: &mut Session, topic: &str, period_ns: i64) -> Result<Vec<String>, Error> {
+fn thinned(session: &mut Session, topic: &str, period_ns: i64) {
     let channel: Vec<Option<usize>> =
         session.recordings.iter().map(|r| r.log.channels.iter().position(|c| c.topic == topic)).collect();
     let mut last = vec![None; channel.len()];
@@ -158,27 +148,24 @@ fn thinned(session: &mut Session, topic: &str, period_ns: i64) -> Result<Vec<Str
         }
         fresh
     });
-    anything()
 }
 
-fn stopped_early(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn stopped_early(session: &mut Session, _: &mut Draw) {
     let until_ns = session.recordings[0].rests.get(4).map_or(0, |r| r.end_ns);
     keep(session, 0..1, |_, m| m.stamp_ns <= until_ns);
     session.recordings.truncate(1);
     session.entries().truncate(1);
-    anything()
 }
 
 /// A program that sways the arm all the time.
-fn never_at_rest(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn never_at_rest(session: &mut Session, _: &mut Draw) {
     session.joints(|at, q| {
         let phase = at.stamp_ns as f64 * 1e-9 % 0.8 / 0.8 * std::f64::consts::TAU;
         q.iter_mut().for_each(|q| *q += 0.03 * phase.sin());
     });
-    anything()
 }
 
-fn sensor_frozen(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn sensor_frozen(session: &mut Session, draw: &mut Draw) {
     let from = draw.uniform(0.35, 0.6);
     let mut held: Vec<Option<(Vector3<f64>, Quaternion<f64>)>> = vec![None; session.recordings.len()];
     session.poses(Body::Tip, |at, p, q| {
@@ -186,7 +173,6 @@ fn sensor_frozen(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, 
             (*p, *q) = *held[at.recording].get_or_insert((*p, *q));
         }
     });
-    anything()
 }
 
 /// Blind in every fifth stretch of some seconds, as marked by `blind`.
@@ -194,36 +180,33 @@ fn blind(stamp_ns: i64) -> bool {
     (stamp_ns / 3_000_000_000) % 4 == 0
 }
 
-fn repeats(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn repeats(session: &mut Session, _: &mut Draw) {
     let mut held: Vec<Option<(Vector3<f64>, Quaternion<f64>)>> = vec![None; session.recordings.len()];
     session.poses(Body::Tip, |at, p, q| match blind(at.stamp_ns) {
         true => (*p, *q) = *held[at.recording].get_or_insert((*p, *q)),
         false => held[at.recording] = Some((*p, *q)),
     });
-    anything()
 }
 
 /// The position is zero, the orientation the identity: not marked as unseen.
-fn zeros(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn zeros(session: &mut Session, _: &mut Draw) {
     session.poses(Body::Tip, |at, p, q| {
         if blind(at.stamp_ns) {
             (*p, *q) = (Vector3::zeros(), Quaternion::identity());
         }
     });
-    anything()
 }
 
-fn sensor_outliers(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn sensor_outliers(session: &mut Session, draw: &mut Draw) {
     let share = draw.uniform(0.05, 0.12);
     session.poses(Body::Tip, |_, p, _| {
         if draw.chance(share) {
             *p += draw.direction() * draw.uniform(0.02, 0.3);
         }
     });
-    anything()
 }
 
-fn markers_swapped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn markers_swapped(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.008, 0.03);
     let (from, to) = (draw.uniform(0.2, 0.4), draw.uniform(0.55, 0.75));
     session.poses(Body::Tip, |at, p, _| {
@@ -231,11 +214,10 @@ fn markers_swapped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>
             *p += offset;
         }
     });
-    anything()
 }
 
 /// A tracker that smooths over a second.
-fn sensor_filtered(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn sensor_filtered(session: &mut Session, draw: &mut Draw) {
     let time_s = draw.uniform(0.4, 0.9);
     let mut state: Vec<Option<(i64, Vector3<f64>)>> = vec![None; session.recordings.len()];
     session.poses(Body::Tip, |at, p, _| {
@@ -246,5 +228,4 @@ fn sensor_filtered(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>
         }
         *slot = Some((at.stamp_ns, *p));
     });
-    anything()
 }

@@ -1,6 +1,6 @@
 //! Which joint is which, which way it turns, in what unit, from which zero.
 
-use super::{ALL, Kind, about, anything, kind};
+use super::{ALL, Kind, about, kind, whole};
 use crate::session::{JOINTS, Session};
 use crate::{Draw, Error};
 use armcal_lab::sensors::{Message, Payload};
@@ -22,14 +22,14 @@ pub const KINDS: &[Kind] = &[
     }),
     kind("joint-reversed-and-shifted", "joint-sign", ALL, reversed_and_shifted),
     kind("two-joint-names-swapped", "joint-order", ALL, names_swapped),
-    kind("joint-names-rotated", "joint-order", ALL, names_rotated),
-    kind("joint-names-backwards", "joint-order", ALL, names_backwards),
+    whole("joint-names-rotated", "joint-order", ALL, names_rotated),
+    whole("joint-names-backwards", "joint-order", ALL, names_backwards),
     kind("driver-in-another-order", "joint-order", ALL, driver_order),
-    kind("degrees-read-as-radians", "joint-unit", ALL, degrees),
-    kind("radians-read-as-degrees", "joint-unit", ALL, declared_degrees),
+    whole("degrees-read-as-radians", "joint-unit", ALL, degrees),
+    whole("radians-read-as-degrees", "joint-unit", ALL, declared_degrees),
     kind("one-joint-in-degrees", "joint-unit", ALL, one_in_degrees),
-    kind("milliradians", "joint-unit", ALL, milliradians),
-    kind("counts-per-turn-doubled", "joint-unit", ALL, counts_per_turn),
+    whole("milliradians", "joint-unit", ALL, milliradians),
+    whole("counts-per-turn-doubled", "joint-unit", ALL, counts_per_turn),
     kind("encoder-direction-declared-wrong", "joint-sign", ALL, encoder_direction),
     kind("gear-ratio-off", "joint-scale", ALL, gear_ratio),
     kind("motor-angles-for-joint-angles", "joint-scale", ALL, motor_angles),
@@ -40,10 +40,10 @@ pub const KINDS: &[Kind] = &[
         let angle = d.signed(12.0, 35.0).to_radians();
         zero_off(s, d, angle)
     }),
-    kind("zeros-of-all-joints-off", "joint-zero-gross", ALL, zeros_off),
+    whole("zeros-of-all-joints-off", "joint-zero-gross", ALL, zeros_off),
     kind("homed-again-between-recordings", "joint-zero-event", ALL, homed_again),
     kind("forearm-angle-absolute", "joint-coupling", ALL, absolute_angle),
-    kind("speeds-in-the-place-of-angles", "wrong-field", ALL, speeds),
+    whole("speeds-in-the-place-of-angles", "wrong-field", ALL, speeds),
 ];
 
 fn reversed(session: &mut Session, joints: &[usize]) -> Result<Vec<String>, Error> {
@@ -64,14 +64,12 @@ fn names_swapped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, 
     about(session, &[first, first + 1])
 }
 
-fn names_rotated(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn names_rotated(session: &mut Session, _: &mut Draw) {
     declared_names(session).rotate_left(1);
-    anything()
 }
 
-fn names_backwards(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn names_backwards(session: &mut Session, _: &mut Draw) {
     declared_names(session).reverse();
-    anything()
 }
 
 fn declared_names(session: &mut Session) -> &mut Vec<Value> {
@@ -92,14 +90,12 @@ fn driver_order(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Erro
     about(session, &[0, 2])
 }
 
-fn degrees(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn degrees(session: &mut Session, _: &mut Draw) {
     session.joints(|_, q| q.iter_mut().for_each(|q| *q = q.to_degrees()));
-    anything()
 }
 
-fn declared_degrees(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn declared_degrees(session: &mut Session, _: &mut Draw) {
     session.set(&["streams", "joints", "unit"], "deg");
-    anything()
 }
 
 fn one_in_degrees(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
@@ -108,14 +104,12 @@ fn one_in_degrees(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>,
     about(session, &[joint])
 }
 
-fn milliradians(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn milliradians(session: &mut Session, _: &mut Draw) {
     session.joints(|_, q| q.iter_mut().for_each(|q| *q *= 1e3));
-    anything()
 }
 
-fn counts_per_turn(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn counts_per_turn(session: &mut Session, _: &mut Draw) {
     as_counts(session, |_| 8192, |_| 1);
-    anything()
 }
 
 fn encoder_direction(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
@@ -164,11 +158,10 @@ fn zero_off(session: &mut Session, draw: &mut Draw, angle_rad: f64) -> Result<Ve
     about(session, &[joint])
 }
 
-fn zeros_off(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn zeros_off(session: &mut Session, draw: &mut Draw) {
     let joints = session.joint_names().len();
     let angles: Vec<f64> = (0..joints).map(|_| draw.signed(8.0, 20.0).to_radians()).collect();
     session.joints(|_, q| q.iter_mut().zip(&angles).for_each(|(q, a)| *q += a));
-    anything()
 }
 
 fn homed_again(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
@@ -184,7 +177,7 @@ fn absolute_angle(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Er
     about(session, &[2])
 }
 
-fn speeds(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn speeds(session: &mut Session, _: &mut Draw) {
     for recorded in &mut session.recordings {
         let joints = recorded.log.channels.iter().position(|c| c.topic == JOINTS);
         let mut before: Option<(i64, Vec<f64>)> = None;
@@ -199,5 +192,4 @@ fn speeds(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
             velocity.clear();
         }
     }
-    anything()
 }

@@ -24,13 +24,31 @@ pub struct Kind {
     pub cause: &'static str,
     /// The rigs on which it can be made.
     pub rigs: &'static [Rig],
-    /// Makes it.
-    pub make: Make,
+    make: Make,
 }
 
-/// Makes a mistake in a session. Returns words of which a report that is about a part has to name one, such as the joint;
-/// none where the report need not.
-pub type Make = fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>;
+/// Makes a mistake in a session.
+#[derive(Clone, Copy)]
+enum Make {
+    /// Of a part: returns words of which a report about it has to name one, such as the joint.
+    Part(fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>),
+    /// Of the whole: a report need not name anything.
+    Whole(fn(&mut Session, &mut Draw)),
+}
+
+impl Kind {
+    /// Makes it in a session. Returns words of which a report that is about a part has to name one; none where the report
+    /// need not.
+    pub fn make(&self, session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+        match self.make {
+            Make::Part(make) => make(session, draw),
+            Make::Whole(make) => {
+                make(session, draw);
+                anything()
+            }
+        }
+    }
+}
 
 const ALL: &[Rig] = &Rig::ALL;
 const SEEN: &[Rig] = &[Rig::Table, Rig::Poses];
@@ -38,8 +56,22 @@ const BOARD: &[Rig] = &[Rig::Table, Rig::Sockets];
 const TABLE: &[Rig] = &[Rig::Table];
 const POSES: &[Rig] = &[Rig::Poses];
 
-const fn kind(name: &'static str, cause: &'static str, rigs: &'static [Rig], make: Make) -> Kind {
-    Kind { name, cause, rigs, make }
+const fn kind(
+    name: &'static str,
+    cause: &'static str,
+    rigs: &'static [Rig],
+    make: fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>,
+) -> Kind {
+    Kind { name, cause, rigs, make: Make::Part(make) }
+}
+
+const fn whole(
+    name: &'static str,
+    cause: &'static str,
+    rigs: &'static [Rig],
+    make: fn(&mut Session, &mut Draw),
+) -> Kind {
+    Kind { name, cause, rigs, make: Make::Whole(make) }
 }
 
 /// Every kind, in the order of the table.
@@ -90,7 +122,7 @@ mod tests {
             for kind in kinds().iter().filter(|kind| kind.rigs.contains(&rig)) {
                 let make = |seed| {
                     let mut session = sound.clone();
-                    let about = (kind.make)(&mut session, &mut Draw::new(seed, kind.name, rig)).unwrap();
+                    let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig)).unwrap();
                     (session, about)
                 };
                 let (made, about) = make(5);

@@ -1,49 +1,46 @@
 //! The arm's table: of another arm, in another convention, in other units.
 
-use super::{ALL, BOARD, Kind, POSES, anything, kind};
+use super::{ALL, BOARD, Kind, POSES, whole};
+use crate::Draw;
 use crate::rigs::Rig;
 use crate::session::Session;
-use crate::{Draw, Error};
 use toml::{Table, Value};
 
 pub const KINDS: &[Kind] = &[
-    kind("modified-dh-for-standard", "dh-convention", ALL, declared_modified),
-    kind("rows-in-modified-convention", "dh-convention", ALL, rows_modified),
-    kind("rows-swapped", "dh-rows", ALL, |s, _| {
+    whole("modified-dh-for-standard", "dh-convention", ALL, declared_modified),
+    whole("rows-in-modified-convention", "dh-convention", ALL, rows_modified),
+    whole("rows-swapped", "dh-rows", ALL, |s, _| {
         s.rows().swap(1, 2);
         keep_names(s);
-        anything()
     }),
-    kind("a-and-d-columns-swapped", "dh-rows", ALL, columns_swapped),
-    kind("lengths-in-metres", "length-unit", ALL, |s, _| lengths(s, 1e-3)),
-    kind("lengths-in-inches", "length-unit", ALL, |s, _| lengths(s, 1.0 / 25.4)),
-    kind("twists-in-radians", "angle-unit", ALL, twists_in_radians),
-    kind("one-twist-of-the-other-sign", "dh-sign", ALL, twist_sign),
-    kind("one-offset-of-the-other-sign", "dh-sign", ALL, offset_sign),
-    kind("one-length-of-the-other-sign", "dh-sign", ALL, length_sign),
-    kind("link-length-wrong-by-a-lot", "link-length", ALL, link_length),
-    kind("tool-length-wrong-by-a-lot", "tool-length", ALL, tool_length),
-    kind("tool-left-out", "tool-length", BOARD, tool_left_out),
-    kind("quarter-turn-of-a-zero-left-out", "joint-zero-gross", ALL, zero_left_out),
-    kind("arm-of-the-other-hand", "wrong-model-file", BOARD, other_hand),
-    kind("model-of-a-smaller-arm", "wrong-model-file", ALL, smaller_arm),
-    kind("row-missing", "wrong-model-file", ALL, |s, _| {
+    whole("a-and-d-columns-swapped", "dh-rows", ALL, columns_swapped),
+    whole("lengths-in-metres", "length-unit", ALL, |s, _| lengths(s, 1e-3)),
+    whole("lengths-in-inches", "length-unit", ALL, |s, _| lengths(s, 1.0 / 25.4)),
+    whole("twists-in-radians", "angle-unit", ALL, twists_in_radians),
+    whole("one-twist-of-the-other-sign", "dh-sign", ALL, twist_sign),
+    whole("one-offset-of-the-other-sign", "dh-sign", ALL, offset_sign),
+    whole("one-length-of-the-other-sign", "dh-sign", ALL, length_sign),
+    whole("link-length-wrong-by-a-lot", "link-length", ALL, link_length),
+    whole("tool-length-wrong-by-a-lot", "tool-length", ALL, tool_length),
+    whole("tool-left-out", "tool-length", BOARD, tool_left_out),
+    whole("quarter-turn-of-a-zero-left-out", "joint-zero-gross", ALL, zero_left_out),
+    whole("arm-of-the-other-hand", "wrong-model-file", BOARD, other_hand),
+    whole("model-of-a-smaller-arm", "wrong-model-file", ALL, smaller_arm),
+    whole("row-missing", "wrong-model-file", ALL, |s, _| {
         s.rows().remove(0);
-        anything()
     }),
-    kind("bounds-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [0.1, 0.02, 0.08, 0.016])),
-    kind("priors-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [5.0, 2.0, 0.02, 0.004])),
-    kind("wrong-entries-fixed", "parameter-fixed", ALL, fixed),
-    kind("target-offset-given-wrong", "frame-declared-wrong", POSES, target_given),
+    whole("bounds-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [0.1, 0.02, 0.08, 0.016])),
+    whole("priors-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [5.0, 2.0, 0.02, 0.004])),
+    whole("wrong-entries-fixed", "parameter-fixed", ALL, fixed),
+    whole("target-offset-given-wrong", "frame-declared-wrong", POSES, target_given),
 ];
 
-fn declared_modified(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn declared_modified(session: &mut Session, _: &mut Draw) {
     session.arm.insert("convention".into(), "modified".into());
-    anything()
 }
 
 /// Twist and length stand a row later, as Craig writes them; the file still says `standard`.
-fn rows_modified(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn rows_modified(session: &mut Session, _: &mut Draw) {
     let mut before = [0.0; 2];
     let mut row_before = usize::MAX;
     session.entries_of_rows(|row, key, value| {
@@ -56,7 +53,6 @@ fn rows_modified(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Err
             _ => {}
         }
     });
-    anything()
 }
 
 /// Names stay in the order of the joints: the numbers beside them are another joint's.
@@ -67,7 +63,7 @@ fn keep_names(session: &mut Session) {
     }
 }
 
-fn columns_swapped(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn columns_swapped(session: &mut Session, _: &mut Draw) {
     let mut d = Vec::new();
     session.entries_of_rows(|_, key, value| {
         if key == "d_mm" {
@@ -85,34 +81,26 @@ fn columns_swapped(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, E
             *value = a[row];
         }
     });
-    anything()
 }
 
-fn lengths(session: &mut Session, factor: f64) -> Result<Vec<String>, Error> {
+fn lengths(session: &mut Session, factor: f64) {
     session.entries_of_rows(|_, key, value| {
         if key.ends_with("_mm") {
             *value *= factor;
         }
     });
-    anything()
 }
 
-fn twists_in_radians(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn twists_in_radians(session: &mut Session, _: &mut Draw) {
     session.entries_of_rows(|_, key, value| {
         if key.ends_with("_deg") {
             *value = value.to_radians();
         }
     });
-    anything()
 }
 
 /// Changes one entry of those that are not near zero; an arm has few.
-fn one(
-    session: &mut Session,
-    draw: &mut Draw,
-    wanted: &str,
-    change: impl Fn(f64) -> f64,
-) -> Result<Vec<String>, Error> {
+fn one(session: &mut Session, draw: &mut Draw, wanted: &str, change: impl Fn(f64) -> f64) {
     let mut found = Vec::new();
     session.entries_of_rows(|row, key, value| {
         if key == wanted && value.abs() > 1.0 {
@@ -125,27 +113,26 @@ fn one(
             *value = change(*value);
         }
     });
-    anything()
 }
 
-fn twist_sign(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    one(session, draw, "alpha_deg", |v| -v)
+fn twist_sign(session: &mut Session, draw: &mut Draw) {
+    one(session, draw, "alpha_deg", |v| -v);
 }
 
-fn offset_sign(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    one(session, draw, "d_mm", |v| -v)
+fn offset_sign(session: &mut Session, draw: &mut Draw) {
+    one(session, draw, "d_mm", |v| -v);
 }
 
-fn length_sign(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    one(session, draw, "a_mm", |v| -v)
+fn length_sign(session: &mut Session, draw: &mut Draw) {
+    one(session, draw, "a_mm", |v| -v);
 }
 
-fn link_length(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn link_length(session: &mut Session, draw: &mut Draw) {
     let error = draw.signed(40.0, 120.0);
-    one(session, draw, "a_mm", |v| v + error)
+    one(session, draw, "a_mm", |v| v + error);
 }
 
-fn tool_length(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn tool_length(session: &mut Session, draw: &mut Draw) {
     let error = draw.signed(40.0, 120.0);
     let last = session.rows().len() - 1;
     session.entries_of_rows(|row, key, value| {
@@ -153,36 +140,32 @@ fn tool_length(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Er
             *value += error;
         }
     });
-    anything()
 }
 
-fn tool_left_out(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn tool_left_out(session: &mut Session, _: &mut Draw) {
     session.rows().pop();
-    anything()
 }
 
-fn zero_left_out(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn zero_left_out(session: &mut Session, _: &mut Draw) {
     let other = if session.rig == Rig::Poses { 90.0 } else { 0.0 };
     session.entries_of_rows(|row, key, value| {
         if row == 1 && key == "theta_deg" {
             *value = other;
         }
     });
-    anything()
 }
 
 /// Both arms of a rig have a file; this is the mirrored one.
-fn other_hand(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn other_hand(session: &mut Session, _: &mut Draw) {
     session.entries_of_rows(|row, key, value| match (row, key) {
         (2, "d_mm") | (3, "alpha_deg") => *value = -*value,
         _ => {}
     });
     session.joints(|_, q| q[0] = -q[0]);
-    anything()
 }
 
 /// The next smaller arm of the same make: of a UR10 the UR5.
-fn smaller_arm(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn smaller_arm(session: &mut Session, draw: &mut Draw) {
     let factor = draw.uniform(0.65, 0.8);
     let small =
         [("d_mm", [89.159, 0.0, 0.0, 109.15, 94.65, 82.3]), ("a_mm", [0.0, -425.0, -392.25, 0.0, 0.0, 0.0])];
@@ -194,13 +177,9 @@ fn smaller_arm(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Er
             *value *= factor;
         }
     });
-    anything()
 }
 
-fn deviation(
-    session: &mut Session,
-    [bound_mm, bound_deg, prior_mm, prior_deg]: [f64; 4],
-) -> Result<Vec<String>, Error> {
+fn deviation(session: &mut Session, [bound_mm, bound_deg, prior_mm, prior_deg]: [f64; 4]) {
     let keys = [
         ("bound_mm", bound_mm),
         ("bound_deg", bound_deg),
@@ -209,24 +188,21 @@ fn deviation(
     ];
     let table: Table = keys.into_iter().map(|(k, v)| (k.to_owned(), Value::Float(v))).collect();
     session.arm.insert("deviation".into(), table.into());
-    anything()
 }
 
 /// Only the zeros may move: lengths and twists are taken from the drawing.
-fn fixed(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+fn fixed(session: &mut Session, _: &mut Draw) {
     let entry = |name: &str| {
         let keys = [("name", Value::String(name.to_owned())), ("free", Value::Boolean(false))];
         Value::Table(keys.into_iter().map(|(k, v)| (k.to_owned(), v)).collect())
     };
     let fixed: Vec<Value> = ["*.alpha", "*.a", "*.d"].map(entry).to_vec();
     session.set(&["parameters"], fixed);
-    anything()
 }
 
-fn target_given(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn target_given(session: &mut Session, draw: &mut Draw) {
     let xyz: Vec<Value> =
         [draw.signed(0.005, 0.02), 0.0, 0.109 + draw.signed(0.01, 0.04)].map(Value::Float).to_vec();
     session.set(&["frames", "tip", "pose"], "given");
     session.set(&["frames", "tip", "at", "xyz_m"], xyz);
-    anything()
 }

@@ -1,30 +1,29 @@
 //! Noise that is not what is declared.
 
-use super::{BOARD, Kind, POSES, SEEN, anything, kind};
+use super::{BOARD, Kind, POSES, SEEN, anything, kind, whole};
 use crate::rigs::{Source, session_of};
 use crate::session::{Body, Session};
 use crate::{Draw, Error};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
-    kind("board-tolerance-underdeclared", "noise-underdeclared", BOARD, |s, d| {
+    whole("board-tolerance-underdeclared", "noise-underdeclared", BOARD, |s, d| {
         tolerances(s, d.uniform(0.02, 0.1))
     }),
-    kind("board-tolerance-overdeclared", "noise-overdeclared", BOARD, |s, d| {
+    whole("board-tolerance-overdeclared", "noise-overdeclared", BOARD, |s, d| {
         tolerances(s, d.uniform(8.0, 30.0))
     }),
     kind("seats-worn-out", "noise-underdeclared", BOARD, worn),
-    kind("sensor-noise-underdeclared", "noise-underdeclared", SEEN, wobbles),
-    kind("sensor-noise-overdeclared", "noise-overdeclared", POSES, overdeclared),
+    whole("sensor-noise-underdeclared", "noise-underdeclared", SEEN, wobbles),
+    whole("sensor-noise-overdeclared", "noise-overdeclared", POSES, overdeclared),
 ];
 
-fn tolerances(session: &mut Session, factor: f64) -> Result<Vec<String>, Error> {
+fn tolerances(session: &mut Session, factor: f64) {
     for key in ["cavity_sigma_mm", "seat_sigma_mm"] {
         if let Some(Value::Float(sigma)) = session.board.as_mut().and_then(|b| b.get_mut(key)) {
             *sigma *= factor;
         }
     }
-    anything()
 }
 
 /// Cavities that were used for years: half a millimetre off their drawing.
@@ -37,7 +36,7 @@ fn worn(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
 }
 
 /// A mount that sways: an error that is constant through a rest and another in the next.
-fn wobbles(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn wobbles(session: &mut Session, draw: &mut Draw) {
     let size_m = draw.uniform(0.6e-3, 1.5e-3);
     let ends: Vec<Vec<i64>> = session
         .recordings
@@ -51,11 +50,9 @@ fn wobbles(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error>
     session.poses(Body::Tip, |at, p, _| {
         *p += offsets[at.recording][ends[at.recording].partition_point(|end| *end <= at.stamp_ns)];
     });
-    anything()
 }
 
-fn overdeclared(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn overdeclared(session: &mut Session, draw: &mut Draw) {
     session.set(&["observations", "sensor_sigma_mm"], draw.uniform(1.0, 3.0));
     session.set(&["observations", "sensor_sigma_deg"], draw.uniform(0.1, 0.3));
-    anything()
 }

@@ -1,6 +1,6 @@
 //! What was moved, exchanged or said wrongly about the cell.
 
-use super::{ALL, BOARD, Kind, SEEN, TABLE, anything, kind};
+use super::{ALL, BOARD, Kind, SEEN, TABLE, anything, kind, whole};
 use crate::rigs::{Rig, Source, session_of};
 use crate::session::{Body, Session};
 use crate::{Draw, Error, draw};
@@ -11,16 +11,16 @@ use toml::Value;
 pub const KINDS: &[Kind] = &[
     kind("one-recording-of-another-arm", "different-arm", ALL, another_arm),
     kind("one-recording-with-another-tool", "different-tool", ALL, another_tool),
-    kind("tool-knocked-in-mid-recording", "different-tool", SEEN, tool_knocked),
+    whole("tool-knocked-in-mid-recording", "different-tool", SEEN, tool_knocked),
     kind("arm-bolted-down-elsewhere", "arm-rebased", ALL, rebased),
-    kind("base-markers-knocked", "base-moved", TABLE, base_knocked),
-    kind("table-markers-knocked-in-mid-recording", "table-bumped", TABLE, table_knocked),
-    kind("camera-knocked", "camera-bumped", SEEN, camera_knocked),
-    kind("camera-recalibrated-between-recordings", "camera-bumped", SEEN, camera_recalibrated),
-    kind("base-frame-declared-wrong", "frame-declared-wrong", BOARD, base_declared),
-    kind("base-markers-turned", "frame-declared-wrong", TABLE, base_turned),
+    whole("base-markers-knocked", "base-moved", TABLE, base_knocked),
+    whole("table-markers-knocked-in-mid-recording", "table-bumped", TABLE, table_knocked),
+    whole("camera-knocked", "camera-bumped", SEEN, camera_knocked),
+    whole("camera-recalibrated-between-recordings", "camera-bumped", SEEN, camera_recalibrated),
+    whole("base-frame-declared-wrong", "frame-declared-wrong", BOARD, base_declared),
+    whole("base-markers-turned", "frame-declared-wrong", TABLE, base_turned),
     kind("load-not-declared", "load-undeclared", BOARD, load),
-    kind("vertical-declared-wrong", "vertical-wrong", SEEN, vertical),
+    whole("vertical-declared-wrong", "vertical-wrong", SEEN, vertical),
 ];
 
 fn another_arm(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
@@ -58,29 +58,28 @@ fn from_moment(
     draw: &mut Draw,
     body: Body,
     mut change: impl FnMut(&mut Vector3<f64>, &mut Quaternion<f64>),
-) -> Result<Vec<String>, Error> {
+) {
     let moment_ns = session.moment_ns(1, draw.uniform(0.3, 0.7));
     session.poses(body, |at, p, q| {
         if at.stamp_ns > moment_ns {
             change(p, q);
         }
     });
-    anything()
 }
 
-fn tool_knocked(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn tool_knocked(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.003, 0.012);
-    from_moment(session, draw, Body::Tip, |p, q| *p += UnitQuaternion::from_quaternion(*q) * offset)
+    from_moment(session, draw, Body::Tip, |p, q| *p += UnitQuaternion::from_quaternion(*q) * offset);
 }
 
-fn base_knocked(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn base_knocked(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.005, 0.02);
-    from_moment(session, draw, Body::Base, |p, _| *p += offset)
+    from_moment(session, draw, Body::Base, |p, _| *p += offset);
 }
 
-fn table_knocked(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn table_knocked(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.003, 0.01);
-    from_moment(session, draw, Body::Table, |p, _| *p += offset)
+    from_moment(session, draw, Body::Table, |p, _| *p += offset);
 }
 
 /// A small motion of the whole camera about a point near the arm.
@@ -96,7 +95,7 @@ fn apply(motion: &Isometry3<f64>, p: &mut Vector3<f64>, q: &mut Quaternion<f64>)
     *q = motion.rotation.quaternion() * *q;
 }
 
-fn camera_knocked(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn camera_knocked(session: &mut Session, draw: &mut Draw) {
     let motion = knock(draw);
     let moment_ns = session.moment_ns(1, draw.uniform(0.3, 0.7));
     session.all_poses(|at, p, q| {
@@ -104,10 +103,9 @@ fn camera_knocked(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>,
             apply(&motion, p, q);
         }
     });
-    anything()
 }
 
-fn camera_recalibrated(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn camera_recalibrated(session: &mut Session, draw: &mut Draw) {
     let turn = draw.turn_deg(5.0, 40.0);
     let motion = Isometry3::from_parts(Translation3::from(draw.direction() * draw.uniform(0.1, 0.5)), turn);
     session.all_poses(|at, p, q| {
@@ -115,7 +113,6 @@ fn camera_recalibrated(session: &mut Session, draw: &mut Draw) -> Result<Vec<Str
             apply(&motion, p, q);
         }
     });
-    anything()
 }
 
 /// Between recordings, as far as a bench vice lets it.
@@ -139,7 +136,7 @@ fn rebased(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error>
 }
 
 /// A pose from a drawing of another cell, given as if it were known.
-fn base_declared(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn base_declared(session: &mut Session, draw: &mut Draw) {
     let xyz = match session.rig {
         Rig::Table => {
             [1.2 + draw.signed(0.02, 0.06), -0.4 + draw.signed(0.02, 0.06), 0.75 + draw.signed(0.01, 0.03)]
@@ -157,18 +154,16 @@ fn base_declared(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, 
     if let Some(Value::Table(streams)) = session.pipeline.get_mut("streams") {
         streams.remove("base");
     }
-    anything()
 }
 
 /// The plate with the markers of the base is screwed on a hole further, and a little turned.
-fn base_turned(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn base_turned(session: &mut Session, draw: &mut Draw) {
     let turn = draw.turn_deg(2.0, 8.0);
     let offset = draw.direction() * draw.uniform(0.01, 0.04);
     session.poses(Body::Base, |_, p, q| {
         *p += UnitQuaternion::from_quaternion(*q) * offset;
         *q *= turn.quaternion();
     });
-    anything()
 }
 
 /// An arm that yields, half of its recordings with a load that nobody declared.
@@ -185,9 +180,8 @@ fn load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     anything()
 }
 
-fn vertical(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn vertical(session: &mut Session, draw: &mut Draw) {
     let turn = draw.turn_deg(60.0, 120.0);
     session.all_poses(|_, p, q| apply(&Isometry3::from_parts(Translation3::identity(), turn), p, q));
     session.set(&["frames", "vertical"], "world");
-    anything()
 }

@@ -1,20 +1,18 @@
 //! What the controller asked of the joints, taken for what the encoders read.
 
-use super::anything;
+use crate::Draw;
 use crate::session::{JOINTS, Rest, Session};
-use crate::{Draw, Error};
 use armcal_lab::sensors::{Channel, Kind, Message, Payload};
 
 /// Set-points under the topic of the readings.
-pub(super) fn recorded(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+pub(super) fn recorded(session: &mut Session, draw: &mut Draw) {
     let commanded = asked_for(session, draw);
     let mut next = commanded.into_iter();
     session.joints(|_, q| *q = next.next().unwrap_or_else(|| q.clone()));
-    anything()
 }
 
 /// The controller's topic beside that of the readings, and named in the pipeline.
-pub(super) fn named(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+pub(super) fn named(session: &mut Session, draw: &mut Draw) {
     let commanded = asked_for(session, draw);
     let mut next = commanded.into_iter();
     for recorded in &mut session.recordings {
@@ -37,7 +35,6 @@ pub(super) fn named(session: &mut Session, draw: &mut Draw) -> Result<Vec<String
         }
     }
     session.set(&["streams", "joints", "topic"], "/controller/command");
-    anything()
 }
 
 /// What a controller without integral action would have asked for, message by message: it stays short of it by gravity's

@@ -24,23 +24,15 @@
 //! # Source
 //! Tenhumberg and Baeuml, arXiv 2311.08333; Klimchik et al., arXiv 1211.5739.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{ARM, Placing, amplitude};
-use super::state::SEATED;
-use crate::rigid::Scalar;
+use super::prelude::*;
 use crate::segment::Motion;
-use armcal_core::Unit;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "arm_compliance",
-    aliases: &[],
     summary: "every joint yields to gravity like a spring",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     target: Target::Whole,
-    offered: Offered::Once,
     shapes: &[SEATED, ARM],
     never_negative: &["compliance"],
     confused_with: &[
@@ -57,6 +49,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     ],
     source: include_str!("arm_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Typical deflection of one joint [deg].

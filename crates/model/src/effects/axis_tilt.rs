@@ -20,27 +20,18 @@
 //! # Source
 //! Hayati and Mirmirani 1985 (J. Robotic Systems 2:4).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
+use super::prelude::*;
 use crate::segment::Geometry;
-use armcal_core::Unit;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "axis_tilt",
     aliases: &["axis not parallel (Hayati beta)"],
     summary: "an axis is not parallel to the one before it",
     family: Family::Geometry,
-    toggle: Toggle::None,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["eccentricity", "second_harmonic", "gear_ratio", "belt_coupling"],
     source: include_str!("axis_tilt.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

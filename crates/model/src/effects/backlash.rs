@@ -33,13 +33,8 @@
 //! Slamani, Nubiola, Bonev 2012 (Industrial Robot 39:4); play operator: Visintin, Differential Models of
 //! Hysteresis, 1994, ch. III.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
-use super::state::{LED, REST};
-use crate::rigid::Scalar;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "backlash",
@@ -47,13 +42,11 @@ pub(super) static KIND: EffectKind = EffectKind {
     summary: "play between encoder and link: the tip depends on the direction of arrival",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[LED, REST],
-    never_negative: &[],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
     source: include_str!("backlash.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -23,25 +23,15 @@
 //! # Source
 //! Notes of the project; ISO 9283 asks for a rigid mounting.
 
-use super::drivers::Drivers;
 use super::frame_shift::about;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::{ARM, Placing};
-use super::shares::Shares;
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::{Observation, Unit};
-use nalgebra::Vector3;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "base_compliance",
-    aliases: &[],
     summary: "the base rocks under the weight of the arm",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     target: Target::Whole,
-    offered: Offered::Once,
     shapes: &[
         Shape {
             name: "height",
@@ -60,6 +50,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
     source: include_str!("base_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Links from this one on count as outer.

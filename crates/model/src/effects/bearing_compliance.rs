@@ -23,29 +23,19 @@
 //! Tilting stiffness of bearings: Harris and Kotzalas, Rolling Bearing Analysis; configuration-dependent joint tilting:
 //! Patel, thesis, Univ. Adelaide 2017.
 
-use super::drivers::Drivers;
 use super::frame_shift::about;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::Placing;
-use super::shares::Shares;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
-use nalgebra::Vector3;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "bearing_compliance",
-    aliases: &[],
     summary: "the bearing of a joint tilts under the moment across its axis",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
     never_negative: &["tilt", "tilt_load"],
     confused_with: &["compliance", "base_compliance", "arm_compliance", "link_bending"],
     source: include_str!("bearing_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

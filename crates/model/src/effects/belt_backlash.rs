@@ -24,14 +24,8 @@
 //! # Source
 //! Play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III; layout of the paper's arm.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, lagging};
-use super::state::LED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "belt_backlash",
@@ -39,13 +33,11 @@ pub(super) static KIND: EffectKind = EffectKind {
     summary: "play in a belt from the base: the sum of two joints decides",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[LED],
-    never_negative: &[],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
     source: include_str!("belt_backlash.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -23,27 +23,19 @@
 //! # Source
 //! Layout of palletisers and of the paper's arm (Li, Yang, Chan, Lin 2016); notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "belt_compliance",
-    aliases: &[],
     summary: "compliance of a joint when the next one is driven by a belt from the base",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[SEATED],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
     source: include_str!("belt_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -20,26 +20,17 @@
 //! # Source
 //! Notes of the project; Kilic, Dolen, Koku, Turk. J. Elec. Eng. 2010 (timing belts).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "belt_coupling",
     aliases: &["coupled wrist"],
     summary: "a joint moves along with the one before it",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["gear_ratio", "compliance", "eccentricity", "second_harmonic"],
     source: include_str!("belt_coupling.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

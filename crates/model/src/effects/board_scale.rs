@@ -18,26 +18,18 @@
 //! # Source
 //! Notes of the project; PLA prints 0.1 to 0.5 %.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::{Reference, Unit};
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "board_scale",
     aliases: &["print shrinkage"],
     summary: "the board is larger or smaller than declared",
     family: Family::Board,
-    toggle: Toggle::None,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["sensor_scale"],
     source: include_str!("board_scale.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -22,15 +22,9 @@
 //! # Source
 //! Rigid motion (eq. 7-10 of Li et al. 2016, for the board); notes of the project.
 
-use super::drivers::Drivers;
 use super::frame_shift::{about, rigid_motion};
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::Placing;
+use super::prelude::*;
 use super::spec::Since;
-use crate::rigid::Scalar;
-use armcal_core::Reference;
-use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -41,11 +35,10 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     target: Target::Whole,
     offered: Offered::Events,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["frame_shift", "tool_shift"],
     source: include_str!("board_shift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

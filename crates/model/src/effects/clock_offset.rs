@@ -18,26 +18,17 @@
 //! # Source
 //! Notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "clock_offset",
-    aliases: &[],
     summary: "clocks of robot and sensor differ: an error in proportion to speed",
     family: Family::Timing,
-    toggle: Toggle::None,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &[],
     source: include_str!("clock_offset.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -25,14 +25,7 @@
 //! # Source
 //! Spong 1987; Tenhumberg and Baeuml, arXiv 2311.08333; Klimchik et al., arXiv 1211.5739.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::Placing;
-use super::shares::Shares;
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "compliance",
@@ -40,8 +33,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     summary: "a joint yields to gravity like a spring",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[SEATED],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &[
@@ -57,6 +48,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     ],
     source: include_str!("compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -24,14 +24,8 @@
 //! # Source
 //! Dahl's friction with a sharp slip is the play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
 use super::play::{RESOLVED_DEG, following};
-use super::state::LED;
-use crate::rigid::Scalar;
-use armcal_core::{Observation, Unit};
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "crossed_backlash",
@@ -39,8 +33,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     summary: "lost motion of one joint that follows the direction of another",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[
         Shape {
             name: "from",
@@ -54,10 +46,10 @@ pub(super) static KIND: EffectKind = EffectKind {
         },
         LED,
     ],
-    never_negative: &[],
     confused_with: &["backlash", "belt_backlash"],
     source: include_str!("crossed_backlash.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// On longer arms only neighbours are offered.

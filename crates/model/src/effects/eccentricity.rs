@@ -19,26 +19,17 @@
 //! # Source
 //! Judd and Knasinski 1990 (IEEE T-RA 6:1); Whitney, Lozinski, Rourke 1986.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "eccentricity",
     aliases: &["encoder eccentricity", "gear run-out"],
     summary: "a gear or encoder disc off its centre: an error once a turn",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
     source: include_str!("eccentricity.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// `harmonic` times a turn.

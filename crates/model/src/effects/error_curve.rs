@@ -25,20 +25,13 @@
 //! # Source
 //! Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.15 and 4.17; Hu et al., Sensors 2020.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "error_curve",
     aliases: &["encoder error map", "gear error curve"],
     summary: "the joint's own repeatable error curve, a Fourier series over its angle",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
     offered: Offered::Never,
     shapes: &[
         Shape {
@@ -62,10 +55,10 @@ pub(super) static KIND: EffectKind = EffectKind {
             values: None,
         },
     ],
-    never_negative: &[],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
     source: include_str!("error_curve.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Standard deviation of the whole curve [rad] where nothing is said: 0.1 deg.

@@ -23,18 +23,13 @@
 //! # Source
 //! The user.
 
-use super::drivers::Drivers;
 use super::formula::{Formula, Number};
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
 use super::measure::{Dimension, Measure, dimension, symbol};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::{Placing, amplitude};
+use super::prelude::*;
 use super::spec::joint_index;
 use super::table::unit_of;
 use crate::error::nearest;
-use crate::rigid::Scalar;
 use crate::segment::Motion;
-use armcal_core::Unit;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
@@ -45,17 +40,14 @@ const SIGMA_OF_BOUND: f64 = 0.3;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "expression",
-    aliases: &[],
     summary: "a formula of the user; written in an [[effects]] table",
     family: Family::User,
-    toggle: Toggle::None,
     target: Target::Whole,
     offered: Offered::Never,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &[],
     source: include_str!("expression.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// A user's formula.

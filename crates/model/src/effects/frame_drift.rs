@@ -18,12 +18,7 @@
 //! # Source
 //! Vicon Tracker help, "Prepare the capture environment"; notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::{Placing, amplitudes_xyz};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "frame_drift",
@@ -32,12 +27,10 @@ pub(super) static KIND: EffectKind = EffectKind {
     family: Family::Drift,
     toggle: Toggle::Time,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["zero_drift", "thermal_growth", "warm_up", "frame_shift"],
     source: include_str!("frame_drift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

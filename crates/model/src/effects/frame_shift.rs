@@ -21,13 +21,9 @@
 //! # Source
 //! Vicon Tracker help, "Prepare the capture environment" (camera creep); notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::{Placing, amplitudes_xyz};
-use crate::rigid::{Scalar, rotation_of_vector};
-use armcal_core::{Parameter, Unit};
-use nalgebra::Vector3;
+use super::prelude::*;
+use crate::rigid::rotation_of_vector;
+use armcal_core::Parameter;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "frame_shift",
@@ -37,11 +33,10 @@ pub(super) static KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     target: Target::Whole,
     offered: Offered::Events,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["zero_slip", "tool_shift", "board_shift", "frame_drift"],
     source: include_str!("frame_shift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

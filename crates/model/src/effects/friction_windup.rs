@@ -25,29 +25,19 @@
 //! Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:7): stick and slip;
 //! Visintin, Differential Models of Hysteresis, 1994, ch. III: the play operator.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::Placing;
 use super::play::{RESOLVED_DEG, lagging};
-use super::shares::Shares;
-use super::state::LED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "friction_windup",
-    aliases: &[],
     summary: "a drive wound up by friction that grows with load",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[LED],
-    never_negative: &[],
     confused_with: &["backlash"],
     source: include_str!("friction_windup.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

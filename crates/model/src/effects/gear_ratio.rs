@@ -19,23 +19,13 @@
 //! # Source
 //! Whitney, Lozinski, Rourke 1986; notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "gear_ratio",
     aliases: &["counts per turn", "pulley diameter"],
     summary: "the gear ratio differs from what is declared",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &[
         "eccentricity",
         "second_harmonic",
@@ -47,6 +37,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     ],
     source: include_str!("gear_ratio.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

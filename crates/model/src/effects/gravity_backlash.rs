@@ -28,22 +28,13 @@
 //! # Source
 //! Contact torque of a gap with friction, notes of the project (eq. 4); Slamani, Bonev 2012.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use super::state::{REST, SEATED};
-use crate::rigid::Scalar;
-use armcal_core::{Observation, Unit};
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "gravity_backlash",
-    aliases: &[],
     summary: "play whose flank gravity chooses",
     family: Family::LostMotion,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[
         Shape {
             name: "friction",
@@ -82,6 +73,7 @@ pub(super) static KIND: EffectKind = EffectKind {
     confused_with: &["backlash", "compliance", "arm_compliance"],
     source: include_str!("gravity_backlash.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

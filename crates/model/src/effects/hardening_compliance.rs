@@ -23,28 +23,18 @@
 //! # Source
 //! Adv. Mech. Eng. 2015, 10.1177/1687814015590289 (piecewise linear joint compliance).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use super::shares::Shares;
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "hardening_compliance",
-    aliases: &[],
     summary: "a joint yields to gravity like a spring that is not linear",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[SEATED],
-    never_negative: &[],
     confused_with: &["compliance", "gravity_backlash"],
     source: include_str!("hardening_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

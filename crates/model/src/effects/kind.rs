@@ -35,6 +35,22 @@ pub struct EffectKind {
 }
 
 impl EffectKind {
+    /// What most entries have in common; each says the rest itself, and the contract tests ask for it.
+    pub(super) const PLAIN: EffectKind = EffectKind {
+        name: "",
+        aliases: &[],
+        summary: "",
+        family: Family::User,
+        toggle: Toggle::None,
+        target: Target::Joint,
+        offered: Offered::Once,
+        shapes: &[],
+        never_negative: &[],
+        confused_with: &[],
+        source: "",
+        place: |_| Err("it has no physics".to_owned()),
+    };
+
     /// Its documentation under the fixed headings: the header of its source file.
     pub fn docs(&self) -> String {
         self.source

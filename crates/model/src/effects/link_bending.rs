@@ -24,30 +24,20 @@
 //! # Source
 //! Gere and Timoshenko, Mechanics of Materials, app. G; Klimchik et al., arXiv 1211.5739.
 
-use super::drivers::Drivers;
 use super::frame_shift::about;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics, Slot};
-use super::placing::Placing;
-use super::shares::Shares;
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
-use nalgebra::Vector3;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "link_bending",
-    aliases: &[],
     summary: "a link bends under what it carries",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[SEATED],
     never_negative: &["sag", "sag_load"],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
     source: include_str!("link_bending.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Shorter links do not bend by an amount worth an entry.

@@ -19,26 +19,19 @@
 //! # Source
 //! Notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitudes_xyz};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "marker_shift",
-    aliases: &[],
     summary: "a marker on a link came loose, between recordings or at a dwell",
     family: Family::Event,
     toggle: Toggle::Recording,
     target: Target::Marker,
     offered: Offered::Events,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["tool_shift", "zero_slip"],
     source: include_str!("marker_shift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

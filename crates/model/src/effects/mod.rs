@@ -51,6 +51,7 @@ mod physics;
 mod placed;
 mod placing;
 mod play;
+mod prelude;
 mod seat_offset;
 mod second_harmonic;
 mod sensor_scale;

@@ -19,12 +19,7 @@
 //! # Source
 //! Tuttle, MIT TR 1992; Jia et al., MMT 155 (2021) 104122.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::{Observation, Unit};
+use super::prelude::*;
 use std::f64::consts::TAU;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -32,8 +27,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     aliases: &["pinion or pulley run-out", "tooth mesh", "motor encoder error"],
     summary: "a periodic error many times a turn",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
     offered: Offered::Scanned,
     shapes: &[Shape {
         name: "frequency",
@@ -45,10 +38,10 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(frequencies),
     }],
-    never_negative: &[],
     confused_with: &[],
     source: include_str!("periodic.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Lowest frequency that is not one of the two lower harmonics.

@@ -19,12 +19,7 @@
 //! # Source
 //! Notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::{Reference, Unit};
+use super::prelude::*;
 use std::ops::Range;
 
 pub(super) static KIND: EffectKind = EffectKind {
@@ -32,14 +27,12 @@ pub(super) static KIND: EffectKind = EffectKind {
     aliases: &["machining error of cavities"],
     summary: "each cavity is a little off: a random offset",
     family: Family::Board,
-    toggle: Toggle::None,
     target: Target::Whole,
     offered: Offered::Never,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["board_scale"],
     source: include_str!("seat_offset.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

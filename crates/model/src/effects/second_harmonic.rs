@@ -20,23 +20,17 @@
 //! Hu et al., Sensors 2020 (harmonic errors of joint modules); Tuttle, MIT TR 1992.
 
 use super::eccentricity::Harmonic;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::placing::{Placing, amplitude};
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "second_harmonic",
     aliases: &["elliptic ring", "misaligned coupling"],
     summary: "an error twice a turn of the joint",
     family: Family::Transmission,
-    toggle: Toggle::None,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
     source: include_str!("second_harmonic.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {

@@ -21,27 +21,18 @@
 //! # Source
 //! Merriaux et al., Sensors 2017, 17, 1591 (static error of Vicon).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitudes_xyz};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
-use nalgebra::Vector3;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "sensor_scale",
     aliases: &["all lengths scaled (its isotropic part)"],
     summary: "the scale of the position sensor is off, for each axis",
     family: Family::Sensor,
-    toggle: Toggle::None,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["volume_distortion"],
     source: include_str!("sensor_scale.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

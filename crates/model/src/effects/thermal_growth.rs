@@ -19,26 +19,18 @@
 //! # Source
 //! Yin et al., IJAMT 2014 (thermal drift of links).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "thermal_growth",
-    aliases: &[],
     summary: "the links grow with temperature, or steadily with time",
     family: Family::Drift,
     toggle: Toggle::Temperature,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["zero_drift", "frame_drift", "warm_up"],
     source: include_str!("thermal_growth.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

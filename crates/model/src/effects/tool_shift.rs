@@ -19,12 +19,7 @@
 //! # Source
 //! Notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{ARM, Placing, amplitudes_xyz};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "tool_shift",
@@ -35,10 +30,10 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     shapes: &[ARM],
-    never_negative: &[],
     confused_with: &["zero_slip", "frame_shift"],
     source: include_str!("tool_shift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -24,13 +24,7 @@
 //! # Source
 //! First-order lag: Astrom, Murray, Feedback Systems, 2nd ed. 2021, sec. 6.3.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use super::state::SEATED;
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "unsettled_reading",
@@ -38,13 +32,11 @@ pub(super) static KIND: EffectKind = EffectKind {
     summary: "read before the joint, or its reading, had settled: a share of the last move is missing",
     family: Family::Timing,
     toggle: Toggle::Approach,
-    target: Target::Joint,
-    offered: Offered::Once,
     shapes: &[SEATED],
-    never_negative: &[],
     confused_with: &["backlash", "friction_windup"],
     source: include_str!("unsettled_reading.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 /// Typical share of a move that is missing.

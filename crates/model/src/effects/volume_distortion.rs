@@ -21,27 +21,18 @@
 //! # Source
 //! Brown, Photogrammetric Engineering 37 (1971): radial and decentring distortion; Merriaux et al., Sensors 2017, 17, 1591: 0.15 mm in a good volume, more at the edge.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude, amplitudes_xyz};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
-use nalgebra::Vector3;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "volume_distortion",
     aliases: &["lens distortion"],
     summary: "the position sensor distorts its volume, most at the edge",
     family: Family::Sensor,
-    toggle: Toggle::None,
     target: Target::Whole,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["sensor_scale"],
     source: include_str!("volume_distortion.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

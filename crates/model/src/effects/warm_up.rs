@@ -19,16 +19,10 @@
 //! # Source
 //! Yin et al., IJAMT 2014; ISO 9283 (warm-up).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::{Observation, Unit};
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "warm_up",
-    aliases: &[],
     summary: "the links grow while the arm warms up, then level off",
     family: Family::Drift,
     toggle: Toggle::Time,
@@ -44,10 +38,10 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(time_constants),
     }],
-    never_negative: &[],
     confused_with: &["thermal_growth", "zero_drift", "frame_drift"],
     source: include_str!("warm_up.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -18,25 +18,17 @@
 //! # Source
 //! Notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "zero_drift",
-    aliases: &[],
     summary: "the zero of an encoder creeps over the session",
     family: Family::Drift,
     toggle: Toggle::Time,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
     source: include_str!("zero_drift.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

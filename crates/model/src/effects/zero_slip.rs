@@ -21,25 +21,18 @@
 //! # Source
 //! notes of the project; a belt tooth of a pulley with z teeth is 360/z deg.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
+use super::prelude::*;
 
 pub(super) static KIND: EffectKind = EffectKind {
     name: "zero_slip",
-    aliases: &[],
     summary: "the zero of an encoder slipped, between recordings or at a dwell",
     family: Family::Event,
     toggle: Toggle::Recording,
-    target: Target::Joint,
     offered: Offered::Events,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["frame_shift", "tool_shift", "zero_drift"],
     source: include_str!("zero_slip.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -6,12 +6,14 @@ use super::slot::Slot;
 use super::types::{Field, Kind, Repeat, Types};
 use super::{DecodeError, Role};
 
-/// A message shape: the fields it must and may have.
+/// A message shape: the fields it must and may have, beside a stamp and of poses a frame, which any may have.
 pub(super) struct Shape {
     /// What it is read as.
     pub(super) role: Role,
     /// Whether its positions are in millimetres by definition.
     pub(super) in_millimetres: bool,
+    /// The message that has stamp and frame.
+    stamped: &'static str,
     parts: &'static [(Need, &'static str, Part)],
 }
 
@@ -39,15 +41,20 @@ enum Part {
 use Part::{Frame, Point, Quaternion, Stamp, Value};
 
 const fn joints(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Joints, in_millimetres: false, parts }
+    Shape { role: Role::Joints, in_millimetres: false, stamped: "", parts }
+}
+
+/// Poses of which the message at `stamped` has stamp and frame.
+const fn poses(stamped: &'static str, parts: &'static [(Need, &'static str, Part)]) -> Shape {
+    Shape { role: Role::Pose, in_millimetres: false, stamped, parts }
 }
 
 const fn pose(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Pose, in_millimetres: false, parts }
+    poses("", parts)
 }
 
 const fn scalar(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Scalar, in_millimetres: false, parts }
+    Shape { role: Role::Scalar, in_millimetres: false, stamped: "", parts }
 }
 
 /// Every shape armcal reads.
@@ -57,113 +64,94 @@ pub(super) static SHAPES: &[Shape] = &[
         (Must, "name[]", Value(Slot::Joint)),
         (Must, "position[]", Value(Slot::Position)),
         (May, "effort[]", Value(Slot::Effort)),
-        (May, "", Stamp),
     ]),
     // foxglove.JointStates
     joints(&[
         (Must, "joints[].name", Value(Slot::Joint)),
         (Must, "joints[].position", Value(Slot::Position)),
         (May, "joints[].effort", Value(Slot::Effort)),
-        (May, "", Stamp),
     ]),
     // control_msgs/DynamicJointState
     joints(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "interface_values[].interface_names[]", Value(Slot::Interface)),
         (Must, "interface_values[].values[]", Value(Slot::InterfaceValue)),
-        (May, "", Stamp),
     ]),
     // control_msgs/JointTrajectoryControllerState since 2023
     joints(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "feedback.positions[]", Value(Slot::Position)),
         (May, "feedback.effort[]", Value(Slot::Effort)),
-        (May, "", Stamp),
     ]),
     // control_msgs/JointTrajectoryControllerState before, and in ROS 1
     joints(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "actual.positions[]", Value(Slot::Position)),
         (May, "actual.effort[]", Value(Slot::Effort)),
-        (May, "", Stamp),
     ]),
     // geometry_msgs/PoseStamped, foxglove.PoseInFrame
-    pose(&[
-        (Must, "pose.position", Point),
-        (Must, "pose.orientation", Quaternion),
-        (May, "", Frame),
-        (May, "", Stamp),
-    ]),
+    pose(&[(Must, "pose.position", Point), (Must, "pose.orientation", Quaternion)]),
     // geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry
     pose(&[
         (Must, "pose.pose.position", Point),
         (Must, "pose.pose.orientation", Quaternion),
         (May, "child_frame_id", Value(Slot::Body)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // geometry_msgs/PointStamped, foxglove.Point3InFrame
-    pose(&[(Must, "point", Point), (May, "", Frame), (May, "", Stamp)]),
+    pose(&[(Must, "point", Point)]),
     // geometry_msgs/TransformStamped
     pose(&[
         (Must, "transform.translation", Point),
         (Must, "transform.rotation", Quaternion),
         (Must, "child_frame_id", Value(Slot::Body)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // tf2_msgs/TFMessage
-    pose(&[
-        (Must, "transforms[].transform.translation", Point),
-        (Must, "transforms[].transform.rotation", Quaternion),
-        (Must, "transforms[].child_frame_id", Value(Slot::Body)),
-        (May, "transforms[]", Frame),
-        (May, "transforms[]", Stamp),
-    ]),
+    poses(
+        "transforms[]",
+        &[
+            (Must, "transforms[].transform.translation", Point),
+            (Must, "transforms[].transform.rotation", Quaternion),
+            (Must, "transforms[].child_frame_id", Value(Slot::Body)),
+        ],
+    ),
     // foxglove.FrameTransform
     pose(&[
         (Must, "translation", Point),
         (Must, "rotation", Quaternion),
         (Must, "child_frame_id", Value(Slot::Body)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // foxglove.FrameTransforms
-    pose(&[
-        (Must, "transforms[].translation", Point),
-        (Must, "transforms[].rotation", Quaternion),
-        (Must, "transforms[].child_frame_id", Value(Slot::Body)),
-        (May, "transforms[]", Frame),
-        (May, "transforms[]", Stamp),
-    ]),
+    poses(
+        "transforms[]",
+        &[
+            (Must, "transforms[].translation", Point),
+            (Must, "transforms[].rotation", Quaternion),
+            (Must, "transforms[].child_frame_id", Value(Slot::Body)),
+        ],
+    ),
     // mocap4r2_msgs/RigidBodies, mocap_msgs/RigidBodies. The header of the list is the one its drivers fill.
     pose(&[
         (Must, "rigidbodies[].pose.position", Point),
         (Must, "rigidbodies[].pose.orientation", Quaternion),
         (Must, "rigidbodies[].rigid_body_name", Value(Slot::Body)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // motion_capture_tracking_interfaces/NamedPoseArray
     pose(&[
         (Must, "poses[].pose.position", Point),
         (Must, "poses[].pose.orientation", Quaternion),
         (Must, "poses[].name", Value(Slot::Body)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // vicon_bridge/Markers passes the millimetres of the Vicon SDK on
     // (vicon_bridge.cpp publishes `GetMarkerGlobalTranslation` unscaled).
     Shape {
         role: Role::Pose,
         in_millimetres: true,
+        stamped: "",
         parts: &[
             (Must, "markers[].translation", Point),
             (Must, "markers[].marker_name", Value(Slot::Body)),
             (Must, "markers[].subject_name", Value(Slot::Subject)),
             (Must, "markers[].occluded", Value(Slot::Occluded)),
-            (May, "", Frame),
-            (May, "", Stamp),
         ],
     },
     // mocap4r2_msgs/Markers
@@ -171,20 +159,14 @@ pub(super) static SHAPES: &[Shape] = &[
         (Must, "markers[].translation", Point),
         (Must, "markers[].marker_name", Value(Slot::Body)),
         (May, "markers[].marker_index", Value(Slot::BodyIndex)),
-        (May, "", Frame),
-        (May, "", Stamp),
     ]),
     // mocap_msgs/Markers of 2021, numbered only
-    pose(&[
-        (Must, "markers[].translation", Point),
-        (Must, "markers[].index", Value(Slot::BodyIndex)),
-        (May, "", Frame),
-        (May, "", Stamp),
-    ]),
+    pose(&[(Must, "markers[].translation", Point), (Must, "markers[].index", Value(Slot::BodyIndex))]),
     // vicon_receiver/Position (before version 1), millimetres of the Vicon SDK
     Shape {
         role: Role::Pose,
         in_millimetres: true,
+        stamped: "",
         parts: &[
             (Must, "x_trans", Value(Slot::X)),
             (Must, "y_trans", Value(Slot::Y)),
@@ -195,14 +177,12 @@ pub(super) static SHAPES: &[Shape] = &[
             (Must, "w", Value(Slot::Qw)),
             (Must, "segment_name", Value(Slot::Body)),
             (May, "subject_name", Value(Slot::Subject)),
-            (May, "", Frame),
-            (May, "", Stamp),
         ],
     },
     // sensor_msgs/Temperature
-    scalar(&[(Must, "temperature", Value(Slot::Value)), (May, "", Stamp)]),
+    scalar(&[(Must, "temperature", Value(Slot::Value))]),
     // std_msgs/Float64 and its relatives
-    scalar(&[(Must, "data", Value(Slot::Value)), (May, "", Stamp)]),
+    scalar(&[(Must, "data", Value(Slot::Value))]),
 ];
 
 /// The fields to read out of a message, in the order of their definition.
@@ -253,6 +233,10 @@ impl Shape {
                 return None;
             }
         }
+        if self.role == Role::Pose {
+            Frame.add(types, &mut wanted, self.stamped);
+        }
+        Stamp.add(types, &mut wanted, self.stamped);
         Some(wanted)
     }
 }

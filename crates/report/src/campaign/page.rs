@@ -11,7 +11,7 @@ use crate::text::millimetres;
 use crate::told_warning::ToldWarning;
 use armcal_campaign::{Row, RowStatus, Series};
 use askama::Template;
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Points of one curve; more are thinned out evenly.
 const MOST_POINTS: usize = 5000;
@@ -49,7 +49,7 @@ impl<'a> CampaignPage<'a> {
         let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")];
         let name = &campaign.pipeline;
         let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
-        let shell = Shell::new("campaign-page", names, &scripts, &Document::of(campaign), "'none'")?;
+        let shell = Shell::new("campaign-page", names, &scripts, &document(campaign), "'none'")?;
         let story = Story::of_campaign(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
         let rows = campaign.rows.iter().zip(&campaign.folders);
@@ -81,84 +81,53 @@ fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {
     }
 }
 
-/// What the page's script draws.
-#[derive(Serialize)]
-struct Document<'a> {
-    recordings: Vec<&'a str>,
-    errors: Errors,
-    curves: Vec<Curve<'a>>,
+/// What the page's script draws: errors of every recording [mm] and quantities in their display units, by time.
+fn document(campaign: &Campaign) -> Value {
+    let rows = &campaign.rows;
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.sort_by_key(|i| (rows[*i].start_ns, *i));
+    let order = thinned(order);
+    let mm = |f: fn(&Row) -> Option<f64>| -> Vec<Option<f64>> {
+        order.iter().map(|i| f(&rows[*i]).map(|m| m * 1e3)).collect()
+    };
+    // What changes is shown first; a quantity that no other recording has is no curve.
+    let mut series: Vec<&Series> = campaign.series.iter().filter(|s| s.points.len() > 1).collect();
+    let changed = |s: &Series| campaign.changes.iter().any(|c| c.quantity == s.quantity);
+    series.sort_by_key(|s| !changed(s));
+    json!({
+        "recordings": rows.iter().map(|r| r.recording.as_str()).collect::<Value>(),
+        "errors": {
+            "row": order,
+            "time_ms": order.iter().map(|i| rows[*i].start_ns / 1_000_000).collect::<Value>(),
+            "before": mm(|r| r.nominal.mean_m),
+            "after": mm(|r| r.calibrated.mean_m),
+            "floor": mm(|r| Some(r.noise_floor_m).filter(|m| m.is_finite())),
+        },
+        "curves": series.into_iter().map(|s| curve(campaign, s)).collect::<Value>(),
+    })
 }
 
-/// Errors of every recording [mm], by time.
-#[derive(Serialize)]
-struct Errors {
-    row: Vec<usize>,
-    time_ms: Vec<i64>,
-    before: Vec<Option<f64>>,
-    after: Vec<Option<f64>>,
-    floor: Vec<Option<f64>>,
-}
-
-/// A quantity by time, in its display unit.
-#[derive(Serialize)]
-struct Curve<'a> {
-    name: &'a str,
-    unit: &'static str,
-    row: Vec<usize>,
-    time_ms: Vec<i64>,
-    value: Vec<f64>,
-    /// Half widths of the 95 % intervals.
-    half: Vec<Option<f64>>,
-    /// Rows at which something changes.
-    marks: Vec<usize>,
-}
-
-impl<'a> Document<'a> {
-    fn of(campaign: &'a Campaign) -> Document<'a> {
-        let rows = &campaign.rows;
-        let mut order: Vec<usize> = (0..rows.len()).collect();
-        order.sort_by_key(|i| (rows[*i].start_ns, *i));
-        let order = thinned(order);
-        let mm = |f: fn(&Row) -> Option<f64>| order.iter().map(|i| f(&rows[*i]).map(|m| m * 1e3)).collect();
-        let errors = Errors {
-            time_ms: order.iter().map(|i| rows[*i].start_ns / 1_000_000).collect(),
-            before: mm(|r| r.nominal.mean_m),
-            after: mm(|r| r.calibrated.mean_m),
-            floor: mm(|r| Some(r.noise_floor_m).filter(|m| m.is_finite())),
-            row: order.clone(),
-        };
-        // What changes is shown first; a quantity that no other recording has is no curve.
-        let mut series: Vec<&Series> = campaign.series.iter().filter(|s| s.points.len() > 1).collect();
-        let changed = |s: &Series| campaign.changes.iter().any(|c| c.quantity == s.quantity);
-        series.sort_by_key(|s| !changed(s));
-        Document {
-            recordings: rows.iter().map(|r| r.recording.as_str()).collect(),
-            errors,
-            curves: series.into_iter().map(|s| curve(campaign, s)).collect(),
-        }
-    }
-}
-
-fn curve<'a>(campaign: &Campaign, series: &'a Series) -> Curve<'a> {
+fn curve(campaign: &Campaign, series: &Series) -> Value {
     use armcal_campaign::ChangeKind::{Outlier, Step, Trend};
     let points = thinned(series.points.clone());
     let own = campaign.changes.iter().filter(|c| c.quantity == series.quantity);
+    let marks = own.filter_map(|c| match c.kind {
+        Step { after, .. } => Some(after),
+        Outlier { at } => Some(at),
+        Trend { .. } => None,
+    });
     let unit = series.unit;
-    Curve {
-        name: &series.quantity,
-        unit: unit.display_symbol(),
-        row: points.iter().map(|p| p.row).collect(),
-        time_ms: points.iter().map(|p| p.time_ns / 1_000_000).collect(),
-        value: points.iter().map(|p| unit.to_display(p.value)).collect(),
-        half: points.iter().map(|p| p.sigma.map(|s| 1.96 * unit.to_display(s))).collect(),
-        marks: own
-            .filter_map(|c| match c.kind {
-                Step { after, .. } => Some(after),
-                Outlier { at } => Some(at),
-                Trend { .. } => None,
-            })
-            .collect(),
-    }
+    json!({
+        "name": series.quantity,
+        "unit": unit.display_symbol(),
+        "row": points.iter().map(|p| p.row).collect::<Value>(),
+        "time_ms": points.iter().map(|p| p.time_ns / 1_000_000).collect::<Value>(),
+        "value": points.iter().map(|p| unit.to_display(p.value)).collect::<Value>(),
+        // Half widths of the 95 % intervals.
+        "half": points.iter().map(|p| p.sigma.map(|s| 1.96 * unit.to_display(s))).collect::<Vec<_>>(),
+        // Rows at which something changes.
+        "marks": marks.collect::<Value>(),
+    })
 }
 
 fn thinned<T>(all: Vec<T>) -> Vec<T> {

@@ -161,7 +161,8 @@ pub(super) fn parameters(fit: &Fit, time_ns: i64) -> proto::Parameters {
     }
 }
 
-fn parameter(e: &Estimate) -> proto::Parameter {
+/// One parameter.
+pub(crate) fn parameter(e: &Estimate) -> proto::Parameter {
     let p = &e.parameter;
     let shown = |si: f64| p.unit.to_display(si);
     proto::Parameter {

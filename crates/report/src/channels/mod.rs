@@ -52,6 +52,7 @@ pub(crate) mod robots;
 mod scene;
 mod shapes;
 
+pub(crate) use facts::parameter;
 pub(crate) use findings::{curve_topic, implied_topic};
 pub(crate) use scene::places_m;
 

@@ -8,7 +8,7 @@ use crate::pairing::paired;
 use crate::past_run::PastRun;
 use crate::text::millimetres;
 use askama::Template;
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Two results, compared already, as one HTML page.
 ///
@@ -27,7 +27,7 @@ pub fn comparison_html(
     let kicker = format!("{} against {}", with(&before.pipeline, own), with(&after.pipeline, other));
     let title = format!("{} and {}", before.pipeline, after.pipeline);
     let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
-    let document = Document::of(before, after, comparison);
+    let document = document(before, after, comparison);
     let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document, "'none'")?;
     let page = ComparePage {
         shell: shell.saying(comparison.sentence()),
@@ -66,70 +66,36 @@ struct MovedRow {
 }
 
 /// What the page's scripts draw.
-#[derive(Serialize)]
-struct Document {
-    recordings: Vec<RecordingName>,
-    pairs: Vec<PairRow>,
-    /// Indices into `pairs`, the most improved first.
-    by_change: Vec<usize>,
-    differences: Vec<NamedDifference>,
-}
-
-#[derive(Serialize)]
-struct RecordingName {
-    name: String,
-}
-
-#[derive(Serialize)]
-struct PairRow {
-    recording: usize,
-    dwell: usize,
-    cavity: String,
-    before_mm: f64,
-    after_mm: f64,
-}
-
-#[derive(Serialize)]
-struct NamedDifference {
-    name: String,
-    difference_mm: f64,
-    ci95_mm: Option<[f64; 2]>,
-}
-
-impl Document {
-    fn of(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Document {
-        let mut recordings: Vec<RecordingName> = Vec::new();
-        let mut pairs = Vec::new();
-        for (earlier, r) in paired(before, after).pairs {
-            let recording =
-                recordings.iter().position(|known| known.name == r.recording).unwrap_or_else(|| {
-                    recordings.push(RecordingName { name: r.recording.clone() });
-                    recordings.len() - 1
-                });
-            let (before_mm, after_mm) = (earlier.error_m * 1e3, r.error_m * 1e3);
-            pairs.push(PairRow {
-                recording,
-                dwell: r.dwell.dwell,
-                cavity: r.cavity.clone(),
-                before_mm,
-                after_mm,
-            });
-        }
-        let change = |k: &usize| pairs[*k].after_mm - pairs[*k].before_mm;
-        let mut by_change: Vec<usize> = (0..pairs.len()).collect();
-        by_change.sort_by(|a, b| change(a).total_cmp(&change(b)));
-        let named = |(name, d): (String, Difference)| NamedDifference {
-            name,
-            difference_mm: d.difference_mm,
-            ci95_mm: d.ci95_mm,
-        };
-        Document {
-            differences: differences(comparison).into_iter().map(named).collect(),
-            by_change,
-            recordings,
-            pairs,
-        }
-    }
+fn document(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Value {
+    let pairs = paired(before, after).pairs;
+    let mut recordings: Vec<&str> = Vec::new();
+    let rows = pairs.iter().map(|(earlier, r)| {
+        let recording = recordings.iter().position(|known| *known == r.recording).unwrap_or_else(|| {
+            recordings.push(&r.recording);
+            recordings.len() - 1
+        });
+        json!({
+            "recording": recording,
+            "dwell": r.dwell.dwell,
+            "cavity": r.cavity,
+            "before_mm": earlier.error_m * 1e3,
+            "after_mm": r.error_m * 1e3,
+        })
+    });
+    let rows: Value = rows.collect();
+    let change = |k: &usize| pairs[*k].1.error_m * 1e3 - pairs[*k].0.error_m * 1e3;
+    let mut by_change: Vec<usize> = (0..pairs.len()).collect();
+    by_change.sort_by(|a, b| change(a).total_cmp(&change(b)));
+    let named = |(name, d): (String, Difference)| -> Value {
+        json!({ "name": name, "difference_mm": d.difference_mm, "ci95_mm": d.ci95_mm })
+    };
+    json!({
+        "recordings": recordings.iter().map(|name| json!({ "name": name })).collect::<Value>(),
+        "pairs": rows,
+        // Indices into `pairs`, the most improved first.
+        "by_change": by_change,
+        "differences": differences(comparison).into_iter().map(named).collect::<Value>(),
+    })
 }
 
 /// Held out, all, then each recording.

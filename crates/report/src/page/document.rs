@@ -13,6 +13,7 @@ use crate::sizes::sizes;
 use armcal_diagnose::{CandidateReport, Diagnosis};
 use armcal_model::find;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Rows of the ranking.
@@ -37,16 +38,16 @@ pub(crate) struct Document {
     pub told: BTreeMap<String, String>,
     /// The dwells that became observations.
     pub dwells: Dwells,
-    /// Boards with seated dwells.
-    pub boards: Vec<BoardMap>,
+    /// Boards with seated dwells, as one recording each saw them.
+    pub boards: Vec<Value>,
     /// The run's own calibration, then every refit.
     pub refits: Vec<Shown>,
     /// Geometry and what was found, one effect after the other, by index into `refits`.
     pub path: Vec<usize>,
     /// The ranking.
-    pub candidates: Vec<CandidateRow>,
+    pub candidates: Vec<Value>,
     /// Shapes without a listed cause.
-    pub unlisted: Vec<UnlistedShape>,
+    pub unlisted: Vec<Value>,
     /// Effects that the run's own model has.
     pub own_effects: Vec<String>,
 }
@@ -65,44 +66,6 @@ pub(crate) struct Dwells {
     pub reach_mm: [Column; 2],
     /// Cavity in its board [mm]: x, y.
     pub board_mm: [Column; 2],
-}
-
-/// A board as one recording saw it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct BoardMap {
-    pub recording: usize,
-    /// Cavities [mm]: x, y.
-    pub cavities_mm: [Column; 2],
-    pub names: Vec<String>,
-}
-
-/// One row of the ranking.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct CandidateRow {
-    pub spec: String,
-    pub summary: String,
-    pub size: String,
-    pub probability: f64,
-    pub p_adjusted: f64,
-    pub log_evidence: f64,
-    pub absorbed: f64,
-    pub also: Vec<String>,
-    /// Whether the diagnosis holds it to be missing.
-    pub found: bool,
-    /// Index into `refits`.
-    pub refit: Option<usize>,
-}
-
-/// A shape without a listed cause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct UnlistedShape {
-    pub channel: String,
-    pub driver: String,
-    pub driver_unit: String,
-    pub unit: String,
-    pub at: Column,
-    pub value: Column,
-    pub half: Column,
 }
 
 impl Document {
@@ -157,22 +120,24 @@ fn ranking(
     d: &Diagnosis,
     names: &RecordingNames,
     index_of: &dyn Fn(&[String]) -> Option<usize>,
-) -> Vec<CandidateRow> {
+) -> Vec<Value> {
     let found = |spec: &str| spec.split('+').all(|s| d.effects.iter().any(|e| e.set.iter().any(|n| n == s)));
     let row = |c: &CandidateReport| {
         let specs: Vec<String> = c.spec.split('+').map(str::to_owned).collect();
-        CandidateRow {
-            summary: find(&c.effect).map_or(String::new(), |kind| kind.summary.to_owned()),
-            size: sizes(c),
-            probability: c.probability,
-            p_adjusted: c.p_adjusted,
-            log_evidence: c.log_evidence,
-            absorbed: c.absorbed,
-            also: c.same_to_the_data.iter().map(|name| names.label(name)).collect(),
-            found: found(&c.spec),
-            refit: index_of(&specs),
-            spec: c.spec.clone(),
-        }
+        json!({
+            "spec": c.spec,
+            "summary": find(&c.effect).map_or("", |kind| kind.summary),
+            "size": sizes(c),
+            "probability": c.probability,
+            "p_adjusted": c.p_adjusted,
+            "log_evidence": c.log_evidence,
+            "absorbed": c.absorbed,
+            "also": c.same_to_the_data.iter().map(|name| names.label(name)).collect::<Value>(),
+            // Whether the diagnosis holds it to be missing.
+            "found": found(&c.spec),
+            // Index into `refits`.
+            "refit": index_of(&specs),
+        })
     };
     let best = d.candidates.iter().take(RANKED);
     let rest = d.candidates.iter().skip(RANKED).filter(|c| found(&c.spec));
@@ -209,29 +174,29 @@ fn dwells(run: &Run) -> Dwells {
     }
 }
 
-fn boards(run: &Run) -> Vec<BoardMap> {
+fn boards(run: &Run) -> Vec<Value> {
     let Some(board) = &run.board else { return Vec::new() };
     let seen =
         |index: usize| run.observations.iter().any(|o| o.dwell.recording == index && o.cavity().is_some());
     let of_axis = |axis: usize| Column::of_all(board.cavities.iter().map(|c| c.in_board_m[axis] * 1e3));
-    let map = |recording: usize| BoardMap {
-        recording,
-        cavities_mm: [of_axis(0), of_axis(1)],
-        names: board.cavities.iter().map(|c| c.name.clone()).collect(),
+    let names: Vec<&str> = board.cavities.iter().map(|c| c.name.as_str()).collect();
+    let map = |recording: usize| {
+        // Cavities [mm]: x, y.
+        json!({ "recording": recording, "cavities_mm": [of_axis(0), of_axis(1)], "names": names })
     };
     (0..run.recordings.len()).filter(|index| seen(*index)).map(map).collect()
 }
 
 /// The curve that Foxglove plots, as a line with half its band.
-fn unlisted_shape(curve: ErrorCurve) -> UnlistedShape {
+fn unlisted_shape(curve: ErrorCurve) -> Value {
     let half = curve.high.iter().zip(&curve.low).map(|(high, low)| (high - low) / 2.0);
-    UnlistedShape {
-        half: Column::of_all(half),
-        channel: channel_told(&curve.channel),
-        driver: driver_told(&curve.driver),
-        driver_unit: curve.driver_unit,
-        unit: curve.unit,
-        at: Column::of_all(curve.at),
-        value: Column::of_all(curve.value),
-    }
+    json!({
+        "channel": channel_told(&curve.channel),
+        "driver": driver_told(&curve.driver),
+        "driver_unit": curve.driver_unit,
+        "unit": curve.unit,
+        "at": Column::of_all(curve.at),
+        "value": Column::of_all(curve.value),
+        "half": Column::of_all(half),
+    })
 }

@@ -13,6 +13,7 @@ use armcal_core::ErrorStats;
 use armcal_model::Model;
 use nalgebra::Vector3;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Everything on the page that depends on the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,13 +25,13 @@ pub(crate) struct Shown {
     /// The result in one sentence.
     pub sentence: String,
     /// Errors on points that the fit saw.
-    pub train: Side,
+    pub train: Value,
     /// Errors on points that it did not.
-    pub holdout: Side,
+    pub holdout: Value,
     /// Mean error expected from the declared noise alone [mm].
     pub noise_floor_mm: f64,
     /// Against the run's own calibration, on the points both judge.
-    pub change: Option<Change>,
+    pub change: Option<Value>,
     /// 1 where the fit that predicted a dwell did not see it.
     pub held_out: Vec<u8>,
     /// Size of the error of each dwell [mm].
@@ -51,33 +52,6 @@ pub(crate) struct Shown {
     pub signatures: Vec<Signature>,
     /// All parameters.
     pub parameters: Vec<ParameterRow>,
-}
-
-/// Errors of one side of the hold-out [mm].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Side {
-    pub n: usize,
-    pub nominal_mm: Option<Errors>,
-    pub fitted_mm: Option<Errors>,
-}
-
-/// Statistics of error norms [mm], and the mean as people read it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Errors {
-    pub mean: f64,
-    pub rms: f64,
-    pub p95: f64,
-    pub max: f64,
-    pub mean_text: String,
-}
-
-/// Paired difference to the run's own calibration [mm].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Change {
-    pub difference_mm: f64,
-    pub ci95_mm: Option<[f64; 2]>,
-    pub better: usize,
-    pub worse: usize,
 }
 
 /// A parameter in the unit shown to people.
@@ -158,28 +132,32 @@ pub(crate) fn effect_names(model: &Model) -> Vec<String> {
     model.effects().iter().map(|e| e.spec.to_string()).collect()
 }
 
-fn side(errors: &SideErrors) -> Side {
+/// Errors of one side of the hold-out [mm], the mean also as people read it.
+fn side(errors: &SideErrors) -> Value {
     let of = |stats: &ErrorStats| {
-        (stats.n > 0).then(|| Errors {
-            mean: stats.mean_m * 1e3,
-            rms: stats.rms_m * 1e3,
-            p95: stats.p95_m * 1e3,
-            max: stats.max_m * 1e3,
-            mean_text: millimetres(stats.mean_m),
+        (stats.n > 0).then(|| {
+            json!({
+                "mean": stats.mean_m * 1e3,
+                "rms": stats.rms_m * 1e3,
+                "p95": stats.p95_m * 1e3,
+                "max": stats.max_m * 1e3,
+                "mean_text": millimetres(stats.mean_m),
+            })
         })
     };
-    Side { n: errors.fitted.n, nominal_mm: of(&errors.nominal), fitted_mm: of(&errors.fitted) }
+    json!({ "n": errors.fitted.n, "nominal_mm": of(&errors.nominal), "fitted_mm": of(&errors.fitted) })
 }
 
-fn change(run: &Run, after: &Calibration) -> Option<Change> {
+/// Paired difference to the run's own calibration [mm].
+fn change(run: &Run, after: &Calibration) -> Option<Value> {
     let d = PairedDifference::between(&run.observations, &run.calibration, after)?;
     let mm = |m: f64| m * 1e3;
-    Some(Change {
-        difference_mm: mm(d.difference_m),
-        ci95_mm: d.ci95_m[0].is_finite().then_some(d.ci95_m.map(mm)),
-        better: d.better,
-        worse: d.worse,
-    })
+    Some(json!({
+        "difference_mm": mm(d.difference_m),
+        "ci95_mm": d.ci95_m[0].is_finite().then_some(d.ci95_m.map(mm)),
+        "better": d.better,
+        "worse": d.worse,
+    }))
 }
 
 /// A parameter as pages show it.

@@ -1,62 +1,38 @@
 //! A verification for programs.
 
 use super::page::verification_html;
-use super::{IsoReport, PathSample, Published, Told, Verification, VerifiedRecording};
+use super::{PathSample, Verification};
 use crate::ReportError;
-use crate::past_model::Value;
-use crate::run::{Status, VERSION};
+use crate::run::VERSION;
 use crate::tables::Columns;
-use armcal_core::Warning;
-use armcal_verify::{PathRow, PointsRow};
-use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Version of the contract of `verification.json`.
 const SCHEMA: &str = "armcal.verification/1";
 
-#[derive(Serialize)]
-struct File<'a> {
-    schema: &'static str,
-    version: &'static str,
-    pipeline: &'a str,
-    result: String,
-    status: Status,
-    conclusion: String,
-    effects: &'a [String],
-    recordings: &'a [VerifiedRecording],
-    told: &'a [Told],
-    recognises_copies: bool,
-    points: &'a [PointsRow],
-    paths: &'a [PathRow],
-    iso9283: &'a IsoReport,
-    parameters: &'a [Value],
-    published: &'a [Published],
-    warnings: &'a [Warning],
-}
-
 /// `verification.json`: every row of every table in SI, indented, with a final newline. `before` is the nominal arm,
 /// `after` the calibrated one.
 pub fn verification_json(v: &Verification) -> String {
-    let file = File {
-        schema: SCHEMA,
-        version: VERSION,
-        pipeline: &v.pipeline,
-        result: v.result.to_string_lossy().into_owned(),
-        status: v.status(),
-        conclusion: super::terminal::conclusion(v),
-        effects: &v.effects,
-        recordings: &v.recordings,
-        told: &v.told,
-        recognises_copies: v.recognises_copies,
-        points: &v.points,
-        paths: &v.paths,
-        iso9283: &v.iso9283,
-        parameters: &v.parameters,
-        published: &v.published,
-        warnings: &v.warnings,
-    };
-    let json = serde_json::to_string_pretty(&file);
-    json.expect("strings, numbers and lists under literal names always serialise") + "\n"
+    let file = json!({
+        "schema": SCHEMA,
+        "version": VERSION,
+        "pipeline": v.pipeline,
+        "result": v.result.to_string_lossy(),
+        "status": v.status(),
+        "conclusion": super::terminal::conclusion(v),
+        "effects": v.effects,
+        "recordings": v.recordings,
+        "told": v.told,
+        "recognises_copies": v.recognises_copies,
+        "points": v.points,
+        "paths": v.paths,
+        "iso9283": v.iso9283,
+        "parameters": v.parameters,
+        "published": v.published,
+        "warnings": v.warnings,
+    });
+    format!("{file:#}\n")
 }
 
 /// The files that `armcal verify` writes into a folder.

@@ -10,9 +10,9 @@ pub use files::{verification_files, verification_json, verification_paths};
 pub use terminal::verification_text;
 
 use crate::past_model::Value;
-use crate::run::Status;
+use crate::run::{Status, status_of};
 use crate::two_arms::Closing;
-use armcal_core::{Severity, Warning};
+use armcal_core::Warning;
 use armcal_iso9283::Assessment;
 use armcal_verify::{PathError, PathRow, PointsRow};
 use nalgebra::Vector3;
@@ -193,10 +193,6 @@ impl Verification {
 
     /// The gravest thing any warning says.
     pub fn status(&self) -> Status {
-        match self.warnings.iter().map(|w| w.severity).max() {
-            None | Some(Severity::Notice) => Status::Ok,
-            Some(Severity::Inadequate) => Status::Inadequate,
-            Some(Severity::DataLost) => Status::DataLost,
-        }
+        status_of(self.warnings.iter())
     }
 }

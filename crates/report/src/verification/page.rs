@@ -13,7 +13,7 @@ use crate::told_warning::{ToldWarning, gravest_first};
 use armcal_verify::{Against, PathRow, PointsRow};
 use askama::Template;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Motions drawn, and points of each: enough to see a path, few enough to open at once.
 const MOTIONS: usize = 12;
@@ -28,7 +28,8 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
         if v.effects.is_empty() { " alone".to_owned() } else { format!(", {}", v.effects.join(", ")) };
     let names = (format!("{}, verified", v.pipeline), format!("{} · model: geometry{effects}", v.pipeline));
     let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/verified.js")];
-    let document = Document { motions: motions(&v.samples) };
+    // What the page's script draws.
+    let document = json!({ "motions": motions(&v.samples) });
     let shell = Shell::new("verification-page", names, &scripts, &document, "'none'")?;
     let recordings = RecordingNames::new(v.recordings.iter().map(|r| r.name.clone()));
     let told = v.warnings.iter().map(|w| ToldWarning::new(&recordings, None, w)).collect();
@@ -102,26 +103,8 @@ impl From<Row> for Shown {
     }
 }
 
-/// What the page's script draws.
-#[derive(Serialize)]
-struct Document {
-    motions: Vec<MotionDrawn>,
-}
-
-/// One motion, in millimetres and seconds.
-#[derive(Serialize)]
-struct MotionDrawn {
-    name: String,
-    time_s: Vec<f64>,
-    measured_mm: [Vec<f64>; 3],
-    nominal_mm: [Vec<f64>; 3],
-    calibrated_mm: [Vec<f64>; 3],
-    before_mm: Vec<f64>,
-    after_mm: Vec<f64>,
-}
-
 /// The longest motions, the longest first, thinned evenly.
-fn motions(samples: &[PathSample]) -> Vec<MotionDrawn> {
+fn motions(samples: &[PathSample]) -> Value {
     let same = |a: &PathSample, b: &PathSample| a.recording == b.recording && a.motion == b.motion;
     let length_m = |motion: &[PathSample]| -> f64 {
         motion.windows(2).map(|w| (w[1].calibrated_m - w[0].calibrated_m).norm()).sum()
@@ -131,7 +114,8 @@ fn motions(samples: &[PathSample]) -> Vec<MotionDrawn> {
     all.into_iter().take(MOTIONS).map(drawn).collect()
 }
 
-fn drawn(motion: &[PathSample]) -> MotionDrawn {
+/// One motion, in millimetres and seconds.
+fn drawn(motion: &[PathSample]) -> Value {
     let stride = motion.len().div_ceil(POINTS).max(1);
     let shown: Vec<&PathSample> = motion.iter().step_by(stride).collect();
     // A hundredth of a millimetre is below what any of it is worth, and the page stays small.
@@ -143,13 +127,13 @@ fn drawn(motion: &[PathSample]) -> MotionDrawn {
         shown.iter().map(|s| round((s.measured_m - of(s)).norm() * 1e3)).collect::<Vec<f64>>()
     };
     let since_s = |s: &PathSample| (s.time_ns - motion[0].time_ns) as f64 * 1e-9;
-    MotionDrawn {
-        name: format!("{}, motion {}", motion[0].recording, motion[0].motion),
-        time_s: shown.iter().map(|s| (since_s(s) * 1e3).round() / 1e3).collect(),
-        measured_mm: axes(|s| &s.measured_m),
-        nominal_mm: axes(|s| &s.nominal_m),
-        calibrated_mm: axes(|s| &s.calibrated_m),
-        before_mm: error(|s| &s.nominal_m),
-        after_mm: error(|s| &s.calibrated_m),
-    }
+    json!({
+        "name": format!("{}, motion {}", motion[0].recording, motion[0].motion),
+        "time_s": shown.iter().map(|s| (since_s(s) * 1e3).round() / 1e3).collect::<Value>(),
+        "measured_mm": axes(|s| &s.measured_m),
+        "nominal_mm": axes(|s| &s.nominal_m),
+        "calibrated_mm": axes(|s| &s.calibrated_m),
+        "before_mm": error(|s| &s.nominal_m),
+        "after_mm": error(|s| &s.calibrated_m),
+    })
 }

@@ -5,9 +5,6 @@
 mod input;
 mod synthetic;
 
-/// The checked-in protobuf code is current.
-mod proto_is_current;
-
 /// What was found: arrays to plot, maps to look at, layouts that point at them.
 mod findings;
 

@@ -4,39 +4,7 @@ use super::*;
 use armcal_core::Pose;
 use nalgebra::Point3;
 
-pub fn zero_slip(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    slip(draw, config, Timing::Before)
-}
-
-pub fn zero_slip_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    slip(draw, config, Timing::Within)
-}
-
-pub fn zero_slip_passing(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    slip(draw, config, Timing::Passing)
-}
-
-pub fn tool_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Tool, Timing::Before)
-}
-
-pub fn tool_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Tool, Timing::Within)
-}
-
-pub fn tool_shift_passing(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Tool, Timing::Passing)
-}
-
-pub fn frame_shift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Base, Timing::Before)
-}
-
-pub fn frame_shift_within(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    bump(draw, config, BumpedBody::Base, Timing::Within)
-}
-
-fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, LabError> {
+pub fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, LabError> {
     let slip_deg = draw.signed();
     let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
     let slip = ZeroSlip { joint: draw.joint, slip_deg, recording, at_s, until_s };
@@ -50,7 +18,7 @@ fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, Lab
     Ok(made(MechanismConfig::ZeroSlip(slip), effect, enters).same(&same))
 }
 
-fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -> Result<Made, LabError> {
+pub fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -> Result<Made, LabError> {
     let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
     let turn_deg =
         if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };

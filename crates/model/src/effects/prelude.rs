@@ -1,0 +1,11 @@
+//! What the file of every effect is written with.
+
+pub(super) use super::drivers::Drivers;
+pub(super) use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+pub(super) use super::physics::{Deformation, Physics, Slot};
+pub(super) use super::placing::{ARM, Placing, amplitude, amplitudes_xyz};
+pub(super) use super::shares::Shares;
+pub(super) use super::state::{LED, REST, SEATED};
+pub(super) use crate::rigid::Scalar;
+pub(super) use armcal_core::{Observation, Reference, Unit};
+pub(super) use nalgebra::Vector3;
