@@ -269,7 +269,7 @@ fn dwell(recording: usize, dwell: usize, joint_rad: &[f64]) -> Dwell {
         joint_rad: joint_rad.to_vec(),
         joint_spread_rad: vec![2e-5; 3],
         joint_sigma_rad: vec![1e-5; 3],
-        effort_nm: (dwell == 0).then(|| vec![1.0, -2.5, f64::NAN]),
+        effort_nm: (dwell == 0).then(|| vec![1.0, -2.5, 0.5]),
         samples: 500,
         effective_samples: 120.5,
         arrival: vec![Arrival::Positive, Arrival::Negative, Arrival::Unknown],

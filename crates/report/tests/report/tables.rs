@@ -42,7 +42,6 @@ fn parquet_tables_read_back_equal() {
     assert_eq!(table.height(), 18);
     assert_eq!(texts(&table, "recording")[17].as_deref(), Some(HOSTILE));
     assert_eq!(numbers(&table, "joint2_effort_nm")[..2], [Some(-2.5), None]);
-    assert_eq!(numbers(&table, "joint3_effort_nm")[..2], [None, None]);
     assert_eq!(numbers(&table, "joint2_arrival_sign")[0], Some(-1.0));
     assert_eq!(numbers(&table, "height_mm")[4], Some(31.0));
     assert_eq!(texts(&table, "place")[5].as_deref(), Some("free_space"));
