@@ -195,9 +195,6 @@ pub(super) fn check(
         if section.pose == FramePose::Measured && section.sigma_mm == 0.0 {
             return fail(&format!("{key}.pose"), "is \"measured\" without sigma_mm".to_owned());
         }
-        if !pipeline.measure.iter().any(|m| m.between[1] == *name) {
-            return fail(&key, "is measured by no [[measure]]; add one with it in `between`".to_owned());
-        }
     }
     let seen = pipeline.table.is_some() || pipeline.streams.tip.is_some() || !pipeline.markers.is_empty();
     let all_estimated = || {
@@ -216,6 +213,13 @@ pub(super) fn check(
         if pipeline.measure[..at].iter().any(|other| other.name() == section.name()) {
             let problem = format!("`{}` names two of them; give one another name = \"...\"", section.name());
             return fail(&format!("measure[{at}].name"), problem);
+        }
+    }
+    for (kind, names) in [("points", pipeline.points.keys()), ("planes", pipeline.planes.keys())] {
+        let is_idle = |name: &&String| !pipeline.measure.iter().any(|m| m.between[1] == **name);
+        if let Some(name) = names.into_iter().find(is_idle) {
+            let problem = "is measured by no [[measure]]; add one with it in `between`";
+            return fail(&format!("{kind}.{name}"), problem.to_owned());
         }
     }
     Ok(())

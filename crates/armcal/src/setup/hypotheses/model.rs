@@ -2,9 +2,10 @@
 
 use super::joints::ZERO;
 use super::{Estimated, Freedom, Hypothesis};
+use crate::pipeline::{Measure, MeasureKind};
 use crate::setup::DEGREES;
 use crate::setup::trial::{Change, Inputs};
-use armcal_core::{Parameter, Unit};
+use armcal_core::{Against, Parameter, Unit};
 use armcal_model::Arm;
 use armcal_recording::Streams;
 
@@ -114,12 +115,18 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     all
 }
 
-/// The parameters of each model file. Of tips joined to each other and seen by no sensor no change of all lengths at once is
-/// tried: a robot that is smaller, or seen in a mirror, closes just as well.
+/// The parameters of each model file. Of tips joined to each other, or brought into points, and seen by no sensor no change of all
+/// lengths at once is tried: a robot that is smaller, or seen in a mirror, closes just as well.
 fn files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
     let Inputs { pipeline, chain, .. } = inputs;
     let Streams { tip, bodies, .. } = &pipeline.streams;
-    let is_unseen = pipeline.closed_chain.is_some() && tip.is_none() && bodies.is_empty();
+    let measured = pipeline.measures();
+    let known = |m: &Measure| m.kind == MeasureKind::Distance && matches!(m.against, Against::Fixed(_));
+    let is_unseen = !measured.is_empty()
+        && !measured.iter().any(known)
+        && tip.is_none()
+        && bodies.is_empty()
+        && pipeline.table.is_none();
     let of_arm =
         |arm: &Arm| (format!("the model of {}", arm.name), &chain.parameters()[arm.parameters.clone()]);
     match chain.arms() {
