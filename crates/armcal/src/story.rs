@@ -9,7 +9,7 @@ use crate::stages::observe::Observed;
 use crate::stages::{frames, observe, perceive};
 use armcal_calibrate::{Calibration, calibrate, holdout_turns};
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
-use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, Verdict, diagnose, nested};
+use armcal_diagnose::{Calibrated, Diagnosis, Knowledge, Nested, ParameterReport, Verdict, diagnose, nested};
 use armcal_model::{EffectSpec, Model, Session};
 use armcal_recording::Recording;
 use armcal_report::{Refit, Run, Undiagnosed};
@@ -331,7 +331,39 @@ pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &Progress) -> Re
     choose_again(run, pipeline, progress);
     progress.step("fitting the best candidates");
     run.alternatives = alternatives(run, pipeline);
+    size_by_refits(run);
     Ok(())
+}
+
+/// Tells the sizes that the refits found, in place of those of one step from the model without them: far from it, where the
+/// errors are a thousand times the noise, a step is short.
+fn size_by_refits(run: &mut Run) {
+    let Some(mut diagnosis) = run.diagnosis.take() else { return };
+    let estimate = |refit: &Refit, name: &str| {
+        let estimates = &refit.calibration.fit.estimates;
+        estimates.iter().find(|e| e.parameter.name == name).map(|e| (e.value, e.ci95))
+    };
+    let resize = |refit: &Refit, spec: &str, sizes: &mut [ParameterReport]| {
+        for size in sizes {
+            let name =
+                if size.name.contains(':') { size.name.clone() } else { format!("{spec}.{}", size.name) };
+            if let Some((value, ci95)) = estimate(refit, &name) {
+                (size.value, size.ci95) = (value, ci95);
+                size.upper_limit95 = value.abs() + 0.5 * (ci95[1] - ci95[0]);
+            }
+        }
+    };
+    // What was found, by the model with all of it that has a name.
+    let named = run.steps.iter().find(|step| step.effects.len() == diagnosis.effects.len());
+    for found in diagnosis.effects.iter_mut().filter(|found| found.combination.is_none()) {
+        named.into_iter().for_each(|step| resize(step, &found.name, &mut found.parameters));
+    }
+    for candidate in &mut diagnosis.candidates {
+        let is_of = |refit: &&Refit| refit.effects.join("+") == candidate.spec;
+        let refit = run.steps.iter().chain(&run.alternatives).find(is_of);
+        refit.into_iter().for_each(|refit| resize(refit, &candidate.spec, &mut candidate.parameters));
+    }
+    run.diagnosis = Some(diagnosis);
 }
 
 /// Adds what the diagnosis found to the model, each time fitted anew: one named effect after the other, then all that has

@@ -237,7 +237,7 @@ pub struct FoundEffect {
     pub log_evidence: f64,
     /// ln Bayes factor against the best unlisted explanation of another shape.
     pub margin_nats: f64,
-    /// Size.
+    /// Size: of one step, or of the refit with it where a report made one.
     pub parameters: Vec<ParameterReport>,
     /// What the data determine of several amplitudes, where they do not determine each.
     pub combination: Option<Combination>,
@@ -288,7 +288,7 @@ pub struct CandidateReport {
     pub effect: String,
     /// Target.
     pub target: String,
-    /// One-step estimates.
+    /// One-step estimates, or those of the refit with it where a report made one.
     pub parameters: Vec<ParameterReport>,
     /// ln Bayes factor against nothing.
     pub log_evidence: f64,

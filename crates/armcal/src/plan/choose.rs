@@ -324,7 +324,7 @@ fn assumptions(known: &Known<'_>, allowed: &Allowed) -> Vec<String> {
             all.push("the tips are joined in every dwell, as they were".to_owned());
         }
         None if known.observations.iter().any(|o| o.against().is_some()) => {
-            all.push("in every dwell the tip is measured against what it was measured against".to_owned());
+            all.push("the tip is brought to where the places of [[measure]] and their instruments reach it, as they did".to_owned());
         }
         None => all.push("no tip stream: only cavities of the board can be visited".to_owned()),
     }

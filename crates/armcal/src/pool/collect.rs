@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
 use crate::two_arms::ClosedChainSection;
-use armcal_core::{Dwell, Observation, Pose, Severity, Stage, Warning};
+use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_report::{
     BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, PastObservations,
@@ -219,6 +219,14 @@ fn contradiction(
     if then != pipeline.observations {
         let now = &pipeline.observations;
         return Some(format!("its [observations] were {then:?}, the pipeline's are {now:?}"));
+    }
+    let mut observations = past.recordings.iter().flat_map(|recording| &recording.observations);
+    if observations.any(|o| matches!(o.against(), Some(Against::Fixed(_)))) {
+        return Some(
+            "its tip was measured against places ([[measure]]), which a result does not keep for others: list its recordings in one \
+             pipeline and run that"
+                .into(),
+        );
     }
     if let Some(difference) = ClosedChainSection::differs(pipeline.closed_chain.as_ref(), past) {
         return Some(difference);

@@ -25,6 +25,9 @@ const OPEN_FACTOR: f64 = 10.0;
 /// there, and whoever left these dwells out would never see it.
 const OPEN_SHARE: f64 = 0.1;
 
+/// What dwells of joined tips are held to.
+type Check = fn(&Model, [FeatureId; 2], &[Observation]) -> Result<(), Error>;
+
 /// Every measurement that each dwell may be.
 pub struct Measures<'a> {
     pipeline: &'a Pipeline,
@@ -229,12 +232,7 @@ impl<'a> Measures<'a> {
     }
 
     /// Holds the chosen dwells of joined tips to a check, where there are any.
-    fn check_joined(
-        &self,
-        model: &Model,
-        which: &[bool],
-        check: fn(&Model, [FeatureId; 2], &[Observation]) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    fn check_joined(&self, model: &Model, which: &[bool], check: Check) -> Result<(), Error> {
         let Some((at, joins)) = self.joins() else { return Ok(()) };
         let joined = self.all.iter().zip(which).filter(|(c, chosen)| **chosen && c.measure == at);
         let joined: Vec<Observation> = joined.map(|(c, _)| c.observation.clone()).collect();

@@ -63,7 +63,10 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     if !moved.is_finite() || moved == 0.0 {
         return None;
     }
-    let (channel, share) = channel(basis, &difference_m, effect.spec.target)?;
+    // Any channel alone stands for what is off along one direction: there the shares say nothing of them.
+    let scalars = run.observations.iter().filter(|o| o.is_scalar()).count();
+    let preference = if 2 * scalars > run.observations.len() { 1.0 } else { PREFERENCE };
+    let (channel, share) = channel(basis, &difference_m, (effect.spec.target, preference))?;
     let effect_is = basis.levers.implied(channel, &difference_m);
     let driver = match effect.spec.since {
         // What else changed at that moment, the temperature for one, is no cause of an event.
@@ -95,12 +98,16 @@ fn summary(run: &Run, effect: &PlacedEffect) -> &'static str {
     }
 }
 
-/// The channel that alone stands for most of the displacements; the effect's own joint where that is nearly as good.
-fn channel(basis: &Basis, difference_m: &[Vector3<f64>], target: Option<usize>) -> Option<(usize, f64)> {
+/// The channel that alone stands for most of the displacements; the effect's own joint where that is as good but for so much.
+fn channel(
+    basis: &Basis,
+    difference_m: &[Vector3<f64>],
+    (target, preference): (Option<usize>, f64),
+) -> Option<(usize, f64)> {
     let shares: Vec<f64> =
         (0..basis.levers.channels.len()).map(|c| basis.levers.share(c, difference_m)).collect();
     let best = (0..shares.len()).max_by(|a, b| shares[*a].total_cmp(&shares[*b]))?;
-    let chosen = target.filter(|own| shares[*own] > shares[best] - PREFERENCE).unwrap_or(best);
+    let chosen = target.filter(|own| shares[*own] > shares[best] - preference).unwrap_or(best);
     Some((chosen, shares[chosen]))
 }
 

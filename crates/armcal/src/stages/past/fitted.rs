@@ -28,7 +28,7 @@ impl Placed {
             self.calibrated = fit_frames_from(model, observations, self.calibrated.clone(), fit, &fitted)?;
             said.push(frames_fitted(&frames_of(model, &fitted)));
         }
-        if !frames_of(model, &|p| estimated(p) && !fitted(p)).is_empty() {
+        if model.parameters().iter().any(|p| estimated(p) && !fitted(p) && !is_length(&p.name)) {
             said.push(tip_kept());
         }
         Ok(said)
@@ -38,7 +38,10 @@ impl Placed {
 /// Names of the frames of which a parameter is chosen.
 fn frames_of(model: &Model, chosen: &dyn Fn(&Parameter) -> bool) -> Vec<String> {
     let chosen = model.parameters().iter().filter(|p| chosen(p));
-    chosen.filter_map(|p| p.name.strip_suffix(".x").map(str::to_owned)).collect()
+    let mut names: Vec<String> =
+        chosen.filter_map(|p| p.name.rsplit_once('.').map(|(frame, _)| frame.to_owned())).collect();
+    names.dedup();
+    names
 }
 
 fn notice(code: &'static str, subject: String, message: &str) -> Warning {
