@@ -15,6 +15,7 @@ pub mod pipeline;
 pub mod plan;
 pub mod pool;
 pub mod progress;
+pub mod refits;
 pub mod score;
 pub mod setup;
 pub mod stages;

@@ -6,11 +6,13 @@
 mod loads;
 mod markers;
 mod measures;
+mod text;
 
 pub use loads::LoadEntry;
 pub use markers::MarkerSection;
 pub(crate) use measures::knowledge;
 pub use measures::{Measure, MeasureKind, MeasureSection};
+pub(crate) use text::read_text;
 
 use crate::check::CheckSection;
 use crate::error::Error;
@@ -26,7 +28,6 @@ use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// A pipeline, as written.
@@ -311,41 +312,6 @@ impl Default for ObservationsSection {
     }
 }
 
-/// A pipeline's text.
-fn read(path: &Path) -> Result<String, Error> {
-    read_text("pipeline", path)
-}
-
-/// The text of a file that people write; a recording or a folder in its place is named for what it is.
-pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error> {
-    let failed = |source| Error::ReadFile { what, path: path.to_owned(), source };
-    let is = |found, next| Err(Error::NotText { path: path.to_owned(), found, wanted: what, next });
-    let own = "name it under [[recordings]] of a pipeline file (docs/pipeline-reference.md), and give that";
-    if path.is_dir() {
-        let next = "name the TOML file; recordings are listed in it, under [[recordings]]";
-        return is("a folder", next.to_owned());
-    }
-    let (mut bytes, mut file) = (Vec::new(), input::open(path).map_err(failed)?);
-    file.by_ref().take(16).read_to_end(&mut bytes).map_err(failed)?;
-    match bytes.as_slice() {
-        b if b.starts_with(b"\x89MCAP") => is(
-            "a recording (MCAP)",
-            format!("{own}; `armcal inspect {}` shows what is in it", path.display()),
-        ),
-        b if b.starts_with(b"#ROSBAG") => {
-            is("a ROS 1 bag", format!("convert it with `mcap convert in.bag out.mcap`, {own}"))
-        }
-        b if b.starts_with(b"SQLite format 3") => {
-            is("a rosbag2 database", format!("convert it with `ros2 bag convert` to MCAP, {own}"))
-        }
-        _ => {
-            file.read_to_end(&mut bytes).map_err(failed)?;
-            let text = String::from_utf8(bytes);
-            text.map_err(|_| failed(std::io::Error::other("it is not UTF-8 text")))
-        }
-    }
-}
-
 /// Text that is no TOML is nobody's; its syntax error is told by whoever parses it.
 fn is_of_two_arms(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms"))
@@ -354,13 +320,13 @@ fn is_of_two_arms(text: &str) -> bool {
 impl Pipeline {
     /// Reads and checks a pipeline file.
     pub fn load(path: &Path) -> Result<Pipeline, Error> {
-        let text = read(path)?;
+        let text = read_text("pipeline", path)?;
         Pipeline::parse(path, text, path.parent().unwrap_or(Path::new("")))
     }
 
     /// The same for recordings that are named elsewhere; the pipeline's own are left out.
     pub fn load_for_others(path: &Path) -> Result<Pipeline, Error> {
-        let text = read(path)?;
+        let text = read_text("pipeline", path)?;
         let mut pipeline = Pipeline::parse_unchecked(path, text, path.parent().unwrap_or(Path::new("")))?;
         pipeline.recordings.clear();
         pipeline.check_sections(path)?;

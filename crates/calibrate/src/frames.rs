@@ -339,13 +339,17 @@ impl<'a> Alignment<'a> {
         let mut pairs = Vec::new();
         for &at in seated {
             let o = self.observations[at];
-            let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
             if let Some(in_board_m) = o.in_board_m() {
-                let to = (base * links[at] * in_link[o.feature.0]).translation.vector;
-                pairs.push(Pair { from: *in_board_m, to });
+                pairs.push(Pair { from: *in_board_m, to: self.reached_m(p, o, &links[at], &in_link) });
             }
         }
         board.put(p, &rigid_fit(&pairs, &current, board.rotation.is_some()));
+    }
+
+    /// Where the arm has the feature of an observation, in the world [m].
+    fn reached_m(&self, p: &[f64], o: &Observation, link: &Pose, in_link: &[Pose]) -> Vector3<f64> {
+        let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
+        (base * link * in_link[o.feature.0]).translation.vector
     }
 
     /// A fixed point from where the arm was while it was in it. Distances and planes are left to the solver.
@@ -355,12 +359,8 @@ impl<'a> Alignment<'a> {
         let at = current.translation.vector;
         let own = self.observations.iter().zip(links);
         let own = own.filter(|(o, _)| o.against() == Some(Against::Fixed(point)) && !o.is_scalar());
-        let errors: Vec<Vector3<f64>> = own
-            .map(|(o, link)| {
-                let base = self.model.arm_base_in_world(p, self.model.arm_of(o.feature));
-                (base * link * in_link[o.feature.0]).translation.vector - at
-            })
-            .collect();
+        let errors: Vec<Vector3<f64>> =
+            own.map(|(o, link)| self.reached_m(p, o, link, &in_link) - at).collect();
         let weights = weights_of(&errors);
         let total: f64 = weights.iter().sum();
         if total > 0.0 {

@@ -15,8 +15,7 @@ pub(crate) fn scale(model: &Model, p: &[f64]) -> Symmetry {
         (0..bases.len()).map(|arm| model.arm_base_in_world(p, arm).translation.vector).collect();
     // Which base a parameter is of, and which coordinate of it.
     let of_base = |p: &Parameter| {
-        let (frame, quantity) = p.name.rsplit_once('.')?;
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == quantity);
+        let (frame, axis) = coordinate(p)?;
         Some((bases.iter().position(|base| base == frame)?, axis))
     };
     let is_free = |base: &usize| {
@@ -25,8 +24,8 @@ pub(crate) fn scale(model: &Model, p: &[f64]) -> Symmetry {
     let fixed = (0..bases.len()).find(|base| !is_free(base)).unwrap_or(0);
     // Of a place where it is as seen from that base, of a plane along its normal.
     let of_place = |p_at: &Parameter| {
-        let (frame, quantity) = p_at.name.rsplit_once('.')?;
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == quantity)?;
+        let (frame, axis) = coordinate(p_at)?;
+        let axis = axis?;
         let (place, _, is_plane) = model.places().find(|(_, name, _)| *name == frame)?;
         let place = model.place_in_world(p, place);
         let from_m = place.translation.vector - base_m[fixed];
@@ -54,4 +53,10 @@ pub(crate) fn scale(model: &Model, p: &[f64]) -> Symmetry {
          one, such as {such}"
     );
     Symmetry { direction, text }
+}
+
+/// The frame that a parameter is of, and which coordinate of its position, where it is one.
+fn coordinate(p: &Parameter) -> Option<(&str, Option<usize>)> {
+    let (frame, quantity) = p.name.rsplit_once('.')?;
+    Some((frame, ["x", "y", "z"].iter().position(|axis| *axis == quantity)))
 }

@@ -12,8 +12,7 @@ use std::ops::Range;
 const SAME_POSE_RAD: f64 = 0.01;
 
 /// The runs of observations that are what was measured in one dwell, each of another feature or against another place, in the
-/// order given. They share
-/// the readings of the joints, and with them the encoders' noise.
+/// order given. They share the readings of the joints, and with them the encoders' noise.
 pub fn measured_together<O: Borrow<Observation>>(observations: &[O]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::with_capacity(observations.len());
     for (i, o) in observations.iter().map(Borrow::borrow).enumerate() {

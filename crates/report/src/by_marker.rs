@@ -1,6 +1,7 @@
 //! Errors by what was measured: the tip and each of its markers, by a sensor or against fixed places.
 
 use crate::run::Run;
+use armcal_core::Observation;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -24,7 +25,12 @@ pub(crate) struct MarkerErrors<'a> {
 /// Whether more than the tip was measured, or against more than sensor and table; not where all are tips that are joined.
 pub(crate) fn is_told(run: &Run) -> bool {
     let more = run.model.markers().next().is_some() || run.model.places().next().is_some();
-    more && !run.observations.iter().all(armcal_core::Observation::is_joined)
+    more && !run.observations.iter().all(Observation::is_joined)
+}
+
+/// The name of what an observation is of.
+pub(crate) fn name(run: &Run, o: &Observation) -> String {
+    run.model.measured_name(o).unwrap_or_else(|| run.model.feature_name(o.feature).to_owned())
 }
 
 /// The errors of each; nothing of an arm without markers and places, whose errors are those of its tip.
@@ -38,11 +44,11 @@ pub(crate) fn by_marker(run: &Run) -> Vec<MarkerErrors<'_>> {
         groups.entry(pair.1.what()).or_default().push(pair);
     }
     let link = |id| model.markers().find(|(marker, ..)| *marker == id).map(|(_, _, link)| link);
-    let errors = |own: Vec<(&armcal_calibrate::Residual, &armcal_core::Observation)>| {
+    let errors = |own: Vec<(&armcal_calibrate::Residual, &Observation)>| {
         let o = own.first()?.1;
         let mean_mm = |sum_m: f64| sum_m / own.len() as f64 * 1e3;
         Some(MarkerErrors {
-            marker: model.measured_name(o).unwrap_or_else(|| model.feature_name(o.feature).to_owned()),
+            marker: name(run, o),
             link: link(o.feature),
             n: own.len(),
             nominal_mm: mean_mm(own.iter().map(|(r, _)| r.nominal_m.norm()).sum()),

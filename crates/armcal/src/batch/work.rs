@@ -47,7 +47,7 @@ fn make(
     let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &silent)?, pipeline, &silent)?;
     let made = store.begin()?;
     if full {
-        story::add_refits(&mut run, pipeline, &silent)?;
+        crate::refits::add_refits(&mut run, pipeline, &silent)?;
         write_all(&run, &recordings, made.path(), &pipeline.output)?;
     } else {
         write_brief(&run, made.path())?;

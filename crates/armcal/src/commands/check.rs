@@ -63,7 +63,7 @@ fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
     let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &progress)?, pipeline, &progress)?;
     let judged = judge(&run, &limits)?;
     if let Some(out) = &request.out {
-        story::add_refits(&mut run, pipeline, &progress)?;
+        crate::refits::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
         view::remember(out, &request.pipeline, &[])?;

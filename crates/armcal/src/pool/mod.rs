@@ -80,7 +80,7 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
     } else {
         story::diagnose_again(&mut run, pipeline, progress);
-        story::add_refits(&mut run, pipeline, progress)?;
+        crate::refits::add_refits(&mut run, pipeline, progress)?;
     }
     Ok(Pooled { run, geometry })
 }

@@ -72,9 +72,6 @@ impl<'a> Measures<'a> {
     /// A measurement that no dwell is near to; joined tips that do not move, or too few dwells of them; parameters that each
     /// recording is to have for itself.
     pub fn near(&self, geometry: &mut Model, sure: &[Observation]) -> Result<Vec<bool>, Error> {
-        if self.is_empty() {
-            return Ok(Vec::new());
-        }
         let fit = &self.pipeline.fit;
         if self.pipeline.recordings.len() > 1 && !self.pipeline.pool.per_recording.is_empty() {
             let problem = "which dwells are joined, or at a place, is found with one base for all recordings, so that [pool] \
@@ -189,14 +186,19 @@ impl<'a> Measures<'a> {
     }
 
     /// Adds what was chosen to the observations by sensor and table, dwell by dwell.
-    pub fn add(&self, observed: &mut Observed, which: &[bool]) {
+    ///
+    /// # Errors
+    /// Too few dwells of joined tips.
+    pub fn add(&self, observed: &mut Observed, which: &[bool]) -> Result<(), Error> {
         if self.is_empty() {
-            return;
+            return Ok(());
         }
+        self.enough_joined(which)?;
         observed.observations.extend(self.chosen(which));
         observed.observations.sort_by_key(|o| o.dwell);
         let used: BTreeSet<DwellId> = observed.observations.iter().map(|o| o.dwell).collect();
         observed.rejections.retain(|r| !used.contains(&r.dwell));
+        Ok(())
     }
 
     /// Why the dwells that were not chosen were not, as the calibrated model has them.
@@ -223,20 +225,19 @@ impl<'a> Measures<'a> {
     }
 
     fn chosen(&self, which: &[bool]) -> Vec<Observation> {
-        self.all
-            .iter()
-            .zip(which)
-            .filter(|(_, chosen)| **chosen)
-            .map(|(c, _)| c.observation.clone())
-            .collect()
+        self.chosen_of(which, |_| true)
+    }
+
+    /// Those of the measurements that `wanted` accepts, by their places among all.
+    fn chosen_of(&self, which: &[bool], wanted: impl Fn(usize) -> bool) -> Vec<Observation> {
+        let chosen = self.all.iter().zip(which).filter(|(c, chosen)| **chosen && wanted(c.measure));
+        chosen.map(|(c, _)| c.observation.clone()).collect()
     }
 
     /// Holds the chosen dwells of joined tips to a check, where there are any.
     fn check_joined(&self, model: &Model, which: &[bool], check: Check) -> Result<(), Error> {
         let Some((at, joins)) = self.joins() else { return Ok(()) };
-        let joined = self.all.iter().zip(which).filter(|(c, chosen)| **chosen && c.measure == at);
-        let joined: Vec<Observation> = joined.map(|(c, _)| c.observation.clone()).collect();
-        check(model, joins, &joined)
+        check(model, joins, &self.chosen_of(which, |measure| measure == at))
     }
 
     /// The measurement of joined tips, and these.
@@ -248,17 +249,23 @@ impl<'a> Measures<'a> {
         self.measures.iter().enumerate().find_map(joins)
     }
 
+    /// Refuses joined tips that too few of the chosen dwells show.
+    fn enough_joined(&self, which: &[bool]) -> Result<(), Error> {
+        let Some(((at, _), closure)) = self.joins().zip(self.pipeline.closed_chain.as_ref()) else {
+            return Ok(());
+        };
+        let dwells = self.all.iter().filter(|c| c.measure == at).count();
+        let joined = self.chosen_of(which, |measure| measure == at);
+        check::enough(closure, &joined, (dwells, self.pipeline.two_arms.is_some()))
+    }
+
     /// What the frames are placed by, if every measurement was made.
     fn enough(&self, model: &Model, near: &[bool], sure: &[Observation]) -> Result<Vec<Observation>, Error> {
+        self.enough_joined(near)?;
         let p = model.nominal();
         for (at, m) in self.measures.iter().enumerate() {
             let own = || self.all.iter().zip(near).filter(|(c, _)| c.measure == at);
-            let chosen: Vec<Observation> =
-                own().filter(|(_, near)| **near).map(|(c, _)| c.observation.clone()).collect();
-            let closure = self.pipeline.closed_chain.as_ref();
-            if let (Against::Feature(_), Some(closure)) = (m.against, closure) {
-                check::enough(closure, &chosen, (own().count(), self.pipeline.two_arms.is_some()))?;
-            } else if chosen.is_empty() {
+            if !own().any(|(_, near)| *near) {
                 let off = own().map(|(c, _)| error_m(model, &p, &c.observation));
                 return Err(m.never_made(off.fold(f64::INFINITY, f64::min)));
             }

@@ -36,7 +36,7 @@ impl Bench {
                 let settled = story::settle(&pipeline, progress)?;
                 let geometry = settled.fitted.geometry.clone();
                 let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
-                story::add_refits(&mut run, &pipeline, progress)?;
+                crate::refits::add_refits(&mut run, &pipeline, progress)?;
                 (pipeline, geometry, run)
             }
             results => {

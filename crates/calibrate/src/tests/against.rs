@@ -78,27 +78,22 @@ fn estimate<'f>(fit: &'f Fit, name: &str) -> &'f crate::Estimate {
 #[test]
 fn intervals_from_distances_and_heights_hold_the_planted_truth_95_percent_of_the_time() {
     let model = model();
-    let (mut inside, mut total, mut undetermined) = (0, 0, 0);
+    let mut coverage = rig::Coverage::default();
+    // Truths are drawn evenly between the bounds: where the prior has a say, through another parameter too, intervals hold more.
+    // Places have no bounds and go with the joints' zeros.
+    let of_the_data = |e: &crate::Estimate| {
+        let half = 0.5 * (e.parameter.upper - e.parameter.lower);
+        e.determined && half.is_finite() && e.sigma <= 0.05 * half
+    };
     for seed in 0..100 {
         let mut rng = rig::rng(seed);
         let truth = planted(&model, &mut rng);
         let observations = measured(&model, &truth, 120, &mut rng);
         let fit = fit(&model, &observations, &FitConfig::default()).unwrap();
-        for (e, truth) in fit.estimates.iter().zip(&truth).filter(|(e, _)| e.parameter.free) {
-            // Truths are drawn evenly between the bounds: where the prior has a say, through another parameter too, intervals
-            // hold more. Places have no bounds and go with the joints' zeros.
-            let half = 0.5 * (e.parameter.upper - e.parameter.lower);
-            if !e.determined || !half.is_finite() || e.sigma > 0.05 * half {
-                undetermined += 1;
-                continue;
-            }
-            total += 1;
-            inside += usize::from(e.ci95[0] <= *truth && *truth <= e.ci95[1]);
-        }
+        coverage.count(&fit, &truth, of_the_data);
     }
-    let share = inside as f64 / total as f64;
-    println!("coverage {share:.4} of {total} intervals; {undetermined} undetermined");
-    assert!((0.93..0.975).contains(&share), "coverage {share} over {total}");
+    let share = coverage.share();
+    assert!((0.93..0.975).contains(&share), "coverage {share}");
 }
 
 #[test]

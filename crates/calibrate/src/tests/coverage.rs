@@ -4,24 +4,16 @@ use crate::{FitConfig, fit};
 #[test]
 fn intervals_hold_the_planted_truth_95_percent_of_the_time() {
     let model = rig::tracked_model();
-    let (mut inside, mut total, mut undetermined) = (0, 0, 0);
+    let mut coverage = rig::Coverage::default();
     for seed in 0..150 {
         let mut rng = rig::rng(seed);
         let truth = rig::planted(&model, &mut rng, 0.9);
         let observations = rig::tracked(&model, &truth, 99, &mut rng);
         let fit = fit(&model, &observations, &FitConfig::default()).unwrap();
-        for (e, truth) in fit.estimates.iter().zip(&truth).filter(|(e, _)| e.parameter.free) {
-            if !e.determined {
-                undetermined += 1;
-                continue;
-            }
-            total += 1;
-            inside += usize::from(e.ci95[0] <= *truth && *truth <= e.ci95[1]);
-        }
+        coverage.count(&fit, &truth, |e| e.determined);
     }
-    let share = inside as f64 / total as f64;
-    println!("coverage {share:.4} of {total} intervals; {undetermined} undetermined");
-    assert!((0.93..0.975).contains(&share), "coverage {share} over {total}");
+    let share = coverage.share();
+    assert!((0.93..0.975).contains(&share), "coverage {share}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The paper's arm with planted deviations, seen by a sensor or seated on a board.
 
+use crate::{Estimate, Fit};
 use armcal_core::{DwellId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model};
 use nalgebra::{Matrix3, Vector3};
@@ -57,6 +58,35 @@ pub fn poses(n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
             [(-1.2, 1.2), (-1.3, 0.3), (-1.0, 0.9)].map(|(from, to)| rng.random_range(from..to)).to_vec()
         })
         .collect()
+}
+
+/// How many 95 % intervals hold the planted truth.
+#[derive(Default)]
+pub struct Coverage {
+    inside: usize,
+    total: usize,
+    left_out: usize,
+}
+
+impl Coverage {
+    /// Counts the free parameters of a fit that `counts` accepts.
+    pub fn count(&mut self, fit: &Fit, truth: &[f64], counts: impl Fn(&Estimate) -> bool) {
+        for (e, truth) in fit.estimates.iter().zip(truth).filter(|(e, _)| e.parameter.free) {
+            if !counts(e) {
+                self.left_out += 1;
+                continue;
+            }
+            self.total += 1;
+            self.inside += usize::from(e.ci95[0] <= *truth && *truth <= e.ci95[1]);
+        }
+    }
+
+    /// The share of those counted.
+    pub fn share(&self) -> f64 {
+        let share = self.inside as f64 / self.total as f64;
+        println!("coverage {share:.4} of {} intervals; {} left out", self.total, self.left_out);
+        share
+    }
 }
 
 pub fn gauss3(rng: &mut ChaCha8Rng, sigma: f64) -> Vector3<f64> {

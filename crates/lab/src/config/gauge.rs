@@ -1,6 +1,6 @@
 //! Instruments that read one length of the tip: a ballbar or a wire to a fixed point, a gauge above a plane.
 
-use super::{not_negative, positive, range, value};
+use super::{default_placement_mm, not_negative, positive, range, value};
 use crate::LabError;
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -45,10 +45,6 @@ pub enum GaugeKind {
     Distance,
     /// How high it is above a plane.
     Height,
-}
-
-fn default_placement_mm() -> f64 {
-    3.0
 }
 
 fn default_placement_deg() -> f64 {

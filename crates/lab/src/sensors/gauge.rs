@@ -1,8 +1,8 @@
 //! Instruments that read one length of the true tip.
 
-use super::Log;
-use super::message::{Channel, Kind, Message, Payload};
+use super::message::{Channel, Kind, Payload};
 use super::transport::Transport;
+use super::{Log, evenly};
 use crate::config::{GaugeConfig, GaugeKind, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::session::Session;
@@ -73,16 +73,12 @@ fn of_one(
     let stream = 1000 + 2 * (recording * config.gauges.len() + index);
     let mut noise = Stream::new(config.seed, Purpose::Gauge, stream);
     let draw = Stream::new(config.seed, Purpose::Gauge, stream + 1);
-    let mut transport = Transport::new(&config.joints.transport, draw);
-    for sequence in 0..=(session.trace.duration_s() * gauge.rate_hz).floor() as u32 {
-        let time_s = f64::from(sequence) / gauge.rate_hz;
+    let transport = Transport::new(&config.joints.transport, draw);
+    evenly(config, (recording, session), (channel, gauge.rate_hz, transport), log, |time_s| {
         let base = pose_at(&session.trace.world_from_base, time_s);
         let tip = pose_at(&session.trace.world_from_tip, time_s);
         let read_mm = standing.length_m(gauge.kind, &base, &tip) * 1e3 + noise.normal() * gauge.noise_mm;
         let [low, high] = gauge.range_mm;
-        let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
-        let log_ns = transport.log_ns(stamp_ns);
-        let payload = Payload::Number(read_mm.clamp(low, high));
-        log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
-    }
+        Payload::Number(read_mm.clamp(low, high))
+    });
 }

@@ -16,6 +16,7 @@ pub use vicon::{Occlusion, OcclusionKind};
 use crate::config::LabConfig;
 use crate::mechanism::Body;
 use crate::session::Session;
+use transport::Transport;
 
 /// Everything that reached the recorder.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,23 @@ pub struct Log {
     pub clock: SensorClock,
     /// When which subject was occluded.
     pub occlusions: Vec<Occlusion>,
+}
+
+/// Adds messages that come evenly, so many a second, stamped by the robot's clock; `payload` is told when [s].
+fn evenly(
+    config: &LabConfig,
+    (recording, session): (usize, &Session),
+    (channel, rate_hz, mut transport): (usize, f64, Transport),
+    log: &mut Log,
+    mut payload: impl FnMut(f64) -> Payload,
+) {
+    for sequence in 0..=(session.trace.duration_s() * rate_hz).floor() as u32 {
+        let time_s = f64::from(sequence) / rate_hz;
+        let payload = payload(time_s);
+        let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
+        let log_ns = transport.log_ns(stamp_ns);
+        log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
+    }
 }
 
 /// Records a session.

@@ -1,7 +1,7 @@
 //! Where the error is large: its mean by recording, direction of arrival, joint range, time and load.
 
 use super::basis::Basis;
-use crate::by_marker::is_told;
+use crate::by_marker::{self, is_told};
 use crate::run::Run;
 use armcal_calibrate::{grouped_ci95, independent_groups};
 use serde::Serialize;
@@ -37,9 +37,7 @@ pub(crate) fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<
     }
     let measured: BTreeMap<_, _> = run.observations.iter().map(|o| (o.what(), o)).collect();
     for (what, o) in measured.into_iter().filter(|_| is_told(run)) {
-        let name = run.model.measured_name(o);
-        let name = name.unwrap_or_else(|| run.model.feature_name(o.feature).to_owned());
-        all.extend(table.group("marker", name, |i| run.observations[i].what() == what));
+        all.extend(table.group("marker", by_marker::name(run, o), |i| run.observations[i].what() == what));
     }
     let names = run.model.chain().joint_names();
     for (j, name) in names.iter().enumerate() {
