@@ -61,7 +61,7 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     }
     let last = judge.turn(&[], None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
-    let near = (judge.config.objective != Objective::Paper).then_some(&last.fit);
+    let near = (judge.config.objective != Objective::Paper).then_some(&last);
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turns: Vec<Result<Turn, CalibrateError>> =
         holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
@@ -177,8 +177,8 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// Fits without the observations `held`, from nominal or from `near`.
-    fn turn(&self, held: &[usize], near: Option<&Fit>) -> Result<Turn, CalibrateError> {
+    /// Fits without the observations `held`, from nominal or from the turn `near` that saw them too.
+    fn turn(&self, held: &[usize], near: Option<&Turn>) -> Result<Turn, CalibrateError> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
             let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
@@ -188,9 +188,12 @@ impl Judge<'_> {
         let unseen = self.frames_only_in(&test, &train);
         let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
-        let mut nominal_values = frames::fit_on(&train, self.config)?;
+        let mut nominal_values = match near {
+            Some(near) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
+            None => frames::fit_on(&train, self.config)?,
+        };
         let free = |p: &Parameter| p.free && !of_unseen(p);
-        let mut fit = match near.map(|fit| self.near(fit, &nominal_values, &of_unseen)) {
+        let mut fit = match near.map(|near| self.near(&near.fit, &nominal_values, &of_unseen)) {
             Some(near) => fit_near(&train, &near, &free, self.config)?,
             None => fit_problem(&train, &nominal_values, &free, self.config)?,
         };

@@ -52,6 +52,9 @@ pub struct FitConfig {
     pub average_accuracy_mm: Option<f64>,
     /// Limit of iterations of one solve; default 200.
     pub max_iterations: usize,
+    /// Mean error [m] of the nominal arm, its frames placed, above which a fit is given up; not set by files, default: none.
+    #[serde(skip)]
+    pub give_up_above_m: Option<f64>,
 }
 
 impl Default for FitConfig {
@@ -65,6 +68,7 @@ impl Default for FitConfig {
             learn_priors: true,
             average_accuracy_mm: None,
             max_iterations: 200,
+            give_up_above_m: None,
         }
     }
 }

@@ -49,6 +49,12 @@ pub enum CalibrateError {
         /// Joint readings of the observation [rad]; empty when the problem has none.
         joint_rad: Vec<f64>,
     },
+    /// The nominal arm is further off than a fit was asked to mend.
+    #[error("the nominal arm errs by {mean_m:.3} m on average, too much for this fit to begin")]
+    GivenUp {
+        /// Mean error, frames placed [m].
+        mean_m: f64,
+    },
     /// The covariance cannot whiten the observation.
     #[error(
         "{observation}: its covariance is not positive definite: declare a position noise above zero for this sensor or \

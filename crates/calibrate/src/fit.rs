@@ -84,7 +84,15 @@ fn fit_from(
     config.check()?;
     let declared = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&declared)?;
-    let solved = solve(&declared, near.map(|n| n.sigma_scale), config)?;
+    let solved = match near {
+        // The first fit that counts is that with the priors which the other one learnt.
+        Some(near)
+            if priors::begins_with(&declared, &near.prior_scales, config) && !problem.noise_depends() =>
+        {
+            Solved::unmoved(&declared, near.sigma_scale)?
+        }
+        _ => solve(&declared, near.map(|n| n.sigma_scale), config)?,
+    };
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let known = near.map(|n| &n.prior_scales);
     let learnt = priors::learnt(problem, (&declared, &solved), known, free, config)?;
@@ -178,6 +186,12 @@ pub(crate) struct Solved {
 }
 
 impl Solved {
+    /// Where the problem starts.
+    fn unmoved(white: &Whitened<'_>, sigma_scale: f64) -> Result<Solved, CalibrateError> {
+        let at = white.at(white.start())?;
+        Ok(Solved { at, sigma_scale, paper: None, status: Status::Converged, iterations: 0 })
+    }
+
     /// The cost that was minimised (for eq. 4: the one that stands in for it in the statistics).
     pub fn cost<'a, 'p>(&self, white: &'a Whitened<'p>, config: &FitConfig) -> RobustCost<'a, 'p> {
         let mut cost = RobustCost::new(white, config, self.sigma_scale);

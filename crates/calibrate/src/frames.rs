@@ -15,9 +15,10 @@ use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rounds of the alternation, and the change [m, rad] below which it ends.
+/// Rounds of the alternation, and the change [m, rad] below which it ends: the solver, which goes on from there, closes in on the
+/// minimum much faster.
 const ROUNDS: usize = 200;
-const SETTLED: f64 = 1e-6;
+const SETTLED: f64 = 1e-3;
 
 /// Closed-form start: nominal, with the estimated frames placed onto the observations.
 ///
@@ -61,6 +62,20 @@ pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<V
     fit_some(problem, problem.model().nominal(), config, &|p| touched.contains(frame_of(p)))
 }
 
+/// [`fit_on`] from where the frames of more observations ended, those among them: to the same minimum, only the way is shorter.
+pub(crate) fn fit_on_fewer(
+    problem: &ModelProblem<'_>,
+    of_more: &[f64],
+    config: &FitConfig,
+) -> Result<Vec<f64>, CalibrateError> {
+    let touched = touched(problem);
+    let free = |p: &Parameter| is_free(p) && touched.contains(frame_of(p));
+    let mut start = problem.model().nominal();
+    let known = problem.parameters().iter().zip(of_more).zip(&mut start).filter(|((p, _), _)| free(p));
+    known.for_each(|((_, value), start)| *start = *value);
+    solved(problem, start, config, &free)
+}
+
 fn touched(problem: &ModelProblem<'_>) -> BTreeSet<String> {
     touched_frames(problem.model(), problem.observations()).into_iter().collect()
 }
@@ -72,13 +87,35 @@ pub(crate) fn fit_some(
     config: &FitConfig,
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Result<Vec<f64>, CalibrateError> {
+    let free = |p: &Parameter| is_free(p) && which(p);
+    let start = aligned(problem, config, start, &free);
+    if let Some(most_m) = config.give_up_above_m {
+        let error_m = |o: &&Observation| problem.model().residual(&start, o).position_m.norm();
+        let observations = problem.observations();
+        let mean_m = observations.iter().map(error_m).sum::<f64>() / observations.len().max(1) as f64;
+        if mean_m > most_m {
+            return Err(CalibrateError::GivenUp { mean_m });
+        }
+    }
+    solved(problem, start, config, &free)
+}
+
+fn is_free(p: &Parameter) -> bool {
+    p.free && p.role == Role::EstimatedFrame
+}
+
+/// The frames `free` where the solver ends with them, the others at `start`.
+fn solved(
+    problem: &ModelProblem<'_>,
+    start: Vec<f64>,
+    config: &FitConfig,
+    free: &dyn Fn(&Parameter) -> bool,
+) -> Result<Vec<f64>, CalibrateError> {
     config.check()?;
-    let free = |p: &Parameter| p.free && p.role == Role::EstimatedFrame && which(p);
     if problem.blocks() == 0 || !problem.parameters().iter().any(free) {
         return Ok(start);
     }
-    let start = aligned(problem, config, start, &free);
-    let white = Whitened::new(Box::new(problem), &start, &free, config)?;
+    let white = Whitened::new(Box::new(problem), &start, free, config)?;
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
     let solved = fit::solve(&white, None, &FitConfig { objective, ..config.clone() })?;
@@ -197,7 +234,7 @@ impl Place {
         let index = |quantity: &str| {
             model.index(&format!("{frame}.{quantity}")).filter(|&i| {
                 let p = &model.parameters()[i];
-                p.free && p.role == Role::EstimatedFrame && which(p)
+                is_free(p) && which(p)
             })
         };
         let three = |a, b, c| Some([index(a)?, index(b)?, index(c)?]);

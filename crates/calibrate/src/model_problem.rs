@@ -10,7 +10,7 @@ use crate::poses::measured_together;
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter, Reference};
-use armcal_model::{Model, ModelResidual};
+use armcal_model::{Asked, Model, ModelResidual};
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use std::ops::Range;
 
@@ -292,21 +292,29 @@ impl Problem for ModelProblem<'_> {
         stacked(self.of_block(block).iter().map(of).collect())
     }
 
-    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
+    fn linearised_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        asked: &Asked<'_>,
+        each: &mut dyn FnMut(usize, Linearised),
+    ) {
         let Some(first) = self.blocks.get(blocks.start).filter(|_| !blocks.is_empty()) else {
-            return Vec::new();
+            return;
         };
         let of_blocks = first.start..self.blocks[blocks.end - 1].end;
-        let runs = self.alike(&self.observations[of_blocks]);
-        let mut linearised = runs.flat_map(|run| {
-            let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
-            model.residuals_with_jacobians(&p, run)
-        });
-        let mut of = |block: usize| {
-            let parts = self.of_block(block).iter().zip(&mut linearised);
-            stacked(parts.map(|(o, linearised)| self.used(o, linearised)).collect())
+        let (mut block, mut parts) = (blocks.start, Vec::new());
+        let mut of = |o: &Observation, linearised: (ModelResidual, DMatrix<f64>)| {
+            parts.push(self.used(o, linearised));
+            if parts.len() == self.blocks[block].len() {
+                each(block, stacked(std::mem::take(&mut parts)));
+                block += 1;
+            }
         };
-        blocks.map(&mut of).collect()
+        for run in self.alike(&self.observations[of_blocks]) {
+            let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
+            model.residuals_with_jacobians(&p, run, asked, &mut of);
+        }
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

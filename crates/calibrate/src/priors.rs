@@ -15,10 +15,11 @@ use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::statistics::posterior;
-use crate::whitened::Whitened;
+use crate::whitened::{Axis, Whitened};
 use crate::wider::wider;
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
+use armcal_model::Asked;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -65,8 +66,14 @@ impl Problem for WithPriors<'_> {
         self.problem.linearised(block, p)
     }
 
-    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
-        self.problem.linearised_each(blocks, p)
+    fn linearised_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        asked: &Asked<'_>,
+        each: &mut dyn FnMut(usize, Linearised),
+    ) {
+        self.problem.linearised_each(blocks, p, asked, each);
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
@@ -97,6 +104,16 @@ pub(crate) fn scales_of(fit: &Fit, parameters: &[Parameter]) -> PriorScales {
     fit.estimates.iter().zip(parameters).filter(|(e, _)| e.parameter.free).filter_map(scale).collect()
 }
 
+/// Whether [`learnt`] fits with scales that another fit learnt, whatever the fit with the default priors is.
+pub(crate) fn begins_with(white: &Whitened<'_>, scales: &PriorScales, config: &FitConfig) -> bool {
+    !scales.is_empty() && are_learnt(white, config)
+}
+
+fn are_learnt(white: &Whitened<'_>, config: &FitConfig) -> bool {
+    let is_assumed = |axis: &Axis| white.problem.parameters()[axis.index].assumed.is_some();
+    config.learn_priors && config.objective != Objective::Paper && white.axes.iter().any(is_assumed)
+}
+
 /// A fit with priors as narrow as the data ask for, from the fit with the default ones and from the scales that a fit to
 /// nearly the same data learnt; none where all are declared.
 pub(crate) fn learnt<'a>(
@@ -106,8 +123,7 @@ pub(crate) fn learnt<'a>(
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Option<(Whitened<'a>, Solved)>, CalibrateError> {
-    let assumed = white.axes.iter().any(|a| problem.parameters()[a.index].assumed.is_some());
-    if !assumed || !config.learn_priors || config.objective == Objective::Paper {
+    if !are_learnt(white, config) {
         return Ok(None);
     }
     let mut scales = PriorScales::new();

@@ -2,6 +2,7 @@
 //! observation), their exact derivatives, their covariance, and the parameters.
 
 use armcal_core::Parameter;
+use armcal_model::Asked;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -54,9 +55,15 @@ pub trait Problem: Sync {
     /// The same with its derivative, one column for each parameter that the block knows ([`Problem::known`]);
     /// fixed ones may be zero.
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised;
-    /// [`Problem::linearised`] of these blocks, in order.
-    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
-        blocks.map(|block| self.linearised(block, p)).collect()
+    /// Calls `each` with [`Problem::linearised`] of these blocks, in order; columns that are not `asked` for may be zero.
+    fn linearised_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        _asked: &Asked<'_>,
+        each: &mut dyn FnMut(usize, Linearised),
+    ) {
+        blocks.for_each(|block| each(block, self.linearised(block, p)));
     }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;
@@ -105,8 +112,14 @@ impl<P: Problem + ?Sized> Problem for &P {
         (**self).linearised(block, p)
     }
 
-    fn linearised_each(&self, blocks: Range<usize>, p: &[f64]) -> Vec<Linearised> {
-        (**self).linearised_each(blocks, p)
+    fn linearised_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        asked: &Asked<'_>,
+        each: &mut dyn FnMut(usize, Linearised),
+    ) {
+        (**self).linearised_each(blocks, p, asked, each);
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {

@@ -4,8 +4,9 @@ use armcal_core::Pose;
 use armcal_core::robust::median;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Rounds of reweighting.
+/// Rounds of reweighting, and the motion [m, rad] below which they end.
 const ROUNDS: usize = 20;
+const SETTLED: f64 = 1e-5;
 /// Share by which the current rotation is preferred where the points leave it open.
 const PREFERENCE: f64 = 1e-9;
 
@@ -49,7 +50,7 @@ pub(crate) fn rigid_fit(pairs: &[Pair], current: &Pose, rotate: bool) -> Pose {
             .map(|pair| pair.to - (pose.rotation * pair.from + pose.translation.vector))
             .collect();
         weights = weights_of(&errors);
-        if moved < 1e-12 {
+        if moved < SETTLED {
             break;
         }
     }

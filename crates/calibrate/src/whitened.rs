@@ -213,8 +213,10 @@ impl<'a> Whitened<'a> {
         let height = self.offsets[at_group.blocks.end] - first;
         let (mut stacked, mut jacobian) =
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
-        let linearised = self.problem.linearised_each(at_group.blocks.clone(), p);
-        for (block, (raw, full)) in at_group.blocks.clone().zip(linearised) {
+        let mut asked = vec![false; self.problem.parameters().len()];
+        at_group.columns.iter().flatten().for_each(|column| asked[*column] = true);
+        let mut done = Ok(());
+        let mut put = |block: usize, (raw, full): Linearised| {
             self.finite(block, raw.as_slice(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
@@ -229,7 +231,14 @@ impl<'a> Whitened<'a> {
                 }
                 whiten(white, raw, a.scale, &mut column[at..at + rows]);
             }
-        }
+            Ok(())
+        };
+        self.problem.linearised_each(at_group.blocks.clone(), p, &|k| asked[k], &mut |block, linearised| {
+            if done.is_ok() {
+                done = put(block, linearised);
+            }
+        });
+        done?;
         Ok((stacked, jacobian))
     }
 

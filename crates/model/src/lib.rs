@@ -50,3 +50,4 @@ pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;
+pub use tree::Asked;

@@ -17,6 +17,9 @@ pub(crate) type SegmentId = usize;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Tree(pub Vec<Segment>);
 
+/// Whether derivatives by a parameter are asked for, by its index.
+pub type Asked<'a> = dyn Fn(usize) -> bool + 'a;
+
 /// The segments from the world to a feature, in this order; the last one ends there.
 pub(crate) type Route = Box<[SegmentId]>;
 
@@ -82,16 +85,30 @@ impl Tree {
 pub(crate) struct TreeAt<'a> {
     tree: &'a Tree,
     p: Cow<'a, [f64]>,
-    /// By segment; `None` where a joint moves it.
-    still: Vec<Option<LinearisedSegment>>,
+    segments: Vec<Still>,
+}
+
+/// What is known of a segment before its pose.
+enum Still {
+    /// All of it: no joint moves it.
+    Linearised(LinearisedSegment),
+    /// Nothing, and how its parameters and its joint move its end is asked of it.
+    Asked,
+    /// Nothing, and only where it ends is asked.
+    Unasked,
 }
 
 impl<'a> TreeAt<'a> {
-    pub fn of(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>) -> TreeAt<'a> {
+    /// Where only some parameters are `asked` for, what others and joints move may be missing.
+    pub fn of(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>, asked: Option<&Asked<'_>>) -> TreeAt<'a> {
         let p = p.into();
-        let still = |segment: &Segment| segment.joint.is_none().then(|| segment.linearised(&p, &[]));
-        let still = tree.0.iter().map(still).collect();
-        TreeAt { tree, p, still }
+        let still = |segment: &Segment| match segment.joint {
+            None => Still::Linearised(segment.linearised(&p, &[])),
+            Some(_) if asked.is_none_or(|asked| segment.parameters.clone().any(asked)) => Still::Asked,
+            Some(_) => Still::Unasked,
+        };
+        let segments = tree.0.iter().map(still).collect();
+        TreeAt { tree, p, segments }
     }
 
     /// The end of a route and its derivatives with respect to every parameter and joint on it.
@@ -107,8 +124,12 @@ impl<'a> TreeAt<'a> {
             let segment = &self.tree.0[id];
             let own = segment.parameters.clone();
             let moved;
-            let linearised = match &self.still[id] {
-                Some(still) if p[own.clone()] == self.p[own] => still,
+            let linearised = match &self.segments[id] {
+                Still::Linearised(still) if p[own.clone()] == self.p[own] => still,
+                Still::Unasked => {
+                    at = at.then(&segment.transform(p, joints));
+                    continue;
+                }
                 _ => {
                     moved = segment.linearised(p, joints);
                     &moved

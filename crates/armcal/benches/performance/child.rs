@@ -33,8 +33,15 @@ pub fn run(arguments: &[String]) -> Result<()> {
 
 /// Runs an armcal command in a child.
 pub fn armcal<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(arguments: I) -> Result<Cost> {
-    let mut command = Command::new(std::env::current_exe()?);
-    command.arg(CHILD).args(arguments);
+    told(Command::new(std::env::current_exe()?).arg(CHILD).args(arguments))
+}
+
+/// The same with one thread.
+pub fn armcal_on_one<I: IntoIterator<Item = S>, S: AsRef<OsStr>>(arguments: I) -> Result<Cost> {
+    told(Command::new(std::env::current_exe()?).arg(CHILD).args(arguments).env("RAYON_NUM_THREADS", "1"))
+}
+
+fn told(command: &mut Command) -> Result<Cost> {
     let began = Instant::now();
     let output = command.output()?;
     let wall_s = began.elapsed().as_secs_f64();

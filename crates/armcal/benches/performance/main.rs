@@ -2,21 +2,24 @@
 //!
 //! `cargo bench -p armcal --bench performance` measures everything and rewrites `docs/performance.md`. With names of
 //! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`.
-//! `--size-mb N` sets the size of the recording that is read, `--recordings N` the most recordings of a batch (1000 both).
+//! `--size-mb N` sets the size of the recording that is read, `--recordings N` the most recordings of a batch (1000 both),
+//! `--poses N` the most poses of a campaign.
 //! Data go to `target/bench-data`.
 //!
-//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `memory`, `batch` are the parts; `peers` finds or makes
+//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes), `memory`, `batch` are the parts; `peers` finds or makes
 //! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `child`
 //! measures processes, `page` lays out, `machine` says on what.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its numbers")]
 
 mod batch;
+mod campaign;
 mod child;
 mod clock;
 mod diagnosis;
 mod fit;
 mod fit_problem;
+mod growth;
 mod machine;
 mod memory;
 mod page;
@@ -34,10 +37,11 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 type Part = fn(&Options) -> Result<Section>;
 
 /// Each by its name, in the order of the page.
-const PARTS: [(&str, Part); 5] = [
+const PARTS: [(&str, Part); 6] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
+    ("growth", growth::section),
     ("memory", memory::section),
     ("batch", batch::section),
 ];
@@ -48,6 +52,8 @@ pub struct Options {
     pub size_mb: u64,
     /// Most recordings of a batch.
     pub recordings: usize,
+    /// Most poses of a campaign.
+    pub poses: usize,
     /// Where generated recordings and built peers lie.
     pub data: PathBuf,
 }
@@ -61,7 +67,8 @@ fn main() -> Result<()> {
         return child::run(rest);
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut options = Options { size_mb: 1000, recordings: 1000, data: root.join("target/bench-data") };
+    let mut options =
+        Options { size_mb: 1000, recordings: 1000, poses: 20_000, data: root.join("target/bench-data") };
     let mut named = Vec::new();
     let mut arguments = arguments.iter();
     while let Some(argument) = arguments.next() {
@@ -69,6 +76,8 @@ fn main() -> Result<()> {
             options.size_mb = count(argument, arguments.next())? as u64;
         } else if argument == "--recordings" {
             options.recordings = count(argument, arguments.next())?;
+        } else if argument == "--poses" {
+            options.poses = count(argument, arguments.next())?;
         } else if PARTS.iter().any(|(name, _)| name == argument) {
             named.push(argument.as_str());
         } else {

@@ -13,6 +13,8 @@ use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 
 /// Mistakes one upon the other.
 const MOST_MISTAKES: usize = 3;
+/// What makes the errors of the nominal arm this many times as large undoes no mistake.
+const HOPELESS: f64 = 5.0;
 /// Codes of changes that let the model's own parameters go.
 const OF_THE_MODEL: [&str; 3] = ["parameter-bound", "parameter-fixed", "joint-zero"];
 
@@ -53,6 +55,8 @@ fn one_upon_the_other(
     let mut found: Vec<Found> = Vec::new();
     while found.len() < MOST_MISTAKES && in_doubt(&before) {
         let at_bound = first.as_ref().map(at_bound).unwrap_or_default();
+        now.pipeline.fit.give_up_above_m =
+            first.as_ref().map(|f| HOPELESS * f.calibration.judged().nominal.mean_m);
         let (mut tried, mut within) = (Vec::new(), Vec::new());
         for some in hypotheses(&now, &at_bound) {
             // A frame that is let go takes a share of anything: what is rarer may still fit better.

@@ -42,6 +42,9 @@ const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
 /// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
 const TRIED_ROWS: f64 = 5.0;
 
+/// Motion of a joint [rad] (prismatic: [m]) up to which the tip is where it was, whatever the uncertain parameters.
+const RESTING_RAD: f64 = 1e-4;
+
 /// Times the uncertain parameters are estimated anew, and the change at which they stay, in standard deviations.
 const MODEL_ROUNDS: usize = 3;
 const MODEL_SETTLED: f64 = 0.05;
@@ -336,7 +339,10 @@ impl<'a> Streams<'a> {
         if so_far.is_empty() {
             return None;
         }
-        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS);
+        let moved = |from: usize, to: usize| {
+            self.joints.joint_rad.iter().any(|column| (column[to] - column[from]).abs() > RESTING_RAD)
+        };
+        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS, &moved);
         let thin = JointSamples {
             time_ns: rows.iter().map(|row| self.joints.time_ns[*row]).collect(),
             joint_rad: self

@@ -208,7 +208,7 @@ impl Effects {
 
     /// The tree before a pose deforms it.
     pub fn tree_at(&self, p: &[f64]) -> TreeAt<'_> {
-        TreeAt::of(&self.tree, self.extended(p))
+        TreeAt::of(&self.tree, self.extended(p), None)
     }
 
     /// A feature of the deformed arm and its derivatives by every parameter; `tree` is that of [`Effects::tree_at`].

@@ -6,7 +6,7 @@ use super::prediction::{measured_m, seated_m};
 use crate::effects::Effects;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::segment::{LinearisedSegment, Segment};
-use crate::tree::TreeAt;
+use crate::tree::{Asked, TreeAt};
 use armcal_core::{Against, FeatureId, Observation};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -27,10 +27,15 @@ enum Arm<'a> {
 }
 
 impl<'a> Linearisation<'a> {
-    /// For these observations.
-    pub fn of(model: &'a Model, p: &'a [f64], observations: &[&Observation]) -> Linearisation<'a> {
+    /// For these observations and the parameters `asked` for: columns of others may be zero.
+    pub fn of(
+        model: &'a Model,
+        p: &'a [f64],
+        observations: &[&Observation],
+        asked: &Asked<'_>,
+    ) -> Linearisation<'a> {
         let arm = match &model.effects {
-            None => Arm::Rigid(TreeAt::of(&model.tree, p)),
+            None => Arm::Rigid(TreeAt::of(&model.tree, p, Some(asked))),
             Some(effects) => Arm::Deformed(effects, effects.tree_at(p)),
         };
         let seated = observations.iter().filter_map(|o| Some((o.dwell.recording, model.board_under(o)?)));

@@ -6,6 +6,7 @@ use super::measurement::Sides;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::Segment;
+use crate::tree::Asked;
 use armcal_core::{Against, FeatureId, Observation};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};
 
@@ -44,21 +45,24 @@ impl Model {
             let (residual, jacobian) = model.residual_with_jacobian(&own, o);
             return (residual, self.by_all(&jacobian, o));
         }
-        Linearisation::of(self, p, &[o]).residual_with_jacobian(o)
+        Linearisation::of(self, p, &[o], &|_| true).residual_with_jacobian(o)
     }
 
-    /// [`Model::residual_with_jacobian`] of many observations at the same parameters, in their order: what is alike for
-    /// all of them is worked out once, where no recording has parameters of its own.
+    /// Calls `each` with the [`Model::residual_with_jacobian`] of every one of many observations at the same parameters, in
+    /// their order: what is alike for all of them is worked out once, where no recording has parameters of its own, and
+    /// columns of parameters that are not `asked` for may be zero.
     pub fn residuals_with_jacobians(
         &self,
         p: &[f64],
         observations: &[&Observation],
-    ) -> Vec<(ModelResidual, DMatrix<f64>)> {
+        asked: &Asked<'_>,
+        each: &mut dyn FnMut(&Observation, (ModelResidual, DMatrix<f64>)),
+    ) {
         if self.scopes.is_some() {
-            return observations.iter().map(|o| self.residual_with_jacobian(p, o)).collect();
+            return observations.iter().for_each(|o| each(o, self.residual_with_jacobian(p, o)));
         }
-        let at = Linearisation::of(self, p, observations);
-        observations.iter().map(|o| at.residual_with_jacobian(o)).collect()
+        let at = Linearisation::of(self, p, observations, asked);
+        observations.iter().for_each(|o| each(o, at.residual_with_jacobian(o)));
     }
 
     /// d (predicted - measured) / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the
