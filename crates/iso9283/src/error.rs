@@ -62,3 +62,13 @@ pub enum IsoError {
     )]
     NoWeave { stroke_mm: f64 },
 }
+
+/// Fails with fewer than `needed`.
+pub(crate) fn at_least(
+    needed: usize,
+    of: &'static str,
+    given: usize,
+    what: &'static str,
+) -> Result<(), IsoError> {
+    if given < needed { Err(IsoError::TooFew { what, of, needed, given }) } else { Ok(()) }
+}
