@@ -97,30 +97,13 @@ use armcal_core::Pose;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Settings of a mechanism: they can be checked, and built in its initial state.
-pub trait Hidden: Untouched {
+/// Settings of a mechanism, which are the mechanism itself as long as nothing has happened to it.
+pub trait Hidden: Mechanism {
     /// Checks the values.
     fn check(&self, keys: &Keys) -> Result<(), LabError>;
 
-    /// The mechanism at the start of a recording.
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        self.untouched()
-    }
-
     /// What it does to the board while that is made.
     fn machine_board(&self, _board: &mut Board) {}
-}
-
-/// Settings that are the mechanism themselves, as long as nothing has happened to it.
-pub trait Untouched {
-    /// That mechanism.
-    fn untouched(&self) -> Box<dyn Mechanism>;
-}
-
-impl<M: Mechanism + Clone + 'static> Untouched for M {
-    fn untouched(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
-    }
 }
 
 macro_rules! mechanisms {
@@ -136,6 +119,11 @@ macro_rules! mechanisms {
             /// What all kinds have in common.
             pub fn hidden(&self) -> &dyn Hidden {
                 match self { $(MechanismConfig::$name(settings) => settings),* }
+            }
+
+            /// The mechanism at the start of a recording.
+            pub fn mechanism(&self) -> Box<dyn Mechanism> {
+                match self { $(MechanismConfig::$name(settings) => Box::new(settings.clone())),* }
             }
         }
     };

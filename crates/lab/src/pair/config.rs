@@ -3,7 +3,7 @@
 use super::drives::acts_on_drives;
 use super::torso::TorsoConfig;
 use crate::LabError;
-use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, positive, range, value};
+use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, parse, positive, range, value};
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -117,11 +117,7 @@ impl Default for PairTaskConfig {
 impl PairConfig {
     /// Reads and checks a lab file.
     pub fn from_toml(text: &str, path: &Path) -> Result<PairConfig, LabError> {
-        let config: PairConfig = toml::from_str(text).map_err(|source| LabError::Parse {
-            what: "lab file",
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let config: PairConfig = parse("lab file", text, path)?;
         config.check()?;
         Ok(config)
     }
