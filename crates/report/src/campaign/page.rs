@@ -9,7 +9,7 @@ use crate::page::shell::Shell;
 use crate::story::Story;
 use crate::text::millimetres;
 use crate::told_warning::ToldWarning;
-use armcal_campaign::{Row, RowStatus, Series};
+use armcal_campaign::{Row, Series, Status};
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -76,7 +76,7 @@ fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {
         before: mean(row.nominal.mean_m),
         after: mean(row.calibrated.mean_m),
         verdict: &row.verdict,
-        flag: if row.status == RowStatus::Ok { "" } else { row.status.word() },
+        flag: if row.status == Status::Ok { "" } else { row.status.word() },
         warnings: row.warnings.len(),
     }
 }

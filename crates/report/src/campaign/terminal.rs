@@ -60,7 +60,7 @@ fn recordings(pen: &Pen, rows: &[Row]) -> String {
             number(mean(&row.nominal)),
             number(mean(&row.calibrated)),
             Cell::new(printable(&row.missing.join(", "))),
-            Cell::new(if row.status == armcal_campaign::RowStatus::Ok { "" } else { row.status.word() }),
+            Cell::new(if row.status == armcal_campaign::Status::Ok { "" } else { row.status.word() }),
         ]);
     }
     let mut text = pen.render(&table);

@@ -46,8 +46,11 @@ pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow> {
 }
 
 fn recording(run: &Run, r: &RecordingRun, errors: &RecordingErrors) -> RecordingRow {
-    let clock = r.clock.as_ref();
-    let ms = |s: f64| s * 1e3;
+    let no_clock = || {
+        let why = if r.earlier.is_some() { "–" } else { "one clock" };
+        [why, "–"].map(str::to_owned)
+    };
+    let [clock, drift] = r.clock_shown().unwrap_or_else(no_clock);
     RecordingRow {
         name: r.name.clone(),
         dwells: r.found(),
@@ -57,16 +60,8 @@ fn recording(run: &Run, r: &RecordingRun, errors: &RecordingErrors) -> Recording
             .unseen
             .map(|unseen| [errors.nominal, errors.calibrated, unseen].map(|e| millimetres(e.mean_m)).to_vec())
             .unwrap_or_default(),
-        clock: match clock {
-            Some(c) if c.declared => format!("{:.2} declared", ms(c.offset_s)),
-            Some(c) => format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s)),
-            None if r.earlier.is_some() => "–".into(),
-            None => "one clock".into(),
-        },
-        drift: clock.map_or("–".into(), |c| match c.declared {
-            true => format!("{:.1} declared", c.drift * 1e6),
-            false => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
-        }),
+        clock,
+        drift,
         files: r.files().into_iter().enumerate().map(|(at, file)| (file, damage(r, at))).collect(),
         streams: r.report.streams.iter().map(stream).collect(),
     }
