@@ -60,13 +60,13 @@ use std::path::{Path, PathBuf};
 
 /// What a simulation left on disk.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Simulated {
+pub struct Simulated<T = Truth> {
     /// One file a recording, in the order of the session.
     pub recordings: Vec<PathBuf>,
     /// The truth file.
     pub truth: PathBuf,
     /// What it says.
-    pub facts: Truth,
+    pub facts: T,
 }
 
 /// Simulates a session with what `[[mechanisms]]` hides in it, and writes `<recording>.mcap` and `truth.json` into
@@ -87,7 +87,7 @@ pub fn simulate_with(
     let (truth, logs) = run(config, base_dir, mechanisms)?;
     let recordings = write_recordings(&truth, &logs, out_dir)?;
     let path = out_dir.join(TRUTH);
-    truth.write(&path)?;
+    truth::write_json(&truth, &path)?;
     Ok(Simulated { recordings, truth: path, facts: truth })
 }
 

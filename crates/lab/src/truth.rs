@@ -209,11 +209,6 @@ impl Truth {
             recordings: Vec::new(),
         }
     }
-
-    /// Writes it as JSON, atomically.
-    pub fn write(&self, path: &Path) -> Result<(), LabError> {
-        write_json(self, path)
-    }
 }
 
 /// Writes a truth as JSON, atomically.

@@ -194,7 +194,7 @@ impl LabConfig {
     }
 }
 
-fn default_start() -> u64 {
+pub(crate) fn default_start() -> u64 {
     1_760_000_000
 }
 

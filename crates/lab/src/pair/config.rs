@@ -18,7 +18,7 @@ pub struct PairConfig {
     /// Seed of everything random.
     pub seed: u64,
     /// Clock at the start of the first recording [s since 1970]. Default 1760000000.
-    #[serde(default = "default_start")]
+    #[serde(default = "crate::config::default_start")]
     pub start_unix_s: u64,
     /// The arms.
     pub arms: [PairArmConfig; 2],
@@ -206,10 +206,6 @@ fn default_link_kg() -> f64 {
 
 fn is_default_link(link_kg: &f64) -> bool {
     *link_kg == default_link_kg()
-}
-
-fn default_start() -> u64 {
-    1_760_000_000
 }
 
 fn default_recordings() -> Vec<String> {

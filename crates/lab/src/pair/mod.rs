@@ -16,16 +16,17 @@ pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig};
 pub use torso::{TipsSeenConfig, TorsoConfig};
 pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
 
-use crate::LabError;
 use crate::arm::AxisArm;
 use crate::config::DhRow;
 use crate::quick::encoders;
 use crate::random::{Purpose, Stream};
 use crate::rig::{build_rows, small_motion};
+use crate::truth::write_json;
+use crate::{LabError, Simulated};
 use armcal_core::{DwellId, Observation, Pose, Reference};
 use motion::{Motion, Phase};
 use nalgebra::Vector3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The pair of one seed, as built.
 #[derive(Debug, Clone)]
@@ -45,17 +46,6 @@ pub(crate) struct BuiltArm {
     pub world_from_base: Pose,
 }
 
-/// What a simulation of a pair left on disk.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SimulatedPair {
-    /// One file a recording.
-    pub recordings: Vec<PathBuf>,
-    /// The truth file.
-    pub truth: PathBuf,
-    /// What it says.
-    pub facts: PairTruth,
-}
-
 /// What the pipeline would make of the recordings of a pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservedPair {
@@ -66,7 +56,7 @@ pub struct ObservedPair {
 }
 
 /// Simulates a pair and writes `<recording>.mcap` and `truth.json` into `out_dir`, made if need be.
-pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, LabError> {
+pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<Simulated<PairTruth>, LabError> {
     config.check()?;
     let truth_path = out_dir.join(crate::TRUTH);
     crate::may_write(config.recordings.iter().map(String::as_str), out_dir, &truth_path)?;
@@ -82,8 +72,8 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, La
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
         recordings.push(path);
     }
-    truth.write(&truth_path)?;
-    Ok(SimulatedPair { recordings, truth: truth_path, facts: truth })
+    write_json(&truth, &truth_path)?;
+    Ok(Simulated { recordings, truth: truth_path, facts: truth })
 }
 
 /// Observes a pair without recording it.

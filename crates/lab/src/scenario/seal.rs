@@ -2,6 +2,7 @@
 
 use super::Scenario;
 use crate::config::{LabConfig, value};
+use crate::truth::write_json;
 use crate::{LabError, Nominal, board, make_folder, may_write, nothing_hidden, run, write_recordings};
 use armcal_recording::may_write_all;
 use std::fmt::Write as _;
@@ -42,7 +43,7 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
     if let Some(parent) = truth.parent() {
         make_folder(parent)?;
     }
-    facts.write(truth)?;
+    write_json(&facts, truth)?;
     Ok(Sealed { recordings, pipeline, truth: truth.to_owned() })
 }
 

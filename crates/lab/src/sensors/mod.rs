@@ -33,19 +33,19 @@ pub struct Log {
 
 impl Log {
     /// Nothing was recorded yet.
-    pub(crate) fn new(clock: SensorClock) -> Log {
+    pub fn new(clock: SensorClock) -> Log {
         Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() }
     }
 
     /// Announces a channel.
-    pub(crate) fn channel(&mut self, topic: &str, kind: Kind, frame_id: &str, names: &[String]) -> usize {
+    pub fn channel(&mut self, topic: &str, kind: Kind, frame_id: &str, names: &[String]) -> usize {
         let (topic, frame_id, names) = (topic.to_owned(), frame_id.to_owned(), names.to_vec());
         self.channels.push(Channel { topic, kind, frame_id, names });
         self.channels.len() - 1
     }
 
     /// In the order of the log times. Stable: messages logged in the same nanosecond keep the order of their channels.
-    pub(crate) fn in_order(mut self) -> Log {
+    pub fn in_order(mut self) -> Log {
         self.messages.sort_by_key(|message| message.log_ns);
         self
     }
