@@ -45,11 +45,6 @@ impl Judgement {
             Judgement::Broken => "BROKEN",
         }
     }
-
-    /// Whether something was said that is not so, or nothing could be said at all.
-    pub fn is_false(self) -> bool {
-        !matches!(self, Judgement::Right | Judgement::NotShown | Judgement::Missed)
-    }
 }
 
 /// One mistake on one rig, and what came of it.
