@@ -56,11 +56,14 @@ pub enum Body {
     Marker(usize),
 }
 
-/// One hidden physical effect. Every hook defaults to "does nothing".
-pub trait Mechanism: std::fmt::Debug + Send {
+/// What has a name.
+pub trait Named {
     /// Its name, as the truth file records it.
     fn name(&self) -> &str;
+}
 
+/// One hidden physical effect. Every hook defaults to "does nothing".
+pub trait Mechanism: Named + std::fmt::Debug + Send {
     /// The joint, from 1, whose link it puts ahead of the motor while all joints are at these angles, and by how much [rad]:
     /// all that both turning hooks do where it does not matter which side drives.
     fn ahead(&mut self, _now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {

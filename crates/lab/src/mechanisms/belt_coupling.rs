@@ -26,10 +26,6 @@ fn two() -> usize {
 }
 
 impl Mechanism for BeltCoupling {
-    fn name(&self) -> &str {
-        "belt_coupling"
-    }
-
     fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, joint_rad[self.by - 1] * self.share_percent / 100.0))
     }

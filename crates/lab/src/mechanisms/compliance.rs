@@ -38,10 +38,6 @@ impl Compliance {
 }
 
 impl Mechanism for Compliance {
-    fn name(&self) -> &str {
-        "compliance"
-    }
-
     fn ahead(&mut self, now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, self.deflection_rad(now.gravity_nm[self.joint - 1])))
     }

@@ -21,10 +21,6 @@ pub struct CrossedFriction {
 }
 
 impl Mechanism for CrossedFriction {
-    fn name(&self) -> &str {
-        "crossed_friction"
-    }
-
     /// The rubbing part follows the moving joint until its spring is stronger than the friction.
     fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
         let by_rad = joint_rad[self.by - 1];

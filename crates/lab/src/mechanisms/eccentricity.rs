@@ -37,8 +37,6 @@ pub enum MountedOn {
 }
 
 impl Lead for Eccentricity {
-    const KIND: &'static str = "eccentricity";
-
     fn joint(&self) -> usize {
         self.joint
     }

@@ -1,13 +1,11 @@
 //! A transmission that is not quite proportional: the motor leads the link by an angle that depends on where
 //! the link is.
 
+use crate::mechanism::Named;
 use crate::{Mechanism, Moment};
 
 /// The shape of a transmission's error.
-pub(super) trait Lead: std::fmt::Debug + Send {
-    /// Its kind.
-    const KIND: &'static str;
-
+pub(super) trait Lead: Named + std::fmt::Debug + Send {
     /// The joint, from 1.
     fn joint(&self) -> usize;
 
@@ -34,10 +32,6 @@ pub(super) trait Lead: std::fmt::Debug + Send {
 }
 
 impl<L: Lead> Mechanism for L {
-    fn name(&self) -> &str {
-        L::KIND
-    }
-
     fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
         let q = &mut joint_rad[self.joint() - 1];
         if !self.of_reading() {

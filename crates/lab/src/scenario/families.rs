@@ -74,7 +74,7 @@ impl Draw {
         let [channel, driver] = made.enters;
         Ok(Hidden {
             family: family.name.to_owned(),
-            mechanism: made.mechanism.mechanism().name().to_owned(),
+            mechanism: made.mechanism.hidden().name().to_owned(),
             joint: (self.joint > 0).then_some(self.joint),
             recording: self.recording,
             dwell: self.dwell,
