@@ -175,6 +175,7 @@ impl TiltMechanism {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Translation3, UnitQuaternion};
 
     fn tilting() -> Board {
         let mechanism = TiltMechanism::new(MechanismTable {

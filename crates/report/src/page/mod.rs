@@ -109,7 +109,7 @@ struct ReportPage<'a> {
     live: bool,
     verdict: Verdict,
     run: &'a Run,
-    recordings: Vec<quality::RecordingRow>,
+    recordings: Vec<quality::RecordingRow<'a>>,
     markers: Vec<MarkerErrors<'a>>,
     rejections: Vec<quality::RejectionRow>,
     next: &'a [String],
