@@ -72,7 +72,7 @@ pub(super) fn tips_seen(
     let camera_from_robot = armcal_core::Pose::from(seen.robot);
     let still = TransportConfig::default();
     for (arm, topic) in seen.topics.iter().enumerate() {
-        let channel = log.channel(topic, Kind::PoseStamped, "cameras", &[torso.arm.name.clone()]);
+        let channel = log.channel(topic, Kind::PoseStamped, "cameras", std::slice::from_ref(&torso.arm.name));
         let stream = 2 * recording + arm;
         let mut noise = Stream::new(config.seed, Purpose::ViconMarker, stream);
         let mut transport =
