@@ -11,7 +11,7 @@ mod segment;
 mod series;
 
 pub use change::{Change, ChangeKind, changes};
-pub use row::{ErrorFigures, Quantity, Row, RowStatus};
+pub use row::{ErrorFigures, Quantity, Row, Status};
 pub use series::{Series, SeriesPoint, series};
 
 #[cfg(test)]

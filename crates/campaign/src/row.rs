@@ -29,7 +29,7 @@ pub struct Row {
     /// Of these, rejected.
     pub rejected: usize,
     /// Whether the result can be relied upon.
-    pub status: RowStatus,
+    pub status: Status,
     /// Errors of the nominal arm where the fit did not look.
     pub nominal: ErrorFigures,
     /// Errors of the calibrated arm where the fit did not look.
@@ -49,11 +49,11 @@ pub struct Row {
     pub quantities: Vec<Quantity>,
 }
 
-/// Whether the result of a recording can be relied upon.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Whether a result can be relied upon; decides between exit codes 0 and 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum RowStatus {
-    /// Nothing speaks against it.
+pub enum Status {
+    /// Nothing speaks against the result.
     Ok,
     /// The model or the data are inadequate.
     Inadequate,
@@ -61,13 +61,13 @@ pub enum RowStatus {
     DataLost,
 }
 
-impl RowStatus {
+impl Status {
     /// The status as outputs write it.
     pub fn word(self) -> &'static str {
         match self {
-            RowStatus::Ok => "ok",
-            RowStatus::Inadequate => "inadequate",
-            RowStatus::DataLost => "data_lost",
+            Status::Ok => "ok",
+            Status::Inadequate => "inadequate",
+            Status::DataLost => "data_lost",
         }
     }
 }

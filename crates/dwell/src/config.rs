@@ -2,6 +2,7 @@
 
 use crate::DwellError;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// How the sensor's clock is aligned with the robot's (`[clock]` of a pipeline).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,22 +71,15 @@ impl Default for ClockConfig {
 impl ClockConfig {
     /// Checks the values; the key at fault is in the error.
     pub fn check(&self) -> Result<(), DwellError> {
-        let s = "clock";
-        within(s, "max_offset_s", self.max_offset_s, 1e-3, 3600.0, "must be between 0.001 and 3600")?;
-        within(
-            s,
-            "initial_offset_s",
-            self.initial_offset_s,
-            -9e9,
-            9e9,
-            "must be a finite number of seconds",
-        )?;
-        within(s, "max_drift_ppm", self.max_drift_ppm, 0.0, 1e4, "must be between 0 and 10000")?;
-        within(s, "smoothing_s", self.smoothing_s, 1e-3, 10.0, "must be between 0.001 and 10")?;
-        within(s, "max_gap_s", self.max_gap_s, 0.0, 10.0, "must be between 0 and 10")?;
-        within(s, "min_motion_s", self.min_motion_s, 0.0, f64::MAX, "must not be negative")?;
-        within(s, "min_speed_mm_s", self.min_speed_mm_s, 0.0, f64::MAX, "must not be negative")?;
-        within(s, "min_correlation", self.min_correlation, 0.0, 1.0, "must be between 0 and 1")?;
+        let within = |key, value, range, why| within("clock", key, value, range, why);
+        within("max_offset_s", self.max_offset_s, 1e-3..=3600.0, "must be between 0.001 and 3600")?;
+        within("initial_offset_s", self.initial_offset_s, -9e9..=9e9, "must be a finite number of seconds")?;
+        within("max_drift_ppm", self.max_drift_ppm, 0.0..=1e4, "must be between 0 and 10000")?;
+        within("smoothing_s", self.smoothing_s, 1e-3..=10.0, "must be between 0.001 and 10")?;
+        within("max_gap_s", self.max_gap_s, 0.0..=10.0, "must be between 0 and 10")?;
+        within("min_motion_s", self.min_motion_s, 0.0..=f64::MAX, "must not be negative")?;
+        within("min_speed_mm_s", self.min_speed_mm_s, 0.0..=f64::MAX, "must not be negative")?;
+        within("min_correlation", self.min_correlation, 0.0..=1.0, "must be between 0 and 1")?;
         self.check_declared()
     }
 
@@ -108,9 +102,9 @@ impl ClockConfig {
             (None, None, Some(value)) => refuse("drift_ppm", value, "needs offset_ms beside it"),
             (_, offset_ms, drift_ppm) => {
                 let (offset_ms, drift_ppm) = (offset_ms.unwrap_or(0.0), drift_ppm.unwrap_or(0.0));
-                within(s, "offset_ms", offset_ms, -9e12, 9e12, "must be a finite number of milliseconds")?;
+                within(s, "offset_ms", offset_ms, -9e12..=9e12, "must be a finite number of milliseconds")?;
                 let most = self.max_drift_ppm;
-                within(s, "drift_ppm", drift_ppm, -most, most, "must be within max_drift_ppm")
+                within(s, "drift_ppm", drift_ppm, -most..=most, "must be within max_drift_ppm")
             }
         }
     }
@@ -190,18 +184,12 @@ impl Default for DwellConfig {
 impl DwellConfig {
     /// Checks the values; the key at fault is in the error.
     pub fn check(&self) -> Result<(), DwellError> {
-        let s = "dwell";
-        within(s, "min_duration_s", self.min_duration_s, 1e-3, 1e6, "must be at least 0.001")?;
-        within(s, "window_s", self.window_s, 1e-3, 60.0, "must be between 0.001 and 60")?;
-        within(s, "enter_factor", self.enter_factor, 1.0, 1e9, "must be at least 1")?;
-        within(
-            s,
-            "leave_factor",
-            self.leave_factor,
-            self.enter_factor,
-            1e9,
-            "must be at least enter_factor",
-        )?;
+        let within = |key, value, range, why| within("dwell", key, value, range, why);
+        let enter = self.enter_factor;
+        within("min_duration_s", self.min_duration_s, 1e-3..=1e6, "must be at least 0.001")?;
+        within("window_s", self.window_s, 1e-3..=60.0, "must be between 0.001 and 60")?;
+        within("enter_factor", enter, 1.0..=1e9, "must be at least 1")?;
+        within("leave_factor", self.leave_factor, enter..=1e9, "must be at least enter_factor")?;
         for (key, value) in [
             ("max_gap_s", self.max_gap_s),
             ("settle_factor", self.settle_factor),
@@ -217,7 +205,7 @@ impl DwellConfig {
             ("orientation_sigma_floor_deg", self.orientation_sigma_floor_deg),
             ("temperature_max_age_s", self.temperature_max_age_s),
         ] {
-            within(s, key, value, 0.0, f64::MAX, "must be finite and not negative")?;
+            within(key, value, 0.0..=f64::MAX, "must be finite and not negative")?;
         }
         Ok(())
     }
@@ -227,15 +215,10 @@ fn within(
     section: &'static str,
     key: &'static str,
     value: f64,
-    least: f64,
-    most: f64,
+    range: RangeInclusive<f64>,
     why: &'static str,
 ) -> Result<(), DwellError> {
-    if value >= least && value <= most {
-        Ok(())
-    } else {
-        Err(DwellError::Config { section, key, value, why })
-    }
+    if range.contains(&value) { Ok(()) } else { Err(DwellError::Config { section, key, value, why }) }
 }
 
 #[cfg(test)]

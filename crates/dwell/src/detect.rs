@@ -160,28 +160,31 @@ impl Summary<'_> {
         warnings.extend(self.creep(found));
         let few = |d: &&Dwell| d.effective_samples < self.config.min_effective_samples && d.samples > 1;
         let varying = |d: &&Dwell| d.joint_spread_rad.iter().any(|s| *s > 0.0);
-        let poor: Vec<usize> = dwells.iter().filter(varying).filter(few).map(|d| d.id.dwell).collect();
-        if !poor.is_empty() {
-            let message = format!(
-                "{} dwells are worth fewer than {} independent readings ({}); their standard errors are rough, \
-                 hold each pose longer",
-                poor.len(),
-                self.config.min_effective_samples,
-                list(&poor)
-            );
-            warnings.push(say(Severity::Notice, "few-effective-samples", message));
-        }
-        let blind: Vec<usize> = dwells.iter().filter(|d| d.tip.is_none()).map(|d| d.id.dwell).collect();
-        if self.tip.is_some() && !blind.is_empty() {
-            let message = format!(
-                "{} of {} dwells have no tip measurement, the sensor did not see the tip then ({})",
-                blind.len(),
-                dwells.len(),
-                list(&blind)
-            );
-            warnings.push(say(Severity::Notice, "dwell-without-tip", message));
-        }
-        warnings.extend(self.markers.iter().filter_map(|(name, _)| unseen(name, dwells)));
+        let (of, least) = (dwells.len(), self.config.min_effective_samples);
+        let poor = dwells.iter().filter(varying).filter(few);
+        warnings.extend(some("few-effective-samples", "dwells", poor, |n, list| {
+            format!(
+                "{n} dwells are worth fewer than {least} independent readings ({list}); their standard errors are rough, \
+                 hold each pose longer"
+            )
+        }));
+        let blind = dwells.iter().filter(|d| self.tip.is_some() && d.tip.is_none());
+        warnings.extend(some("dwell-without-tip", "dwells", blind, |n, list| {
+            format!(
+                "{n} of {of} dwells have no tip measurement, the sensor did not see the tip then ({list})"
+            )
+        }));
+        // They keep what was seen of the others.
+        let unseen = |(name, _): &(&String, Tip<'_>)| {
+            let blind = dwells.iter().filter(|d| !d.markers.contains_key(*name));
+            some("dwell-without-marker", &format!("marker {name}"), blind, |n, list| {
+                format!(
+                    "the sensor saw it in {} of {of} dwells, not in {list}; what else was seen then is used",
+                    of - n
+                )
+            })
+        };
+        warnings.extend(self.markers.iter().filter_map(unseen));
         warnings
     }
 
@@ -263,25 +266,16 @@ impl Summary<'_> {
     }
 }
 
-/// The dwells in which a marker was not seen; they keep what was seen of the others.
-fn unseen(name: &str, dwells: &[Dwell]) -> Option<Warning> {
-    let blind: Vec<usize> =
-        dwells.iter().filter(|d| !d.markers.contains_key(name)).map(|d| d.id.dwell).collect();
-    (!blind.is_empty()).then(|| {
-        let message = format!(
-            "the sensor saw it in {} of {} dwells, not in {}; what else was seen then is used",
-            dwells.len() - blind.len(),
-            dwells.len(),
-            list(&blind)
-        );
-        Warning::new(
-            Severity::Notice,
-            Stage::Dwell,
-            "dwell-without-marker",
-            format!("marker {name}"),
-            message,
-        )
-    })
+/// What is to be noticed of some dwells, given how many and which; nothing of none.
+fn some<'d>(
+    code: &'static str,
+    subject: &str,
+    dwells: impl Iterator<Item = &'d Dwell>,
+    message: impl Fn(usize, String) -> String,
+) -> Option<Warning> {
+    let which: Vec<usize> = dwells.map(|d| d.id.dwell).collect();
+    let told = || message(which.len(), list(&which));
+    (!which.is_empty()).then(|| Warning::new(Severity::Notice, Stage::Dwell, code, subject, told()))
 }
 
 /// How far each joint went from one dwell to the next [rad].

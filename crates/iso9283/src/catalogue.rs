@@ -24,40 +24,32 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Symbol of the SI unit.
-    pub fn symbol(self) -> &'static str {
+    /// Symbol of the SI unit, that of the unit shown to people (the standard's own), and how many of these it is.
+    fn units(self) -> (&'static str, &'static str, f64) {
+        let of = |unit: Unit| (unit.symbol(), unit.display_symbol(), unit.to_display(1.0));
         match self {
-            Quantity::Length => Unit::Metre.symbol(),
-            Quantity::Angle => Unit::Radian.symbol(),
-            Quantity::Duration => Unit::Second.symbol(),
-            Quantity::Speed => Unit::MetrePerSecond.symbol(),
-            Quantity::Ratio => Unit::One.symbol(),
-            Quantity::Compliance => "m/N",
+            Quantity::Length => of(Unit::Metre),
+            Quantity::Angle => of(Unit::Radian),
+            Quantity::Duration => of(Unit::Second),
+            Quantity::Speed => of(Unit::MetrePerSecond),
+            Quantity::Ratio => (Unit::One.symbol(), "%", 100.0),
+            Quantity::Compliance => ("m/N", "mm/N", 1e3),
         }
     }
 
-    /// Symbol of the unit shown to people, the standard's own.
+    /// Symbol of the SI unit.
+    pub fn symbol(self) -> &'static str {
+        self.units().0
+    }
+
+    /// Symbol of the unit shown to people.
     pub fn display_symbol(self) -> &'static str {
-        match self {
-            Quantity::Length => Unit::Metre.display_symbol(),
-            Quantity::Angle => Unit::Radian.display_symbol(),
-            Quantity::Duration => Unit::Second.display_symbol(),
-            Quantity::Speed => Unit::MetrePerSecond.display_symbol(),
-            Quantity::Ratio => "%",
-            Quantity::Compliance => "mm/N",
-        }
+        self.units().1
     }
 
     /// Converts an SI value to the unit shown to people.
     pub fn to_display(self, si: f64) -> f64 {
-        match self {
-            Quantity::Length => Unit::Metre.to_display(si),
-            Quantity::Angle => Unit::Radian.to_display(si),
-            Quantity::Duration => si,
-            Quantity::Speed => Unit::MetrePerSecond.to_display(si),
-            Quantity::Ratio => si * 100.0,
-            Quantity::Compliance => si * 1e3,
-        }
+        si * self.units().2
     }
 }
 

@@ -1,6 +1,7 @@
 //! Clause 10: static compliance, the displacement of the tip per unit of load.
 
 use crate::IsoError;
+use crate::error::at_least;
 use crate::stats::{largest, mean};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -20,10 +21,7 @@ pub struct LoadStep {
 ///
 /// Fails without a load, where a number is not finite, or where a force is zero.
 pub fn static_compliance_m_n(steps: &[LoadStep]) -> Result<f64, IsoError> {
-    const WHAT: &str = "static compliance";
-    if steps.is_empty() {
-        return Err(IsoError::TooFew { what: WHAT, of: "loads", needed: 1, given: 0 });
-    }
+    at_least(1, "loads", steps.len(), "static compliance")?;
     let finite = |step: &LoadStep| step.force_n.iter().chain(&step.displacement_m).all(|v| v.is_finite());
     if let Some(index) = steps.iter().position(|step| !finite(step)) {
         return Err(IsoError::NotFinite { what: "loads of static compliance".into(), index });

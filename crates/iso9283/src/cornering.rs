@@ -3,6 +3,7 @@
 
 use crate::IsoError;
 use crate::command::Corner;
+use crate::error::at_least;
 use crate::stats::{largest, mean};
 use nalgebra::Vector3;
 
@@ -51,13 +52,9 @@ fn distance_m(point_m: &Vector3<f64>, from_m: &Vector3<f64>, to_m: &Vector3<f64>
 }
 
 fn check(what: &'static str, runs: &[Vec<Vector3<f64>>]) -> Result<(), IsoError> {
-    if runs.is_empty() {
-        return Err(IsoError::TooFew { what, of: "cycles", needed: 1, given: 0 });
-    }
+    at_least(1, "cycles", runs.len(), what)?;
     for run in runs {
-        if run.len() < 2 {
-            return Err(IsoError::TooFew { what, of: "samples in each cycle", needed: 2, given: run.len() });
-        }
+        at_least(2, "samples in each cycle", run.len(), what)?;
         if let Some(index) = run.iter().position(|p| p.iter().any(|v| !v.is_finite())) {
             return Err(IsoError::NotFinite { what: format!("positions of {what}"), index });
         }

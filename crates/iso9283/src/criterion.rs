@@ -1,6 +1,8 @@
 //! What an assessment says: every criterion that could be computed, and every other one with the reason.
 
+use crate::IsoError;
 use crate::catalogue::{CHARACTERISTICS, Characteristic, Component, Quantity};
+use crate::pose::Deviation;
 use armcal_core::listed;
 use serde::{Serialize, Serializer};
 
@@ -139,6 +141,30 @@ impl Findings {
             notes: few.into_iter().chain(place.notes.iter().cloned()).collect(),
         };
         self.found.push((what, component, criterion));
+    }
+
+    /// The only part, or why there is none.
+    pub fn tell(&mut self, what: &'static Characteristic, value: Result<f64, IsoError>, place: &Place<'_>) {
+        match value {
+            Ok(value) => self.give(what, Component::Only, value, place),
+            Err(why) => self.lack(what, place.at, why),
+        }
+    }
+
+    /// Position and angles, or why there are none.
+    pub fn tell_deviation(
+        &mut self,
+        what: &'static Characteristic,
+        deviation: Result<Deviation, IsoError>,
+        place: &Place<'_>,
+    ) {
+        match deviation {
+            Ok(deviation) => {
+                self.give(what, Component::Position, deviation.position_m, place);
+                self.give_angles(what, deviation.angles_rad, place);
+            }
+            Err(why) => self.lack(what, place.at, why),
+        }
     }
 
     /// Three parts at once.

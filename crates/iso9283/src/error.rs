@@ -4,51 +4,29 @@ use thiserror::Error;
 
 /// What can go wrong between poses and criteria.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum IsoError {
     /// Fewer cycles, poses or points than the formula can do with.
     #[error("{what} needs at least {needed} {of}, and has {given}")]
-    TooFew {
-        /// The criterion, or the input it is computed from.
-        what: &'static str,
-        /// What there are too few of.
-        of: &'static str,
-        /// How many the formula can do with.
-        needed: usize,
-        /// How many there are.
-        given: usize,
-    },
+    TooFew { what: &'static str, of: &'static str, needed: usize, given: usize },
     /// A coordinate is NaN or infinite.
     #[error(
         "{what}: number {index} has a coordinate that is not finite: leave out frames in which the tip was not seen"
     )]
     NotFinite {
-        /// The input.
         what: String,
         /// Its index in the list, from 0.
         index: usize,
     },
     /// A number that must be positive is not.
     #[error("{what} is {value}: it must be finite and above zero")]
-    NotPositive {
-        /// The number.
-        what: String,
-        /// Its value.
-        value: f64,
-    },
+    NotPositive { what: String, value: f64 },
     /// Two lists that belong together differ in length.
     #[error("{what}: {left} and {right} entries belong together one by one")]
-    Uneven {
-        /// The two lists.
-        what: &'static str,
-        /// Length of the first.
-        left: usize,
-        /// Length of the second.
-        right: usize,
-    },
+    Uneven { what: &'static str, left: usize, right: usize },
     /// Times run backwards.
     #[error("{what}: sample {index} is not later than the one before it: sort the samples by time")]
     TimeNotIncreasing {
-        /// The input.
         what: String,
         /// Index of the sample, from 0.
         index: usize,
@@ -59,31 +37,22 @@ pub enum IsoError {
          that name: give poses that differ different names (a tilted board's cavities, for one)"
     )]
     CommandMoved {
-        /// Name of the pose.
         pose: String,
         /// Index of the visit, from 0.
         visit: usize,
-        /// Distance of the two commanded positions [mm].
         distance_mm: f64,
-        /// Angle between the two commanded orientations [deg].
         angle_deg: f64,
     },
     /// The samples begin inside the limit band.
     #[error(
         "the samples begin inside the limit band of {band_mm:.3} mm: record the approach from further away"
     )]
-    CrossingNotSeen {
-        /// Radius of the limit band [mm].
-        band_mm: f64,
-    },
+    CrossingNotSeen { band_mm: f64 },
     /// The samples end outside the limit band.
     #[error(
         "the samples end outside the limit band of {band_mm:.3} mm: record until the arm rests, or widen the band"
     )]
-    NeverSettles {
-        /// Radius of the limit band [mm].
-        band_mm: f64,
-    },
+    NeverSettles { band_mm: f64 },
     /// A path without length.
     #[error("the command path has no length: give at least two points that differ")]
     NoLength,
@@ -91,8 +60,15 @@ pub enum IsoError {
     #[error(
         "the attained path does not go four times to a side by an eighth of the commanded stroke of {stroke_mm:.3} mm"
     )]
-    NoWeave {
-        /// Commanded stroke [mm].
-        stroke_mm: f64,
-    },
+    NoWeave { stroke_mm: f64 },
+}
+
+/// Fails with fewer than `needed`.
+pub(crate) fn at_least(
+    needed: usize,
+    of: &'static str,
+    given: usize,
+    what: &'static str,
+) -> Result<(), IsoError> {
+    if given < needed { Err(IsoError::TooFew { what, of, needed, given }) } else { Ok(()) }
 }

@@ -1,9 +1,31 @@
 //! Clause 7.2: pose accuracy AP, pose repeatability RP, multi-directional pose accuracy variation vAP.
 
 use crate::IsoError;
+use crate::error::at_least;
 use crate::stats::{deviation, largest, mean};
 use crate::tip_pose::{TipPose, barycentre, check};
 use nalgebra::Vector3;
+
+/// A deviation of the position, and about x, y, z where every orientation was tracked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviation {
+    /// Of the position [m].
+    pub position_m: f64,
+    /// Of the angles about x, y, z [rad].
+    pub angles_rad: Option<Vector3<f64>>,
+}
+
+impl Deviation {
+    /// The largest of each part.
+    pub(crate) fn largest(all: &[Deviation]) -> Deviation {
+        let turns_rad: Option<Vec<Vector3<f64>>> = all.iter().map(|d| d.angles_rad).collect();
+        Deviation {
+            position_m: largest(all.iter().map(|d| d.position_m)),
+            angles_rad: turns_rad
+                .map(|turns| Vector3::from_fn(|axis, _| largest(turns.iter().map(|t| t[axis].abs())))),
+        }
+    }
+}
 
 /// 7.2.1: where the barycentre of the attained poses lies, seen from the commanded pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +36,13 @@ pub struct PoseAccuracy {
     pub axes_m: Vector3<f64>,
     /// `AP_a, AP_b, AP_c` = mean minus commanded angle about x, y, z [rad].
     pub angles_rad: Option<Vector3<f64>>,
+}
+
+impl PoseAccuracy {
+    /// Without the axes.
+    pub(crate) fn deviation(&self) -> Deviation {
+        Deviation { position_m: self.position_m, angles_rad: self.angles_rad }
+    }
 }
 
 /// Pose accuracy of `attained`, all approached from one direction (ISO 9283:1998, 7.2.1).
@@ -40,6 +69,13 @@ pub struct PoseRepeatability {
     pub angles_rad: Option<Vector3<f64>>,
 }
 
+impl PoseRepeatability {
+    /// Radius and angles.
+    pub(crate) fn deviation(&self) -> Deviation {
+        Deviation { position_m: self.radius_m, angles_rad: self.angles_rad }
+    }
+}
+
 /// Pose repeatability of `attained`, all approached from one direction (ISO 9283:1998, 7.2.2).
 ///
 /// Fails with fewer than two poses, or where one is not finite.
@@ -62,36 +98,20 @@ pub(crate) fn three_deviations(rows: &[Vector3<f64>]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| 3.0 * deviation(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>()))
 }
 
-/// 7.2.3: how far the barycentre moves with the direction of approach.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AccuracyVariation {
-    /// `vAP_P`, the largest distance between the barycentres of two directions [m].
-    pub position_m: f64,
-    /// `vAP_a, vAP_b, vAP_c`, the largest angle between two directions about x, y, z [rad].
-    pub angles_rad: Option<Vector3<f64>>,
-}
-
-/// Multi-directional pose accuracy variation: `directions[h]` are the poses attained from direction h, three
-/// perpendicular ones in the standard (ISO 9283:1998, 7.2.3).
+/// Multi-directional pose accuracy variation vAP, the largest distance and the largest angle between the barycentres of two
+/// directions: `directions[h]` are the poses attained from direction h, three perpendicular ones in the standard (ISO
+/// 9283:1998, 7.2.3).
 ///
 /// Fails with fewer than two directions, with a direction without poses, or where a pose is not finite.
-pub fn accuracy_variation(directions: &[Vec<TipPose>]) -> Result<AccuracyVariation, IsoError> {
+pub fn accuracy_variation(directions: &[Vec<TipPose>]) -> Result<Deviation, IsoError> {
     const WHAT: &str = "multi-directional pose accuracy variation";
-    if directions.len() < 2 {
-        return Err(IsoError::TooFew {
-            what: WHAT,
-            of: "directions of approach",
-            needed: 2,
-            given: directions.len(),
-        });
-    }
+    at_least(2, "directions of approach", directions.len(), WHAT)?;
     directions.iter().try_for_each(|poses| check(WHAT, poses, 1))?;
     let centres: Vec<TipPose> = directions.iter().map(|poses| barycentre(poses)).collect();
-    let pairs = || centres.iter().enumerate().flat_map(|(h, a)| centres[..h].iter().map(move |b| (a, b)));
-    let turns_rad: Option<Vec<Vector3<f64>>> = pairs().map(|(a, b)| a.turn_from_rad(b)).collect();
-    Ok(AccuracyVariation {
-        position_m: largest(pairs().map(|(a, b)| (a.position_m - b.position_m).norm())),
-        angles_rad: turns_rad
-            .map(|turns| Vector3::from_fn(|axis, _| largest(turns.iter().map(|t| t[axis].abs())))),
-    })
+    let pairs = centres.iter().enumerate().flat_map(|(h, a)| centres[..h].iter().map(move |b| (a, b)));
+    let between = |(a, b): (&TipPose, &TipPose)| Deviation {
+        position_m: (a.position_m - b.position_m).norm(),
+        angles_rad: a.turn_from_rad(b),
+    };
+    Ok(Deviation::largest(&pairs.map(between).collect::<Vec<_>>()))
 }

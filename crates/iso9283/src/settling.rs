@@ -1,6 +1,7 @@
 //! Clauses 7.4 and 7.5: position stabilization time t and position overshoot OV, and clause 9: minimum posing time.
 
 use crate::IsoError;
+use crate::error::at_least;
 use crate::stats::{largest, mean};
 use crate::tip_pose::TimedPose;
 use nalgebra::Vector3;
@@ -76,13 +77,13 @@ pub(crate) fn between_ns(from_ns: i64, to_ns: i64, s: f64) -> i64 {
 
 /// Position stabilization time t [s]: the mean over the cycles (ISO 9283:1998, 7.4; it asks for three).
 pub fn stabilization_time_s(cycles: &[Settling]) -> Result<f64, IsoError> {
-    some("position stabilization time", cycles.len())?;
+    at_least(1, "cycles", cycles.len(), "position stabilization time")?;
     Ok(mean(&cycles.iter().map(Settling::time_s).collect::<Vec<_>>()))
 }
 
 /// Position overshoot OV [m]: the largest of the cycles (ISO 9283:1998, 7.5; it asks for three).
 pub fn overshoot_m(cycles: &[Settling]) -> Result<f64, IsoError> {
-    some("position overshoot", cycles.len())?;
+    at_least(1, "cycles", cycles.len(), "position overshoot")?;
     Ok(largest(cycles.iter().map(|cycle| cycle.overshoot_m)))
 }
 
@@ -90,20 +91,13 @@ pub fn overshoot_m(cycles: &[Settling]) -> Result<f64, IsoError> {
 /// stabilization time included; the mean over the cycles (ISO 9283:1998, 9; it asks for three). Each cycle is
 /// departure and arrival [ns].
 pub fn posing_time_s(cycles: &[[i64; 2]]) -> Result<f64, IsoError> {
-    some("minimum posing time", cycles.len())?;
+    at_least(1, "cycles", cycles.len(), "minimum posing time")?;
     Ok(mean(
         &cycles
             .iter()
             .map(|[departed_ns, settled_ns]| elapsed_s(*departed_ns, *settled_ns))
             .collect::<Vec<_>>(),
     ))
-}
-
-fn some(what: &'static str, given: usize) -> Result<(), IsoError> {
-    if given == 0 {
-        return Err(IsoError::TooFew { what, of: "cycles", needed: 1, given });
-    }
-    Ok(())
 }
 
 /// Fails unless samples are finite and in strict order of time.

@@ -6,6 +6,7 @@
 //! orientations the two agree to first order.
 
 use crate::IsoError;
+use crate::error::at_least;
 use armcal_core::Pose;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -86,9 +87,7 @@ fn mean_orientation(poses: &[TipPose]) -> Option<UnitQuaternion<f64>> {
 
 /// Fails unless there are at least `least` poses for the criterion `what`, all finite.
 pub(crate) fn check(what: &'static str, poses: &[TipPose], least: usize) -> Result<(), IsoError> {
-    if poses.len() < least {
-        return Err(IsoError::TooFew { what, of: "cycles", needed: least, given: poses.len() });
-    }
+    at_least(least, "cycles", poses.len(), what)?;
     match poses.iter().position(|p| !p.is_finite()) {
         Some(index) => Err(IsoError::NotFinite { what: format!("poses of {what}"), index }),
         None => Ok(()),

@@ -4,6 +4,7 @@
 //! at constant speed.
 
 use crate::IsoError;
+use crate::error::at_least;
 use crate::stats::{deviation, largest, mean};
 
 /// Path velocity accuracy `AV = (v_mean - v_c) / v_c` as a ratio, `v_mean` the mean over cycles of their mean speeds
@@ -45,9 +46,7 @@ fn check(what: &'static str, commanded_m_s: f64, runs: &[Vec<f64>], least: usize
     if !(commanded_m_s.is_finite() && commanded_m_s > 0.0) {
         return Err(IsoError::NotPositive { what: "the commanded speed [m/s]".into(), value: commanded_m_s });
     }
-    if runs.len() < least {
-        return Err(IsoError::TooFew { what, of: "cycles", needed: least, given: runs.len() });
-    }
+    at_least(least, "cycles", runs.len(), what)?;
     if let Some(index) = runs.iter().position(|run| run.is_empty() || run.iter().any(|v| !v.is_finite())) {
         return Err(IsoError::NotFinite { what: format!("speeds of {what}"), index });
     }

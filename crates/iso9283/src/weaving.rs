@@ -3,6 +3,7 @@
 
 use crate::IsoError;
 use crate::command::CommandPath;
+use crate::error::at_least;
 use crate::settling::{between_ns, check_run, elapsed_s};
 use crate::stats::mean;
 use crate::tip_pose::TimedPose;
@@ -41,9 +42,7 @@ fn relative(
         return Err(IsoError::NotPositive { what: format!("the command of {what}"), value: commanded });
     }
     let attained: Vec<f64> = attained.collect();
-    if attained.is_empty() {
-        return Err(IsoError::TooFew { what, of: "cycles", needed: 1, given: 0 });
-    }
+    at_least(1, "cycles", attained.len(), what)?;
     Ok((mean(&attained) - commanded) / commanded)
 }
 

@@ -6,9 +6,9 @@
 //! common normal by `a`, the next axis twisted about that normal by `alpha`.
 
 use crate::config::DhRow;
-use crate::screw::{Line, turn};
+use crate::screw::{Line, pose, turn};
 use armcal_core::Pose;
-use nalgebra::{Isometry3, Matrix3, Matrix3xX, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix3xX, Vector3};
 
 /// An arm at rest in its zero position, in its base frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,13 +69,24 @@ impl AxisArm {
     /// A body fixed to the link of joint `link`, `at_m` from where that ends, along the axes of the base in the zero position,
     /// where it is [base frame].
     pub fn carried_pose(&self, link: usize, at_m: &Vector3<f64>, joint_rad: &[f64]) -> Pose {
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()]
-            .map(|axis| (0..=link).rev().fold(axis, |v, j| turn(&self.axes[j].direction, &v, joint_rad[j])));
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
-        Isometry3::from_parts(
-            Translation3::from(self.carried(link, &(self.link_end_m(link) + at_m), joint_rad)),
-            UnitQuaternion::from_rotation_matrix(&rotation),
+        self.carried_frame(
+            link,
+            &(self.link_end_m(link) + at_m),
+            [Vector3::x(), Vector3::y(), Vector3::z()],
+            joint_rad,
         )
+    }
+
+    fn carried_frame(
+        &self,
+        link: usize,
+        at_m: &Vector3<f64>,
+        axes: [Vector3<f64>; 3],
+        joint_rad: &[f64],
+    ) -> Pose {
+        let turned =
+            |axis| (0..=link).rev().fold(axis, |v, j| turn(&self.axes[j].direction, &v, joint_rad[j]));
+        pose(self.carried(link, at_m, joint_rad), &axes.map(turned))
     }
 
     /// The tip [m, base frame].
@@ -85,14 +96,7 @@ impl AxisArm {
 
     /// The tip frame in the base frame.
     pub fn tip_pose(&self, joint_rad: &[f64]) -> Pose {
-        let axes = self.tip_axes.map(|axis| {
-            (0..self.joint_count()).rev().fold(axis, |v, j| turn(&self.axes[j].direction, &v, joint_rad[j]))
-        });
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
-        Isometry3::from_parts(
-            Translation3::from(self.tip(joint_rad)),
-            UnitQuaternion::from_rotation_matrix(&rotation),
-        )
+        self.carried_frame(self.joint_count() - 1, &self.tip_m, self.tip_axes, joint_rad)
     }
 
     /// The joint axes where they are at these angles.

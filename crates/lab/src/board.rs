@@ -1,10 +1,10 @@
 //! The calibration board: as drawn, as machined, as tilted.
 
 use crate::random::{Purpose, Stream};
-use crate::screw::{Line, turn};
+use crate::screw::{Line, pose, turn};
 use crate::{LabError, config};
 use armcal_core::Pose;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -68,12 +68,7 @@ struct CavityTable {
 impl Board {
     /// Reads a board file and machines one such board: every cavity off by its tolerance, the file's or `true_mm`.
     pub fn machine(path: &Path, seed: u64, true_mm: Option<f64>) -> Result<Board, LabError> {
-        let text = drawing(path)?;
-        let file: BoardFile = toml::from_str(&text).map_err(|source| LabError::Parse {
-            what: "board file",
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let file: BoardFile = config::parse("board file", &drawing(path)?, path)?;
         config::not_negative("cavity_sigma_mm", file.cavity_sigma_mm)?;
         config::not_negative("seat_sigma_mm", file.seat_sigma_mm)?;
         if file.cavities.is_empty() {
@@ -173,14 +168,14 @@ impl TiltMechanism {
         let origin = self.pitch.turn_point(&self.roll.turn_point(&Vector3::zeros(), roll_rad), pitch_rad);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()]
             .map(|v| turn(&self.pitch.direction, &turn(&self.roll.direction, &v, roll_rad), pitch_rad));
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
-        Isometry3::from_parts(Translation3::from(origin), UnitQuaternion::from_rotation_matrix(&rotation))
+        pose(origin, &axes)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Translation3, UnitQuaternion};
 
     fn tilting() -> Board {
         let mechanism = TiltMechanism::new(MechanismTable {

@@ -209,25 +209,25 @@ impl<'a> Engine<'a> {
     }
 
     fn moment(&self) -> Moment<'_> {
-        let time_s = self.time_s;
-        let session_s = time_s + self.recording as f64 * self.config.interval_s;
+        let session_s = self.session_s();
         Moment {
-            time_s,
+            time_s: self.time_s,
             session_s,
             recording: self.recording,
-            temperature_c: self.config.temperature.at(session_s),
             warmer_k: self.config.temperature.at(session_s) - self.config.temperature.start_c,
             motors_lead: self.config.hand.motors_lead,
-            load_kg: self.config.recordings[self.recording].load_kg,
             arm: &self.arm,
             masses_kg: &self.rig.masses_kg,
             tip_kg: self.tip_kg(),
             gravity_m_s2: &self.rig.gravity_m_s2,
-            motor_rad: &self.servo.angle_rad,
             link_rad: &self.link_rad,
-            speed_rad_s: &self.servo.speed_rad_s,
             gravity_nm: &self.gravity_nm,
         }
+    }
+
+    /// Time since the start of the session [s].
+    fn session_s(&self) -> f64 {
+        self.time_s + self.recording as f64 * self.config.interval_s
     }
 
     /// Mass at the tip: the tool and what it carries [kg].
@@ -296,7 +296,7 @@ impl<'a> Engine<'a> {
     }
 
     fn push(&mut self, tip: Pose, [seen_tip, seen_table, seen_base]: [Pose; 3]) {
-        let temperature_c = self.moment().temperature_c;
+        let temperature_c = self.config.temperature.at(self.session_s());
         let trace = &mut self.trace;
         trace.time_s.push(self.time_s);
         trace.temperature_c.push(temperature_c);

@@ -4,56 +4,30 @@ use std::path::PathBuf;
 
 /// Why a simulation could not be run.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum LabError {
     /// A file named by the configuration could not be read.
     #[error("reading the {what} {path}: {source}", path = path.display())]
-    Read {
-        /// What the file is.
-        what: &'static str,
-        /// Where it was looked for.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Read { what: &'static str, path: PathBuf, source: std::io::Error },
     /// A TOML file does not say what it should.
     #[error("the {what} {path} is not valid: {source}", path = path.display())]
-    Parse {
-        /// What the file is.
-        what: &'static str,
-        /// The file.
-        path: PathBuf,
-        /// Position and reason.
-        source: Box<toml::de::Error>,
-    },
+    Parse { what: &'static str, path: PathBuf, source: Box<toml::de::Error> },
     /// A file of set-points does not say what it should.
     #[error("the set-points {path}: {why}", path = path.display())]
-    SetPoints {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong and what would be right.
-        why: String,
-    },
+    SetPoints { path: PathBuf, why: String },
     /// A value that the lab cannot work with.
     #[error("lab key `{key}`: {why}")]
-    Value {
-        /// The key, with its tables.
-        key: String,
-        /// What is wrong and what would be right.
-        why: String,
-    },
+    Value { key: String, why: String },
     /// The true or the nominal arm cannot get to where the task sends it.
     #[error(
         "recording `{recording}`: the {arm} arm stays {short_by_mm:.1} mm away from {what}; move the board \
          (`board.in_base`) or choose another seed"
     )]
     Unreachable {
-        /// Name of the recording.
         recording: String,
         /// `true` or `nominal`.
         arm: &'static str,
-        /// The place.
         what: String,
-        /// How far the arm falls short [mm].
         short_by_mm: f64,
     },
     /// One of two joined arms cannot get to where the hand leads the tips.
@@ -61,52 +35,23 @@ pub enum LabError {
         "recording `{recording}`: an arm stays {short_by_mm:.1} mm away from {what}; narrow `task.region_m`, move \
          `arms.base` or choose another seed"
     )]
-    JoinedOutOfReach {
-        /// Name of the recording.
-        recording: String,
-        /// The place.
-        what: String,
-        /// How far the arm falls short [mm].
-        short_by_mm: f64,
-    },
+    JoinedOutOfReach { recording: String, what: String, short_by_mm: f64 },
     /// No free pose that keeps clear of the board was found.
     #[error(
         "recording `{recording}`: found only {found} of {wanted} free poses that keep clear of the board and of \
          the arm's own axis; widen `task.free.range_deg` or lower `task.free.poses`"
     )]
-    NoFreePose {
-        /// Name of the recording.
-        recording: String,
-        /// Poses found.
-        found: usize,
-        /// Poses asked for.
-        wanted: usize,
-    },
+    NoFreePose { recording: String, found: usize, wanted: usize },
     /// The folder of the results could not be made.
     #[error("making the folder {path}: {source}", path = path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Folder { path: PathBuf, source: std::io::Error },
     /// A recording could not be written.
     #[error("writing the recording {path}: {source}", path = path.display())]
-    Recording {
-        /// The file.
-        path: PathBuf,
-        /// The writer's reason.
-        source: Box<armcal_recording::RecordingError>,
-    },
+    Recording { path: PathBuf, source: Box<armcal_recording::RecordingError> },
     /// An output would replace what must stay.
     #[error(transparent)]
     InTheWay(#[from] armcal_recording::RecordingError),
     /// The truth file could not be written.
     #[error("writing the truth {path}: {why}", path = path.display())]
-    Truth {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        why: String,
-    },
+    Truth { path: PathBuf, why: String },
 }

@@ -46,7 +46,7 @@ pub mod truth;
 
 pub use config::LabConfig;
 pub use error::LabError;
-pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, nothing_hidden};
+pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, Named, nothing_hidden};
 pub use quick::{Nominal, NominalBoard, Observed, observe, observe_from};
 pub use trace::RestKind;
 pub use truth::{DwellTruth, RecordingTruth, SetPointTruth, Truth};
@@ -60,13 +60,13 @@ use std::path::{Path, PathBuf};
 
 /// What a simulation left on disk.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Simulated {
+pub struct Simulated<T = Truth> {
     /// One file a recording, in the order of the session.
     pub recordings: Vec<PathBuf>,
     /// The truth file.
     pub truth: PathBuf,
     /// What it says.
-    pub facts: Truth,
+    pub facts: T,
 }
 
 /// Simulates a session with what `[[mechanisms]]` hides in it, and writes `<recording>.mcap` and `truth.json` into
@@ -85,16 +85,9 @@ pub fn simulate_with(
     note_inputs(config, base_dir);
     may_write(config.recordings.iter().map(|r| r.name.as_str()), out_dir, &out_dir.join(TRUTH))?;
     let (truth, logs) = run(config, base_dir, mechanisms)?;
-    let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
-    std::fs::create_dir_all(out_dir).map_err(refused)?;
-    let mut recordings = Vec::new();
-    for (log, recording) in logs.iter().zip(&truth.recordings) {
-        let path = out_dir.join(&recording.file);
-        record::write(&path, &config.name, &recording.name, log)?;
-        recordings.push(path);
-    }
+    let recordings = write_recordings(&truth, &logs, out_dir)?;
     let path = out_dir.join(TRUTH);
-    truth.write(&path)?;
+    truth::write_json(&truth, &path)?;
     Ok(Simulated { recordings, truth: path, facts: truth })
 }
 
@@ -120,6 +113,20 @@ pub(crate) fn may_write<'a>(
 ) -> Result<(), LabError> {
     let recordings = recordings.map(|name| folder.join(recording_file(name)));
     Ok(armcal_recording::may_write_all(recordings.chain([truth.to_owned()]))?)
+}
+
+/// Writes the recordings of a session into a folder, made if need be.
+pub(crate) fn write_recordings(truth: &Truth, logs: &[Log], folder: &Path) -> Result<Vec<PathBuf>, LabError> {
+    make_folder(folder)?;
+    let write = |(recording, log): (&RecordingTruth, &Log)| {
+        let path = folder.join(&recording.file);
+        record::write(&path, &truth.config.name, &recording.name, log).map(|()| path)
+    };
+    truth.recordings.iter().zip(logs).map(write).collect()
+}
+
+pub(crate) fn make_folder(path: &Path) -> Result<(), LabError> {
+    std::fs::create_dir_all(path).map_err(|source| LabError::Folder { path: path.to_owned(), source })
 }
 
 /// Simulates a session without writing anything: the truth, and one log a recording.
@@ -157,7 +164,7 @@ pub fn run(
 
 /// The mechanisms of the configuration, in their initial state.
 fn hidden_in(config: &LabConfig) -> impl Iterator<Item = Box<dyn Mechanism>> {
-    config.mechanisms.iter().map(|m| m.hidden().mechanism())
+    config.mechanisms.iter().map(|m| m.mechanism())
 }
 
 fn one(

@@ -25,14 +25,10 @@ pub struct Moment<'a> {
     pub session_s: f64,
     /// Index of the recording.
     pub recording: usize,
-    /// Temperature of the arm [degC].
-    pub temperature_c: f64,
-    /// How much warmer that is than at the start of the session [K].
+    /// How much warmer the arm is than at the start of the session [K].
     pub warmer_k: f64,
     /// Whether a path that is given on the link side is driven by the motors: they lead, and the links follow.
     pub motors_lead: bool,
-    /// Load at the tip [kg].
-    pub load_kg: f64,
     /// The arm as it is at this moment.
     pub arm: &'a AxisArm,
     /// True mass of each link [kg].
@@ -41,12 +37,8 @@ pub struct Moment<'a> {
     pub tip_kg: f64,
     /// Gravity in the base frame [m/s^2].
     pub gravity_m_s2: &'a nalgebra::Vector3<f64>,
-    /// Motor-side joint angles [rad].
-    pub motor_rad: &'a [f64],
     /// Link-side joint angles [rad].
     pub link_rad: &'a [f64],
-    /// Motor-side joint speeds [rad/s].
-    pub speed_rad_s: &'a [f64],
     /// Gravity's torque on each joint, `> 0` pushing towards `+q` [N m].
     pub gravity_nm: &'a [f64],
 }
@@ -64,22 +56,34 @@ pub enum Body {
     Marker(usize),
 }
 
-/// One hidden physical effect. Every hook defaults to "does nothing".
-pub trait Mechanism: std::fmt::Debug + Send {
+/// What has a name.
+pub trait Named {
     /// Its name, as the truth file records it.
     fn name(&self) -> &str;
+}
 
-    /// Everything an assertion may want to know about it.
-    fn truth(&self) -> serde_json::Value {
-        serde_json::Value::Null
+/// One hidden physical effect. Every hook defaults to "does nothing".
+pub trait Mechanism: Named + std::fmt::Debug + Send {
+    /// The joint, from 1, whose link it puts ahead of the motor while all joints are at these angles, and by how much [rad]:
+    /// all that both turning hooks do where it does not matter which side drives.
+    fn ahead(&mut self, _now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
+        None
     }
 
     /// The motor drives: turns motor-side angles into link-side angles, in place.
-    fn motor_to_link(&mut self, _now: &Moment<'_>, _joint_rad: &mut [f64]) {}
+    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+        if let Some((joint, by_rad)) = self.ahead(now, joint_rad) {
+            joint_rad[joint - 1] += by_rad;
+        }
+    }
 
     /// The hand drives: turns link-side angles into motor-side angles, in place. With [`Moment::motors_lead`] it is
     /// the motors that take the links there.
-    fn link_to_motor(&mut self, _now: &Moment<'_>, _joint_rad: &mut [f64]) {}
+    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+        if let Some((joint, by_rad)) = self.ahead(now, joint_rad) {
+            joint_rad[joint - 1] -= by_rad;
+        }
+    }
 
     /// Changes the arm's geometry.
     fn reshape_arm(&self, _now: &Moment<'_>, _arm: &mut AxisArm) {}

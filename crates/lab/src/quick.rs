@@ -9,6 +9,7 @@ mod past;
 mod reading;
 
 pub use nominal::{Nominal, NominalBoard};
+pub(crate) use reading::encoders;
 
 use crate::config::LabConfig;
 use crate::engine::Pace;
@@ -21,7 +22,7 @@ use crate::trace::{Rest, RestKind};
 use crate::{LabError, RecordingTruth, Truth, hidden_in};
 use armcal_core::{DwellId, FeatureId, Observation, Reference};
 use nalgebra::Matrix3;
-use reading::Camera;
+use reading::{Camera, MOST_READINGS};
 use std::path::Path;
 
 /// Shortest pause that is taken for a dwell [s].
@@ -73,7 +74,7 @@ fn dwell_s(session: &Session, rest: &Rest) -> [f64; 2] {
 }
 
 fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) -> Vec<Observation> {
-    let mut encoders = Stream::new(config.seed, Purpose::Quick, 2 * recording);
+    let mut draw = Stream::new(config.seed, Purpose::Quick, 2 * recording);
     let duration_s = session.trace.duration_s();
     let mut camera = Camera::new(config, recording, duration_s);
     let markers = 0..config.vicon.markers.len();
@@ -85,7 +86,9 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
         if span_s[1] - span_s[0] < SHORTEST_S {
             continue;
         }
-        let readings = reading::encoders(config, session, rest, span_s, &mut encoders);
+        let readings = ((span_s[1] - span_s[0]) * config.joints.rate_hz).min(MOST_READINGS);
+        let read_rad = &session.trace.reading_rad[rest.last];
+        let [joint_rad, joint_sigma_rad] = encoders(&config.joints, read_rad, readings, &mut draw);
         let seen = camera.tip(&session.trace.seen_tip[rest.last], span_s);
         let (reference, covariance_m2) = match (rest.kind, rest.cavity) {
             (RestKind::Seated, Some(cavity)) => {
@@ -104,13 +107,13 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             feature: FeatureId::TIP,
             dwell: DwellId { recording, dwell },
             time_ns: config.start_ns(recording) + (mid_s * 1e9).round() as i64,
-            arrival: past::arrivals(since, &readings.mean_rad, config.joints.count_rad()),
-            path_memory_rad: Some(past::memories(since, &readings.mean_rad, config.joints.count_rad())),
-            pair_memory_rad: Some(past::pair_memories(since, &readings.mean_rad, config.joints.count_rad())),
-            moved_rad: observations.last().map(|before| past::moved(&before.joint_rad, &readings.mean_rad)),
+            arrival: past::arrivals(since, &joint_rad, config.joints.count_rad()),
+            path_memory_rad: Some(past::memories(since, &joint_rad, config.joints.count_rad())),
+            pair_memory_rad: Some(past::pair_memories(since, &joint_rad, config.joints.count_rad())),
+            moved_rad: observations.last().map(|before| past::moved(&before.joint_rad, &joint_rad)),
             joint_velocity_radps: None,
-            joint_rad: readings.mean_rad,
-            joint_sigma_rad: readings.sigma_rad,
+            joint_rad,
+            joint_sigma_rad,
             effort_nm: None,
             temperature_c: config.temperature.published.then(|| camera.thermometer(temperature)),
             load_kg: config.recordings[recording].load_kg,

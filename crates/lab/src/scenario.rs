@@ -15,12 +15,12 @@ pub use design::{Design, Driving};
 pub use hidden::Hidden;
 pub use seal::{Sealed, seal};
 
-use crate::config::{BoardConfig, LabConfig, value};
+use crate::config::{LabConfig, parse, value};
 use crate::random::{Purpose, Stream};
-use crate::{LabError, Observed, board, observe};
+use crate::{LabError, Observed, observe};
 use families::Draw;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::Path;
 
 /// What to hide, how large, and how the arm moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,7 +115,7 @@ impl Scenario {
 
     /// Draws the rig and hides what is to be hidden.
     pub fn plant(&self) -> Result<Planted, LabError> {
-        let mut config = rig(self.seed);
+        let mut config = rig(self.seed)?;
         self.design.apply(&mut config, self.driving);
         let mut hidden = Vec::new();
         for (part, name) in self.family.split('+').map(str::trim).enumerate() {
@@ -142,34 +142,14 @@ impl Scenario {
     }
 }
 
-/// The paper's rig of one seed, nothing hidden, nothing to do yet. Its name tells nothing.
-fn rig(seed: u64) -> LabConfig {
-    let mut config = LabConfig {
-        name: "rig".into(),
-        seed,
-        start_unix_s: 1_760_000_000,
-        interval_s: 1200.0,
-        arm: Default::default(),
-        base: armcal_core::RollPitchYaw { xyz_m: [1.2, -0.4, 0.75], rpy_deg: [0.4, -0.6, 30.0] },
-        board: BoardConfig {
-            file: PathBuf::from(board::BUILTIN),
-            true_cavity_sigma_mm: None,
-            in_base: armcal_core::RollPitchYaw { xyz_m: [0.42, 0.0, 0.10], rpy_deg: [0.0; 3] },
-            placement_sigma_mm: 3.0,
-            placement_sigma_deg: 0.5,
-            tilt_sigma_deg: 0.1,
-        },
-        task: Default::default(),
-        hand: Default::default(),
-        joints: Default::default(),
-        vicon: Default::default(),
-        temperature: Default::default(),
-        gauges: Vec::new(),
-        recordings: Vec::new(),
-        mechanisms: Vec::new(),
-    };
+/// Everything about the rig that is not a default: its name tells nothing.
+const RIG: &str = "name = 'rig'\nseed = 0\nrecordings = []\nboard.file = 'builtin:paper'";
+
+/// The paper's rig of one seed, nothing hidden, nothing to do yet.
+fn rig(seed: u64) -> Result<LabConfig, LabError> {
+    let mut config = LabConfig { seed, ..parse("lab file", RIG, Path::new("rig"))? };
     config.arm.deviation.mass_percent = 25.0;
-    config
+    Ok(config)
 }
 
 /// Whether these are families that can be hidden, one or several joined by `+`.

@@ -1,7 +1,8 @@
 //! Lines in space and turning about them (Rodrigues' rotation formula). The lab's whole kinematics is
 //! built on these two functions, so that it shares no formula with the models being fitted.
 
-use nalgebra::Vector3;
+use armcal_core::Pose;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// A directed line: a joint axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +37,12 @@ impl Line {
 pub fn turn(axis: &Vector3<f64>, v: &Vector3<f64>, angle_rad: f64) -> Vector3<f64> {
     let (sin, cos) = angle_rad.sin_cos();
     v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos))
+}
+
+/// The pose of a body whose origin is at `origin_m` and whose x, y and z axes point along `axes`.
+pub fn pose(origin_m: Vector3<f64>, axes: &[Vector3<f64>; 3]) -> Pose {
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(axes));
+    Pose::from_parts(origin_m.into(), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
 #[cfg(test)]

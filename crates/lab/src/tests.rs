@@ -261,11 +261,13 @@ struct Play {
     motor_rad: Option<f64>,
 }
 
-impl Mechanism for Play {
+impl Named for Play {
     fn name(&self) -> &str {
         "play"
     }
+}
 
+impl Mechanism for Play {
     fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
         let half = self.width_rad / 2.0;
         let motor = joint_rad[1];

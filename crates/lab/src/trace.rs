@@ -7,9 +7,6 @@ use nalgebra::{Isometry3, Translation3};
 /// Step of the integration [s].
 pub const STEP_S: f64 = 0.002;
 
-/// The same in nanoseconds.
-pub const STEP_NS: i64 = 2_000_000;
-
 /// One column a quantity, one row a step.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {

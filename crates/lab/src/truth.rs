@@ -143,7 +143,7 @@ pub struct SetPointTruth {
 pub struct MechanismTruth {
     /// Its name.
     pub name: String,
-    /// What it says.
+    /// Nothing so far.
     pub truth: serde_json::Value,
 }
 
@@ -209,11 +209,6 @@ impl Truth {
             recordings: Vec::new(),
         }
     }
-
-    /// Writes it as JSON, atomically.
-    pub fn write(&self, path: &Path) -> Result<(), LabError> {
-        write_json(self, path)
-    }
 }
 
 /// Writes a truth as JSON, atomically.
@@ -238,7 +233,8 @@ impl RecordingTruth {
         let start_ns = config.start_ns(recording);
         let set_point = |due: &Due| SetPointTruth::of_due(&session.trace, due, start_ns);
         let dwell = |rest: &Rest| DwellTruth::of_rest(rig, &session.trace, rest, start_ns);
-        let mechanism = |m: &dyn Mechanism| MechanismTruth { name: m.name().into(), truth: m.truth() };
+        let mechanism =
+            |m: &dyn Mechanism| MechanismTruth { name: m.name().into(), truth: serde_json::Value::Null };
         RecordingTruth {
             file: crate::recording_file(&name),
             name,

@@ -5,46 +5,23 @@ use std::path::PathBuf;
 
 /// Why a case could not be made or run: never because of what the program said.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum Error {
     /// The lab refused.
     #[error(transparent)]
     Lab(#[from] LabError),
     /// A shipped TOML text does not parse.
     #[error("parsing the {what}: {source}")]
-    Toml {
-        /// Which text.
-        what: &'static str,
-        /// Why.
-        source: Box<toml::de::Error>,
-    },
+    Toml { what: &'static str, source: Box<toml::de::Error> },
     /// A table could not be written as TOML.
     #[error("writing the {what} as TOML: {source}")]
-    Text {
-        /// Which table.
-        what: &'static str,
-        /// Why.
-        source: Box<toml::ser::Error>,
-    },
+    Text { what: &'static str, source: Box<toml::ser::Error> },
     /// A file or folder could not be used.
     #[error("{doing} {path}: {source}", path = path.display())]
-    File {
-        /// What was being done.
-        doing: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    File { doing: &'static str, path: PathBuf, source: std::io::Error },
     /// A name that is not in the list.
     #[error("no {what} is named `{name}`; known: {known}")]
-    Unknown {
-        /// What was asked for.
-        what: &'static str,
-        /// The name given.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
+    Unknown { what: &'static str, name: String, known: String },
 }
 
 impl Error {

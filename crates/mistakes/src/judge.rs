@@ -45,11 +45,6 @@ impl Judgement {
             Judgement::Broken => "BROKEN",
         }
     }
-
-    /// Whether something was said that is not so, or nothing could be said at all.
-    pub fn is_false(self) -> bool {
-        !matches!(self, Judgement::Right | Judgement::NotShown | Judgement::Missed)
-    }
 }
 
 /// One mistake on one rig, and what came of it.
@@ -93,7 +88,7 @@ impl Case {
 
 /// What of it names the cause, and how right the whole is.
 pub fn judge(said: &Said, cause_name: &str, about: &[String]) -> (Option<String>, Judgement) {
-    let reported = cause(cause_name).and_then(|cause| reported(said, cause, about));
+    let reported = reported(said, cause_name, about);
     let above = |floors: f64| said.ratio().is_none_or(|ratio| ratio.is_nan() || ratio > floors);
     let done = matches!(said.exit, Some(0 | 3));
     let findings = said.statements.iter().any(|s| s.place == Place::Setup);
@@ -110,28 +105,30 @@ pub fn judge(said: &Said, cause_name: &str, about: &[String]) -> (Option<String>
     (reported, judgement)
 }
 
-fn reported(said: &Said, cause: &Cause, about: &[String]) -> Option<String> {
-    let statement = said.statements.iter().find(|s| names(s, cause, about));
+fn reported(said: &Said, name: &str, about: &[String]) -> Option<String> {
+    let cause = cause(name)?;
+    let of_cavity = name == "board-typo";
+    let statement = said.statements.iter().find(|s| names(s, cause, of_cavity, about));
     let label = |s: &Statement| match s.code.as_str() {
         "" => "error message".to_owned(),
         code => code.to_owned(),
     };
     let effect = || {
         let kind = |effect: &str| effect.split([':', '@', ',']).next().unwrap_or_default().to_owned();
-        let named = said.effects.iter().find(|effect| cause.effects.contains(&kind(effect).as_str()));
+        let named = said.effects.iter().find(|effect| cause.effects.contains(&kind(effect)));
         named.filter(|_| said.names()).cloned()
     };
     statement.map(label).or_else(effect)
 }
 
-fn names(statement: &Statement, cause: &Cause, about: &[String]) -> bool {
+fn names(statement: &Statement, cause: &Cause, of_cavity: bool, about: &[String]) -> bool {
     let text = without_checklists(&statement.text.to_lowercase());
-    let code = cause.codes.iter().any(|code| statement.code.contains(code));
-    if !code && !cause.words.iter().any(|word| text.contains(word)) {
+    let code = cause.codes.iter().any(|code| statement.code.contains(code.as_str()));
+    if !code && !cause.words.iter().any(|word| text.contains(word.as_str())) {
         return false;
     }
     // A report about a joint, or about a cavity, has to be about the right one.
-    let particular = statement.code.starts_with("joint") || cause.name == "board-typo";
+    let particular = statement.code.starts_with("joint") || of_cavity;
     about.is_empty() || !particular || about.iter().any(|part| text.contains(&part.to_lowercase()))
 }
 

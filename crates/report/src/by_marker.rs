@@ -1,6 +1,7 @@
 //! Errors by what was measured: the tip and each of its markers, by a sensor or against fixed places.
 
 use crate::run::Run;
+use crate::text::millimetres;
 use armcal_core::Observation;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -20,6 +21,13 @@ pub(crate) struct MarkerErrors<'a> {
     pub fitted_mm: f64,
     /// Mean error that the declared noise alone gives [mm].
     pub floor_mm: f64,
+}
+
+impl MarkerErrors<'_> {
+    /// Mean errors as tables show them [mm]: nominal, fitted, floor.
+    pub fn shown(&self) -> [String; 3] {
+        [self.nominal_mm, self.fitted_mm, self.floor_mm].map(|mm| millimetres(mm * 1e-3))
+    }
 }
 
 /// Whether more than the tip was measured, or against more than sensor and table; not where all are tips that are joined.

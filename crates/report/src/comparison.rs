@@ -109,6 +109,13 @@ impl Comparison {
         }
     }
 
+    /// Held out, all, then each recording.
+    pub(crate) fn differences(&self) -> Vec<(String, Difference)> {
+        let whole = [("held out", self.held_out), ("all", self.all)];
+        let whole = whole.into_iter().filter_map(|(name, d)| Some((name.to_owned(), d?)));
+        whole.chain(self.recordings.iter().cloned()).collect()
+    }
+
     /// The comparison as text, ending in a newline.
     pub fn terminal(&self, style: TerminalStyle) -> String {
         let pen = Pen { style };
@@ -146,21 +153,11 @@ impl Comparison {
     fn errors(&self, pen: &Pen) -> String {
         let mut table =
             pen.table(&["points", "n", "groups", "before", "after", "difference", "95 %", "better", "worse"]);
-        let named = [("held out", &self.held_out), ("all", &self.all)];
-        let rows = named.iter().filter_map(|(name, d)| d.map(|d| ((*name).to_owned(), d)));
-        for (name, d) in rows.chain(self.recordings.iter().cloned()) {
-            let interval = d.ci95_mm.map_or("-".to_owned(), |[low, high]| format!("{low:+.3} to {high:+.3}"));
-            table.add_row(vec![
-                Cell::new(printable(&name)),
-                number(d.n),
-                number(d.groups),
-                number(millimetres(d.before_mm * 1e-3)),
-                number(millimetres(d.after_mm * 1e-3)),
-                number(format!("{:+.3}", d.difference_mm)),
-                number(interval),
-                number(d.better),
-                number(d.worse),
-            ]);
+        for (name, d) in self.differences() {
+            let mut row = vec![Cell::new(printable(&name)), number(d.n), number(d.groups)];
+            row.extend(d.shown("-").map(number));
+            row.extend([d.better, d.worse].map(number));
+            table.add_row(row);
         }
         let mut text = pen.render(&table);
         if !self.unpaired.is_empty() {
@@ -187,14 +184,8 @@ impl Comparison {
     fn parameter_table(&self, pen: &Pen) -> String {
         let mut table = pen.table(&["parameter", "unit", "before", "after", "change", "in 95 % widths"]);
         for m in self.moved.iter().take(2 * LISTED) {
-            table.add_row(vec![
-                Cell::new(printable(&m.name)),
-                Cell::new(&m.unit),
-                number(format!("{:.4}", m.before)),
-                number(format!("{:.4}", m.after)),
-                number(format!("{:+.4}", m.after - m.before)),
-                number(format!("{:.1}", m.in_half_widths)),
-            ]);
+            let name = [Cell::new(printable(&m.name)), Cell::new(&m.unit)];
+            table.add_row(name.into_iter().chain(m.shown().map(number)).collect::<Vec<Cell>>());
         }
         let mut text = pen.render(&table);
         for (what, names) in [("Only after", &self.added), ("Only before", &self.removed)] {
@@ -203,6 +194,27 @@ impl Comparison {
             }
         }
         text
+    }
+}
+
+impl Difference {
+    /// Before, after, the change and its interval, or `none` where there is no interval.
+    pub(crate) fn shown(&self, none: &str) -> [String; 4] {
+        let interval = self.ci95_mm.map(|[low, high]| format!("{low:+.3} to {high:+.3}"));
+        [
+            millimetres(self.before_mm * 1e-3),
+            millimetres(self.after_mm * 1e-3),
+            format!("{:+.3}", self.difference_mm),
+            interval.unwrap_or_else(|| none.to_owned()),
+        ]
+    }
+}
+
+impl Moved {
+    /// Before, after, the change, and that in half widths.
+    pub(crate) fn shown(&self) -> [String; 4] {
+        let [before, after] = [self.before, self.after].map(|v| format!("{v:.4}"));
+        [before, after, format!("{:+.4}", self.after - self.before), format!("{:.1}", self.in_half_widths)]
     }
 }
 

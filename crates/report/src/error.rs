@@ -4,32 +4,18 @@ use std::path::PathBuf;
 
 /// Why results could not be written.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 #[non_exhaustive]
 pub enum ReportError {
     /// The output folder cannot be made.
     #[error("cannot make the output folder {}: {source}; choose another one", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
+    Folder { path: PathBuf, source: std::io::Error },
     /// A file cannot be written, or an input not be passed through.
     #[error("writing {}: {source}", path.display())]
-    Write {
-        /// The result file.
-        path: PathBuf,
-        /// What went wrong.
-        source: Box<armcal_recording::RecordingError>,
-    },
+    Write { path: PathBuf, source: Box<armcal_recording::RecordingError> },
     /// A table cannot be encoded as Parquet.
     #[error("encoding the table {table} as Parquet: {source}")]
-    Parquet {
-        /// The table.
-        table: &'static str,
-        /// What polars said.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
+    Parquet { table: &'static str, source: Box<dyn std::error::Error + Send + Sync> },
     /// The parameters cannot be written as TOML.
     #[error("encoding the parameters as TOML: {0}")]
     Toml(#[from] toml::ser::Error),

@@ -73,54 +73,30 @@ pub struct PastResidual {
 
 /// Why a result cannot be read back.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum PastRunError {
     /// The file is not there or not an MCAP.
     #[error("reading the result {}: {source}", path.display())]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: Box<RecordingError>,
-    },
+    Open { path: PathBuf, source: Box<RecordingError> },
     /// The file holds no results of armcal.
     #[error(
         "{} holds no results of armcal (no messages on {topic}); name the run.mcap that `armcal run` wrote, or its folder",
         path.display()
     )]
-    NoResults {
-        /// The file.
-        path: PathBuf,
-        /// The topic that is missing.
-        topic: &'static str,
-    },
+    NoResults { path: PathBuf, topic: &'static str },
     /// There is no model in the result.
     #[error(
         "{} holds no calibrated model ({why}); name the results of `armcal run` (their folder, run.mcap or model.json), \
          and run an older result again",
         path.display()
     )]
-    NoModel {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        why: String,
-    },
+    NoModel { path: PathBuf, why: String },
     /// The observations of the result are not what they should be.
     #[error("the observations in {}: {why}; run the pipeline again", path.display())]
-    BadObservations {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        why: String,
-    },
+    BadObservations { path: PathBuf, why: String },
     /// The model of the result is not what it should be.
     #[error("the calibrated model in {}: {why}; run the pipeline again", path.display())]
-    BadModel {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        why: String,
-    },
+    BadModel { path: PathBuf, why: String },
 }
 
 impl PastRun {

@@ -1,5 +1,7 @@
 //! Everything a finished run knows. All outputs are views of this one value.
 
+pub use armcal_campaign::Status;
+
 use crate::diagnosis_text::{headline, setup_sentence};
 use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
@@ -12,7 +14,6 @@ use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::Vector3;
-use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -152,18 +153,6 @@ pub(crate) struct RecordingErrors {
     pub calibrated: ErrorStats,
     /// As a day that the calibration never saw.
     pub unseen: Option<ErrorStats>,
-}
-
-/// Whether the result can be relied upon; decides between exit codes 0 and 3.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Nothing speaks against the result.
-    Ok,
-    /// The model or the data are inadequate.
-    Inadequate,
-    /// Data of the input were damaged or could not be used.
-    DataLost,
 }
 
 impl Run {
@@ -328,6 +317,20 @@ impl RecordingRun {
     /// Dwells that did not become an observation.
     pub fn rejected(&self) -> usize {
         self.earlier.as_ref().map_or(self.rejections.len(), |earlier| earlier.rejected)
+    }
+
+    /// Offset [ms] and drift [ppm] of the sensor's clock in words, where there is one.
+    pub(crate) fn clock_shown(&self) -> Option<[String; 2]> {
+        let c = self.clock.as_ref()?;
+        let [offset_ms, offset_sigma_ms] = [c.offset_s, c.offset_sigma_s].map(|s| s * 1e3);
+        let [drift_ppm, drift_sigma_ppm] = [c.drift, c.drift_sigma].map(|d| d * 1e6);
+        Some(match c.declared {
+            true => [format!("{offset_ms:.2} declared"), format!("{drift_ppm:.1} declared")],
+            false => [
+                format!("{offset_ms:.2} ± {offset_sigma_ms:.2}"),
+                format!("{drift_ppm:.1} ± {drift_sigma_ppm:.1}"),
+            ],
+        })
     }
 
     /// Its files: paths as given, what identifies them, sizes.

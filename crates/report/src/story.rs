@@ -147,8 +147,7 @@ fn lamp(verdict: &'static str, status: Status) -> &'static str {
     match status {
         Status::Ok => verdict,
         _ if matches!(verdict, "unexplained" | "setup") => verdict,
-        Status::Inadequate => "inadequate",
-        Status::DataLost => "data_lost",
+        _ => status.word(),
     }
 }
 

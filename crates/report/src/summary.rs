@@ -118,19 +118,16 @@ fn recording(run: &Run, r: &RecordingRun) -> Value {
 
 /// Where the tip was during a dwell.
 fn place(dwell: &Dwell, assignment: Option<&Assignment>) -> Value {
-    let (place, cavity, confidence) = match assignment.map(|a| &a.place) {
-        None => ("no_board", None, None),
-        Some(Place::Seated { cavity, confidence }) => ("seated", Some(cavity), Some(confidence)),
-        Some(Place::Hovering { .. }) => ("hovering", None, None),
-        Some(Place::FreeSpace) => ("free_space", None, None),
-        Some(Place::Ambiguous { .. }) => ("ambiguous", None, None),
-        Some(Place::Unassigned { .. }) => ("unassigned", None, None),
+    let place = assignment.map(|a| &a.place);
+    let (cavity, confidence) = match place {
+        Some(Place::Seated { cavity, confidence }) => (Some(cavity), Some(confidence)),
+        _ => (None, None),
     };
     json!({
         "dwell": dwell.id.dwell,
         "start_ns": dwell.start_ns,
         "end_ns": dwell.end_ns,
-        "place": place,
+        "place": place.map_or("no_board", Place::word),
         "cavity": cavity,
         "confidence": confidence,
     })

@@ -161,14 +161,7 @@ impl Columns {
     }
 
     fn places(&mut self, places: &[Option<&Assignment>]) {
-        let word = |a: &Assignment| match a.place {
-            Place::Seated { .. } => "seated",
-            Place::Hovering { .. } => "hovering",
-            Place::FreeSpace => "free_space",
-            Place::Ambiguous { .. } => "ambiguous",
-            Place::Unassigned { .. } => "unassigned",
-        };
-        self.text("place", places.iter().map(|a| a.map(word)));
+        self.text("place", places.iter().map(|a| a.map(|a| a.place.word())));
         self.text("cavity", places.iter().map(|a| a.and_then(cavity)));
         self.confidence(places);
         let height = |a: &Assignment| match a.place {

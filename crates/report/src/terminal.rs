@@ -2,7 +2,7 @@
 
 use crate::by_marker::{MarkerErrors, by_marker};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::{RecordingRun, Run, Status, VERSION};
+use crate::run::{Run, Status, VERSION};
 use crate::story::{SHOWN, Story};
 use crate::text::{estimate_shown, millimetres, printable, remark};
 use crate::told_warning::ToldWarning;
@@ -159,7 +159,8 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
             }
             None => {
                 let associated = run.associated(recording).to_string();
-                [dwells, associated, rejected, clock_offset(recording), clock_drift(recording)]
+                let [offset_ms, drift_ppm] = recording.clock_shown().unwrap_or(["-", "-"].map(str::to_owned));
+                [dwells, associated, rejected, offset_ms, drift_ppm]
             }
         };
         let name = [Cell::new(printable(&recording.name))];
@@ -171,33 +172,12 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
     pen.render(&table) + &rest
 }
 
-fn clock_offset(recording: &RecordingRun) -> String {
-    match &recording.clock {
-        Some(c) if c.declared => format!("{:.2} declared", c.offset_s * 1e3),
-        Some(c) => format!("{:.2} ± {:.2}", c.offset_s * 1e3, c.offset_sigma_s * 1e3),
-        None => "-".into(),
-    }
-}
-
-fn clock_drift(recording: &RecordingRun) -> String {
-    match &recording.clock {
-        Some(c) if c.declared => format!("{:.1} declared", c.drift * 1e6),
-        Some(c) => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
-        None => "-".into(),
-    }
-}
-
 fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>], what: &str) -> String {
     let mut table = pen.table(&[what, "n", "nominal", "calibrated", "noise floor"]);
     for of in markers {
-        let mm = |mm: f64| number(millimetres(mm * 1e-3));
-        table.add_row(vec![
-            Cell::new(printable(&of.marker)),
-            number(of.n),
-            mm(of.nominal_mm),
-            mm(of.fitted_mm),
-            mm(of.floor_mm),
-        ]);
+        let mut row = vec![Cell::new(printable(&of.marker)), number(of.n)];
+        row.extend(of.shown().map(number));
+        table.add_row(row);
     }
     pen.render(&table)
 }

@@ -33,6 +33,19 @@ pub enum Place {
     },
 }
 
+impl Place {
+    /// As outputs spell it.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Place::Seated { .. } => "seated",
+            Place::Hovering { .. } => "hovering",
+            Place::FreeSpace => "free_space",
+            Place::Ambiguous { .. } => "ambiguous",
+            Place::Unassigned { .. } => "unassigned",
+        }
+    }
+}
+
 /// One dwell and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {

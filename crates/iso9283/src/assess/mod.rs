@@ -6,11 +6,11 @@ mod moves;
 mod paths;
 mod poses;
 
+use crate::IsoError;
 use crate::catalogue::{EXCHANGEABILITY, STATIC_COMPLIANCE};
 use crate::compliance::static_compliance_m_n;
 use crate::criterion::{Assessment, Findings, Place};
 use crate::evidence::{Evidence, Settings};
-use crate::{Component, IsoError};
 
 /// Computes every criterion of ISO 9283:1998 that `evidence` supports.
 ///
@@ -48,11 +48,6 @@ fn assess_loads(evidence: &Evidence, findings: &mut Findings) {
     }
     let same = |force| evidence.loads.iter().filter(|load| load.force_n == force).count();
     let n = evidence.loads.iter().map(|load| same(load.force_n)).min().unwrap_or(0);
-    match static_compliance_m_n(&evidence.loads) {
-        Ok(value) => {
-            let place = Place { at: "the loaded pose", n, notes: &[] };
-            findings.give(&STATIC_COMPLIANCE, Component::Only, value, &place);
-        }
-        Err(why) => findings.lack(&STATIC_COMPLIANCE, "the loaded pose", why),
-    }
+    let place = Place { at: "the loaded pose", n, notes: &[] };
+    findings.tell(&STATIC_COMPLIANCE, static_compliance_m_n(&evidence.loads), &place);
 }

@@ -1,13 +1,13 @@
 //! Clauses 8 and 11 from a commanded path and what was attained.
 
 use crate::catalogue::{
-    CORNER_OVERSHOOT, Characteristic, Component, FREQUENCY_ERROR, PATH_ACCURACY, PATH_REPEATABILITY,
-    REORIENTATION, ROUND_OFF, STROKE_ERROR, VELOCITY_ACCURACY, VELOCITY_FLUCTUATION, VELOCITY_REPEATABILITY,
+    CORNER_OVERSHOOT, Component, FREQUENCY_ERROR, PATH_ACCURACY, PATH_REPEATABILITY, REORIENTATION,
+    ROUND_OFF, STROKE_ERROR, VELOCITY_ACCURACY, VELOCITY_FLUCTUATION, VELOCITY_REPEATABILITY,
 };
 use crate::command::{CommandPath, Plane};
 use crate::criterion::{Findings, Place};
 use crate::evidence::{PathTest, Settings};
-use crate::path::{OverPath, path_accuracy, path_repeatability};
+use crate::path::{path_accuracy, path_repeatability};
 use crate::planes::{Crossing, cross};
 use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
@@ -68,23 +68,8 @@ fn assess_planes(
     } else {
         findings.lack(&REORIENTATION, &path.name, REORIENTATION.needs);
     }
-    give_over(&PATH_ACCURACY, accuracy, &place, findings);
-    give_over(&PATH_REPEATABILITY, path_repeatability(&attained), &place, findings);
-}
-
-fn give_over(
-    what: &'static Characteristic,
-    value: Result<OverPath, IsoError>,
-    place: &Place<'_>,
-    findings: &mut Findings,
-) {
-    match value {
-        Ok(value) => {
-            findings.give(what, Component::Position, value.position_m, place);
-            findings.give_angles(what, value.angles_rad, place);
-        }
-        Err(why) => findings.lack(what, place.at, why),
-    }
+    findings.tell_deviation(&PATH_ACCURACY, accuracy, &place);
+    findings.tell_deviation(&PATH_REPEATABILITY, path_repeatability(&attained), &place);
 }
 
 fn assess_corners(path: &PathTest, command: &CommandPath, settings: &Settings, findings: &mut Findings) {
@@ -93,16 +78,8 @@ fn assess_corners(path: &PathTest, command: &CommandPath, settings: &Settings, f
     for (index, corner) in command.corners(settings.corner_rad).iter().enumerate() {
         let at = format!("{} corner {}", path.name, index + 1);
         let place = Place { at: &at, n: path.runs.len(), notes: &[] };
-        let values = [
-            (&ROUND_OFF, cornering::round_off_m(corner, &positions_m)),
-            (&CORNER_OVERSHOOT, cornering::overshoot_m(corner, &positions_m)),
-        ];
-        for (what, value) in values {
-            match value {
-                Ok(value) => findings.give(what, Component::Only, value, &place),
-                Err(why) => findings.lack(what, &at, why),
-            }
-        }
+        findings.tell(&ROUND_OFF, cornering::round_off_m(corner, &positions_m), &place);
+        findings.tell(&CORNER_OVERSHOOT, cornering::overshoot_m(corner, &positions_m), &place);
     }
 }
 
@@ -117,17 +94,9 @@ fn assess_speed(path: &PathTest, planes: &[Plane], runs: &[Vec<Option<Crossing>>
     let spacing_m = planes.windows(2).next().map_or(0.0, |pair| pair[1].along_m - pair[0].along_m);
     let notes = [format!("speeds over {:.1} mm each, in the middle half of the path", spacing_m * 1e3)];
     let place = Place { at: &path.name, n: runs.len(), notes: &notes };
-    let values = [
-        velocity_accuracy(commanded_m_s, &speeds_m_s),
-        velocity_repeatability(commanded_m_s, &speeds_m_s),
-        velocity_fluctuation_m_s(&speeds_m_s),
-    ];
-    for (what, value) in all.into_iter().zip(values) {
-        match value {
-            Ok(value) => findings.give(what, Component::Only, value, &place),
-            Err(why) => findings.lack(what, &path.name, why),
-        }
-    }
+    findings.tell(&VELOCITY_ACCURACY, velocity_accuracy(commanded_m_s, &speeds_m_s), &place);
+    findings.tell(&VELOCITY_REPEATABILITY, velocity_repeatability(commanded_m_s, &speeds_m_s), &place);
+    findings.tell(&VELOCITY_FLUCTUATION, velocity_fluctuation_m_s(&speeds_m_s), &place);
 }
 
 fn speeds_m_s(crossings: &[Option<Crossing>]) -> Vec<f64> {
@@ -145,14 +114,7 @@ fn assess_weave(path: &PathTest, centre: &CommandPath, findings: &mut Findings) 
     let attained =
         path.runs.iter().map(|run| weave_of(centre, run, commanded.stroke_m)).collect::<Result<Vec<_>, _>>();
     let place = Place { at: &path.name, n: path.runs.len(), notes: &[] };
-    let values = [
-        (&STROKE_ERROR, attained.clone().and_then(|weaves| stroke_error(&commanded, &weaves))),
-        (&FREQUENCY_ERROR, attained.and_then(|weaves| frequency_error(&commanded, &weaves))),
-    ];
-    for (what, value) in values {
-        match value {
-            Ok(value) => findings.give(what, Component::Only, value, &place),
-            Err(why) => findings.lack(what, &path.name, why),
-        }
-    }
+    let stroke = attained.clone().and_then(|weaves| stroke_error(&commanded, &weaves));
+    findings.tell(&STROKE_ERROR, stroke, &place);
+    findings.tell(&FREQUENCY_ERROR, attained.and_then(|weaves| frequency_error(&commanded, &weaves)), &place);
 }

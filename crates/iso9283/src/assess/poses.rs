@@ -1,13 +1,11 @@
 //! Clauses 7.2 and 7.6 from visits.
 
 use super::cycles::{Cycles, by_pose};
-use crate::IsoError;
 use crate::catalogue::{
-    ACCURACY_DRIFT, ACCURACY_VARIATION, Characteristic, Component, POSE_ACCURACY, POSE_REPEATABILITY,
-    REPEATABILITY_DRIFT,
+    ACCURACY_DRIFT, ACCURACY_VARIATION, Component, POSE_ACCURACY, POSE_REPEATABILITY, REPEATABILITY_DRIFT,
 };
 use crate::criterion::{Findings, Place};
-use crate::drift::{Drift, accuracy_drift, repeatability_drift};
+use crate::drift::{accuracy_drift, repeatability_drift};
 use crate::pose::{accuracy_variation, pose_accuracy, pose_repeatability};
 use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
@@ -65,23 +63,8 @@ fn assess_drift(known: &Cycles<'_>, place: &Place<'_>, findings: &mut Findings) 
     let notes: Vec<String> = place.notes.iter().cloned().chain(short).collect();
     let place = Place { at: place.at, n: size, notes: &notes };
     let commanded = &known.visits[0].commanded;
-    give_drift(&ACCURACY_DRIFT, accuracy_drift(commanded, &blocks), &place, findings);
-    give_drift(&REPEATABILITY_DRIFT, repeatability_drift(&blocks), &place, findings);
-}
-
-fn give_drift(
-    what: &'static Characteristic,
-    drift: Result<Drift, IsoError>,
-    place: &Place<'_>,
-    findings: &mut Findings,
-) {
-    match drift {
-        Ok(drift) => {
-            findings.give(what, Component::Position, drift.position_m, place);
-            findings.give_angles(what, drift.angles_rad, place);
-        }
-        Err(why) => findings.lack(what, place.at, why),
-    }
+    findings.tell_deviation(&ACCURACY_DRIFT, accuracy_drift(commanded, &blocks), &place);
+    findings.tell_deviation(&REPEATABILITY_DRIFT, repeatability_drift(&blocks), &place);
 }
 
 /// Multi-directional pose accuracy variation of every pose.
@@ -101,13 +84,7 @@ pub(super) fn assess_directions(cycles: &[Cycles<'_>], findings: &mut Findings) 
             oblique.then(|| format!("directions are {low:.0} to {high:.0} deg apart instead of 90"));
         let notes: Vec<String> = oblique.into_iter().collect();
         let place = Place { at: pose, n, notes: &notes };
-        match accuracy_variation(&attained) {
-            Ok(variation) => {
-                findings.give(&ACCURACY_VARIATION, Component::Position, variation.position_m, &place);
-                findings.give_angles(&ACCURACY_VARIATION, variation.angles_rad, &place);
-            }
-            Err(why) => findings.lack(&ACCURACY_VARIATION, pose, why),
-        }
+        findings.tell_deviation(&ACCURACY_VARIATION, accuracy_variation(&attained), &place);
     }
 }
 

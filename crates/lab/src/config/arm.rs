@@ -47,7 +47,7 @@ pub struct DeviationConfig {
     /// Of `theta` and `alpha` [deg]. Default 2, the paper's bound.
     pub angle_deg: f64,
     /// Of the masses of links and tool [%]. Default 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub mass_percent: f64,
 }
 
@@ -127,11 +127,6 @@ impl Default for DeviationConfig {
     fn default() -> DeviationConfig {
         DeviationConfig { length_mm: 5.0, angle_deg: 2.0, mass_percent: 0.0 }
     }
-}
-
-/// Keys at their defaults stay out of the truth file.
-fn is_zero(v: &f64) -> bool {
-    *v == 0.0
 }
 
 impl ArmConfig {

@@ -19,6 +19,7 @@ pub use task::{
 use crate::LabError;
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -113,11 +114,7 @@ pub struct RecordingConfig {
 impl LabConfig {
     /// Reads and checks a lab file.
     pub fn from_toml(text: &str, path: &Path) -> Result<LabConfig, LabError> {
-        let config: LabConfig = toml::from_str(text).map_err(|source| LabError::Parse {
-            what: "lab file",
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let config: LabConfig = parse("lab file", text, path)?;
         config.check()?;
         Ok(config)
     }
@@ -197,7 +194,7 @@ impl LabConfig {
     }
 }
 
-fn default_start() -> u64 {
+pub(crate) fn default_start() -> u64 {
     1_760_000_000
 }
 
@@ -223,6 +220,25 @@ fn default_placement_deg() -> f64 {
 
 fn default_tilt_deg() -> f64 {
     0.1
+}
+
+/// Keys at their defaults stay out of the truth file.
+fn is_default<T: Default + PartialEq>(v: &T) -> bool {
+    *v == T::default()
+}
+
+/// Degrees of freedom of Student's t.
+fn tail(key: &str, degrees: f64) -> Result<(), LabError> {
+    if degrees == 0.0 || (degrees.is_finite() && degrees > 2.0) {
+        return Ok(());
+    }
+    Err(value(key, "must be 0 (normal) or above 2, where Student's t has a variance".into()))
+}
+
+/// What a TOML file says.
+pub(crate) fn parse<T: DeserializeOwned>(what: &'static str, text: &str, path: &Path) -> Result<T, LabError> {
+    let refused = |source| LabError::Parse { what, path: path.to_owned(), source: Box::new(source) };
+    toml::from_str(text).map_err(refused)
 }
 
 pub(crate) fn value(key: &str, why: String) -> LabError {

@@ -1,6 +1,6 @@
 //! Encoders, motion capture, thermometer, and the clocks and transport of their messages.
 
-use super::{not_negative, positive, range, share, value};
+use super::{not_negative, positive, range, share, tail, value};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
 
@@ -70,13 +70,13 @@ pub struct ViconConfig {
     pub correlation_s: f64,
     /// Degrees of freedom of Student's t for the size of the noise from one stretch of `tail_s` to the next: heavy
     /// tails that averaging over a pause does not remove. 0 for none. Default 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub tail_degrees: f64,
     /// Length of such a stretch [s]. Default 2.
     #[serde(skip_serializing_if = "is_two")]
     pub tail_s: f64,
     /// Swaps of the tip's markers a minute. Default 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub swaps_per_minute: f64,
     /// Mean length of a swap [s]. Default 2.
     #[serde(skip_serializing_if = "is_two")]
@@ -362,10 +362,7 @@ impl ViconConfig {
 
     pub(super) fn check(&self) -> Result<(), LabError> {
         not_negative("vicon.noise_95_mm", self.noise_95_mm)?;
-        if self.tail_degrees != 0.0 && !(self.tail_degrees.is_finite() && self.tail_degrees > 2.0) {
-            let why = "must be 0 (normal) or above 2, where Student's t has a variance".into();
-            return Err(value("vicon.tail_degrees", why));
-        }
+        tail("vicon.tail_degrees", self.tail_degrees)?;
         positive("vicon.tail_s", self.tail_s)?;
         not_negative("vicon.swaps_per_minute", self.swaps_per_minute)?;
         positive("vicon.swap_s", self.swap_s)?;
@@ -418,10 +415,6 @@ fn rate(key: &str, hz: f64) -> Result<(), LabError> {
 }
 
 // Keys at their defaults stay out of the truth file.
-
-fn is_zero(v: &f64) -> bool {
-    *v == 0.0
-}
 
 fn is_two(v: &f64) -> bool {
     *v == 2.0

@@ -1,6 +1,6 @@
 //! What the arm does, and how the hand that seats it behaves.
 
-use super::{not_negative, positive, range, share, value};
+use super::{not_negative, positive, range, share, tail, value};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -124,7 +124,7 @@ pub struct FreeConfig {
     pub speed_m_s: f64,
     /// Whether a hand leads the arm there and holds it, back-driving the gears (or, with `hand.motors_lead`, motors
     /// that follow the path exactly). Default false: the motors do under control.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub by_hand: bool,
 }
 
@@ -169,16 +169,16 @@ pub struct HandConfig {
     pub tremor_s: f64,
     /// Whether it is not a hand but the motors that jog the tip into the cavities: without tremor, and the motors lead.
     /// Default false.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub motors_lead: bool,
     /// Whether every cavity is entered by the same final descent, instead of along the way. Default false.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub plunge: bool,
     /// Correlation of where the tip sits in the clearance from one visit to the next. Default 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub seat_correlation: f64,
     /// Degrees of freedom of Student's t for where the tip sits; 0 for normal. Default 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub seat_tail_degrees: f64,
 }
 
@@ -279,12 +279,7 @@ impl HandConfig {
         not_negative("hand.rattle_mm", self.rattle_mm)?;
         not_negative("hand.seated_tremor_mm", self.seated_tremor_mm)?;
         share("hand.seat_correlation", self.seat_correlation)?;
-        if self.seat_tail_degrees != 0.0
-            && !(self.seat_tail_degrees.is_finite() && self.seat_tail_degrees > 2.0)
-        {
-            let why = "must be 0 (normal) or above 2, where Student's t has a variance".into();
-            return Err(value("hand.seat_tail_degrees", why));
-        }
+        tail("hand.seat_tail_degrees", self.seat_tail_degrees)?;
         positive("hand.tremor_s", self.tremor_s)
     }
 }
@@ -310,14 +305,4 @@ fn speed_deg_s() -> f64 {
 
 fn all() -> f64 {
     1.0
-}
-
-// Keys at their defaults stay out of the truth file.
-
-fn is_zero(v: &f64) -> bool {
-    *v == 0.0
-}
-
-fn is_false(v: &bool) -> bool {
-    !*v
 }

@@ -14,10 +14,6 @@ pub struct AxisTilt {
 }
 
 impl Mechanism for AxisTilt {
-    fn name(&self) -> &str {
-        "axis_tilt"
-    }
-
     fn reshape_arm(&self, _now: &Moment<'_>, arm: &mut AxisArm) {
         let before = self.joint - 2;
         let across = arm.axes[before].direction.cross(&arm.link_m(before));

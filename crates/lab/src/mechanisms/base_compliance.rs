@@ -28,10 +28,6 @@ impl BaseCompliance {
 }
 
 impl Mechanism for BaseCompliance {
-    fn name(&self) -> &str {
-        "base_compliance"
-    }
-
     fn move_base(&self, now: &Moment<'_>, world_from_base: &mut Pose) {
         let rock = self.rock_rad(now);
         if rock.norm() > 0.0 {

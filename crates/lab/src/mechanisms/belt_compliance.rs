@@ -30,10 +30,6 @@ impl BeltCompliance {
 }
 
 impl Mechanism for BeltCompliance {
-    fn name(&self) -> &str {
-        "belt_compliance"
-    }
-
     fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
         let deflections = self.deflections_rad(now);
         joint_rad[self.joint - 1..].iter_mut().zip(deflections).for_each(|(q, x)| *q += x);

@@ -26,16 +26,8 @@ fn two() -> usize {
 }
 
 impl Mechanism for BeltCoupling {
-    fn name(&self) -> &str {
-        "belt_coupling"
-    }
-
-    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] += joint_rad[self.by - 1] * self.share_percent / 100.0;
-    }
-
-    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] -= joint_rad[self.by - 1] * self.share_percent / 100.0;
+    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint, joint_rad[self.by - 1] * self.share_percent / 100.0))
     }
 }
 

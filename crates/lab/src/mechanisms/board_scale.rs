@@ -10,11 +10,7 @@ pub struct BoardScale {
     pub percent: [f64; 3],
 }
 
-impl Mechanism for BoardScale {
-    fn name(&self) -> &str {
-        "board_scale"
-    }
-}
+impl Mechanism for BoardScale {}
 
 impl Hidden for BoardScale {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {

@@ -63,10 +63,6 @@ impl Bump {
 }
 
 impl Mechanism for Bump {
-    fn name(&self) -> &str {
-        "bump"
-    }
-
     fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
         if !self.hit(now, BumpedBody::Tool) {
             return;

@@ -22,24 +22,11 @@ pub struct CableDrag {
     pub gear_nm_rad: f64,
 }
 
-impl CableDrag {
-    fn deflection_rad(&self, by_rad: f64) -> f64 {
-        let taut = ((by_rad.to_degrees() - self.anchor_deg).abs() - self.slack_deg).max(0.0);
-        -taut.to_radians() * self.cable_nm_rad / self.gear_nm_rad
-    }
-}
-
 impl Mechanism for CableDrag {
-    fn name(&self) -> &str {
-        "cable_drag"
-    }
-
-    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] += self.deflection_rad(joint_rad[self.by - 1]);
-    }
-
-    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] -= self.deflection_rad(joint_rad[self.by - 1]);
+    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+        let from_anchor_deg = joint_rad[self.by - 1].to_degrees() - self.anchor_deg;
+        let taut = (from_anchor_deg.abs() - self.slack_deg).max(0.0);
+        Some((self.joint, -taut.to_radians() * self.cable_nm_rad / self.gear_nm_rad))
     }
 }
 

@@ -25,10 +25,6 @@ pub struct CameraDistortion {
 }
 
 impl Mechanism for CameraScale {
-    fn name(&self) -> &str {
-        "camera_scale"
-    }
-
     fn distort_camera(&self, _now: &Moment<'_>, _body: Body, world_from_body: &mut Pose) {
         let position = &mut world_from_body.translation.vector;
         let off = *position - Vector3::from(self.centre_m);
@@ -37,10 +33,6 @@ impl Mechanism for CameraScale {
 }
 
 impl Mechanism for CameraDistortion {
-    fn name(&self) -> &str {
-        "camera_distortion"
-    }
-
     fn distort_camera(&self, _now: &Moment<'_>, _body: Body, world_from_body: &mut Pose) {
         let position = &mut world_from_body.translation.vector;
         let off = *position - Vector3::from(self.centre_m);

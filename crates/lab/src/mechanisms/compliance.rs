@@ -38,16 +38,8 @@ impl Compliance {
 }
 
 impl Mechanism for Compliance {
-    fn name(&self) -> &str {
-        "compliance"
-    }
-
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] += self.deflection_rad(now.gravity_nm[self.joint - 1]);
-    }
-
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] -= self.deflection_rad(now.gravity_nm[self.joint - 1]);
+    fn ahead(&mut self, now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint, self.deflection_rad(now.gravity_nm[self.joint - 1])))
     }
 }
 

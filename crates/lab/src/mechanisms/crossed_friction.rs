@@ -20,28 +20,15 @@ pub struct CrossedFriction {
     pub(crate) before: Option<[f64; 2]>,
 }
 
-impl CrossedFriction {
+impl Mechanism for CrossedFriction {
     /// The rubbing part follows the moving joint until its spring is stronger than the friction.
-    fn wound_rad(&mut self, by_rad: f64) -> f64 {
+    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+        let by_rad = joint_rad[self.by - 1];
         let limit = self.friction_nm / self.stiffness_nm_rad;
         let [was, wound] = self.before.unwrap_or([by_rad, 0.0]);
         let wound = (wound + by_rad - was).clamp(-limit, limit);
         self.before = Some([by_rad, wound]);
-        wound
-    }
-}
-
-impl Mechanism for CrossedFriction {
-    fn name(&self) -> &str {
-        "crossed_friction"
-    }
-
-    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] += self.wound_rad(joint_rad[self.by - 1]);
-    }
-
-    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] -= self.wound_rad(joint_rad[self.by - 1]);
+        Some((self.joint, wound))
     }
 }
 

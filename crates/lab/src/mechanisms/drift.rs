@@ -36,10 +36,6 @@ pub enum DriftingBody {
 }
 
 impl Mechanism for ZeroDrift {
-    fn name(&self) -> &str {
-        "zero_drift"
-    }
-
     fn distort_encoder(&self, now: &Moment<'_>, reading_rad: &mut [f64]) {
         reading_rad[self.joint - 1] -= self.deg_per_hour.to_radians() * now.session_s / 3600.0;
     }
@@ -55,10 +51,6 @@ impl FrameDrift {
 }
 
 impl Mechanism for FrameDrift {
-    fn name(&self) -> &str {
-        "frame_drift"
-    }
-
     fn move_base(&self, now: &Moment<'_>, world_from_base: &mut Pose) {
         self.shift(now, DriftingBody::Base, world_from_base);
     }

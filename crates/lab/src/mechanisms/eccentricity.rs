@@ -37,10 +37,12 @@ pub enum MountedOn {
 }
 
 impl Lead for Eccentricity {
-    const KIND: &'static str = "eccentricity";
-
     fn joint(&self) -> usize {
         self.joint
+    }
+
+    fn of_reading(&self) -> bool {
+        self.on == MountedOn::Encoder
     }
 
     fn lead_rad(&self, link_rad: f64) -> f64 {
@@ -50,33 +52,11 @@ impl Lead for Eccentricity {
     }
 }
 
-/// The disc of an encoder: motor and link agree, the reading does not.
-#[derive(Debug)]
-struct Disc(Eccentricity);
-
-impl Mechanism for Disc {
-    fn name(&self) -> &str {
-        Eccentricity::KIND
-    }
-
-    fn distort_encoder(&self, _now: &Moment<'_>, reading_rad: &mut [f64]) {
-        let reading = &mut reading_rad[self.0.joint - 1];
-        *reading += self.0.lead_rad(*reading);
-    }
-}
-
 impl Hidden for Eccentricity {
     fn check(&self, keys: &Keys) -> Result<(), LabError> {
         keys.joint("joint", self.joint)?;
         keys.within("radius_mm", self.radius_mm, [0.1, 1e4])?;
         keys.within("offset_mm", self.offset_mm, [0.0, 0.3 * self.radius_mm])?;
         keys.finite("phase_deg", self.phase_deg)
-    }
-
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        match self.on {
-            MountedOn::Gear => self.untouched(),
-            MountedOn::Encoder => Box::new(Disc(self.clone())),
-        }
     }
 }

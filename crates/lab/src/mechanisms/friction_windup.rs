@@ -42,10 +42,6 @@ impl FrictionWindup {
 }
 
 impl Mechanism for FrictionWindup {
-    fn name(&self) -> &str {
-        "friction_windup"
-    }
-
     fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
         let (motor, limit) = (joint_rad[self.joint - 1] + self.sag_rad(now), self.limit_rad(now));
         let stuck = self.before.map_or(motor, |[_, link]| link);

@@ -61,10 +61,6 @@ impl Gap {
 }
 
 impl Mechanism for Gap {
-    fn name(&self) -> &str {
-        "gap"
-    }
-
     fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
         let motor = joint_rad[self.joint - 1] + self.carried_rad(joint_rad);
         let half = self.half_rad(motor);

@@ -1,17 +1,20 @@
 //! A transmission that is not quite proportional: the motor leads the link by an angle that depends on where
 //! the link is.
 
+use crate::mechanism::Named;
 use crate::{Mechanism, Moment};
 
 /// The shape of a transmission's error.
-pub(super) trait Lead: std::fmt::Debug + Send {
-    /// Its kind.
-    const KIND: &'static str;
-
+pub(super) trait Lead: Named + std::fmt::Debug + Send {
     /// The joint, from 1.
     fn joint(&self) -> usize;
 
-    /// Motor less link where the link is at `link_rad` [rad].
+    /// Whether it is the reading that is off, and motor and link agree.
+    fn of_reading(&self) -> bool {
+        false
+    }
+
+    /// Motor less link (reading less motor) where the link is at `link_rad` [rad].
     fn lead_rad(&self, link_rad: f64) -> f64;
 
     /// The link's angle for a motor's: the error changes slowly with the angle, so the fixed point is near.
@@ -29,17 +32,24 @@ pub(super) trait Lead: std::fmt::Debug + Send {
 }
 
 impl<L: Lead> Mechanism for L {
-    fn name(&self) -> &str {
-        L::KIND
-    }
-
     fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
         let q = &mut joint_rad[self.joint() - 1];
-        *q = self.link_rad(*q);
+        if !self.of_reading() {
+            *q = self.link_rad(*q);
+        }
     }
 
     fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
         let q = &mut joint_rad[self.joint() - 1];
-        *q += self.lead_rad(*q);
+        if !self.of_reading() {
+            *q += self.lead_rad(*q);
+        }
+    }
+
+    fn distort_encoder(&self, _now: &Moment<'_>, reading_rad: &mut [f64]) {
+        let q = &mut reading_rad[self.joint() - 1];
+        if self.of_reading() {
+            *q += self.lead_rad(*q);
+        }
     }
 }

@@ -113,12 +113,8 @@ impl RoomTemperature {
 }
 
 macro_rules! growing {
-    ($name:ident, $kind:expr, $advance:ident, $ppm:expr) => {
+    ($name:ident, $advance:ident, $ppm:expr) => {
         impl Mechanism for $name {
-            fn name(&self) -> &str {
-                $kind
-            }
-
             fn motor_to_link(&mut self, now: &Moment<'_>, _joint_rad: &mut [f64]) {
                 self.$advance(now);
             }
@@ -134,9 +130,9 @@ macro_rules! growing {
     };
 }
 
-growing!(ThermalGrowth, "thermal_growth", read, |m: &ThermalGrowth| m.grown_ppm);
-growing!(WarmUp, "warm_up", warm, |m: &WarmUp| m.heat.above_k * m.per_kelvin_ppm);
-growing!(RoomTemperature, "room_temperature", warm, |m: &RoomTemperature| m.heat.above_k * m.per_kelvin_ppm);
+growing!(ThermalGrowth, read, |m: &ThermalGrowth| m.grown_ppm);
+growing!(WarmUp, warm, |m: &WarmUp| m.heat.above_k * m.per_kelvin_ppm);
+growing!(RoomTemperature, warm, |m: &RoomTemperature| m.heat.above_k * m.per_kelvin_ppm);
 
 fn check_links(keys: &Keys, links: &[usize], per_kelvin_ppm: f64) -> Result<(), LabError> {
     links.iter().try_for_each(|link| keys.joint("links", *link))?;

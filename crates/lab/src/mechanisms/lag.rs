@@ -30,10 +30,6 @@ impl Lag {
 }
 
 impl Mechanism for Lag {
-    fn name(&self) -> &str {
-        "lag"
-    }
-
     fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
         joint_rad[self.joint - 1] = self.follow(now, joint_rad[self.joint - 1]);
     }

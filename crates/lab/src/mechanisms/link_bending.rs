@@ -66,10 +66,6 @@ impl LinkBending {
 }
 
 impl Mechanism for LinkBending {
-    fn name(&self) -> &str {
-        "link_bending"
-    }
-
     fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
         let link = self.link - 1;
         let sag = self.sag(now, arm);

@@ -91,40 +91,23 @@ pub use zero_slip::ZeroSlip;
 use crate::arm::AxisArm;
 use crate::board::Board;
 use crate::config::{not_negative, positive, value};
-use crate::mechanism::Body;
+use crate::mechanism::{Body, Named};
 use crate::{LabError, Mechanism, Moment};
 use armcal_core::Pose;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Settings of a mechanism: they can be checked, and built in its initial state.
-pub trait Hidden: Untouched {
+/// Settings of a mechanism, which are the mechanism itself as long as nothing has happened to it.
+pub trait Hidden: Mechanism {
     /// Checks the values.
     fn check(&self, keys: &Keys) -> Result<(), LabError>;
-
-    /// The mechanism at the start of a recording.
-    fn mechanism(&self) -> Box<dyn Mechanism> {
-        self.untouched()
-    }
 
     /// What it does to the board while that is made.
     fn machine_board(&self, _board: &mut Board) {}
 }
 
-/// Settings that are the mechanism themselves, as long as nothing has happened to it.
-pub trait Untouched {
-    /// That mechanism.
-    fn untouched(&self) -> Box<dyn Mechanism>;
-}
-
-impl<M: Mechanism + Clone + 'static> Untouched for M {
-    fn untouched(&self) -> Box<dyn Mechanism> {
-        Box::new(self.clone())
-    }
-}
-
 macro_rules! mechanisms {
-    ($($name:ident),* $(,)?) => {
+    ($($kind:ident: $name:ident),* $(,)?) => {
         /// One `[[mechanisms]]` table.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind", rename_all = "snake_case")]
@@ -137,41 +120,52 @@ macro_rules! mechanisms {
             pub fn hidden(&self) -> &dyn Hidden {
                 match self { $(MechanismConfig::$name(settings) => settings),* }
             }
+
+            /// The mechanism at the start of a recording.
+            pub fn mechanism(&self) -> Box<dyn Mechanism> {
+                match self { $(MechanismConfig::$name(settings) => Box::new(settings.clone())),* }
+            }
         }
+
+        $(impl Named for $name {
+            fn name(&self) -> &str {
+                stringify!($kind)
+            }
+        })*
     };
 }
 
 mechanisms!(
-    Gap,
-    FrictionWindup,
-    Compliance,
-    BeltCompliance,
-    LinkBending,
-    BaseCompliance,
-    Eccentricity,
-    SecondHarmonic,
-    ToothRunout,
-    GearRatio,
-    BeltCoupling,
-    AxisTilt,
-    ZeroSlip,
-    Bump,
-    ThermalGrowth,
-    WarmUp,
-    ZeroDrift,
-    FrameDrift,
-    CameraScale,
-    CameraDistortion,
-    BoardScale,
-    AxisWobble,
-    CableDrag,
-    DamagedTeeth,
-    Sawtooth,
-    SoftStop,
-    Twist,
-    RoomTemperature,
-    CrossedFriction,
-    Lag,
+    gap: Gap,
+    friction_windup: FrictionWindup,
+    compliance: Compliance,
+    belt_compliance: BeltCompliance,
+    link_bending: LinkBending,
+    base_compliance: BaseCompliance,
+    eccentricity: Eccentricity,
+    second_harmonic: SecondHarmonic,
+    tooth_runout: ToothRunout,
+    gear_ratio: GearRatio,
+    belt_coupling: BeltCoupling,
+    axis_tilt: AxisTilt,
+    zero_slip: ZeroSlip,
+    bump: Bump,
+    thermal_growth: ThermalGrowth,
+    warm_up: WarmUp,
+    zero_drift: ZeroDrift,
+    frame_drift: FrameDrift,
+    camera_scale: CameraScale,
+    camera_distortion: CameraDistortion,
+    board_scale: BoardScale,
+    axis_wobble: AxisWobble,
+    cable_drag: CableDrag,
+    damaged_teeth: DamagedTeeth,
+    sawtooth: Sawtooth,
+    soft_stop: SoftStop,
+    twist: Twist,
+    room_temperature: RoomTemperature,
+    crossed_friction: CrossedFriction,
+    lag: Lag,
 );
 
 /// Checks the values of one `[[mechanisms]]` table and names the key at fault.

@@ -80,8 +80,6 @@ pub struct SoftStop {
 }
 
 impl Lead for SecondHarmonic {
-    const KIND: &'static str = "second_harmonic";
-
     fn joint(&self) -> usize {
         self.joint
     }
@@ -96,8 +94,6 @@ impl Lead for SecondHarmonic {
 }
 
 impl Lead for ToothRunout {
-    const KIND: &'static str = "tooth_runout";
-
     fn joint(&self) -> usize {
         self.joint
     }
@@ -108,8 +104,6 @@ impl Lead for ToothRunout {
 }
 
 impl Lead for GearRatio {
-    const KIND: &'static str = "gear_ratio";
-
     fn joint(&self) -> usize {
         self.joint
     }
@@ -121,8 +115,6 @@ impl Lead for GearRatio {
 }
 
 impl Lead for DamagedTeeth {
-    const KIND: &'static str = "damaged_teeth";
-
     fn joint(&self) -> usize {
         self.joint
     }
@@ -138,8 +130,6 @@ impl Lead for DamagedTeeth {
 }
 
 impl Lead for Sawtooth {
-    const KIND: &'static str = "sawtooth";
-
     fn joint(&self) -> usize {
         self.joint
     }
@@ -153,8 +143,6 @@ impl Lead for Sawtooth {
 }
 
 impl Lead for SoftStop {
-    const KIND: &'static str = "soft_stop";
-
     fn joint(&self) -> usize {
         self.joint
     }

@@ -44,17 +44,13 @@ impl Rest {
             time_s: self.session_s,
             session_s: self.session_s,
             recording: self.recording,
-            temperature_c: 22.0,
             warmer_k: 10.0,
             motors_lead: self.motors_lead,
-            load_kg: 0.5,
             arm: &self.arm,
             masses_kg: &self.masses_kg,
             tip_kg: 0.65,
             gravity_m_s2: &DOWN,
-            motor_rad: &self.link_rad,
             link_rad: &self.link_rad,
-            speed_rad_s: &[0.0; 3],
             gravity_nm: &self.gravity_nm,
         }
     }
@@ -66,7 +62,7 @@ impl Rest {
 }
 
 fn mechanism(text: &str) -> Box<dyn Mechanism> {
-    toml::from_str::<MechanismConfig>(text).unwrap().hidden().mechanism()
+    toml::from_str::<MechanismConfig>(text).unwrap().mechanism()
 }
 
 fn link(m: &mut dyn Mechanism, rest: &Rest, motor: [f64; 3]) -> Vec<f64> {

@@ -16,10 +16,6 @@ pub struct Twist {
 }
 
 impl Mechanism for Twist {
-    fn name(&self) -> &str {
-        "twist"
-    }
-
     fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
         let link = self.link - 1;
         let share = now.link_rad[self.by - 1] / std::f64::consts::FRAC_PI_4;

@@ -19,10 +19,6 @@ pub struct AxisWobble {
 }
 
 impl Mechanism for AxisWobble {
-    fn name(&self) -> &str {
-        "axis_wobble"
-    }
-
     fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
         let joint = self.joint - 1;
         let axis = arm.axes[joint];

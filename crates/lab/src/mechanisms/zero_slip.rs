@@ -21,23 +21,10 @@ pub struct ZeroSlip {
     pub until_s: Option<f64>,
 }
 
-impl ZeroSlip {
-    fn slip_rad(&self, now: &Moment<'_>) -> f64 {
-        if happened(now, self.recording, self.at_s, self.until_s) { self.slip_deg.to_radians() } else { 0.0 }
-    }
-}
-
 impl Mechanism for ZeroSlip {
-    fn name(&self) -> &str {
-        "zero_slip"
-    }
-
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] += self.slip_rad(now);
-    }
-
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
-        joint_rad[self.joint - 1] -= self.slip_rad(now);
+    fn ahead(&mut self, now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
+        let slipped = happened(now, self.recording, self.at_s, self.until_s);
+        slipped.then(|| (self.joint, self.slip_deg.to_radians()))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::drives::acts_on_drives;
 use super::torso::TorsoConfig;
 use crate::LabError;
-use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, positive, range, value};
+use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, parse, positive, range, value};
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub struct PairConfig {
     /// Seed of everything random.
     pub seed: u64,
     /// Clock at the start of the first recording [s since 1970]. Default 1760000000.
-    #[serde(default = "default_start")]
+    #[serde(default = "crate::config::default_start")]
     pub start_unix_s: u64,
     /// The arms.
     pub arms: [PairArmConfig; 2],
@@ -117,11 +117,7 @@ impl Default for PairTaskConfig {
 impl PairConfig {
     /// Reads and checks a lab file.
     pub fn from_toml(text: &str, path: &Path) -> Result<PairConfig, LabError> {
-        let config: PairConfig = toml::from_str(text).map_err(|source| LabError::Parse {
-            what: "lab file",
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let config: PairConfig = parse("lab file", text, path)?;
         config.check()?;
         Ok(config)
     }
@@ -210,10 +206,6 @@ fn default_link_kg() -> f64 {
 
 fn is_default_link(link_kg: &f64) -> bool {
     *link_kg == default_link_kg()
-}
-
-fn default_start() -> u64 {
-    1_760_000_000
 }
 
 fn default_recordings() -> Vec<String> {

@@ -14,14 +14,12 @@ pub(super) struct Drives<'a> {
     built: &'a BuiltArm,
     recording: usize,
     mechanisms: Vec<Box<dyn Mechanism>>,
-    /// Time [s], link and motor angles [rad] of the moment before.
-    before: Option<(f64, Vec<f64>, Vec<f64>)>,
 }
 
 impl<'a> Drives<'a> {
     pub fn new(config: &'a PairArmConfig, built: &'a BuiltArm, recording: usize) -> Drives<'a> {
-        let mechanisms = config.mechanisms.iter().map(|m| m.hidden().mechanism()).collect();
-        Drives { config, built, recording, mechanisms, before: None }
+        let mechanisms = config.mechanisms.iter().map(|m| m.mechanism()).collect();
+        Drives { config, built, recording, mechanisms }
     }
 
     /// What the encoders see of links at these angles [rad], before they count.
@@ -33,34 +31,25 @@ impl<'a> Drives<'a> {
         let gravity_m_s2 = built.world_from_base.rotation.inverse() * GRAVITY_M_S2;
         let masses_kg = vec![own.link_kg; link_rad.len()];
         let gravity_nm = built.arm.gravity_torque(link_rad, &gravity_m_s2, &masses_kg, 0.0);
-        let (then_s, links, motors) =
-            self.before.take().unwrap_or_else(|| (time_s, link_rad.to_vec(), link_rad.to_vec()));
-        let lasts_s = (time_s - then_s).max(1e-6);
-        let speed_rad_s: Vec<f64> = link_rad.iter().zip(&links).map(|(q, old)| (q - old) / lasts_s).collect();
         // Recordings begin a quarter of an hour apart.
         let session_s = time_s + 900.0 * self.recording as f64;
         let now = Moment {
             time_s,
             session_s,
             recording: self.recording,
-            temperature_c: 20.0,
             warmer_k: 0.0,
             motors_lead: false,
-            load_kg: 0.0,
             arm: &built.arm,
             masses_kg: &masses_kg,
             tip_kg: 0.0,
             gravity_m_s2: &gravity_m_s2,
-            motor_rad: &motors,
             link_rad,
-            speed_rad_s: &speed_rad_s,
             gravity_nm: &gravity_nm,
         };
         let mut motor_rad = link_rad.to_vec();
         self.mechanisms.iter_mut().for_each(|m| m.link_to_motor(&now, &mut motor_rad));
         let mut reading_rad = motor_rad.clone();
         self.mechanisms.iter().for_each(|m| m.distort_encoder(&now, &mut reading_rad));
-        self.before = Some((time_s, link_rad.to_vec(), motor_rad));
         reading_rad
     }
 }

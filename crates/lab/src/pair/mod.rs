@@ -16,15 +16,17 @@ pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig};
 pub use torso::{TipsSeenConfig, TorsoConfig};
 pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
 
-use crate::LabError;
 use crate::arm::AxisArm;
 use crate::config::DhRow;
+use crate::quick::encoders;
 use crate::random::{Purpose, Stream};
 use crate::rig::{build_rows, small_motion};
+use crate::truth::write_json;
+use crate::{LabError, Simulated};
 use armcal_core::{DwellId, Observation, Pose, Reference};
 use motion::{Motion, Phase};
 use nalgebra::Vector3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The pair of one seed, as built.
 #[derive(Debug, Clone)]
@@ -44,17 +46,6 @@ pub(crate) struct BuiltArm {
     pub world_from_base: Pose,
 }
 
-/// What a simulation of a pair left on disk.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SimulatedPair {
-    /// One file a recording.
-    pub recordings: Vec<PathBuf>,
-    /// The truth file.
-    pub truth: PathBuf,
-    /// What it says.
-    pub facts: PairTruth,
-}
-
 /// What the pipeline would make of the recordings of a pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservedPair {
@@ -65,13 +56,12 @@ pub struct ObservedPair {
 }
 
 /// Simulates a pair and writes `<recording>.mcap` and `truth.json` into `out_dir`, made if need be.
-pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, LabError> {
+pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<Simulated<PairTruth>, LabError> {
     config.check()?;
     let truth_path = out_dir.join(crate::TRUTH);
     crate::may_write(config.recordings.iter().map(String::as_str), out_dir, &truth_path)?;
     let pair = Pair::build(config);
-    let refused = |source| LabError::Folder { path: out_dir.to_owned(), source };
-    std::fs::create_dir_all(out_dir).map_err(refused)?;
+    crate::make_folder(out_dir)?;
     let mut truth = PairTruth::of_pair(config, &pair);
     let mut recordings = Vec::new();
     for (recording, name) in config.recordings.iter().enumerate() {
@@ -82,8 +72,8 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<SimulatedPair, La
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
         recordings.push(path);
     }
-    truth.write(&truth_path)?;
-    Ok(SimulatedPair { recordings, truth: truth_path, facts: truth })
+    write_json(&truth, &truth_path)?;
+    Ok(Simulated { recordings, truth: truth_path, facts: truth })
 }
 
 /// Observes a pair without recording it.
@@ -103,11 +93,11 @@ pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
         for (dwell, rest) in rests.into_iter().enumerate() {
             let id = DwellId { recording, dwell };
             let time_ns = config.start_ns(recording) + (rest.mid_s() * 1e9) as i64;
-            let reading = |arm: usize, draw: &mut Stream| {
-                reading(config, arm, &rest.to_rad[arm], rest.end_s - rest.start_s, draw)
-            };
-            let first = observation(id, time_ns, reading(0, &mut draw));
-            dwells.push([first, observation(id, time_ns, reading(1, &mut draw))]);
+            dwells.push([0, 1].map(|arm: usize| {
+                let joints = &config.arms[arm].joints;
+                let readings = (rest.end_s - rest.start_s) * joints.rate_hz;
+                observation(id, time_ns, encoders(joints, &rest.to_rad[arm], readings, &mut draw))
+            }));
         }
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
     }
@@ -156,26 +146,6 @@ impl BuiltArm {
         let in_base = self.world_from_base.inverse() * nalgebra::Point3::from(*target_m);
         self.arm.solve(&in_base.coords, start_rad).map_err(|out| out.short_by_m)
     }
-}
-
-/// Mean reading of each joint over a rest [rad], and its standard error [rad].
-fn reading(
-    config: &PairConfig,
-    arm: usize,
-    joint_rad: &[f64],
-    rest_s: f64,
-    draw: &mut Stream,
-) -> [Vec<f64>; 2] {
-    let joints = &config.arms[arm].joints;
-    let (count, readings) = (joints.count_rad(), (rest_s * joints.rate_hz).max(1.0).floor());
-    let mean = |angle: &f64| {
-        let counted =
-            (0..readings as usize).map(|_| (angle / count + draw.normal() * joints.noise_counts).round());
-        counted.sum::<f64>() / readings * count
-    };
-    // Counting adds the variance of a uniform error of one count.
-    let sigma = count * ((joints.noise_counts.powi(2) + 1.0 / 12.0) / readings).sqrt();
-    [joint_rad.iter().map(mean).collect(), vec![sigma; joint_rad.len()]]
 }
 
 fn observation(dwell: DwellId, time_ns: i64, [joint_rad, joint_sigma_rad]: [Vec<f64>; 2]) -> Observation {

@@ -7,7 +7,7 @@ use crate::LabError;
 use crate::random::{Purpose, Stream};
 use crate::sensors::encoder::payload;
 use crate::sensors::transport::Transport;
-use crate::sensors::{Channel, Kind, Log, Message, SensorClock};
+use crate::sensors::{Kind, Log, Message, SensorClock};
 
 /// Records a motion.
 pub(crate) fn log(
@@ -18,7 +18,7 @@ pub(crate) fn log(
 ) -> Result<Log, LabError> {
     let reference_ns = config.start_ns(recording);
     let clock = SensorClock { offset_s: 0.0, latency_s: 0.0, drift: 0.0, reference_ns };
-    let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
+    let mut log = Log::new(clock);
     for arm in 0..pair.carriers().len() {
         joint_states(config, pair, motion, recording, arm, &mut log)?;
     }
@@ -28,9 +28,7 @@ pub(crate) fn log(
         what: "the joined tips on their way".into(),
         short_by_mm: short_by_m * 1e3,
     })?;
-    // Stable: messages logged in the same nanosecond keep the order of their channels.
-    log.messages.sort_by_key(|message| message.log_ns);
-    Ok(log)
+    Ok(log.in_order())
 }
 
 fn joint_states(
@@ -43,12 +41,7 @@ fn joint_states(
 ) -> Result<(), LabError> {
     let (own, built) = (config.carriers()[arm], pair.carriers()[arm]);
     let joints = &own.joints;
-    log.channels.push(Channel {
-        topic: joints.topic.clone(),
-        kind: Kind::JointState,
-        frame_id: String::new(),
-        names: joints.names.clone(),
-    });
+    let channel = log.channel(&joints.topic, Kind::JointState, "", &joints.names);
     // The torso's come behind those of the arms in all recordings.
     let stream = if arm < 2 { 2 * recording + arm } else { 2 * config.recordings.len() + recording };
     let mut noise = Stream::new(config.seed, Purpose::Encoder, stream);
@@ -75,7 +68,7 @@ fn joint_states(
         let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
         let log_ns = transport.log_ns(stamp_ns);
         let payload = payload(joints, &counts, &[]);
-        log.messages.push(Message { channel: arm, sequence, stamp_ns, log_ns, payload });
+        log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
     }
     Ok(())
 }

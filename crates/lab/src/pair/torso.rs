@@ -5,7 +5,7 @@ use super::{Pair, PairArmConfig, PairConfig};
 use crate::config::{not_negative, positive, range, value};
 use crate::random::{Purpose, Stream};
 use crate::sensors::transport::Transport;
-use crate::sensors::{Channel, Kind, Log, Message, Payload};
+use crate::sensors::{Kind, Log, Message, Payload};
 use crate::{LabError, config::TransportConfig};
 use armcal_core::RollPitchYaw;
 use nalgebra::{Point3, Quaternion};
@@ -72,13 +72,7 @@ pub(super) fn tips_seen(
     let camera_from_robot = armcal_core::Pose::from(seen.robot);
     let still = TransportConfig::default();
     for (arm, topic) in seen.topics.iter().enumerate() {
-        let channel = log.channels.len();
-        log.channels.push(Channel {
-            topic: topic.clone(),
-            kind: Kind::PoseStamped,
-            frame_id: "cameras".into(),
-            names: vec![torso.arm.name.clone()],
-        });
+        let channel = log.channel(topic, Kind::PoseStamped, "cameras", std::slice::from_ref(&torso.arm.name));
         let stream = 2 * recording + arm;
         let mut noise = Stream::new(config.seed, Purpose::ViconMarker, stream);
         let mut transport =

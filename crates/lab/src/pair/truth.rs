@@ -2,10 +2,8 @@
 
 use super::motion::Motion;
 use super::{Pair, PairConfig};
-use crate::LabError;
-use crate::truth::{Deviation, PoseTruth, deviations, write_json};
+use crate::truth::{Deviation, PoseTruth, deviations};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Everything that was true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,11 +73,6 @@ impl PairTruth {
             link_m: pair.link_m,
             recordings: Vec::new(),
         }
-    }
-
-    /// Writes it as JSON, atomically.
-    pub fn write(&self, path: &Path) -> Result<(), LabError> {
-        write_json(self, path)
     }
 }
 

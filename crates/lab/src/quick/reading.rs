@@ -1,10 +1,8 @@
 //! What the mean over a dwell makes of encoders, cameras and thermometer.
 
-use crate::config::LabConfig;
+use crate::config::{EncoderConfig, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::sensors::outliers::{Swap, Tails, swapped_m, swaps};
-use crate::session::Session;
-use crate::trace::Rest;
 use armcal_core::{Pose, Reference};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -15,33 +13,24 @@ const FLOOR_M: f64 = 1e-5;
 const FLOOR_RAD: f64 = 0.001 * std::f64::consts::PI / 180.0;
 
 /// Readings that are really drawn: their mean is exact enough beyond.
-const MOST_READINGS: f64 = 100.0;
+pub const MOST_READINGS: f64 = 100.0;
 
-/// Mean reading of each joint.
-pub struct Readings {
-    pub mean_rad: Vec<f64>,
-    pub sigma_rad: Vec<f64>,
-}
-
-/// Draws, counts and averages the readings of a dwell.
-pub fn encoders(
-    config: &LabConfig,
-    session: &Session,
-    rest: &Rest,
-    span_s: [f64; 2],
+/// Mean of so many readings of each joint [rad], and its standard error [rad].
+pub(crate) fn encoders(
+    joints: &EncoderConfig,
+    joint_rad: &[f64],
+    readings: f64,
     draw: &mut Stream,
-) -> Readings {
-    let (joints, count) = (&config.joints, config.joints.count_rad());
-    let readings = ((span_s[1] - span_s[0]) * joints.rate_hz).clamp(1.0, MOST_READINGS).floor();
+) -> [Vec<f64>; 2] {
+    let (count, readings) = (joints.count_rad(), readings.max(1.0).floor());
     let mean = |angle: &f64| {
         let counted =
             (0..readings as usize).map(|_| (angle / count + draw.normal() * joints.noise_counts).round());
         counted.sum::<f64>() / readings * count
     };
-    let mean_rad: Vec<f64> = session.trace.reading_rad[rest.last].iter().map(mean).collect();
     // Counting adds the variance of a uniform error of one count.
     let sigma = count * ((joints.noise_counts.powi(2) + 1.0 / 12.0) / readings).sqrt();
-    Readings { sigma_rad: vec![sigma; mean_rad.len()], mean_rad }
+    [joint_rad.iter().map(mean).collect(), vec![sigma; joint_rad.len()]]
 }
 
 /// The cameras and the thermometer of one recording.

@@ -74,7 +74,7 @@ impl Draw {
         let [channel, driver] = made.enters;
         Ok(Hidden {
             family: family.name.to_owned(),
-            mechanism: made.mechanism.hidden().mechanism().name().to_owned(),
+            mechanism: made.mechanism.hidden().name().to_owned(),
             joint: (self.joint > 0).then_some(self.joint),
             recording: self.recording,
             dwell: self.dwell,
@@ -217,7 +217,7 @@ fn shape_relatives(joint: usize) -> Vec<String> {
 
 type Build = fn(&mut Draw, &mut LabConfig) -> Result<Made, LabError>;
 
-const fn family(
+pub(super) const fn family(
     name: &'static str,
     joints: &'static [usize],
     range: [f64; 2],

@@ -1,42 +1,25 @@
 //! Mechanisms that are in no catalogue: the right answer is where they enter and what they depend on.
 
-use super::families::{Draw, Family, Made, stretched_nm};
+use super::families::{Draw, Family, Made, family, stretched_nm};
 use crate::LabError;
 use crate::config::LabConfig;
 use crate::mechanisms::*;
 
 /// Every one.
 pub(super) const FAMILIES: &[Family] = &[
-    Family { name: "outside:axis_wobble", joints: &[1], range: [0.05, 0.5], unit: "deg", build: axis_wobble },
-    Family { name: "outside:cable_drag", joints: &[2], range: [0.2, 1.0], unit: "deg", build: cable_drag },
-    Family { name: "outside:worn_gap", joints: &[1, 2], range: [0.3, 1.2], unit: "deg", build: worn_gap },
-    Family {
-        name: "outside:damaged_teeth",
-        joints: &[1],
-        range: [0.15, 0.8],
-        unit: "deg",
-        build: damaged_teeth,
-    },
-    Family { name: "outside:twist", joints: &[1], range: [0.2, 1.0], unit: "deg", build: twist },
-    Family {
-        name: "outside:room_temperature",
-        joints: &[],
-        range: [0.05, 0.2],
-        unit: "%",
-        build: room_temperature,
-    },
-    Family { name: "outside:soft_stop", joints: &[2], range: [2.0, 8.0], unit: "%", build: soft_stop },
-    Family { name: "outside:sawtooth", joints: &[1, 2, 3], range: [0.1, 0.5], unit: "deg", build: sawtooth },
+    family("outside:axis_wobble", &[1], [0.05, 0.5], "deg", axis_wobble),
+    family("outside:cable_drag", &[2], [0.2, 1.0], "deg", cable_drag),
+    family("outside:worn_gap", &[1, 2], [0.3, 1.2], "deg", worn_gap),
+    family("outside:damaged_teeth", &[1], [0.15, 0.8], "deg", damaged_teeth),
+    family("outside:twist", &[1], [0.2, 1.0], "deg", twist),
+    family("outside:room_temperature", &[], [0.05, 0.2], "%", room_temperature),
+    family("outside:soft_stop", &[2], [2.0, 8.0], "%", soft_stop),
+    family("outside:sawtooth", &[1, 2, 3], [0.1, 0.5], "deg", sawtooth),
 ];
 
 fn made(mechanism: MechanismConfig, channel: String, driver: &str) -> Made {
-    Made {
-        mechanism,
-        effect: None,
-        same: Vec::new(),
-        alike: Vec::new(),
-        enters: [channel, driver.to_owned()],
-    }
+    let (same, alike) = (Vec::new(), Vec::new());
+    Made { mechanism, effect: None, same, alike, enters: [channel, driver.to_owned()] }
 }
 
 fn axis_wobble(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {

@@ -2,7 +2,8 @@
 
 use super::Scenario;
 use crate::config::{LabConfig, value};
-use crate::{LabError, Nominal, board, may_write, nothing_hidden, record, run};
+use crate::truth::write_json;
+use crate::{LabError, Nominal, board, make_folder, may_write, nothing_hidden, run, write_recordings};
 use armcal_recording::may_write_all;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -35,25 +36,15 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
     facts.scenario = Some(scenario.clone());
     facts.hidden = planted.hidden;
 
-    make_folder(folder)?;
-    let mut recordings = Vec::new();
-    for (log, recording) in logs.iter().zip(&facts.recordings) {
-        let path = folder.join(&recording.file);
-        record::write(&path, &config.name, &recording.name, log)?;
-        recordings.push(path);
-    }
+    let recordings = write_recordings(&facts, &logs, folder)?;
     write(&arm, "arm", &Nominal::dh_toml(config))?;
     write(&drawing, "board", &board::drawing(&config.board.file)?)?;
     write(&pipeline, "pipeline", &pipeline_toml(config))?;
     if let Some(parent) = truth.parent() {
         make_folder(parent)?;
     }
-    facts.write(truth)?;
+    write_json(&facts, truth)?;
     Ok(Sealed { recordings, pipeline, truth: truth.to_owned() })
-}
-
-fn make_folder(path: &Path) -> Result<(), LabError> {
-    std::fs::create_dir_all(path).map_err(|source| LabError::Folder { path: path.to_owned(), source })
 }
 
 /// Writes a text that says in its first line by whom it was made.

@@ -1,8 +1,8 @@
 //! Encoders: angles become counts, counts become joint states.
 
-use super::Log;
-use super::message::{Channel, Kind, Message, Payload};
+use super::message::{Kind, Message, Payload};
 use super::transport::Transport;
+use super::{Log, evenly};
 use crate::config::{EncoderConfig, JointFormat, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::session::Session;
@@ -11,11 +11,11 @@ use crate::trace::row_at;
 /// Adds the joint states of a session to the log.
 pub fn joint_states(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
     let joints = &config.joints;
-    let channel = announce(joints, &joints.topic, log);
+    let channel = log.channel(&joints.topic, Kind::JointState, "", &joints.names);
     let mut noise = Stream::new(config.seed, Purpose::Encoder, recording);
     let mut transport = transport(config, recording, 0);
     let mut before: Option<(f64, Vec<f64>)> = None;
-    for sequence in 0..messages(config, session) {
+    for sequence in 0..=(session.trace.duration_s() * joints.rate_hz).floor() as u32 {
         let nominal_s = f64::from(sequence) / joints.rate_hz;
         let time_s = (nominal_s + transport.period_jitter_s()).clamp(0.0, session.trace.duration_s());
         let counts: Vec<f64> = row_at(&session.trace.reading_rad, time_s)
@@ -29,7 +29,9 @@ pub fn joint_states(config: &LabConfig, recording: usize, session: &Session, log
             _ => vec![0.0; counts.len()],
         };
         let payload = payload(joints, &counts, &speed);
-        put(config, recording, time_s, channel, sequence, payload, &mut transport, log);
+        let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
+        let log_ns = transport.log_ns(stamp_ns);
+        log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
         before = Some((time_s, counts));
     }
 }
@@ -38,58 +40,20 @@ pub fn joint_states(config: &LabConfig, recording: usize, session: &Session, log
 pub fn set_points(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
     let joints = &config.joints;
     let Some(topic) = &joints.set_point_topic else { return };
-    let channel = announce(joints, topic, log);
-    let mut transport = transport(config, recording, 1);
-    for sequence in 0..messages(config, session) {
-        let time_s = f64::from(sequence) / joints.rate_hz;
+    let channel = log.channel(topic, Kind::JointState, "", &joints.names);
+    let transport = transport(config, recording, 1);
+    evenly(config, (recording, session), (channel, joints.rate_hz, transport), log, |time_s| {
         // Set-points step: the one in force is the one of the step before, not a mean of two.
         let (step, ..) = crate::trace::around(time_s, session.trace.len());
         let set = &session.trace.set_point_rad[step];
         let counts: Vec<f64> = set.iter().map(|angle| (angle / joints.count_rad()).round()).collect();
-        let mut payload = payload(joints, &counts, &[]);
-        if let Payload::Joints { velocity, .. } = &mut payload {
-            velocity.clear();
-        }
-        put(config, recording, time_s, channel, sequence, payload, &mut transport, log);
-    }
-}
-
-fn announce(joints: &EncoderConfig, topic: &str, log: &mut Log) -> usize {
-    log.channels.push(Channel {
-        topic: topic.to_owned(),
-        kind: Kind::JointState,
-        frame_id: String::new(),
-        names: joints.names.clone(),
+        payload(joints, &counts, &[])
     });
-    log.channels.len() - 1
 }
 
 fn transport(config: &LabConfig, recording: usize, channel: usize) -> Transport<'_> {
     let draw = Stream::new(config.seed, Purpose::JointTransport, 2 * recording + channel);
     Transport::new(&config.joints.transport, draw)
-}
-
-fn messages(config: &LabConfig, session: &Session) -> u32 {
-    (session.trace.duration_s() * config.joints.rate_hz).floor() as u32 + 1
-}
-
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one message is that many things; a struct would only rename them"
-)]
-fn put(
-    config: &LabConfig,
-    recording: usize,
-    time_s: f64,
-    channel: usize,
-    sequence: u32,
-    payload: Payload,
-    transport: &mut Transport<'_>,
-    log: &mut Log,
-) {
-    let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
-    let log_ns = transport.log_ns(stamp_ns);
-    log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
 }
 
 /// A joint state of these counts, in the form that is published.

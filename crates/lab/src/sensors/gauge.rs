@@ -1,9 +1,9 @@
 //! Instruments that read one length of the true tip.
 
-use super::message::{Channel, Kind, Payload};
+use super::message::{Kind, Payload};
 use super::transport::Transport;
 use super::{Log, evenly};
-use crate::config::{GaugeConfig, GaugeKind, LabConfig};
+use crate::config::{GaugeKind, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::session::Session;
 use crate::trace::pose_at;
@@ -49,25 +49,14 @@ impl Standing {
 
 /// Adds the readings of every instrument to the log.
 pub fn readings(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
-    for (index, gauge) in config.gauges.iter().enumerate() {
-        of_one(config, gauge, [recording, index], session, log);
+    for index in 0..config.gauges.len() {
+        of_one(config, [recording, index], session, log);
     }
 }
 
-fn of_one(
-    config: &LabConfig,
-    gauge: &GaugeConfig,
-    [recording, index]: [usize; 2],
-    session: &Session,
-    log: &mut Log,
-) {
-    log.channels.push(Channel {
-        topic: gauge.topic.clone(),
-        kind: Kind::Float64,
-        frame_id: String::new(),
-        names: Vec::new(),
-    });
-    let channel = log.channels.len() - 1;
+fn of_one(config: &LabConfig, [recording, index]: [usize; 2], session: &Session, log: &mut Log) {
+    let gauge = &config.gauges[index];
+    let channel = log.channel(&gauge.topic, Kind::Float64, "", &[]);
     let standing = Standing::draw(config, index);
     // Behind the draws of where the instruments stand.
     let stream = 1000 + 2 * (recording * config.gauges.len() + index);

@@ -31,6 +31,26 @@ pub struct Log {
     pub occlusions: Vec<Occlusion>,
 }
 
+impl Log {
+    /// Nothing was recorded yet.
+    pub fn new(clock: SensorClock) -> Log {
+        Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() }
+    }
+
+    /// Announces a channel.
+    pub fn channel(&mut self, topic: &str, kind: Kind, frame_id: &str, names: &[String]) -> usize {
+        let (topic, frame_id, names) = (topic.to_owned(), frame_id.to_owned(), names.to_vec());
+        self.channels.push(Channel { topic, kind, frame_id, names });
+        self.channels.len() - 1
+    }
+
+    /// In the order of the log times. Stable: messages logged in the same nanosecond keep the order of their channels.
+    pub fn in_order(mut self) -> Log {
+        self.messages.sort_by_key(|message| message.log_ns);
+        self
+    }
+}
+
 /// Adds messages that come evenly, so many a second, stamped by the robot's clock; `payload` is told when [s].
 fn evenly(
     config: &LabConfig,
@@ -51,7 +71,7 @@ fn evenly(
 /// Records a session.
 pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
     let clock = SensorClock::draw(config, recording);
-    let mut log = Log { channels: Vec::new(), messages: Vec::new(), clock, occlusions: Vec::new() };
+    let mut log = Log::new(clock);
     encoder::joint_states(config, recording, session, &mut log);
     let markers = (0..config.vicon.markers.len()).map(Body::Marker);
     for body in [Body::Tip, Body::Table, Body::Base].into_iter().chain(markers) {
@@ -62,7 +82,5 @@ pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
     }
     gauge::readings(config, recording, session, &mut log);
     encoder::set_points(config, recording, session, &mut log);
-    // Stable: messages logged in the same nanosecond keep the order of their channels.
-    log.messages.sort_by_key(|message| message.log_ns);
-    log
+    log.in_order()
 }

@@ -1,6 +1,6 @@
 //! A slow thermometer on the arm.
 
-use super::message::{Channel, Kind, Payload};
+use super::message::{Kind, Payload};
 use super::transport::Transport;
 use super::{Log, evenly};
 use crate::config::LabConfig;
@@ -11,13 +11,7 @@ use crate::trace::around;
 /// Adds the temperature readings of a session to the log.
 pub fn readings(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
     let thermometer = &config.temperature;
-    log.channels.push(Channel {
-        topic: thermometer.topic.clone(),
-        kind: Kind::Temperature,
-        frame_id: "arm".into(),
-        names: Vec::new(),
-    });
-    let channel = log.channels.len() - 1;
+    let channel = log.channel(&thermometer.topic, Kind::Temperature, "arm", &[]);
     let mut noise = Stream::new(config.seed, Purpose::Temperature, 2 * recording);
     let draw = Stream::new(config.seed, Purpose::Temperature, 2 * recording + 1);
     let transport = Transport::new(&config.joints.transport, draw);

@@ -1,7 +1,7 @@
 //! The motion capture system: noisy, late, on its own clock, sometimes blind.
 
 use super::Log;
-use super::message::{Channel, Kind, Message, Payload};
+use super::message::{Kind, Message, Payload};
 use super::outliers::{Tails, swapped_m, swaps};
 use super::transport::Transport;
 use crate::config::{BodyConfig, LabConfig, PoseMessage, ViconConfig};
@@ -62,7 +62,12 @@ pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Bo
     };
     let [noise, occlusion, transport] = purposes.map(|p| Stream::new(config.seed, p, stream));
     let (clock, start_ns) = (log.clock, config.start_ns(recording));
-    let channel = announce(vicon, settings, log);
+    let kind = match vicon.message {
+        PoseMessage::PoseStamped => Kind::PoseStamped,
+        PoseMessage::TransformStamped => Kind::TransformStamped,
+    };
+    let name = format!("{0}/{0}", settings.subject);
+    let channel = log.channel(&format!("/vicon/{name}"), kind, &vicon.frame_id, &[name]);
     let mut noise = Noise::new(vicon, settings, noise);
     let mut occlusions = draw_occlusions(settings, session.trace.duration_s(), start_ns, occlusion);
     let mut transport = Transport::new(&vicon.clock.transport, transport);
@@ -99,20 +104,6 @@ pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Bo
     }
     occlusions.retain(|occlusion| occlusion.frames > 0);
     log.occlusions.extend(occlusions);
-}
-
-fn announce(vicon: &ViconConfig, settings: &BodyConfig, log: &mut Log) -> usize {
-    let name = &settings.subject;
-    log.channels.push(Channel {
-        topic: format!("/vicon/{name}/{name}"),
-        kind: match vicon.message {
-            PoseMessage::PoseStamped => Kind::PoseStamped,
-            PoseMessage::TransformStamped => Kind::TransformStamped,
-        },
-        frame_id: vicon.frame_id.clone(),
-        names: vec![format!("{name}/{name}")],
-    });
-    log.channels.len() - 1
 }
 
 /// Bursts at random times; a burst that begins in another one is part of it.

@@ -1,62 +1,44 @@
 //! Encoders and drivers that fail, and readings that are no readings.
 
-use super::{ALL, Kind, about, kind, set_points, whole};
+use super::{ALL, Kind, each, joint, set_points, whole};
+use crate::Draw;
 use crate::session::{Rest, Session};
-use crate::{Draw, Error};
 
 pub const KINDS: &[Kind] = &[
-    kind("joint-frozen-throughout", "joint-stuck", ALL, |s, d| frozen(s, d, 0.0)),
-    kind("joint-frozen-from-the-middle", "joint-stuck", ALL, |s, d| frozen(s, d, 0.45)),
-    kind("joint-always-zero", "joint-stuck", ALL, always_zero),
+    joint("joint-frozen-throughout", "joint-stuck", 0, |s, _, j| frozen(s, j, 0.0)),
+    joint("joint-frozen-from-the-middle", "joint-stuck", 0, |s, _, j| frozen(s, j, 0.45)),
+    joint("joint-always-zero", "joint-stuck", 0, |s, _, j| s.joints(|_, q| q[j] = 0.0)),
     whole("set-points-recorded", "setpoints-recorded", ALL, set_points::recorded),
     whole("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::named),
-    kind("encoder-slips-once", "joint-zero-event", ALL, slips),
-    kind("encoder-wraps-early", "encoder-wrap", ALL, wraps),
-    kind("encoder-saturates", "saturated-joint", ALL, saturates),
+    joint("encoder-slips-once", "joint-zero-event", 1, slips),
+    joint("encoder-wraps-early", "encoder-wrap", 0, wraps),
+    joint("encoder-saturates", "saturated-joint", 0, saturates),
     whole("encoder-coarse", "quantised", ALL, coarse),
     whole("encoder-stale", "stale-encoder", ALL, stale),
     whole("encoder-filtered", "filtered-encoder", ALL, filtered),
     whole("encoder-noisy", "noise-underdeclared", ALL, noisy),
-    kind("encoder-spikes", "outliers", ALL, spikes),
+    joint("encoder-spikes", "outliers", 0, spikes),
     whole("driver-resets-to-zero", "outliers", ALL, resets),
     whole("encoder-not-a-number", "non-finite", ALL, not_a_number),
 ];
 
-fn some_joint(session: &Session, draw: &mut Draw) -> usize {
-    draw.pick(session.joint_names().len())
-}
-
-fn frozen(session: &mut Session, draw: &mut Draw, from: f64) -> Result<Vec<String>, Error> {
-    let joint = some_joint(session, draw);
-    let mut last = Vec::new();
+fn frozen(session: &mut Session, joint: usize, from: f64) {
+    let mut held = vec![None; session.recordings.len()];
     session.joints(|at, q| {
-        last.resize(at.recording + 1, None);
-        let held: &mut Option<f64> = &mut last[at.recording];
-        if at.share < from {
-            return;
+        if at.share >= from {
+            q[joint] = *held[at.recording].get_or_insert(q[joint]);
         }
-        q[joint] = *held.get_or_insert(q[joint]);
     });
-    about(session, &[joint])
 }
 
-fn always_zero(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let joint = some_joint(session, draw);
-    session.joints(|_, q| q[joint] = 0.0);
-    about(session, &[joint])
-}
-
-fn slips(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let joint = 1 + draw.pick(session.joint_names().len() - 1);
+fn slips(session: &mut Session, draw: &mut Draw, joint: usize) {
     let angle = draw.signed(1.0, 4.0).to_radians();
     let moment_ns = session.moment_ns(1, draw.uniform(0.35, 0.65));
     session.joints(|at, q| q[joint] += if at.stamp_ns > moment_ns { angle } else { 0.0 });
-    about(session, &[joint])
 }
 
 /// A counter that is too short: the reading jumps back by what it holds, which is no whole turn of the joint.
-fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let joint = some_joint(session, draw);
+fn wraps(session: &mut Session, draw: &mut Draw, joint: usize) {
     let [top, high, low] = quantiles(session, joint, [draw.uniform(0.45, 0.7), 0.98, 0.02]);
     let holds = (high - low) * draw.uniform(0.6, 1.1);
     session.joints(|_, q| {
@@ -64,14 +46,11 @@ fn wraps(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
             q[joint] -= holds;
         }
     });
-    about(session, &[joint])
 }
 
-fn saturates(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let joint = some_joint(session, draw);
+fn saturates(session: &mut Session, draw: &mut Draw, joint: usize) {
     let [top] = quantiles(session, joint, [draw.uniform(0.5, 0.75)]);
     session.joints(|_, q| q[joint] = q[joint].min(top));
-    about(session, &[joint])
 }
 
 /// Quantiles of the readings of a joint.
@@ -84,15 +63,14 @@ fn quantiles<const N: usize>(session: &mut Session, joint: usize, shares: [f64; 
 
 fn coarse(session: &mut Session, draw: &mut Draw) {
     let step = draw.uniform(0.4, 1.0).to_radians();
-    session.joints(|_, q| q.iter_mut().for_each(|q| *q = (*q / step).round() * step));
+    each(session, |q| (q / step).round() * step);
 }
 
 /// The driver refreshes its readings every second or so and publishes the old ones in between.
 fn stale(session: &mut Session, draw: &mut Draw) {
     let period_ns = (1e9 * draw.uniform(0.9, 1.4)) as i64;
-    let mut held: Vec<Option<(i64, Vec<f64>)>> = Vec::new();
+    let mut held: Vec<Option<(i64, Vec<f64>)>> = vec![None; session.recordings.len()];
     session.joints(|at, q| {
-        held.resize(at.recording + 1, None);
         let slot = &mut held[at.recording];
         match slot {
             Some((slice, value)) if *slice == at.stamp_ns / period_ns => q.clone_from(value),
@@ -104,9 +82,8 @@ fn stale(session: &mut Session, draw: &mut Draw) {
 /// A low-pass that has not settled when the rest is over.
 fn filtered(session: &mut Session, draw: &mut Draw) {
     let time_s = draw.uniform(0.4, 0.9);
-    let mut state: Vec<Option<(i64, Vec<f64>)>> = Vec::new();
+    let mut state: Vec<Option<(i64, Vec<f64>)>> = vec![None; session.recordings.len()];
     session.joints(|at, q| {
-        state.resize(at.recording + 1, None);
         let slot = &mut state[at.recording];
         if let Some((then_ns, value)) = slot {
             let gain = 1.0 - (-((at.stamp_ns - *then_ns) as f64 * 1e-9) / time_s).exp();
@@ -131,15 +108,13 @@ fn noisy(session: &mut Session, draw: &mut Draw) {
     });
 }
 
-fn spikes(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let joint = some_joint(session, draw);
+fn spikes(session: &mut Session, draw: &mut Draw, joint: usize) {
     let share = draw.uniform(0.01, 0.04);
     session.joints(|_, q| {
         if draw.chance(share) {
             q[joint] += draw.signed(0.2, 2.0);
         }
     });
-    about(session, &[joint])
 }
 
 fn resets(session: &mut Session, draw: &mut Draw) {
@@ -152,7 +127,7 @@ fn resets(session: &mut Session, draw: &mut Draw) {
 }
 
 fn not_a_number(session: &mut Session, draw: &mut Draw) {
-    let joint = some_joint(session, draw);
+    let joint = draw.pick(session.joint_names().len());
     let share = draw.uniform(0.1, 0.3);
     session.joints(|_, q| {
         if draw.chance(share) {

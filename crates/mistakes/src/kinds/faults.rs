@@ -97,27 +97,22 @@ fn joint_name(session: &mut Session, _: &mut Draw) {
     session.set(&["streams", "joints", "names"], names.into_iter().map(Value::String).collect::<Vec<_>>());
 }
 
-fn keep(
-    session: &mut Session,
-    recordings: std::ops::Range<usize>,
-    mut kept: impl FnMut(usize, &Message) -> bool,
-) {
-    for (i, recorded) in session.recordings.iter_mut().enumerate().filter(|(i, _)| recordings.contains(i)) {
-        recorded.log.messages.retain(|m| kept(i, m));
+/// Which messages of a topic, or of all topics, are kept; `kept` is told the recording.
+fn keep(session: &mut Session, topic: Option<&str>, mut kept: impl FnMut(usize, &Message) -> bool) {
+    for (i, recorded) in session.recordings.iter_mut().enumerate() {
+        let channels = &recorded.log.channels;
+        let other = |m: &Message| topic.is_some_and(|topic| channels[m.channel].topic != topic);
+        recorded.log.messages.retain(|m| other(m) || kept(i, m));
     }
 }
 
 fn lost(session: &mut Session, draw: &mut Draw, share: f64) {
-    keep(session, 0..usize::MAX, |_, _| !draw.chance(share));
+    keep(session, None, |_, _| !draw.chance(share));
 }
 
 fn gaps(session: &mut Session, draw: &mut Draw) {
-    let joints: Vec<Option<usize>> =
-        session.recordings.iter().map(|r| r.log.channels.iter().position(|c| c.topic == JOINTS)).collect();
     let (period_s, gap_s) = (draw.uniform(25.0, 40.0), draw.uniform(6.0, 12.0));
-    keep(session, 0..usize::MAX, |i, m| {
-        Some(m.channel) != joints[i] || (m.stamp_ns as f64 * 1e-9) % period_s > gap_s
-    });
+    keep(session, Some(JOINTS), |_, m| (m.stamp_ns as f64 * 1e-9) % period_s > gap_s);
 }
 
 fn doubled(session: &mut Session, _: &mut Draw) {
@@ -137,22 +132,16 @@ fn shuffled(session: &mut Session, draw: &mut Draw) {
 }
 
 fn thinned(session: &mut Session, topic: &str, period_ns: i64) {
-    let channel: Vec<Option<usize>> =
-        session.recordings.iter().map(|r| r.log.channels.iter().position(|c| c.topic == topic)).collect();
-    let mut last = vec![None; channel.len()];
-    keep(session, 0..usize::MAX, |i, m| {
+    let mut last = vec![None; session.recordings.len()];
+    keep(session, Some(topic), |i, m| {
         let slice = Some(m.stamp_ns / period_ns);
-        let fresh = Some(m.channel) != channel[i] || slice != last[i];
-        if Some(m.channel) == channel[i] {
-            last[i] = slice;
-        }
-        fresh
+        std::mem::replace(&mut last[i], slice) != slice
     });
 }
 
 fn stopped_early(session: &mut Session, _: &mut Draw) {
     let until_ns = session.recordings[0].rests.get(4).map_or(0, |r| r.end_ns);
-    keep(session, 0..1, |_, m| m.stamp_ns <= until_ns);
+    keep(session, None, |i, m| i > 0 || m.stamp_ns <= until_ns);
     session.recordings.truncate(1);
     session.entries().truncate(1);
 }

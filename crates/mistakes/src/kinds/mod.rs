@@ -32,6 +32,8 @@ pub struct Kind {
 enum Make {
     /// Of a part: returns words of which a report about it has to name one, such as the joint.
     Part(fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>),
+    /// Of a joint, the first one or a later one, which a report has to name.
+    Joint(usize, fn(&mut Session, &mut Draw, usize)),
     /// Of the whole: a report need not name anything.
     Whole(fn(&mut Session, &mut Draw)),
 }
@@ -42,6 +44,11 @@ impl Kind {
     pub fn make(&self, session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
         match self.make {
             Make::Part(make) => make(session, draw),
+            Make::Joint(first, make) => {
+                let joint = first + draw.pick(session.joint_names().len() - first);
+                make(session, draw, joint);
+                about(session, &[joint])
+            }
             Make::Whole(make) => {
                 make(session, draw);
                 anything()
@@ -63,6 +70,16 @@ const fn kind(
     make: fn(&mut Session, &mut Draw) -> Result<Vec<String>, Error>,
 ) -> Kind {
     Kind { name, cause, rigs, make: Make::Part(make) }
+}
+
+/// Of a joint of any rig, drawn from the joint of this index on.
+const fn joint(
+    name: &'static str,
+    cause: &'static str,
+    first: usize,
+    make: fn(&mut Session, &mut Draw, usize),
+) -> Kind {
+    Kind { name, cause, rigs: ALL, make: Make::Joint(first, make) }
 }
 
 const fn whole(
@@ -97,6 +114,11 @@ pub fn named(name: &str) -> Result<Kind, Error> {
         name: name.to_owned(),
         known: kinds().iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
     })
+}
+
+/// Changes every reading of every joint by itself.
+fn each(session: &mut Session, change: impl Fn(f64) -> f64) {
+    session.joints(|_, q| q.iter_mut().for_each(|q| *q = change(*q)));
 }
 
 /// A report may be about anything.

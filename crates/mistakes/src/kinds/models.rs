@@ -17,9 +17,9 @@ pub const KINDS: &[Kind] = &[
     whole("lengths-in-metres", "length-unit", ALL, |s, _| lengths(s, 1e-3)),
     whole("lengths-in-inches", "length-unit", ALL, |s, _| lengths(s, 1.0 / 25.4)),
     whole("twists-in-radians", "angle-unit", ALL, twists_in_radians),
-    whole("one-twist-of-the-other-sign", "dh-sign", ALL, twist_sign),
-    whole("one-offset-of-the-other-sign", "dh-sign", ALL, offset_sign),
-    whole("one-length-of-the-other-sign", "dh-sign", ALL, length_sign),
+    whole("one-twist-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "alpha_deg", |v| -v)),
+    whole("one-offset-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "d_mm", |v| -v)),
+    whole("one-length-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "a_mm", |v| -v)),
     whole("link-length-wrong-by-a-lot", "link-length", ALL, link_length),
     whole("tool-length-wrong-by-a-lot", "tool-length", ALL, tool_length),
     whole("tool-left-out", "tool-length", BOARD, tool_left_out),
@@ -42,16 +42,10 @@ fn declared_modified(session: &mut Session, _: &mut Draw) {
 /// Twist and length stand a row later, as Craig writes them; the file still says `standard`.
 fn rows_modified(session: &mut Session, _: &mut Draw) {
     let mut before = [0.0; 2];
-    let mut row_before = usize::MAX;
-    session.entries_of_rows(|row, key, value| {
-        if row != row_before {
-            row_before = row;
-        }
-        match key {
-            "a_mm" => std::mem::swap(value, &mut before[0]),
-            "alpha_deg" => std::mem::swap(value, &mut before[1]),
-            _ => {}
-        }
+    session.entries_of_rows(|_, key, value| match key {
+        "a_mm" => std::mem::swap(value, &mut before[0]),
+        "alpha_deg" => std::mem::swap(value, &mut before[1]),
+        _ => {}
     });
 }
 
@@ -113,18 +107,6 @@ fn one(session: &mut Session, draw: &mut Draw, wanted: &str, change: impl Fn(f64
             *value = change(*value);
         }
     });
-}
-
-fn twist_sign(session: &mut Session, draw: &mut Draw) {
-    one(session, draw, "alpha_deg", |v| -v);
-}
-
-fn offset_sign(session: &mut Session, draw: &mut Draw) {
-    one(session, draw, "d_mm", |v| -v);
-}
-
-fn length_sign(session: &mut Session, draw: &mut Draw) {
-    one(session, draw, "a_mm", |v| -v);
 }
 
 fn link_length(session: &mut Session, draw: &mut Draw) {

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
-    kind("one-recording-of-another-arm", "different-arm", ALL, another_arm),
+    kind("one-recording-of-another-arm", "different-arm", ALL, |s, _| second(s, Source::reseed)),
     kind("one-recording-with-another-tool", "different-tool", ALL, another_tool),
     whole("tool-knocked-in-mid-recording", "different-tool", SEEN, tool_knocked),
     kind("arm-bolted-down-elsewhere", "arm-rebased", ALL, rebased),
@@ -23,22 +23,16 @@ pub const KINDS: &[Kind] = &[
     whole("vertical-declared-wrong", "vertical-wrong", SEEN, vertical),
 ];
 
-fn another_arm(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
-    let mut other = session.recorded_with(Source::reseed)?;
-    if let Source::SixAxis(lab) = &session.source {
-        // The other arm stands in the same place.
-        let lab = lab.clone();
-        other = session.recorded_with(|s| {
-            *s = Source::SixAxis(crate::rigs::six_axis::Lab { seed: lab.seed + 1, ..lab })
-        })?;
-    }
+/// The second recording made on the rig with something changed.
+fn second(session: &mut Session, change: impl FnOnce(&mut Source)) -> Result<Vec<String>, Error> {
+    let mut other = session.recorded_with(change)?;
     session.recordings[1] = other.swap_remove(1);
     anything()
 }
 
 fn another_tool(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let longer_m = draw.signed(0.012, 0.03);
-    let mut other = session.recorded_with(|source| match source {
+    second(session, |source| match source {
         Source::Lab(config) => {
             if let Some(tool) = config.arm.rows.last_mut() {
                 tool.d_m += longer_m;
@@ -47,9 +41,7 @@ fn another_tool(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, E
         Source::SixAxis(lab) => {
             lab.flange_from_target *= Translation3::new(0.0, 0.004, longer_m);
         }
-    })?;
-    session.recordings[1] = other.swap_remove(1);
-    anything()
+    })
 }
 
 /// A change of pose from a moment within the second recording on.
@@ -119,7 +111,7 @@ fn camera_recalibrated(session: &mut Session, draw: &mut Draw) {
 fn rebased(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let offset = draw.direction() * draw.uniform(0.005, 0.015);
     let yaw_deg = draw.signed(0.5, 2.0);
-    let mut other = session.recorded_with(|source| match source {
+    second(session, |source| match source {
         Source::Lab(config) => {
             // The board stays in the room, so it moves in the arm's frame.
             let xyz = &mut config.board.in_base.xyz_m;
@@ -130,9 +122,7 @@ fn rebased(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error>
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_deg.to_radians());
             lab.world_from_base *= Isometry3::from_parts(Translation3::from(offset), turn);
         }
-    })?;
-    session.recordings[1] = other.swap_remove(1);
-    anything()
+    })
 }
 
 /// A pose from a drawing of another cell, given as if it were known.

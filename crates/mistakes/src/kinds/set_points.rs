@@ -2,7 +2,7 @@
 
 use crate::Draw;
 use crate::session::{JOINTS, Rest, Session};
-use armcal_lab::sensors::{Channel, Kind, Message, Payload};
+use armcal_lab::sensors::{Kind, Message, Payload};
 
 /// Set-points under the topic of the readings.
 pub(super) fn recorded(session: &mut Session, draw: &mut Draw) {
@@ -18,10 +18,8 @@ pub(super) fn named(session: &mut Session, draw: &mut Draw) {
     for recorded in &mut session.recordings {
         let log = &mut recorded.log;
         let joints = log.channels.iter().position(|c| c.topic == JOINTS);
-        let asked = log.channels.len();
         let names = joints.map(|j| log.channels[j].names.clone()).unwrap_or_default();
-        let topic = "/controller/command".to_owned();
-        log.channels.push(Channel { topic, kind: Kind::JointState, frame_id: String::new(), names });
+        let asked = log.channel("/controller/command", Kind::JointState, "", &names);
         let messages: Vec<Message> = std::mem::take(&mut log.messages);
         for message in messages {
             let twin =

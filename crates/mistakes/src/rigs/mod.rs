@@ -83,7 +83,7 @@ impl Source {
         }
     }
 
-    /// Another rig of the same kind.
+    /// Another rig of the same kind; a six-axis arm stands in the same place.
     pub fn reseed(&mut self) {
         match self {
             Source::Lab(config) => config.seed += 1,

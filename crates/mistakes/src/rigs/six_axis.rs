@@ -7,9 +7,10 @@ use super::hidden::Hidden;
 use super::{Rig, Source, joints_toml, parsed, topic};
 use crate::Error;
 use crate::session::{Body, JOINTS, Recorded, Rest, Session};
+use armcal_lab::hand::minimum_jerk;
 use armcal_lab::random::{Purpose, Stream};
 use armcal_lab::screw::Line;
-use armcal_lab::sensors::{Channel, Kind, Log, Message, Payload, SensorClock};
+use armcal_lab::sensors::{Kind, Log, Message, Payload, SensorClock};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -110,7 +111,11 @@ impl Lab {
         let mut transport = Stream::new(self.seed, Purpose::TransportTip, recording);
         let systematic: Vec<_> = (0..=POSES).map(|_| (noise.normal3(), noise.normal3())).collect();
         let still = Isometry3::translation(1.9, 0.6, 0.2);
-        let mut messages = Vec::new();
+        let mut log = Log::new(clock);
+        log.channel(JOINTS, Kind::JointState, "", &NAMES.map(str::to_owned));
+        for body in [Body::Tip, Body::Still] {
+            log.channel(topic(Rig::Poses, body), Kind::PoseStamped, "tracker", &[]);
+        }
         for sequence in 0..(path.end_s() * RATE_HZ) as u32 {
             let time_s = f64::from(sequence) / RATE_HZ;
             let stamp_ns = start_ns + (time_s * 1e9) as i64;
@@ -119,7 +124,7 @@ impl Lab {
             let joints = Payload::Joints { position: read.to_vec(), velocity: Vec::new() };
             let late = |draw: &mut Stream| (1e9 * (0.002 + draw.exponential(0.0005))) as i64;
             let log_ns = stamp_ns + late(&mut transport);
-            messages.push(Message { channel: 0, sequence, stamp_ns, log_ns, payload: joints });
+            log.messages.push(Message { channel: 0, sequence, stamp_ns, log_ns, payload: joints });
 
             let (offset, turn) = systematic[path.rest_near(time_s)];
             let mut links = q;
@@ -134,29 +139,12 @@ impl Lab {
                 let (stamp_ns, log_ns) =
                     (clock.stamp_ns(stamp_ns), stamp_ns + 4_000_000 + late(&mut transport));
                 let payload = Payload::Pose { position_m, orientation };
-                messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
+                log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
             }
         }
-        messages.sort_by_key(|m| m.log_ns);
-        let log = Log { channels: channels(), messages, clock, occlusions: Vec::new() };
-        Recorded { name: ["first", "second"][recording].to_owned(), log, rests: path.rests(start_ns) }
+        let name = ["first", "second"][recording].to_owned();
+        Recorded { name, log: log.in_order(), rests: path.rests(start_ns) }
     }
-}
-
-fn channels() -> Vec<Channel> {
-    let seen = |body: Body| Channel {
-        topic: topic(Rig::Poses, body).to_owned(),
-        kind: Kind::PoseStamped,
-        frame_id: "tracker".to_owned(),
-        names: Vec::new(),
-    };
-    let joints = Channel {
-        topic: JOINTS.to_owned(),
-        kind: Kind::JointState,
-        frame_id: String::new(),
-        names: NAMES.map(str::to_owned).to_vec(),
-    };
-    vec![joints, seen(Body::Tip), seen(Body::Still)]
 }
 
 /// The built arm.
@@ -213,9 +201,7 @@ impl Path {
         let k = self.rest_at(time_s);
         let into_s = time_s - k as f64 * (REST_S + MOVE_S) - REST_S;
         let (here, next) = (&self.poses[k], self.poses.get(k + 1).unwrap_or(&self.poses[k]));
-        let u = (into_s / MOVE_S).clamp(0.0, 1.0);
-        // Quintic: at rest at both ends.
-        let s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+        let s = minimum_jerk(into_s / MOVE_S);
         std::array::from_fn(|j| here[j] + s * (next[j] - here[j]))
     }
 

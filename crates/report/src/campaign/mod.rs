@@ -15,8 +15,7 @@ pub use files::{campaign_files, campaign_json, write_campaign};
 pub use row::campaign_row;
 pub use terminal::campaign_text;
 
-use crate::run::Status;
-use armcal_campaign::{Change, Row, RowStatus, Series, changes, series};
+use armcal_campaign::{Change, Row, Series, Status, changes, series};
 
 /// Many recordings of one rig, each calibrated by itself.
 #[derive(Debug, Clone)]
@@ -90,12 +89,8 @@ impl Campaign {
 
     /// The gravest thing about any recording; one that failed counts as data lost.
     pub fn status(&self) -> Status {
-        let any = |status| self.rows.iter().any(|row| row.status == status);
-        match () {
-            () if !self.failed.is_empty() || any(RowStatus::DataLost) => Status::DataLost,
-            () if any(RowStatus::Inadequate) => Status::Inadequate,
-            () => Status::Ok,
-        }
+        let failed = (!self.failed.is_empty()).then_some(Status::DataLost);
+        self.rows.iter().map(|row| row.status).chain(failed).max().unwrap_or(Status::Ok)
     }
 }
 

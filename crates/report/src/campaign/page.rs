@@ -1,15 +1,13 @@
 //! The page of a campaign: errors over time, every change with its series, every recording.
 
 use super::Campaign;
-use super::date::minute;
-use super::words::{meaning, repeated, sentence};
+use super::words::{self, meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;
 use crate::story::Story;
-use crate::text::millimetres;
 use crate::told_warning::ToldWarning;
-use armcal_campaign::{Row, RowStatus, Series};
+use armcal_campaign::{Row, Series};
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -23,23 +21,10 @@ pub(super) struct CampaignPage<'a> {
     shell: Shell,
     next: Vec<String>,
     changes: Vec<(String, &'static str)>,
-    rows: Vec<Shown<'a>>,
+    rows: Vec<(&'a Row, &'a String)>,
     failed: &'a [super::FailedRecording],
     repeats: Vec<String>,
     warnings: Vec<ToldWarning>,
-}
-
-struct Shown<'a> {
-    recording: &'a str,
-    summary: String,
-    start: String,
-    dwells: usize,
-    associated: usize,
-    before: String,
-    after: String,
-    verdict: &'a str,
-    flag: &'a str,
-    warnings: usize,
 }
 
 impl<'a> CampaignPage<'a> {
@@ -52,32 +37,15 @@ impl<'a> CampaignPage<'a> {
         let shell = Shell::new("campaign-page", names, &scripts, &document(campaign), "'none'")?;
         let story = Story::of_campaign(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
-        let rows = campaign.rows.iter().zip(&campaign.folders);
         Ok(CampaignPage {
             shell: shell.telling(&story),
             next: story.next,
             changes: told.collect(),
-            rows: rows.map(|(row, folder)| shown(row, folder)).collect(),
+            rows: campaign.rows.iter().zip(&campaign.folders).collect(),
             failed: &campaign.failed,
             repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
             warnings: story.warnings,
         })
-    }
-}
-
-fn shown<'a>(row: &'a Row, folder: &str) -> Shown<'a> {
-    let mean = |value_m: Option<f64>| value_m.map_or("–".into(), millimetres);
-    Shown {
-        recording: &row.recording,
-        summary: format!("{folder}/summary.json"),
-        start: minute(row.start_ns),
-        dwells: row.dwells,
-        associated: row.associated,
-        before: mean(row.nominal.mean_m),
-        after: mean(row.calibrated.mean_m),
-        verdict: &row.verdict,
-        flag: if row.status == RowStatus::Ok { "" } else { row.status.word() },
-        warnings: row.warnings.len(),
     }
 }
 

@@ -1,8 +1,8 @@
 //! The row of one recording, taken from its run.
 
-use crate::run::{Run, Status};
+use crate::run::Run;
 use armcal_calibrate::Estimate;
-use armcal_campaign::{ErrorFigures, Quantity, Row, RowStatus};
+use armcal_campaign::{ErrorFigures, Quantity, Row};
 use armcal_core::{ErrorStats, RollPitchYaw, Unit, Warning};
 use armcal_table::Tilt;
 
@@ -29,11 +29,7 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         dwells: recording.dwells.len(),
         associated: run.associated(recording),
         rejected: recording.rejections.len(),
-        status: match run.status() {
-            Status::Ok => RowStatus::Ok,
-            Status::Inadequate => RowStatus::Inadequate,
-            Status::DataLost => RowStatus::DataLost,
-        },
+        status: run.status(),
         nominal: figures(&judged.nominal),
         calibrated: figures(&judged.fitted),
         noise_floor_m: calibration.noise_floor_m,

@@ -2,11 +2,10 @@
 
 use super::Campaign;
 use super::words::{meaning, sentence};
-use crate::run::Status;
 use crate::story::Story;
 use crate::text::{millimetres, printable};
 use crate::told_warning::ToldWarning;
-use armcal_campaign::{ErrorFigures, Row, RowStatus};
+use armcal_campaign::{ErrorFigures, Row, Status};
 use armcal_core::{Severity, listed};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -57,8 +56,8 @@ fn wrong(campaign: &Campaign) -> Vec<String> {
     let count = |status| campaign.rows.iter().filter(|row| row.status == status).count();
     let told = [
         (campaign.failed.len(), "not calibrated at all"),
-        (count(RowStatus::DataLost), "calibrated from damaged data"),
-        (count(RowStatus::Inadequate), "inadequate"),
+        (count(Status::DataLost), "calibrated from damaged data"),
+        (count(Status::Inadequate), "inadequate"),
     ];
     let all = campaign.rows.len() + campaign.failed.len();
     let doubtful = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} of {all} {what}"));
@@ -94,7 +93,7 @@ fn next(campaign: &Campaign) -> Vec<String> {
         )
     });
     let worst = (campaign.rows.iter().zip(&campaign.folders))
-        .filter(|(row, _)| row.status != RowStatus::Ok)
+        .filter(|(row, _)| row.status != Status::Ok)
         .filter_map(|(row, folder)| Some((row, folder, row.calibrated.mean_m?)))
         .max_by(|a, b| a.2.total_cmp(&b.2));
     let worst = worst.map(|(row, folder, mean_m)| {

@@ -1,14 +1,13 @@
 //! A campaign for people, at most 100 columns wide.
 
 use super::Campaign;
-use super::date::minute;
-use super::words::{meaning, repeated, sentence};
+use super::words::{cells, meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::story::Story;
 use crate::terminal::{Detail, Shown, ending};
-use crate::text::{millimetres, printable};
-use armcal_campaign::{ErrorFigures, Row};
+use crate::text::printable;
+use armcal_campaign::Row;
 use comfy_table::Cell;
 
 /// Recordings listed at most; all are in the page and in the table files.
@@ -51,16 +50,16 @@ fn recordings(pen: &Pen, rows: &[Row]) -> String {
     let mut table =
         pen.table(&["recording", "start (UTC)", "dwells", "used", "before", "after [mm]", "missing", ""]);
     for row in rows.iter().take(LISTED) {
-        let mean = |e: &ErrorFigures| e.mean_m.map_or("-".into(), millimetres);
+        let [start, before, after, flag] = cells(row, "-");
         table.add_row(vec![
             Cell::new(printable(&row.recording)),
-            Cell::new(minute(row.start_ns)),
+            Cell::new(start),
             number(row.dwells),
             number(row.associated),
-            number(mean(&row.nominal)),
-            number(mean(&row.calibrated)),
+            number(before),
+            number(after),
             Cell::new(printable(&row.missing.join(", "))),
-            Cell::new(if row.status == armcal_campaign::RowStatus::Ok { "" } else { row.status.word() }),
+            Cell::new(flag),
         ]);
     }
     let mut text = pen.render(&table);

@@ -2,12 +2,19 @@
 
 use super::date::minute;
 use super::{Campaign, Repeat};
-use crate::text::{in_display_unit, printable};
-use armcal_campaign::{Change, ChangeKind};
+use crate::text::{in_display_unit, millimetres, printable};
+use armcal_campaign::{Change, ChangeKind, ErrorFigures, Row, Status};
 use armcal_core::Unit;
 
 /// Days of a month, as rates are told.
 const MONTH_DAYS: f64 = 30.0;
+
+/// Start of a recording, mean errors before and after [mm], or `none` where there are none, and a status that is not good.
+pub(super) fn cells(row: &Row, none: &str) -> [String; 4] {
+    let mean = |errors: &ErrorFigures| errors.mean_m.map_or(none.to_owned(), millimetres);
+    let flag = if row.status == Status::Ok { "" } else { row.status.word() };
+    [minute(row.start_ns), mean(&row.nominal), mean(&row.calibrated), flag.to_owned()]
+}
 
 /// What, by how much, between which recordings.
 pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {

@@ -5,6 +5,17 @@ use super::views::OPENING_DEG;
 use crate::channels::cloud;
 use serde_json::{Map, Value, json};
 
+/// The type of a panel; that of 3D views has another name in each format.
+pub(super) fn panel_type(kind: &Kind, view: &'static str) -> &'static str {
+    match kind {
+        Kind::Plot(_) => "Plot",
+        Kind::View(_) => view,
+        Kind::Table(_) => "Table",
+        Kind::Raw(_) => "RawMessages",
+        Kind::Indicator(..) => "Indicator",
+    }
+}
+
 /// The settings of a panel.
 pub(super) fn config(kind: &Kind) -> Map<String, Value> {
     let value = match kind {

@@ -1,7 +1,7 @@
 //! The format of Foxglove's layout API (foxglove-sdk `foxglove.layouts`, 2026).
 
-use super::config::config;
-use super::spec::{Content, Kind};
+use super::config::{config, panel_type};
+use super::spec::Content;
 use serde_json::{Value, json};
 
 pub(super) fn layout(content: &Content) -> Value {
@@ -12,7 +12,7 @@ fn node(content: &Content) -> Value {
     match content {
         Content::Panel(panel) => json!({
             "type": "panel",
-            "panelType": panel_type(&panel.kind),
+            "panelType": panel_type(&panel.kind, "ThreeDee"),
             "title": panel.title,
             "version": 1,
             "config": config(&panel.kind),
@@ -31,15 +31,5 @@ fn node(content: &Content) -> Value {
                 |(title, content): &(&str, Content)| json!({ "title": title, "content": node(content) });
             json!({ "type": "tabs", "selectedTabIndex": 0, "tabs": tabs.iter().map(tab).collect::<Vec<Value>>() })
         }
-    }
-}
-
-fn panel_type(kind: &Kind) -> &'static str {
-    match kind {
-        Kind::Plot(_) => "Plot",
-        Kind::View(_) => "ThreeDee",
-        Kind::Table(_) => "Table",
-        Kind::Raw(_) => "RawMessages",
-        Kind::Indicator(..) => "Indicator",
     }
 }

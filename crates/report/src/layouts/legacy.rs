@@ -1,6 +1,6 @@
 //! The format of Foxglove Studio, which Lichtblick reads: panels in a map by name, and a binary tree of names.
 
-use super::config::config;
+use super::config::{config, panel_type};
 use super::spec::{Content, Direction, Kind};
 use serde_json::{Map, Value, json};
 
@@ -30,7 +30,7 @@ fn node(content: &Content, panels: &mut Map<String, Value>) -> Value {
             if matches!(panel.kind, Kind::Plot(_)) {
                 settings.insert("sidebarDimension".into(), json!(240));
             }
-            json!(add(panel_type(&panel.kind), settings, panels))
+            json!(add(panel_type(&panel.kind, "3D"), settings, panels))
         }
         Content::Split(direction, items) => split(*direction, items, panels),
         Content::Tabs(tabs) => {
@@ -65,14 +65,4 @@ fn add(panel_type: &str, settings: Map<String, Value>, panels: &mut Map<String, 
     let name = format!("{panel_type}!armcal{}", panels.len() + 1);
     panels.insert(name.clone(), Value::Object(settings));
     name
-}
-
-fn panel_type(kind: &Kind) -> &'static str {
-    match kind {
-        Kind::Plot(_) => "Plot",
-        Kind::View(_) => "3D",
-        Kind::Table(_) => "Table",
-        Kind::Raw(_) => "RawMessages",
-        Kind::Indicator(..) => "Indicator",
-    }
 }

@@ -6,7 +6,6 @@ use crate::ReportError;
 use crate::comparison::{Comparison, Difference};
 use crate::pairing::paired;
 use crate::past_run::PastRun;
-use crate::text::millimetres;
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -29,40 +28,14 @@ pub fn comparison_html(
     let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
     let document = document(before, after, comparison);
     let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document, "'none'")?;
-    let page = ComparePage {
-        shell: shell.saying(comparison.sentence()),
-        differences: differences(comparison).into_iter().map(DifferenceRow::of).collect(),
-        moved: comparison.moved.iter().map(moved).collect(),
-        comparison,
-    };
-    Ok(page.render()?)
+    Ok(ComparePage { shell: shell.saying(comparison.sentence()), comparison }.render()?)
 }
 
 #[derive(Template)]
 #[template(path = "compare.html")]
 struct ComparePage<'a> {
     shell: Shell,
-    differences: Vec<DifferenceRow>,
-    moved: Vec<MovedRow>,
     comparison: &'a Comparison,
-}
-
-struct DifferenceRow {
-    name: String,
-    of: Difference,
-    before: String,
-    after: String,
-    change: String,
-    interval: String,
-}
-
-struct MovedRow {
-    name: String,
-    unit: String,
-    before: String,
-    after: String,
-    change: String,
-    widths: String,
 }
 
 /// What the page's scripts draw.
@@ -94,37 +67,6 @@ fn document(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Value
         "pairs": rows,
         // Indices into `pairs`, the most improved first.
         "by_change": by_change,
-        "differences": differences(comparison).into_iter().map(named).collect::<Value>(),
+        "differences": comparison.differences().into_iter().map(named).collect::<Value>(),
     })
-}
-
-/// Held out, all, then each recording.
-fn differences(comparison: &Comparison) -> Vec<(String, Difference)> {
-    let whole = [("held out", comparison.held_out), ("all", comparison.all)];
-    let whole = whole.into_iter().filter_map(|(name, d)| Some((name.to_owned(), d?)));
-    whole.chain(comparison.recordings.iter().cloned()).collect()
-}
-
-impl DifferenceRow {
-    fn of((name, of): (String, Difference)) -> DifferenceRow {
-        DifferenceRow {
-            name,
-            of,
-            before: millimetres(of.before_mm * 1e-3),
-            after: millimetres(of.after_mm * 1e-3),
-            change: format!("{:+.3}", of.difference_mm),
-            interval: of.ci95_mm.map_or("–".into(), |[low, high]| format!("{low:+.3} to {high:+.3}")),
-        }
-    }
-}
-
-fn moved(m: &crate::Moved) -> MovedRow {
-    MovedRow {
-        name: m.name.clone(),
-        unit: m.unit.clone(),
-        before: format!("{:.4}", m.before),
-        after: format!("{:.4}", m.after),
-        change: format!("{:+.4}", m.after - m.before),
-        widths: format!("{:.1}", m.in_half_widths),
-    }
 }

@@ -86,7 +86,7 @@ pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, R
         verdict: verdict(run),
         run,
         recordings: quality::recordings(run),
-        markers: by_marker(run).iter().map(MarkerRow::of).collect(),
+        markers: by_marker(run),
         rejections: quality::rejections(run),
         next: &story.next,
         warnings: &story.warnings,
@@ -109,38 +109,15 @@ struct ReportPage<'a> {
     live: bool,
     verdict: Verdict,
     run: &'a Run,
-    recordings: Vec<quality::RecordingRow>,
-    markers: Vec<MarkerRow>,
+    recordings: Vec<quality::RecordingRow<'a>>,
+    markers: Vec<MarkerErrors<'a>>,
     rejections: Vec<quality::RejectionRow>,
     next: &'a [String],
     warnings: &'a [ToldWarning],
 }
 
-/// Errors of one marker in words.
-struct MarkerRow {
-    marker: String,
-    link: String,
-    n: usize,
-    nominal: String,
-    fitted: String,
-    floor: String,
-}
-
-impl MarkerRow {
-    fn of(errors: &MarkerErrors<'_>) -> MarkerRow {
-        let mm = |mm: f64| millimetres(mm * 1e-3);
-        MarkerRow {
-            marker: errors.marker.clone(),
-            link: errors.link.unwrap_or("the last").to_owned(),
-            n: errors.n,
-            nominal: mm(errors.nominal_mm),
-            fitted: mm(errors.fitted_mm),
-            floor: mm(errors.floor_mm),
-        }
-    }
-}
-
 /// What the diagnosis says, in sentences.
+#[derive(Default)]
 struct Verdict {
     found: Vec<String>,
     /// Tables to paste into the pipeline for what is unlisted.
@@ -151,15 +128,7 @@ struct Verdict {
 }
 
 fn verdict(run: &Run) -> Verdict {
-    let Some(d) = &run.diagnosis else {
-        return Verdict {
-            found: Vec::new(),
-            paste: Vec::new(),
-            same: Vec::new(),
-            unseen: Vec::new(),
-            explanations: Vec::new(),
-        };
-    };
+    let Some(d) = &run.diagnosis else { return Verdict::default() };
     let names = run.recording_names();
     Verdict {
         found: (d.effects.iter().map(|e| found(e, &fall(run, e))))

@@ -6,30 +6,15 @@ use crate::text::millimetres;
 use armcal_recording::StreamReport;
 
 /// One recording.
-pub(crate) struct RecordingRow {
-    pub name: String,
-    pub dwells: usize,
+pub(crate) struct RecordingRow<'a> {
+    pub of: &'a RecordingRun,
     pub used: usize,
-    pub rejected: usize,
     /// Nominal, calibrated, as a new day [mm]; empty where no recording was held out.
     pub mean_mm: Vec<String>,
-    pub clock: String,
-    pub drift: String,
+    /// Offset and drift.
+    pub clock: [String; 2],
     /// With what is damaged in each.
     pub files: Vec<(ObservedFile, String)>,
-    pub streams: Vec<StreamRow>,
-}
-
-/// One of its streams.
-pub(crate) struct StreamRow {
-    pub role: String,
-    pub topic: String,
-    pub rows: usize,
-    pub rate: String,
-    pub gap: String,
-    pub occluded: String,
-    pub dropped: u64,
-    pub clock: String,
 }
 
 /// Dwells of one recording that were rejected for one reason.
@@ -40,35 +25,24 @@ pub(crate) struct RejectionRow {
 }
 
 /// All recordings.
-pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow> {
+pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow<'_>> {
     let errors = run.errors_by_recording();
     run.recordings.iter().zip(&errors).map(|(r, errors)| recording(run, r, errors)).collect()
 }
 
-fn recording(run: &Run, r: &RecordingRun, errors: &RecordingErrors) -> RecordingRow {
-    let clock = r.clock.as_ref();
-    let ms = |s: f64| s * 1e3;
+fn recording<'a>(run: &Run, of: &'a RecordingRun, errors: &RecordingErrors) -> RecordingRow<'a> {
+    let mean_mm =
+        |unseen| [errors.nominal, errors.calibrated, unseen].map(|e| millimetres(e.mean_m)).to_vec();
+    let no_clock = || {
+        let why = if of.earlier.is_some() { "–" } else { "one clock" };
+        [why, "–"].map(str::to_owned)
+    };
     RecordingRow {
-        name: r.name.clone(),
-        dwells: r.found(),
-        used: run.used(r),
-        rejected: r.rejected(),
-        mean_mm: errors
-            .unseen
-            .map(|unseen| [errors.nominal, errors.calibrated, unseen].map(|e| millimetres(e.mean_m)).to_vec())
-            .unwrap_or_default(),
-        clock: match clock {
-            Some(c) if c.declared => format!("{:.2} declared", ms(c.offset_s)),
-            Some(c) => format!("{:.2} ± {:.2}", ms(c.offset_s), ms(c.offset_sigma_s)),
-            None if r.earlier.is_some() => "–".into(),
-            None => "one clock".into(),
-        },
-        drift: clock.map_or("–".into(), |c| match c.declared {
-            true => format!("{:.1} declared", c.drift * 1e6),
-            false => format!("{:.1} ± {:.1}", c.drift * 1e6, c.drift_sigma * 1e6),
-        }),
-        files: r.files().into_iter().enumerate().map(|(at, file)| (file, damage(r, at))).collect(),
-        streams: r.report.streams.iter().map(stream).collect(),
+        of,
+        used: run.used(of),
+        mean_mm: errors.unseen.map(mean_mm).unwrap_or_default(),
+        clock: of.clock_shown().unwrap_or_else(no_clock),
+        files: of.files().into_iter().enumerate().map(|(at, file)| (file, damage(of, at))).collect(),
     }
 }
 
@@ -84,24 +58,16 @@ fn damage(r: &RecordingRun, file: usize) -> String {
     }
 }
 
-fn stream(s: &StreamReport) -> StreamRow {
+/// Frames of a stream in which nothing was seen, and their share.
+pub(crate) fn occluded(s: &StreamReport) -> String {
     let seen = s.rows as u64 + s.occluded.total();
     let share = if seen > 0 { 100.0 * s.occluded.total() as f64 / seen as f64 } else { 0.0 };
-    StreamRow {
-        role: s.role.clone(),
-        topic: s.topic.clone(),
-        rows: s.rows,
-        rate: format!("{:.1}", s.rate_hz),
-        gap: format!("{:.3}", s.largest_gap_s),
-        occluded: format!("{} ({share:.1} %)", s.occluded.total()),
-        dropped: s.undecodable
-            + s.non_finite
-            + s.impossible
-            + s.unstamped
-            + s.stray_stamps
-            + s.duplicate_stamps,
-        clock: format!("{}: {}", s.clock.word(), s.clock_reason),
-    }
+    format!("{} ({share:.1} %)", s.occluded.total())
+}
+
+/// Messages of a stream that were left out.
+pub(crate) fn dropped(s: &StreamReport) -> u64 {
+    s.undecodable + s.non_finite + s.impossible + s.unstamped + s.stray_stamps + s.duplicate_stamps
 }
 
 /// Rejected dwells, by reason.

@@ -51,24 +51,7 @@ pub(crate) struct Shown {
     /// Every effect by itself.
     pub signatures: Vec<Signature>,
     /// All parameters.
-    pub parameters: Vec<ParameterRow>,
-}
-
-/// A parameter in the unit shown to people.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ParameterRow {
-    pub name: String,
-    pub meaning: String,
-    pub unit: &'static str,
-    pub nominal: String,
-    pub value: String,
-    pub change: String,
-    /// Half of the 95 % interval; empty for a fixed one.
-    pub half: String,
-    pub role: &'static str,
-    pub free: bool,
-    pub determined: bool,
-    pub at_bound: bool,
+    pub parameters: Vec<Value>,
 }
 
 impl Shown {
@@ -160,21 +143,22 @@ fn change(run: &Run, after: &Calibration) -> Option<Value> {
     }))
 }
 
-/// A parameter as pages show it.
-pub(crate) fn parameter(e: &Estimate) -> ParameterRow {
+/// A parameter as the page shows it, in the unit for people.
+fn parameter(e: &Estimate) -> Value {
     let p = &e.parameter;
     let [nominal, value, change, half] = estimate_shown(e);
-    ParameterRow {
-        name: p.name.clone(),
-        meaning: p.meaning.clone(),
-        unit: p.unit.display_symbol(),
-        nominal,
-        value,
-        change,
-        half: if p.free { half } else { String::new() },
-        role: role_word(p.role),
-        free: p.free,
-        determined: e.determined,
-        at_bound: e.at_bound,
-    }
+    json!({
+        "name": p.name,
+        "meaning": p.meaning,
+        "unit": p.unit.display_symbol(),
+        "nominal": nominal,
+        "value": value,
+        "change": change,
+        // Half of the 95 % interval; empty for a fixed one.
+        "half": if p.free { half } else { String::new() },
+        "role": role_word(p.role),
+        "free": p.free,
+        "determined": e.determined,
+        "at_bound": e.at_bound,
+    })
 }

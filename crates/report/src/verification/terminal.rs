@@ -6,7 +6,7 @@ use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
 use crate::text::{millimetres, printable};
 use crate::two_arms::Closing;
-use armcal_verify::{Against, By, Compared, PathRow, Plane, PointsRow};
+use armcal_verify::{Against, By, Compared, PathRow, Plane};
 use comfy_table::Cell;
 
 const HEADER: [&str; 7] = ["n", "before", "± 95 %", "after", "± 95 %", "difference 95 %", "better by"];
@@ -23,8 +23,10 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
     )];
     sections.push(pen.section("Recordings", recordings(&pen, &v.recordings)));
     if !v.points.is_empty() {
+        let rows = v.points.iter().map(Row::of_points);
         let published = v.published.iter().filter(|p| p.on == On::Points);
-        sections.push(pen.section(&format!("{} [mm]", v.points_are()), points(&pen, &v.points, published)));
+        sections
+            .push(pen.section(&format!("{} [mm]", v.points_are()), table(&pen, "points", rows, published)));
     }
     let of = |against| v.paths.iter().filter(move |r: &&PathRow| r.against == against);
     for (against, title) in [
@@ -33,7 +35,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
     ] {
         if of(against).next().is_some() {
             let published = v.published.iter().filter(|p| p.on == On::Paths && against == Against::Encoders);
-            sections.push(pen.section(title, paths(&pen, of(against), published)));
+            sections.push(pen.section(title, table(&pen, "path", of(against).map(Row::of_path), published)));
         }
     }
     sections.push(super::iso::section(&pen, &v.iso9283, v.no_criteria()));
@@ -107,18 +109,6 @@ fn recordings(pen: &Pen, all: &[VerifiedRecording]) -> String {
     pen.render(&table)
 }
 
-fn points<'a>(pen: &Pen, rows: &[PointsRow], published: impl Iterator<Item = &'a Published>) -> String {
-    table(pen, "points", rows.iter().map(Row::of_points), published)
-}
-
-fn paths<'a>(
-    pen: &Pen,
-    rows: impl Iterator<Item = &'a PathRow>,
-    published: impl Iterator<Item = &'a Published>,
-) -> String {
-    table(pen, "path", rows.map(Row::of_path), published)
-}
-
 fn table<'a>(
     pen: &Pen,
     what: &str,
@@ -126,12 +116,7 @@ fn table<'a>(
     published: impl Iterator<Item = &'a Published>,
 ) -> String {
     let mut table = pen.table(&[&[what][..], &HEADER].concat());
-    for row in rows {
-        table.add_row(cells(row));
-    }
-    for p in published {
-        table.add_row(published_cells(p));
-    }
+    table.add_rows(rows.map(cells).chain(published.map(published_cells)));
     pen.render(&table)
 }
 
