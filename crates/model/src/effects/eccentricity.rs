@@ -21,13 +21,11 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "eccentricity",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["encoder eccentricity", "gear run-out"],
     summary: "a gear or encoder disc off its centre: an error once a turn",
     family: Family::Transmission,
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    source: include_str!("eccentricity.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -38,14 +38,11 @@ const LENGTHS: &str = "lengths";
 /// Where a bound is given and no prior: how much of it is a typical size.
 const SIGMA_OF_BOUND: f64 = 0.3;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "expression",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a formula of the user; written in an [[effects]] table",
     family: Family::User,
     target: Target::Whole,
     offered: Offered::Never,
-    confused_with: &[],
-    source: include_str!("expression.rs"),
     place,
     ..EffectKind::PLAIN
 };

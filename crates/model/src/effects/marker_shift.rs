@@ -21,15 +21,13 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "marker_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a marker on a link came loose, between recordings or at a dwell",
     family: Family::Event,
     toggle: Toggle::Recording,
     target: Target::Marker,
     offered: Offered::Events,
     confused_with: &["tool_shift", "zero_slip"],
-    source: include_str!("marker_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };

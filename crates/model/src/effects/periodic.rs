@@ -22,8 +22,7 @@
 use super::prelude::*;
 use std::f64::consts::TAU;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "periodic",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["pinion or pulley run-out", "tooth mesh", "motor encoder error"],
     summary: "a periodic error many times a turn",
     family: Family::Transmission,
@@ -38,8 +37,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(frequencies),
     }],
-    confused_with: &[],
-    source: include_str!("periodic.rs"),
     place,
     ..EffectKind::PLAIN
 };

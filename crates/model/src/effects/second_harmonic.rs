@@ -22,13 +22,11 @@
 use super::eccentricity::Harmonic;
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "second_harmonic",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["elliptic ring", "misaligned coupling"],
     summary: "an error twice a turn of the joint",
     family: Family::Transmission,
     confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    source: include_str!("second_harmonic.rs"),
     place,
     ..EffectKind::PLAIN
 };

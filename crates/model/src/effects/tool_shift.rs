@@ -21,8 +21,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "tool_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["marker shift"],
     summary: "the tool or its marker moved, between recordings or at a dwell",
     family: Family::Event,
@@ -31,7 +30,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift"],
-    source: include_str!("tool_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };
