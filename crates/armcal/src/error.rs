@@ -34,36 +34,9 @@ pub enum Error {
     /// Two parts of the pipeline contradict each other.
     #[error("pipeline {}: `{key}` {problem}", path.display())]
     PipelineContradiction { path: PathBuf, key: String, problem: String },
-    /// A stream that the pipeline relies on gave no rows.
-    #[error(
-        "recording `{recording}`: the {role} stream has no usable sample, so {consequence}; see `armcal inspect`"
-    )]
-    EmptyStream {
-        recording: String,
-        /// `tip`, `table`, `base`.
-        role: &'static str,
-        consequence: &'static str,
-    },
-    /// A body whose pose is needed is tracked by position only.
-    #[error(
-        "recording `{recording}`: the {role} stream has positions but no orientations; name a topic with poses in [streams.{role}]"
-    )]
-    NoOrientation {
-        recording: String,
-        /// `table`, `base`.
-        role: &'static str,
-    },
-    /// A joint of the model that none of several streams has.
-    #[error(
-        "recording `{recording}`: no [[streams.joints]] reads the joint `{joint}` of the model; several streams are put together by \
-         the names of the model file: they read {read}"
-    )]
-    JointUnread { recording: String, joint: String, read: String },
-    /// Another number of joints is read than the model has.
-    #[error(
-        "recording `{recording}`: {read} joints are read for a model of {expected}; mend `names` in [streams.joints], or the rows of the model file: the number of joints differs"
-    )]
-    JointCount { recording: String, read: usize, expected: usize },
+    /// A recording that is not what the pipeline relies on.
+    #[error("recording `{recording}`: {problem}")]
+    InRecording { recording: String, problem: String },
     /// What a batch should work on.
     #[error("recordings `{what}`: {why}")]
     Manifest { what: String, why: String },
@@ -138,28 +111,9 @@ pub enum Error {
         after.display()
     )]
     NothingInCommon { before: PathBuf, after: PathBuf, why: String },
-    /// A folder without results to pool.
-    #[error(
-        "{} holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones again",
-        folder.display()
-    )]
-    NoResults { folder: PathBuf },
-    /// A result that does not belong into the pool.
-    #[error("{} cannot be pooled: {problem}", result.display())]
-    Unpoolable { result: PathBuf, problem: String },
-    /// The result lacks a parameter of the arm.
-    #[error(
-        "{} has no parameter {parameter}: its arm is not the one of this pipeline; name the [model] it was calibrated with",
-        result.display()
-    )]
-    NotInResult { result: PathBuf, parameter: String },
-    /// The result calibrated another nominal arm.
-    #[error(
-        "{} calibrated an arm whose nominal {parameter} is {then}, this pipeline's is {now} (SI); name the [model] it was \
-         calibrated with",
-        result.display()
-    )]
-    OtherArm { result: PathBuf, parameter: String, then: f64, now: f64 },
+    /// A result of an earlier run that cannot be used here, or a folder without any.
+    #[error("{} {problem}", path.display())]
+    Result { path: PathBuf, problem: String },
     /// Judging by ISO 9283.
     #[error("judging by ISO 9283: {0}")]
     Iso(#[from] armcal_iso9283::IsoError),
@@ -198,12 +152,6 @@ pub enum Error {
         of_this_session(left_out)
     )]
     NothingSuggested { pipeline: String, left_out: Vec<String> },
-    /// A folder of results does not say which pipeline made it.
-    #[error(
-        "{} does not say which pipeline made it (view.toml: {source}); name the pipeline file instead",
-        folder.display()
-    )]
-    NoSource { folder: PathBuf, source: Box<dyn std::error::Error + Send + Sync> },
     /// An effect of the pipeline was switched off, which appending cannot express.
     #[error("{effect} is in {} itself; remove its [[effects]] table there by hand", path.display())]
     OwnEffect { effect: String, path: PathBuf },

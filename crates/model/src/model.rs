@@ -197,14 +197,9 @@ impl Model {
         true
     }
 
-    /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base. Effects that are
-    /// placed already keep the old one.
-    pub fn set_base_start(&mut self, base_in_world: Pose) {
-        self.set_arm_base_start(0, base_in_world);
-    }
-
-    /// The same of one of several arms, such as to the pose that brings the tips of two arms together.
-    pub fn set_arm_base_start(&mut self, arm: usize, base_in_world: Pose) {
+    /// Moves the start of the base frame of an arm (nominal value and centre of the prior) to another world_from_base, such as
+    /// the one that brings the tips of two arms together. Effects that are placed already keep the old one.
+    pub fn set_base_start(&mut self, arm: usize, base_in_world: Pose) {
         restart(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
         self.refresh();
     }

@@ -214,11 +214,12 @@ fn dwells_of_one(
     let (mut samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
     let expected = speed_model.chain().joint_names().len();
     if samples.joints.joint_rad.len() != expected {
-        return Err(Error::JointCount {
-            recording: name.to_owned(),
-            read: samples.joints.joint_rad.len(),
-            expected,
-        });
+        let read = samples.joints.joint_rad.len();
+        let problem = format!(
+            "{read} joints are read for a model of {expected}; mend `names` in [streams.joints], or the rows of the model file: \
+             the number of joints differs"
+        );
+        return Err(Error::InRecording { recording: name.to_owned(), problem });
     }
     if pipeline.two_arms.is_none() && pipeline.streams.joints.len() > 1 {
         in_order_of(speed_model.chain(), &mut samples.joints, name)?;
@@ -287,10 +288,13 @@ fn dwells_of_one(
 /// Puts the joints of several streams into the order of the chain, by their names: no list of the pipeline gives it.
 fn in_order_of(chain: &Chain, joints: &mut JointSamples, recording: &str) -> Result<(), Error> {
     let place = |name: &String| {
-        joints.names.iter().position(|read| read == name).ok_or_else(|| Error::JointUnread {
-            recording: recording.to_owned(),
-            joint: name.clone(),
-            read: joints.names.join(", "),
+        joints.names.iter().position(|read| read == name).ok_or_else(|| {
+            let problem = format!(
+                "no [[streams.joints]] reads the joint `{name}` of the model; several streams are put together by the names of the \
+                 model file: they read {}",
+                joints.names.join(", ")
+            );
+            Error::InRecording { recording: recording.to_owned(), problem }
         })
     };
     let order = chain.joint_names().iter().map(place).collect::<Result<Vec<usize>, Error>>()?;
@@ -339,13 +343,20 @@ fn static_bodies(
     name: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Option<MeanPose>, Option<MeanPose>), Error> {
-    let mut mean = |role, stream: Option<&armcal_core::PoseSamples>, consequence| {
-        let empty = || Error::EmptyStream { recording: name.to_owned(), role, consequence };
+    let mut mean = |role: &str, stream: Option<&PoseSamples>, consequence: &str| {
+        let unusable = |problem: String| Error::InRecording { recording: name.to_owned(), problem };
+        let empty = || {
+            unusable(format!(
+                "the {role} stream has no usable sample, so {consequence}; see `armcal inspect`"
+            ))
+        };
         let samples = stream.filter(|s| !s.is_empty()).ok_or_else(empty)?;
         let (pose, said) =
             mean_pose(samples).map_err(|source| Error::Dwell { recording: name.to_owned(), source })?;
         if !pose.has_orientation {
-            return Err(Error::NoOrientation { recording: name.to_owned(), role });
+            return Err(unusable(format!(
+                "the {role} stream has positions but no orientations; name a topic with poses in [streams.{role}]"
+            )));
         }
         // A stream that names no body would leave open which of the two moved.
         let subject =

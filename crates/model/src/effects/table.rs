@@ -20,7 +20,7 @@ use super::Target;
 use super::expression::Expression;
 use super::spec::{EffectSpec, Since, joint_index};
 use crate::ModelError;
-use crate::error::nearest;
+use crate::error::hint;
 use armcal_core::{Parameter, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -167,8 +167,7 @@ impl EffectTable {
 
 fn unknown_key(key: &str) -> String {
     let known = ["kind", "target", "since", "name", "formula", "acts_on", "parameters"];
-    let hint = nearest(key, known.into_iter()).map(|near| format!("; did you mean \"{near}\"?"));
-    format!("there is no key \"{key}\"{}", hint.unwrap_or_default())
+    format!("there is no key \"{key}\"{}", hint(key, known.into_iter()))
 }
 
 impl From<&EffectSpec> for EffectTable {
