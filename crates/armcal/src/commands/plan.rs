@@ -6,7 +6,7 @@ use crate::pipeline::Pipeline;
 use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use crate::progress::Progress;
 use crate::stages::frames;
-use crate::story::{self, Settled};
+use crate::story::{self, Fitted, Settled};
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
@@ -65,12 +65,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     };
     progress.step("weighing what could be recorded");
     let (model, values) = with_certain(&pipeline, &settled, &open)?;
-    let session = frames::session(&pipeline, &settled.fitted.observations);
     let known = Known {
         model: &model,
         values,
         observations: &settled.fitted.observations,
-        session: &session,
+        session: &settled.fitted.session,
         fit: &pipeline.fit,
         board: settled.inputs.board.as_ref().filter(|_| pipeline.observations.seated),
         tracked: tracking(&pipeline, &settled),
@@ -120,13 +119,12 @@ fn allowed(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
 
 /// The calibrated model with the effects that are beyond doubt, and its parameters.
 fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Result<(Model, Vec<f64>), Error> {
+    let Fitted { model, observations, session, calibration, .. } = &settled.fitted;
     if open.certain.is_empty() {
-        return Ok((settled.fitted.model.clone(), settled.fitted.calibration.fit.values()));
+        return Ok((model.clone(), calibration.fit.values()));
     }
-    let session = frames::session(pipeline, &settled.fitted.observations);
-    let model = settled.fitted.model.with_effects(&open.certain, &session)?;
-    let calibration =
-        calibrate(&model, &settled.fitted.observations, &pipeline.fit, &HoldoutConfig::default())?;
+    let model = model.with_effects(&open.certain, session)?;
+    let calibration = calibrate(&model, observations, &pipeline.fit, &HoldoutConfig::default())?;
     Ok((model, calibration.fit.values()))
 }
 
