@@ -45,7 +45,7 @@ pub use effects::{
     least_dwells, place_and_moment,
 };
 pub use error::ModelError;
-pub use fixed::{FixedPlace, Length, LengthKnowledge};
+pub use fixed::{FixedPlace, Length};
 pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};

@@ -1,6 +1,5 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
-mod alone;
 mod features;
 mod linearisation;
 mod measurement;

@@ -179,7 +179,7 @@ fn dwells(proposal: &Proposal, joints: &[String]) -> String {
     for (i, dwell) in proposal.dwells.iter().enumerate() {
         let mut cells = vec![number(format!("{}", i + 1)), Cell::new(place(dwell))];
         cells.extend(dwell.joint_deg.iter().map(|q| number(format!("{q:.1}"))));
-        cells.push(Cell::new(arrival(&dwell.arrival)));
+        cells.push(Cell::new(dwell.arrival.iter().map(Arrival::symbol).collect::<String>()));
         cells.push(number(format!("{}", dwell.load_kg)));
         cells.push(number(format!("{:.1}", dwell.delta)));
         table.add_row(cells);
@@ -212,15 +212,6 @@ fn place(dwell: &Proposed) -> String {
         Place::Joined => "tips joined".to_owned(),
         Place::Again { dwell } => format!("again: {dwell}"),
     }
-}
-
-fn arrival(sides: &[Arrival]) -> String {
-    let sign = |side: &Arrival| match side {
-        Arrival::Positive => '+',
-        Arrival::Negative => '-',
-        Arrival::Unknown => '.',
-    };
-    sides.iter().map(sign).collect()
 }
 
 fn capital(sentence: &str) -> String {

@@ -5,6 +5,7 @@ use crate::rigid::Rigid;
 use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
 use armcal_core::{Against, FeatureId, Observation, Pose};
+use nalgebra::Matrix6xX;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -174,6 +175,19 @@ impl Model {
             Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,
         };
         Pose::from(&at)
+    }
+
+    /// d position [m] and d rotation vector [rad] of a feature, in the world, per unit of each joint reading: 6 rows, one
+    /// column a reading.
+    pub fn feature_jacobian(&self, p: &[f64], feature: FeatureId, o: &Observation) -> Matrix6xX<f64> {
+        let mut jacobian = Matrix6xX::zeros(self.joint_count());
+        for (column, twist) in self.joint_twists(p, feature, o) {
+            let mut moved = jacobian.fixed_view_mut::<3, 1>(0, column);
+            moved += twist.translation_m;
+            let mut turned = jacobian.fixed_view_mut::<3, 1>(3, column);
+            turned += twist.rotation_rad;
+        }
+        jacobian
     }
 
     /// Indices of the parameters of a feature's place on its link.

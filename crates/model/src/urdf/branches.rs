@@ -1,10 +1,11 @@
 //! Which joints of a URDF lead from its base to what is measured, and what hangs beside them.
 
-use super::limits;
 use super::reader::{Reader, child};
+use super::{limits, motion_of};
 use crate::ModelError;
-use crate::rigid::{Rigid, rotation_of_vector};
-use crate::segment::{Body, Mimic};
+use crate::rigid::Rigid;
+use crate::segment::{Body, Mimic, moved};
+use nalgebra::Vector3;
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -137,7 +138,7 @@ impl<'a, 'x> Branches<'a, 'x> {
                 "it mimics \"{leader}\", which mimics another joint itself; name the joint that has a reading"
             )));
         }
-        if !matches!(joint.attribute("type"), Some("revolute" | "continuous" | "prismatic")) {
+        if joint.attribute("type").and_then(motion_of).is_none() {
             return Err(wrong(format!("it mimics \"{leader}\", which does not move")));
         }
         let link = child(joint, "child").and_then(|c| c.attribute("link"));
@@ -173,16 +174,8 @@ impl<'a, 'x> Branches<'a, 'x> {
         let subject = format!("joint \"{}\"", joint.attribute("name").unwrap_or_default());
         let origin = Rigid::from(&self.reader.origin(joint, &subject)?);
         let value = limits(joint).map_or(0.0, |[low, high]| 0f64.clamp(low, high));
-        let motion = match joint.attribute("type") {
-            Some("revolute" | "continuous") => {
-                let turn = self.reader.axis(joint, &subject)? * value;
-                Rigid { rotation: rotation_of_vector(&turn), ..Rigid::identity() }
-            }
-            Some("prismatic") => {
-                Rigid { translation_m: self.reader.axis(joint, &subject)? * value, ..Rigid::identity() }
-            }
-            _ => Rigid::identity(),
-        };
-        Ok(origin.then(&motion))
+        let motion = motion_of(joint.attribute("type").unwrap_or_default());
+        let axis = motion.map_or(Ok(Vector3::zeros()), |_| self.reader.axis(joint, &subject))?;
+        Ok(origin.then(&moved(&axis, value, motion)))
     }
 }
