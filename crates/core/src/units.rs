@@ -113,6 +113,11 @@ impl Unit {
     pub fn to_display(self, si: f64) -> f64 {
         si * self.symbols().2
     }
+
+    /// Converts a value in the unit shown to people to SI.
+    pub fn from_display(self, shown: f64) -> f64 {
+        shown / self.to_display(1.0)
+    }
 }
 
 impl std::fmt::Display for Unit {

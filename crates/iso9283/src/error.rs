@@ -4,64 +4,32 @@ use thiserror::Error;
 
 /// What can go wrong between poses and criteria.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum IsoError {
     /// Fewer cycles, poses or points than the formula can do with.
     #[error("{what} needs at least {needed} {of}, and has {given}")]
-    TooFew {
-        /// The criterion, or the input it is computed from.
-        what: &'static str,
-        /// What there are too few of.
-        of: &'static str,
-        /// How many the formula can do with.
-        needed: usize,
-        /// How many there are.
-        given: usize,
-    },
+    TooFew { what: &'static str, of: &'static str, needed: usize, given: usize },
     /// A coordinate is NaN or infinite.
     #[error(
         "{what}: number {index} has a coordinate that is not finite: leave out frames in which the tip was not seen"
     )]
-    NotFinite {
-        /// The input.
-        what: String,
-        /// Its index in the list, from 0.
-        index: usize,
-    },
+    NotFinite { what: String, index: usize },
     /// A number that must be positive is not.
     #[error("{what} is {value}: it must be finite and above zero")]
-    NotPositive {
-        /// The number.
-        what: String,
-        /// Its value.
-        value: f64,
-    },
+    NotPositive { what: String, value: f64 },
     /// Two lists that belong together differ in length.
     #[error("{what}: {left} and {right} entries belong together one by one")]
-    Uneven {
-        /// The two lists.
-        what: &'static str,
-        /// Length of the first.
-        left: usize,
-        /// Length of the second.
-        right: usize,
-    },
+    Uneven { what: &'static str, left: usize, right: usize },
     /// Times run backwards.
     #[error("{what}: sample {index} is not later than the one before it: sort the samples by time")]
-    TimeNotIncreasing {
-        /// The input.
-        what: String,
-        /// Index of the sample, from 0.
-        index: usize,
-    },
+    TimeNotIncreasing { what: String, index: usize },
     /// Visits of the same name were commanded to different places.
     #[error(
         "visit {visit} to '{pose}' was commanded {distance_mm:.3} mm or {angle_deg:.3} deg away from the first visit of \
          that name: give poses that differ different names (a tilted board's cavities, for one)"
     )]
     CommandMoved {
-        /// Name of the pose.
         pose: String,
-        /// Index of the visit, from 0.
         visit: usize,
         /// Distance of the two commanded positions [mm].
         distance_mm: f64,

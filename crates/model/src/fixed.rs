@@ -80,17 +80,9 @@ impl Length {
             }
             Knowledge::Estimated => (true, None, Role::EstimatedFrame),
         };
-        Ok(Parameter {
-            name: format!("{}.length", self.name),
-            unit: Unit::Metre,
-            nominal: length_m,
-            lower: 0.0,
-            upper: f64::INFINITY,
-            prior_sigma,
-            assumed: None,
-            free,
-            role,
-            meaning: format!("distance that {} stands for", self.name),
-        })
+        let (name, meaning) =
+            (format!("{}.length", self.name), format!("distance that {} stands for", self.name));
+        let fixed = Parameter::fixed(name, Unit::Metre, length_m, role, meaning);
+        Ok(Parameter { lower: 0.0, prior_sigma, free, ..fixed })
     }
 }

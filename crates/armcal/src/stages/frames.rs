@@ -160,7 +160,7 @@ pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> 
             continue;
         }
         model.set_parameter(&change.name, |p| {
-            let si = |display: f64| display / p.unit.to_display(1.0);
+            let si = |display: f64| p.unit.from_display(display);
             p.free = change.free.unwrap_or(p.free);
             if let Some(bound) = change.bound {
                 (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));

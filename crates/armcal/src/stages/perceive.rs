@@ -1,7 +1,7 @@
 //! From files to dwells: open, read, align the clocks, find the pauses.
 
 use crate::error::Error;
-use crate::pipeline::{FramePose, Pipeline, RecordingEntry};
+use crate::pipeline::{BoardPose, FramePose, Pipeline, RecordingEntry};
 use crate::progress::Progress;
 use crate::setup;
 use crate::stages::effort;
@@ -88,8 +88,7 @@ pub fn dwells_of_all(
     let mut all = entries
         .map(|(index, (entry, recording))| {
             progress.step(&format!("reading {}", entry.name()));
-            let (samples, seen) =
-                dwells_of_one(pipeline, &speed_model, index, entry, &entry.name(), recording)?;
+            let (samples, seen) = dwells_of_one(pipeline, &speed_model, index, entry, recording)?;
             keep(samples);
             Ok(seen)
         })
@@ -205,9 +204,9 @@ fn dwells_of_one(
     speed_model: &Model,
     index: usize,
     entry: &RecordingEntry,
-    name: &str,
     recording: &Recording,
 ) -> Result<(Samples, Seen), Error> {
+    let name = &entry.name();
     let in_recording = |source| Error::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
@@ -265,11 +264,10 @@ fn dwells_of_one(
     let mut report = recording.report().clone();
     report.streams = streams;
     let fingerprint = Arc::new(Fingerprint::of(&samples));
-    let name = name.to_owned();
     let readings = Readings::of(&samples.joints, repeated, &dwells);
     let (load_kg, more_loads) = pipeline.loads_of(entry);
     let seen = Seen {
-        name,
+        name: name.clone(),
         load_kg,
         more_loads,
         report,
@@ -329,9 +327,9 @@ fn misread(
 }
 
 /// Distance from the median position that all but the worst hundredth of the frames keep [m].
-fn travel_m(positions_m: &[nalgebra::Vector3<f64>]) -> f64 {
+fn travel_m(positions_m: &[Vector3<f64>]) -> f64 {
     let axis = |k: usize| median(&positions_m.iter().map(|p| p[k]).collect::<Vec<_>>());
-    let centre_m = nalgebra::Vector3::new(axis(0), axis(1), axis(2));
+    let centre_m = Vector3::new(axis(0), axis(1), axis(2));
     let distances_m: Vec<f64> = positions_m.iter().map(|p| (p - centre_m).norm()).collect();
     percentile(&distances_m, 0.99)
 }
@@ -371,7 +369,7 @@ fn static_bodies(
         _ => None,
     };
     let table = match &pipeline.table {
-        Some(t) if t.pose == crate::pipeline::BoardPose::Measured => {
+        Some(t) if t.pose == BoardPose::Measured => {
             Some(mean("table", samples.table.as_ref(), "the board's pose is unknown")?)
         }
         _ => None,

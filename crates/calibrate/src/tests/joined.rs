@@ -75,7 +75,7 @@ fn placed(link: Option<Link>, observations: &[Observation]) -> Model {
     let mut model = pair(link);
     let aligned = align_frames(&model, observations, &FitConfig::default()).unwrap();
     let base = model.arm_base_in_world(&aligned, 1);
-    model.set_arm_base_start(1, base);
+    model.set_base_start(1, base);
     model
 }
 

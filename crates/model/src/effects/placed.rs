@@ -109,17 +109,11 @@ pub(crate) fn place(
     let count = amplitudes.len();
     let mut parameters = amplitudes;
     let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &placing));
-    parameters.extend(shapes.map(|shape| Parameter {
-        name: shape.name.to_owned(),
-        unit: shape.unit,
-        nominal: placing.shape(shape.name).unwrap_or_default(),
-        lower: shape.lower,
-        upper: shape.upper,
-        prior_sigma: None,
-        assumed: None,
-        free: false,
-        role: Role::Effect,
-        meaning: shape.meaning.to_owned(),
+    parameters.extend(shapes.map(|shape| {
+        let (name, meaning) = (shape.name.to_owned(), shape.meaning.to_owned());
+        let nominal = placing.shape(shape.name).unwrap_or_default();
+        let (lower, upper) = (shape.lower, shape.upper);
+        Parameter { lower, upper, ..Parameter::fixed(name, shape.unit, nominal, Role::Effect, meaning) }
     }));
     let physics = state::in_state(physics, count, &parameters);
     for parameter in &mut parameters {

@@ -235,16 +235,11 @@ pub(crate) fn amplitude(
     meaning: impl Into<String>,
 ) -> Parameter {
     Parameter {
-        name: quantity.to_owned(),
-        unit,
-        nominal: 0.0,
         lower: -bound,
         upper: bound,
         prior_sigma: Some(prior_sigma),
-        assumed: None,
         free: true,
-        role: Role::Effect,
-        meaning: meaning.into(),
+        ..Parameter::fixed(quantity.to_owned(), unit, 0.0, Role::Effect, meaning.into())
     }
 }
 

@@ -107,7 +107,7 @@ impl Override {
     /// Changes a parameter; what is wrong otherwise.
     pub(crate) fn apply(&self, p: &mut Parameter) -> Result<(), String> {
         let per_unit = match &self.unit {
-            None => 1.0 / p.unit.to_display(1.0),
+            None => p.unit.from_display(1.0),
             Some(text) => match unit_of(text) {
                 Some((unit, si_per_unit)) if unit == p.unit => si_per_unit,
                 _ => return Err(format!("{} is in {}, not in \"{text}\"", p.name, p.unit)),
@@ -130,7 +130,7 @@ impl Override {
 pub(crate) fn unit_of(text: &str) -> Option<(Unit, f64)> {
     Unit::ALL.into_iter().find_map(|unit| {
         let si = (text == unit.symbol()).then_some(1.0);
-        let display = (text == unit.display_symbol()).then(|| 1.0 / unit.to_display(1.0));
+        let display = (text == unit.display_symbol()).then(|| unit.from_display(1.0));
         si.or(display).map(|scale| (unit, scale))
     })
 }
