@@ -208,29 +208,45 @@ impl Settled {
 
     /// Everything for the report, without a diagnosis.
     pub fn into_run(self, pipeline: &Pipeline) -> (Run, Vec<Recording>) {
-        let Fitted { model, observations, session, calibration, places, rejections, rounds, .. } =
-            self.fitted;
+        let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
         let mut warnings = closing_warnings(rounds, places.iter().any(Option::is_some), &calibration);
         warnings.extend(frames::links_without_mass(pipeline, &self.inputs.chain));
         let run = Run {
-            pipeline_name: pipeline.name.clone(),
-            pipeline_text: pipeline.text.clone(),
-            model_texts: self.model_texts,
             recordings: perceive::recording_runs(pipeline, self.inputs.seen, places, &rejections),
             board: self.inputs.board,
-            model,
-            session,
-            observations,
-            calibration,
-            transfer: None,
             setup: self.setup,
-            diagnosis: None,
-            undiagnosed: Some(Undiagnosed::NotAsked),
-            steps: Vec::new(),
-            alternatives: Vec::new(),
             warnings,
+            ..run_of(pipeline, self.model_texts, model, observations, calibration)
         };
         (run, self.recordings)
+    }
+}
+
+/// A run of these observations, and nothing else of it.
+pub(crate) fn run_of(
+    pipeline: &Pipeline,
+    model_texts: Vec<String>,
+    model: Model,
+    observations: Vec<Observation>,
+    calibration: Calibration,
+) -> Run {
+    Run {
+        pipeline_name: pipeline.name.clone(),
+        pipeline_text: pipeline.text.clone(),
+        model_texts,
+        recordings: Vec::new(),
+        board: None,
+        model,
+        session: frames::session(pipeline, &observations),
+        observations,
+        calibration,
+        transfer: None,
+        setup: SetupReport::default(),
+        diagnosis: None,
+        undiagnosed: Some(Undiagnosed::NotAsked),
+        steps: Vec::new(),
+        alternatives: Vec::new(),
+        warnings: Vec::new(),
     }
 }
 

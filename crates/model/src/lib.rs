@@ -40,7 +40,7 @@ pub use arms::{Arm, ArmFrames};
 pub use chain::Chain;
 pub use deviation::Deviation;
 pub use effects::{
-    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Extra, Family, Offered, Override, PlacedEffect,
+    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, Offered, Override, PlacedEffect,
     Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find, is_of_effect,
     least_dwells, place_and_moment,
 };

@@ -47,29 +47,20 @@ pub struct EffectTable {
     pub acts_on: Option<String>,
     /// Shapes by their names, SI; any other key, which [`EffectTable::spec`] then names.
     #[serde(flatten)]
-    pub shape: BTreeMap<String, Extra>,
+    pub shape: BTreeMap<String, Word<f64>>,
     /// Parameters of an expression, or changes to those of another kind.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Override>,
 }
 
-/// A number or a word.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Word {
-    /// A number.
-    Number(usize),
-    /// A word.
-    Text(String),
-}
-
-/// The value of a key that depends on the kind.
+/// A number or a word. The value of a key that depends on the kind is a number of any size: no key of an effect has a text that
+/// is not listed in [`EffectTable`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Extra {
-    /// The number of a shape.
-    Number(f64),
-    /// No key of an effect has a text that is not listed in [`EffectTable`].
+pub enum Word<N = usize> {
+    /// A number.
+    Number(N),
+    /// A word.
     Text(String),
 }
 
@@ -150,7 +141,7 @@ impl EffectTable {
             None => None,
         };
         for (key, value) in &self.shape {
-            let Extra::Number(value) = value else { return Err(bad(unknown_key(key))) };
+            let Word::Number(value) = value else { return Err(bad(unknown_key(key))) };
             spec.shape.push((key.clone(), *value));
         }
         spec.overrides = self.parameters.clone();
@@ -180,7 +171,7 @@ impl From<&EffectSpec> for EffectTable {
             name: expression.map(|e| e.name.clone()),
             formula: expression.map(|e| e.formula.clone()),
             acts_on: expression.map(|e| e.acts_on.clone()),
-            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Extra::Number(*value))).collect(),
+            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Word::Number(*value))).collect(),
             parameters: spec.overrides.clone(),
         }
     }
