@@ -87,7 +87,7 @@ fn told(family: &str, target: usize, seed: u64) -> [Said; 3] {
         ..Scenario::new(family, Design::OneTiltOnePass, seed)
     };
     let config = scenario.plant().expect("planting").config;
-    let allowed = Allowed { dwells: 8, loads_kg: vec![0.5], ..Allowed::default() };
+    let allowed = Allowed { dwells: 8, loads_kg: vec![0.5], margin_deg: 30.0, ranges_deg: Vec::new() };
     let alone = ask(&config, &allowed);
     let once = record(&config, &alone.proposal);
     let after = ask(&once, &allowed);

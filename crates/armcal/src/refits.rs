@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story::chosen_again;
+use crate::story::{calibrated, chosen_again};
 use armcal_calibrate::{calibrate, holdout_turns};
 use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::ParameterReport;
@@ -36,8 +36,7 @@ fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
         );
         diagnosis.chosen_again(Err(why));
     } else {
-        let Run { model, calibration, observations, .. } = &*run;
-        match chosen_again(pipeline, (model, calibration, observations), &diagnosis, progress) {
+        match chosen_again(pipeline, &calibrated(run, pipeline), &diagnosis, progress) {
             Ok(Some(nested)) => diagnosis.chosen_again(Ok(nested)),
             Ok(None) => {}
             Err(e) => diagnosis.chosen_again(Err(e.to_string())),

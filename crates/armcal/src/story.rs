@@ -23,54 +23,9 @@ const MAX_ROUNDS: usize = 4;
 ///
 /// Returns the run and the opened recordings, which the writers pass through to the output.
 pub fn run(pipeline: &Pipeline, progress: &Progress) -> Result<(Run, Vec<Recording>), Error> {
-    let (mut run, recordings) = diagnosed(settle(pipeline, progress)?, pipeline, progress)?;
+    let (mut run, recordings) = settle(pipeline, progress)?.diagnosed(pipeline, progress);
     add_refits(&mut run, pipeline, progress)?;
     Ok((run, recordings))
-}
-
-/// What has settled, with its diagnosis. What that proposes is not fitted, which takes longer than all before: only a
-/// report shows it ([`add_refits`]).
-pub fn diagnosed(
-    settled: Settled,
-    pipeline: &Pipeline,
-    progress: &Progress,
-) -> Result<(Run, Vec<Recording>), Error> {
-    let diagnosed = Diagnosed::of(settled.diagnose(pipeline, progress));
-    Ok(settled.into_run(pipeline, diagnosed))
-}
-
-/// What came of a diagnosis. Whatever came of it, the calibration stands.
-pub struct Diagnosed {
-    diagnosis: Option<Diagnosis>,
-    undiagnosed: Option<Undiagnosed>,
-    warning: Option<Warning>,
-}
-
-impl Diagnosed {
-    /// That nobody asked for one.
-    pub const NOT_ASKED: Diagnosed =
-        Diagnosed { diagnosis: None, undiagnosed: Some(Undiagnosed::NotAsked), warning: None };
-
-    fn of(result: Result<Option<Diagnosis>, Error>) -> Diagnosed {
-        match result {
-            Ok(Some(diagnosis)) => Diagnosed { diagnosis: Some(diagnosis), undiagnosed: None, warning: None },
-            Ok(None) => Diagnosed::NOT_ASKED,
-            Err(Error::SetupFirst { .. }) => {
-                Diagnosed { diagnosis: None, undiagnosed: Some(Undiagnosed::SetupFirst), warning: None }
-            }
-            Err(e) => Diagnosed {
-                diagnosis: None,
-                undiagnosed: Some(Undiagnosed::Failed),
-                warning: Some(Warning::new(
-                    Severity::Inadequate,
-                    Stage::Diagnose,
-                    DIAGNOSIS_FAILED,
-                    "diagnosis",
-                    format!("what is missing could not be looked for: {e}; the calibration stands"),
-                )),
-            },
-        }
-    }
 }
 
 /// Code of the warning about a diagnosis that could not be made.
@@ -98,6 +53,8 @@ pub struct Fitted {
     pub model: Model,
     /// What the fit saw.
     pub observations: Vec<Observation>,
+    /// What effects know of all of it together.
+    pub session: Session,
     /// The calibration.
     pub calibration: Calibration,
     /// Where every dwell is on the table, by recording.
@@ -112,6 +69,13 @@ impl Fitted {
     /// Where the dwells turned out to be, where there is a table.
     pub fn places(&self) -> impl Iterator<Item = &Place> {
         self.places.iter().flatten().flat_map(|a| &a.assignments).map(|a| &a.place)
+    }
+
+    /// What a diagnosis asks of it.
+    pub fn calibrated<'a>(&'a self, pipeline: &'a Pipeline) -> Calibrated<'a> {
+        let Fitted { model, calibration, observations, session, .. } = self;
+        let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
+        Calibrated { model, calibration, observations, session, fit, holdout }
     }
 }
 
@@ -190,7 +154,17 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
             Some(again) => (places, measured) = again,
             None => {
                 measures.explain(&mut rejections, &model, &calibration);
-                return Ok(Fitted { geometry, model, observations, calibration, places, rejections, rounds });
+                let session = frames::session(pipeline, &observations);
+                return Ok(Fitted {
+                    geometry,
+                    model,
+                    observations,
+                    session,
+                    calibration,
+                    places,
+                    rejections,
+                    rounds,
+                });
             }
         }
     }
@@ -217,53 +191,62 @@ impl Settled {
     /// A mistake of the setup, which would get the name of an effect; a diagnosis that cannot be made.
     pub fn diagnose(&self, pipeline: &Pipeline, progress: &Progress) -> Result<Option<Diagnosis>, Error> {
         self.refuse_mistakes()?;
-        let Fitted { model, calibration, observations, .. } = &self.fitted;
-        diagnosis(pipeline, model, calibration, observations, progress)
+        diagnosis(pipeline, &self.fitted.calibrated(pipeline), progress)
     }
 
-    /// The choice of what the diagnosis found, made again without each part of the hold-out.
-    ///
-    /// # Errors
-    /// A part without which nothing can be calibrated or diagnosed.
-    pub fn nested(
-        &self,
-        pipeline: &Pipeline,
-        found: &Diagnosis,
-        progress: &Progress,
-    ) -> Result<Option<Nested>, Error> {
-        let Fitted { model, calibration, observations, .. } = &self.fitted;
-        chosen_again(pipeline, (model, calibration, observations), found, progress)
+    /// Everything for the report, with its diagnosis: whatever comes of that, the calibration stands. What it proposes is not
+    /// fitted, which takes longer than all before: only a report shows it ([`add_refits`]).
+    pub fn diagnosed(self, pipeline: &Pipeline, progress: &Progress) -> (Run, Vec<Recording>) {
+        let found = self.diagnose(pipeline, progress);
+        let (mut run, recordings) = self.into_run(pipeline);
+        set_diagnosis(&mut run, found);
+        if let Some(named) = run.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {
+            run.setup.outdone_by(named.holdout_mm.after);
+        }
+        (run, recordings)
     }
 
-    /// Everything for the report.
-    pub fn into_run(self, pipeline: &Pipeline, diagnosed: Diagnosed) -> (Run, Vec<Recording>) {
+    /// Everything for the report, without a diagnosis.
+    pub fn into_run(self, pipeline: &Pipeline) -> (Run, Vec<Recording>) {
         let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
         let mut warnings = closing_warnings(rounds, places.iter().any(Option::is_some), &calibration);
         warnings.extend(frames::links_without_mass(pipeline, &self.inputs.chain));
-        warnings.extend(diagnosed.warning);
-        let mut setup = self.setup;
-        if let Some(named) = diagnosed.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {
-            setup.outdone_by(named.holdout_mm.after);
-        }
         let run = Run {
-            pipeline_name: pipeline.name.clone(),
-            pipeline_text: pipeline.text.clone(),
-            model_texts: self.model_texts,
             recordings: perceive::recording_runs(pipeline, self.inputs.seen, places, &rejections),
             board: self.inputs.board,
-            model,
-            session: frames::session(pipeline, &observations),
-            observations,
-            calibration,
-            transfer: None,
-            setup,
-            diagnosis: diagnosed.diagnosis,
-            undiagnosed: diagnosed.undiagnosed,
-            steps: Vec::new(),
-            alternatives: Vec::new(),
+            setup: self.setup,
             warnings,
+            ..run_of(pipeline, self.model_texts, model, observations, calibration)
         };
         (run, self.recordings)
+    }
+}
+
+/// A run of these observations, and nothing else of it.
+pub(crate) fn run_of(
+    pipeline: &Pipeline,
+    model_texts: Vec<String>,
+    model: Model,
+    observations: Vec<Observation>,
+    calibration: Calibration,
+) -> Run {
+    Run {
+        pipeline_name: pipeline.name.clone(),
+        pipeline_text: pipeline.text.clone(),
+        model_texts,
+        recordings: Vec::new(),
+        board: None,
+        model,
+        session: frames::session(pipeline, &observations),
+        observations,
+        calibration,
+        transfer: None,
+        setup: SetupReport::default(),
+        diagnosis: None,
+        undiagnosed: Some(Undiagnosed::NotAsked),
+        steps: Vec::new(),
+        alternatives: Vec::new(),
+        warnings: Vec::new(),
     }
 }
 
@@ -289,49 +272,53 @@ pub fn recalibrate(
 
 /// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
 pub fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
-    let found = diagnosis(pipeline, &run.model, &run.calibration, &run.observations, progress);
-    let Diagnosed { diagnosis, undiagnosed, warning } = Diagnosed::of(found);
-    (run.diagnosis, run.undiagnosed) = (diagnosis, undiagnosed);
-    run.warnings.extend(warning);
+    let found = diagnosis(pipeline, &calibrated(run, pipeline), progress);
+    set_diagnosis(run, found);
+}
+
+/// What a diagnosis asks of a run.
+pub(crate) fn calibrated<'a>(run: &'a Run, pipeline: &'a Pipeline) -> Calibrated<'a> {
+    let Run { model, calibration, observations, session, .. } = run;
+    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
+    Calibrated { model, calibration, observations, session, fit, holdout }
 }
 
 fn diagnosis(
     pipeline: &Pipeline,
-    model: &Model,
-    calibration: &Calibration,
-    observations: &[Observation],
+    calibrated: &Calibrated<'_>,
     progress: &Progress,
 ) -> Result<Option<Diagnosis>, Error> {
     if !pipeline.diagnosis.enabled {
         return Ok(None);
     }
     progress.step("diagnosing");
-    let session = frames::session(pipeline, observations);
-    let calibrated = calibrated(pipeline, model, calibration, observations, &session);
-    Ok(Some(diagnose(&calibrated, &pipeline.diagnosis)?))
+    Ok(Some(diagnose(calibrated, &pipeline.diagnosis)?))
+}
+
+/// What came of a diagnosis, or why there is none.
+fn set_diagnosis(run: &mut Run, found: Result<Option<Diagnosis>, Error>) {
+    (run.diagnosis, run.undiagnosed) = match found {
+        Ok(Some(diagnosis)) => (Some(diagnosis), None),
+        Ok(None) => (None, Some(Undiagnosed::NotAsked)),
+        Err(Error::SetupFirst { .. }) => (None, Some(Undiagnosed::SetupFirst)),
+        Err(e) => {
+            let message = format!("what is missing could not be looked for: {e}; the calibration stands");
+            let (severity, stage) = (Severity::Inadequate, Stage::Diagnose);
+            run.warnings.push(Warning::new(severity, stage, DIAGNOSIS_FAILED, "diagnosis", message));
+            (None, Some(Undiagnosed::Failed))
+        }
+    };
 }
 
 /// The choice of what was found, made again without each part of the hold-out.
 pub(crate) fn chosen_again(
     pipeline: &Pipeline,
-    (model, calibration, observations): (&Model, &Calibration, &[Observation]),
+    calibrated: &Calibrated<'_>,
     found: &Diagnosis,
     progress: &Progress,
 ) -> Result<Option<Nested>, Error> {
     progress.step("choosing again without each part of the hold-out");
-    let session = frames::session(pipeline, observations);
-    Ok(nested(&calibrated(pipeline, model, calibration, observations, &session), found, &pipeline.diagnosis)?)
-}
-
-fn calibrated<'a>(
-    pipeline: &'a Pipeline,
-    model: &'a Model,
-    calibration: &'a Calibration,
-    observations: &'a [Observation],
-    session: &'a Session,
-) -> Calibrated<'a> {
-    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
-    Calibrated { model, calibration, observations, session, fit, holdout }
+    Ok(nested(calibrated, found, &pipeline.diagnosis)?)
 }
 
 /// The geometry with effects, or as it is without any.

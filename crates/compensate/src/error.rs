@@ -2,6 +2,7 @@
 
 /// Every variant names the target and what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum CompensateError {
     /// No posture within the limits brings the tip there.
     #[error(
@@ -9,7 +10,6 @@ pub enum CompensateError {
         turn = if *left_deg > 0.0 { format!(" and {left_deg:.2} deg") } else { String::new() },
     )]
     Unreachable {
-        /// Name of the target.
         target: String,
         /// `nominal` or `calibrated`.
         arm: &'static str,
@@ -17,25 +17,17 @@ pub enum CompensateError {
         left_mm: f64,
         /// Rotation left [deg].
         left_deg: f64,
-        /// The nearest posture found.
         joint_deg: String,
-        /// What to do.
         advice: String,
     },
     /// A number of a target is missing or not finite.
     #[error("target `{target}`: {problem}")]
-    BadTarget {
-        /// Its name.
-        target: String,
-        /// What is wrong, and what would be right.
-        problem: String,
-    },
+    BadTarget { target: String, problem: String },
     /// A joint vector of the wrong length, or limits the wrong way round.
     #[error("{what}: {problem}")]
     BadJoints {
         /// `start`, `limits`, ...
         what: &'static str,
-        /// What is wrong, and what would be right.
         problem: String,
     },
     /// Nothing to compute.

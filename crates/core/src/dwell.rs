@@ -40,6 +40,15 @@ impl Arrival {
             Arrival::Unknown => 0.0,
         }
     }
+
+    /// Its sign in a table: `+`, `-`, or `.` when unknown.
+    pub fn symbol(&self) -> char {
+        match self {
+            Arrival::Positive => '+',
+            Arrival::Negative => '-',
+            Arrival::Unknown => '.',
+        }
+    }
 }
 
 /// What the position sensor saw of the tip, or of a marker, during a dwell, in the sensor's frame.

@@ -31,6 +31,24 @@ pub struct Parameter {
     pub meaning: String,
 }
 
+impl Parameter {
+    /// One that the fit leaves where it is, without bounds.
+    pub fn fixed(name: String, unit: Unit, nominal: f64, role: Role, meaning: String) -> Parameter {
+        Parameter {
+            name,
+            unit,
+            nominal,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            prior_sigma: None,
+            assumed: None,
+            free: false,
+            role,
+            meaning,
+        }
+    }
+}
+
 /// What robot parameters are built and adjusted like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -76,66 +76,47 @@ impl Unit {
         Unit::MetrePerSecond,
     ];
 
+    /// Symbol of the SI unit, symbol of the unit shown to people, and how much of that one SI unit is.
+    fn symbols(self) -> (&'static str, &'static str, f64) {
+        let (milli, micro, deg) = (1e3, 1e6, 1f64.to_degrees());
+        match self {
+            Unit::Metre => ("m", "mm", milli),
+            Unit::Radian => ("rad", "deg", deg),
+            Unit::Second => ("s", "s", 1.0),
+            Unit::One => ("1", "", 1.0),
+            Unit::RadianPerNewtonMetre => ("rad/(N*m)", "deg/(N*m)", deg),
+            Unit::PerKelvin => ("1/K", "ppm/K", micro),
+            Unit::Kilogram => ("kg", "kg", 1.0),
+            Unit::Kelvin => ("K", "K", 1.0),
+            Unit::NewtonMetre => ("N*m", "N*m", 1.0),
+            Unit::MetrePerNewtonMetre => ("m/(N*m)", "mm/(N*m)", milli),
+            Unit::RadianPerKelvin => ("rad/K", "deg/K", deg),
+            Unit::MetrePerKelvin => ("m/K", "mm/K", milli),
+            Unit::RadianPerKilogram => ("rad/kg", "deg/kg", deg),
+            Unit::MetrePerKilogram => ("m/kg", "mm/kg", milli),
+            Unit::RadianPerSecond => ("rad/s", "deg/s", deg),
+            Unit::MetrePerSecond => ("m/s", "mm/s", milli),
+        }
+    }
+
     /// Symbol of the SI unit, as written to machine-readable output.
     pub fn symbol(self) -> &'static str {
-        match self {
-            Unit::Metre => "m",
-            Unit::Radian => "rad",
-            Unit::Second => "s",
-            Unit::One => "1",
-            Unit::RadianPerNewtonMetre => "rad/(N*m)",
-            Unit::PerKelvin => "1/K",
-            Unit::Kilogram => "kg",
-            Unit::Kelvin => "K",
-            Unit::NewtonMetre => "N*m",
-            Unit::MetrePerNewtonMetre => "m/(N*m)",
-            Unit::RadianPerKelvin => "rad/K",
-            Unit::MetrePerKelvin => "m/K",
-            Unit::RadianPerKilogram => "rad/kg",
-            Unit::MetrePerKilogram => "m/kg",
-            Unit::RadianPerSecond => "rad/s",
-            Unit::MetrePerSecond => "m/s",
-        }
+        self.symbols().0
     }
 
     /// Symbol of the unit shown to people.
     pub fn display_symbol(self) -> &'static str {
-        match self {
-            Unit::Metre => "mm",
-            Unit::Radian => "deg",
-            Unit::Second => "s",
-            Unit::One => "",
-            Unit::RadianPerNewtonMetre => "deg/(N*m)",
-            Unit::PerKelvin => "ppm/K",
-            Unit::Kilogram => "kg",
-            Unit::Kelvin => "K",
-            Unit::NewtonMetre => "N*m",
-            Unit::MetrePerNewtonMetre => "mm/(N*m)",
-            Unit::RadianPerKelvin => "deg/K",
-            Unit::MetrePerKelvin => "mm/K",
-            Unit::RadianPerKilogram => "deg/kg",
-            Unit::MetrePerKilogram => "mm/kg",
-            Unit::RadianPerSecond => "deg/s",
-            Unit::MetrePerSecond => "mm/s",
-        }
+        self.symbols().1
     }
 
     /// Converts an SI value to the unit shown to people.
     pub fn to_display(self, si: f64) -> f64 {
-        match self {
-            Unit::Metre
-            | Unit::MetrePerNewtonMetre
-            | Unit::MetrePerKelvin
-            | Unit::MetrePerKilogram
-            | Unit::MetrePerSecond => si * 1e3,
-            Unit::Radian
-            | Unit::RadianPerNewtonMetre
-            | Unit::RadianPerKelvin
-            | Unit::RadianPerKilogram
-            | Unit::RadianPerSecond => si.to_degrees(),
-            Unit::Second | Unit::One | Unit::Kilogram | Unit::Kelvin | Unit::NewtonMetre => si,
-            Unit::PerKelvin => si * 1e6,
-        }
+        si * self.symbols().2
+    }
+
+    /// Converts a value in the unit shown to people to SI.
+    pub fn from_display(self, shown: f64) -> f64 {
+        shown / self.to_display(1.0)
     }
 }
 

@@ -87,6 +87,12 @@ impl Chain {
         }
     }
 
+    /// One of the arms by itself, and where its parameters are among all; of one arm, that.
+    pub fn arm(&self, arm: usize) -> (&Chain, Range<usize>) {
+        let own = self.arms().get(arm).map(|arm| (&arm.chain, arm.parameters.clone()));
+        own.unwrap_or((self, 0..self.parameters.len()))
+    }
+
     /// The joints that are in one arm with a joint, itself among them.
     pub(crate) fn joints_beside(&self, joint: usize) -> Range<usize> {
         let own = self.arms().iter().find(|arm| arm.joints.contains(&joint));

@@ -68,16 +68,11 @@ pub(crate) fn robot_parameter(
     meaning: String,
 ) -> Parameter {
     Parameter {
-        name,
-        unit,
-        nominal,
         lower: nominal - bound,
         upper: nominal + bound,
         prior_sigma: prior_sigma.is_finite().then_some(prior_sigma),
-        assumed: None,
         free: true,
-        role: Role::Robot,
-        meaning,
+        ..Parameter::fixed(name, unit, nominal, Role::Robot, meaning)
     }
 }
 

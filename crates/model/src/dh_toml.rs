@@ -28,7 +28,7 @@ use crate::{Chain, Deviation, ModelError};
 use armcal_core::{Parameter, ParameterKind, Unit};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -44,7 +44,7 @@ pub(crate) struct DhTable {
     rows: Vec<Row>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Convention {
     #[default]
@@ -52,7 +52,7 @@ enum Convention {
     Modified,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum JointKind {
     #[default]
@@ -223,11 +223,8 @@ impl DhTable {
     }
 
     fn to_toml(&self) -> String {
-        let convention = match self.convention {
-            Convention::Standard => "standard",
-            Convention::Modified => "modified",
-        };
-        let mut text = format!("name = {}\nconvention = \"{convention}\"\n", quoted(&self.name));
+        let mut text =
+            format!("name = {}\nconvention = {}\n", toml_of(&self.name), toml_of(&self.convention));
         let declared = self.deviation.map(|d| {
             [
                 ("\n[deviation]\nbound_mm", d.bound_mm),
@@ -241,12 +238,8 @@ impl DhTable {
             let _ = writeln!(text, "{key} = {value:?}");
         }
         for row in &self.rows {
-            let joint = match row.joint {
-                JointKind::Revolute => "revolute",
-                JointKind::Prismatic => "prismatic",
-                JointKind::Fixed => "fixed",
-            };
-            let _ = write!(text, "\n[[rows]]\nname = {}\njoint = \"{joint}\"\n", quoted(&row.name));
+            let (name, joint) = (toml_of(&row.name), toml_of(&row.joint));
+            let _ = write!(text, "\n[[rows]]\nname = {name}\njoint = {joint}\n");
             for field in row.fields() {
                 let _ = writeln!(text, "{} = {}", field.key, field.entry.to_toml());
             }
@@ -409,6 +402,7 @@ impl<'de> Visitor<'de> for EntryVisitor {
     }
 }
 
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+/// A word as TOML has it.
+fn toml_of(word: &impl Serialize) -> String {
+    toml::Value::try_from(word).map_or_else(|_| String::new(), |value| value.to_string())
 }

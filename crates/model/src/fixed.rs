@@ -11,7 +11,7 @@
 //! and Roth 1996, ch. 8 and 9).
 
 use crate::segment::{Freedom, Segment};
-use crate::{Frame, ModelError};
+use crate::{Frame, Knowledge, ModelError};
 use armcal_core::{Parameter, Role, Unit};
 
 /// A point or a plane that stands fixed in the world.
@@ -31,21 +31,7 @@ pub struct Length {
     /// The length before the fit [m].
     pub length_m: f64,
     /// How well that is known.
-    pub knowledge: LengthKnowledge,
-}
-
-/// What is known about a length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum LengthKnowledge {
-    /// It is exact.
-    Given,
-    /// It was measured with this standard error [m].
-    Measured {
-        /// Standard error [m].
-        sigma_m: f64,
-    },
-    /// Nobody measured it: it is fitted.
-    Estimated,
+    pub knowledge: Knowledge,
 }
 
 /// A fixed place in a model.
@@ -68,7 +54,7 @@ impl FixedPlace {
 
 impl Length {
     /// A rigid link with a ball joint at either end, between the tips of two arms.
-    pub fn of_link(length_m: f64, knowledge: LengthKnowledge) -> Length {
+    pub fn of_link(length_m: f64, knowledge: Knowledge) -> Length {
         Length { name: "link".into(), length_m, knowledge }
     }
 
@@ -83,28 +69,20 @@ impl Length {
             return bad(format!("is {length_m} m; give it in millimetres, zero or more"));
         }
         let (free, prior_sigma, role) = match self.knowledge {
-            LengthKnowledge::Given => (false, None, Role::KnownFrame),
-            LengthKnowledge::Measured { sigma_m } if sigma_m.is_finite() && sigma_m > 0.0 => {
+            Knowledge::Given => (false, None, Role::KnownFrame),
+            Knowledge::Measured { sigma_m, .. } if sigma_m.is_finite() && sigma_m > 0.0 => {
                 (true, Some(sigma_m), Role::KnownFrame)
             }
-            LengthKnowledge::Measured { sigma_m } => {
+            Knowledge::Measured { sigma_m, .. } => {
                 return bad(format!(
                     "has a standard error of {sigma_m} m; give one above zero, or call it given"
                 ));
             }
-            LengthKnowledge::Estimated => (true, None, Role::EstimatedFrame),
+            Knowledge::Estimated => (true, None, Role::EstimatedFrame),
         };
-        Ok(Parameter {
-            name: format!("{}.length", self.name),
-            unit: Unit::Metre,
-            nominal: length_m,
-            lower: 0.0,
-            upper: f64::INFINITY,
-            prior_sigma,
-            assumed: None,
-            free,
-            role,
-            meaning: format!("distance that {} stands for", self.name),
-        })
+        let (name, meaning) =
+            (format!("{}.length", self.name), format!("distance that {} stands for", self.name));
+        let fixed = Parameter::fixed(name, Unit::Metre, length_m, role, meaning);
+        Ok(Parameter { lower: 0.0, prior_sigma, free, ..fixed })
     }
 }

@@ -126,17 +126,10 @@ impl Frame {
         let parameter =
             |(quantity, unit, nominal, prior_sigma, meaning): (&str, _, f64, Option<f64>, String)| {
                 Parameter {
-                    name: format!("{}.{quantity}", self.name),
-                    unit,
-                    nominal,
-                    lower: f64::NEG_INFINITY,
-                    upper: f64::INFINITY,
                     // A measurement without error leaves nothing to fit.
                     free: free && prior_sigma != Some(0.0),
                     prior_sigma: prior_sigma.filter(|sigma| *sigma > 0.0),
-                    assumed: None,
-                    role,
-                    meaning,
+                    ..Parameter::fixed(format!("{}.{quantity}", self.name), unit, nominal, role, meaning)
                 }
             };
         let at = self.pose.translation.vector;

@@ -40,12 +40,12 @@ pub use arms::{Arm, ArmFrames};
 pub use chain::Chain;
 pub use deviation::Deviation;
 pub use effects::{
-    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Extra, Family, Offered, Override, PlacedEffect,
+    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, Offered, Override, PlacedEffect,
     Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find, is_of_effect,
     least_dwells, place_and_moment,
 };
 pub use error::ModelError;
-pub use fixed::{FixedPlace, Length, LengthKnowledge};
+pub use fixed::{FixedPlace, Length};
 pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};

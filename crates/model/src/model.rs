@@ -1,6 +1,5 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
-mod alone;
 mod features;
 mod linearisation;
 mod measurement;
@@ -14,7 +13,7 @@ use crate::fixed::{FixedPlace, Length, Standing};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
-use crate::{Chain, Frames, Masses, ModelError};
+use crate::{Chain, Frame, Frames, Marker, Masses, ModelError};
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
 use features::Feature;
 pub use features::LinkFrame;
@@ -53,13 +52,6 @@ pub struct Model {
     own_asked: Option<Arc<OwnAsked>>,
 }
 
-/// What stands around the chain.
-struct Around {
-    arms: Vec<ArmFrames>,
-    markers: Vec<crate::Marker>,
-    boards: Vec<crate::Frame>,
-}
-
 impl Model {
     /// Puts a chain between its frames.
     ///
@@ -67,8 +59,7 @@ impl Model {
     /// error is not a number.
     pub fn new(chain: Chain, frames: Frames) -> Result<Model, ModelError> {
         let Frames { base, tip, markers, boards } = frames;
-        let around = Around { arms: vec![ArmFrames { base, tip }], markers, boards };
-        Model::between(chain, around)
+        Model::between(chain, vec![ArmFrames { base, tip }], markers, boards)
     }
 
     /// Puts joined chains ([`Chain::joined`]), each between its own frames, into one world.
@@ -76,7 +67,7 @@ impl Model {
     /// # Errors
     /// As for one arm; a number of frames that is not that of the arms, bases that are all free.
     pub fn of_arms(chain: Chain, arms: Vec<ArmFrames>) -> Result<Model, ModelError> {
-        Model::between(chain, Around { arms, markers: Vec::new(), boards: Vec::new() })
+        Model::between(chain, arms, Vec::new(), Vec::new())
     }
 
     /// The same with fixed places to measure against, and lengths that distances count from. Before any effect.
@@ -97,28 +88,33 @@ impl Model {
         Ok(self)
     }
 
-    fn between(chain: Chain, around: Around) -> Result<Model, ModelError> {
-        if around.arms.len() != chain.bases() {
-            let problem = format!("{} arms have frames, there are {}", around.arms.len(), chain.bases());
+    fn between(
+        chain: Chain,
+        arms: Vec<ArmFrames>,
+        markers: Vec<Marker>,
+        boards: Vec<Frame>,
+    ) -> Result<Model, ModelError> {
+        if arms.len() != chain.bases() {
+            let problem = format!("{} arms have frames, there are {}", arms.len(), chain.bases());
             return Err(ModelError::BadArms { problem });
         }
         let mut parameters = chain.parameters.clone();
-        let mut place = |frame: &crate::Frame| -> Result<Segment, ModelError> {
+        let mut place = |frame: &Frame| -> Result<Segment, ModelError> {
             let (segment, own) = frame.segment(parameters.len())?;
             parameters.extend(own);
             Ok(segment)
         };
-        let bases = around.arms.iter().map(|arm| place(&arm.base)).collect::<Result<Vec<_>, _>>()?;
-        let mut hung = Vec::with_capacity(around.arms.len() + around.markers.len());
-        for (ArmFrames { tip, .. }, end) in around.arms.iter().zip(chain.ends()) {
+        let bases = arms.iter().map(|arm| place(&arm.base)).collect::<Result<Vec<_>, _>>()?;
+        let mut hung = Vec::with_capacity(arms.len() + markers.len());
+        for (ArmFrames { tip, .. }, end) in arms.iter().zip(chain.ends()) {
             hung.push((tip.name.clone(), None, end, place(tip)?));
         }
-        for marker in &around.markers {
+        for marker in &markers {
             let (name, link) = (marker.frame.name.clone(), Some(marker.link.clone()));
             hung.push((name, link, chain.end_of(&marker.link)?, place(&marker.frame)?));
         }
         let boards =
-            around.boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
+            boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
         arms::check_bases(&bases, &parameters)?;
         check_names(&parameters)?;
         let mut tree = chain.on(bases);
@@ -197,14 +193,9 @@ impl Model {
         true
     }
 
-    /// Moves the start of the base frame (nominal value and centre of the prior) to another world_from_base. Effects that are
-    /// placed already keep the old one.
-    pub fn set_base_start(&mut self, base_in_world: Pose) {
-        self.set_arm_base_start(0, base_in_world);
-    }
-
-    /// The same of one of several arms, such as to the pose that brings the tips of two arms together.
-    pub fn set_arm_base_start(&mut self, arm: usize, base_in_world: Pose) {
+    /// Moves the start of the base frame of an arm (nominal value and centre of the prior) to another world_from_base, such as
+    /// the one that brings the tips of two arms together. Effects that are placed already keep the old one.
+    pub fn set_base_start(&mut self, arm: usize, base_in_world: Pose) {
         restart(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
         self.refresh();
     }

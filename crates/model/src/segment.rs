@@ -284,7 +284,7 @@ fn origin<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid
 }
 
 /// About or along an axis.
-fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D> {
+pub(crate) fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D> {
     match motion {
         Some(Motion::Prismatic) => Rigid { translation_m: axis * q, ..Rigid::identity() },
         Some(Motion::Revolute) => Rigid { rotation: rotation_of_vector(&(axis * q)), ..Rigid::identity() },

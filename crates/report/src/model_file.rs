@@ -25,18 +25,16 @@ pub(crate) struct ModelFile {
 pub(crate) fn model_files(run: &Run) -> Result<Vec<ModelFile>, ReportError> {
     let all = run.calibration.fit.values();
     let (model, values) = run.model.in_recording(run.recordings.len().saturating_sub(1), &all);
-    if model.chain().arms().is_empty() {
+    let arms = model.chain().arms();
+    if arms.is_empty() {
         let text = run.model_texts.first().map_or("", String::as_str);
-        return Ok(vec![calibrated(model, text, &values)?]);
+        return Ok(vec![calibrated((model, 0), text, &values)?]);
     }
-    let arms = model.chain().arms().iter().zip(&run.model_texts).enumerate();
     let of_arm = |(at, (arm, text)): (usize, (&Arm, &String))| {
-        let (alone, index) = model.arm_alone(at)?;
-        let p: Vec<f64> = index.iter().map(|&i| values[i]).collect();
-        let file = calibrated(&alone, text, &p);
-        Some(file.map(|file| ModelFile { name: name(Some(&arm.name), file.name == URDF), ..file }))
+        let file = calibrated((model, at), text, &values)?;
+        Ok(ModelFile { name: name(Some(&arm.name), file.name == URDF), ..file })
     };
-    arms.filter_map(of_arm).collect()
+    arms.iter().zip(&run.model_texts).enumerate().map(of_arm).collect()
 }
 
 /// Name of the file of an arm, of several by its own.
@@ -45,14 +43,19 @@ pub(crate) fn name(arm: Option<&str>, urdf: bool) -> String {
     format!("{}.{form}", arm.unwrap_or("calibrated"))
 }
 
-/// A model with the parameters `p`, in the form of the text that its nominal one was read from.
-fn calibrated(model: &Model, nominal_text: &str, p: &[f64]) -> Result<ModelFile, ReportError> {
-    if model.chain().is_urdf() {
-        let (text, warnings) = model.to_urdf(nominal_text, Path::new("model_text of the run"), p)?;
+/// An arm of a model with the parameters `p`, in the form of the text that its nominal one was read from.
+fn calibrated(
+    (model, arm): (&Model, usize),
+    nominal_text: &str,
+    p: &[f64],
+) -> Result<ModelFile, ReportError> {
+    let (chain, own) = model.chain().arm(arm);
+    if chain.is_urdf() {
+        let (text, warnings) = model.to_urdf(arm, nominal_text, Path::new("model_text of the run"), p)?;
         let text = marked_xml(text);
         return Ok(ModelFile { name: URDF.into(), media_type: "application/xml", text, warnings });
     }
-    let text = format!("# {MARK}\n\n{}", model.chain().to_dh_toml(p)?);
+    let text = format!("# {MARK}\n\n{}", chain.to_dh_toml(&p[own])?);
     Ok(ModelFile { name: DH.into(), media_type: "application/toml", text, warnings: Vec::new() })
 }
 

@@ -8,8 +8,8 @@ use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{FeatureId, Load, Observation, Pose, Unit, Visited};
 use armcal_model::{
-    ArmFrames, Chain, EffectSpec, EffectTable, FixedPlace, Frame, Frames, Length, LengthKnowledge, Marker,
-    Masses, Model, ModelError, Session,
+    ArmFrames, Chain, EffectSpec, EffectTable, FixedPlace, Frame, Frames, Knowledge, Length, Marker, Masses,
+    Model, ModelError, Session,
 };
 use armcal_recording::{Recording, RecordingError, input};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -273,7 +273,7 @@ impl PastModel {
         let length = |l: &LengthFacts| Length {
             name: l.name.clone(),
             length_m: l.length_m,
-            knowledge: LengthKnowledge::Given,
+            knowledge: Knowledge::Given,
         };
         let places: Vec<FixedPlace> = self.places.iter().map(place).collect();
         let lengths: Vec<Length> = self.lengths.iter().map(length).collect();

@@ -44,7 +44,7 @@ fn make(
     full: bool,
 ) -> Result<(), Error> {
     let silent = Progress::silent();
-    let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &silent)?, pipeline, &silent)?;
+    let (mut run, recordings) = story::settle(pipeline, &silent)?.diagnosed(pipeline, &silent);
     let made = store.begin()?;
     if full {
         crate::refits::add_refits(&mut run, pipeline, &silent)?;

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::stages::frames;
-use crate::story::{self, Diagnosed, Fitted, Settled};
+use crate::story::{self, Fitted, Settled};
 use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
 use armcal_diagnose::Nested;
@@ -64,7 +64,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
-    let (mut run, recordings) = settled.into_run(&pipeline, Diagnosed::NOT_ASKED);
+    let (mut run, recordings) = settled.into_run(&pipeline);
     let before = PastRun::of(&run);
     story::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
     let comparison = Comparison::of(&before, &PastRun::of(&run));
@@ -140,7 +140,7 @@ fn chosen(
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
     let nested = match &diagnosis {
-        Some(found) => settled.nested(pipeline, found, progress)?,
+        Some(found) => story::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?,
         None => None,
     };
     let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;

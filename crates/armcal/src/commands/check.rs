@@ -60,7 +60,7 @@ fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
     let limits = Limits::of(pipeline, &request.pipeline)?;
     may_write(request.out.as_deref().map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
-    let (mut run, recordings) = story::diagnosed(story::settle(pipeline, &progress)?, pipeline, &progress)?;
+    let (mut run, recordings) = story::settle(pipeline, &progress)?.diagnosed(pipeline, &progress);
     let judged = judge(&run, &limits)?;
     if let Some(out) = &request.out {
         crate::refits::add_refits(&mut run, pipeline, &progress)?;

@@ -198,7 +198,7 @@ fn joints(words: &str, arms: &PastArms) -> Result<Vec<f64>, Error> {
     let shown = parsed.ok_or_else(|| {
         bad("--from", words.to_owned(), &format!("give {expected} joints in degrees, joined by commas"))
     })?;
-    Ok(shown.iter().enumerate().map(|(j, q)| q / chain.joint_unit(j).to_display(1.0)).collect())
+    Ok(shown.iter().enumerate().map(|(j, q)| chain.joint_unit(j).from_display(*q)).collect())
 }
 
 /// What holds for every set-point.

@@ -21,8 +21,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
-    let settled = story::settle(&pipeline, &progress)?;
-    let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
+    let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;

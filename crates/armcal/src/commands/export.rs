@@ -18,8 +18,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(pipeline)?;
     may_write([out])?;
     let progress = Progress::new();
-    let settled = story::settle(&pipeline, &progress)?;
-    let (run, _) = story::diagnosed(settled, &pipeline, &progress)?;
+    let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
     let text = format!("{:#}\n", problem(&run));
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;

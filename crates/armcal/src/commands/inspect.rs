@@ -2,7 +2,9 @@
 
 use super::{Outcome, print};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, recording_name};
+use crate::progress::Progress;
+use crate::stages::perceive;
 use armcal_core::Severity;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::{RULED, printable};
@@ -14,7 +16,10 @@ use std::path::{Path, PathBuf};
 pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     let reports = match inputs {
         [only] if only.extension().is_some_and(|e| e == "toml") => of_pipeline(only)?,
-        files => vec![(name_of(files), open("the files given", files)?.report().clone())],
+        files => {
+            let failed = |source| Error::Recording { recording: "the files given".to_owned(), source };
+            vec![(recording_name(None, files), Recording::open(files).map_err(failed)?.report().clone())]
+        }
     };
     if json {
         let value: Vec<serde_json::Value> = reports
@@ -40,12 +45,11 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
 
 fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
     let pipeline = Pipeline::load(path)?;
-    let entries = pipeline.recordings.iter();
+    let recordings = perceive::open_all(&pipeline, &Progress::silent())?;
+    let entries = pipeline.recordings.iter().zip(&recordings);
     entries
-        .map(|entry| {
+        .map(|(entry, recording)| {
             let name = entry.name();
-            let paths: Vec<PathBuf> = entry.paths.iter().map(|p| pipeline.resolve(p)).collect();
-            let recording = open(&name, &paths).map_err(|e| pipeline.where_data_come_from(e))?;
             let read = recording.read(&pipeline.streams);
             let (_, streams, warnings) =
                 read.map_err(|source| Error::Recording { recording: name.clone(), source })?;
@@ -55,15 +59,6 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
             Ok((name, report))
         })
         .collect()
-}
-
-fn open(name: &str, paths: &[PathBuf]) -> Result<Recording, Error> {
-    Recording::open(paths).map_err(|source| Error::Recording { recording: name.to_owned(), source })
-}
-
-fn name_of(files: &[PathBuf]) -> String {
-    let stem = files.first().and_then(|f| f.file_stem());
-    stem.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 fn text(name: &str, report: &RecordingReport) -> String {

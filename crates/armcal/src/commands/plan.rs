@@ -6,7 +6,7 @@ use crate::pipeline::Pipeline;
 use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use crate::progress::Progress;
 use crate::stages::frames;
-use crate::story::{self, Settled};
+use crate::story::{self, Fitted, Settled};
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
@@ -65,12 +65,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     };
     progress.step("weighing what could be recorded");
     let (model, values) = with_certain(&pipeline, &settled, &open)?;
-    let session = frames::session(&pipeline, &settled.fitted.observations);
     let known = Known {
         model: &model,
         values,
         observations: &settled.fitted.observations,
-        session: &session,
+        session: &settled.fitted.session,
         fit: &pipeline.fit,
         board: settled.inputs.board.as_ref().filter(|_| pipeline.observations.seated),
         tracked: tracking(&pipeline, &settled),
@@ -120,13 +119,12 @@ fn allowed(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
 
 /// The calibrated model with the effects that are beyond doubt, and its parameters.
 fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Result<(Model, Vec<f64>), Error> {
+    let Fitted { model, observations, session, calibration, .. } = &settled.fitted;
     if open.certain.is_empty() {
-        return Ok((settled.fitted.model.clone(), settled.fitted.calibration.fit.values()));
+        return Ok((model.clone(), calibration.fit.values()));
     }
-    let session = frames::session(pipeline, &settled.fitted.observations);
-    let model = settled.fitted.model.with_effects(&open.certain, &session)?;
-    let calibration =
-        calibrate(&model, &settled.fitted.observations, &pipeline.fit, &HoldoutConfig::default())?;
+    let model = model.with_effects(&open.certain, session)?;
+    let calibration = calibrate(&model, observations, &pipeline.fit, &HoldoutConfig::default())?;
     Ok((model, calibration.fit.values()))
 }
 
@@ -181,7 +179,7 @@ fn dwells(proposal: &Proposal, joints: &[String]) -> String {
     for (i, dwell) in proposal.dwells.iter().enumerate() {
         let mut cells = vec![number(format!("{}", i + 1)), Cell::new(place(dwell))];
         cells.extend(dwell.joint_deg.iter().map(|q| number(format!("{q:.1}"))));
-        cells.push(Cell::new(arrival(&dwell.arrival)));
+        cells.push(Cell::new(dwell.arrival.iter().map(Arrival::symbol).collect::<String>()));
         cells.push(number(format!("{}", dwell.load_kg)));
         cells.push(number(format!("{:.1}", dwell.delta)));
         table.add_row(cells);
@@ -214,15 +212,6 @@ fn place(dwell: &Proposed) -> String {
         Place::Joined => "tips joined".to_owned(),
         Place::Again { dwell } => format!("again: {dwell}"),
     }
-}
-
-fn arrival(sides: &[Arrival]) -> String {
-    let sign = |side: &Arrival| match side {
-        Arrival::Positive => '+',
-        Arrival::Negative => '-',
-        Arrival::Unknown => '.',
-    };
-    sides.iter().map(sign).collect()
 }
 
 fn capital(sentence: &str) -> String {

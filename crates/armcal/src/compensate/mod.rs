@@ -86,13 +86,12 @@ pub fn prepare<'a>(
         temperature_c: drive.temperature_c.or(facts.and_then(|f| f.temperature_c)),
     };
     let chain = arms.geometry.chain();
-    let si = |joint: usize, display: f64| display / chain.joint_unit(joint).to_display(1.0);
     let mut limits = Limits::none(arms.geometry.joint_count());
     for (joint, (limit, recorded)) in limits.0.iter_mut().zip(&past.range_rad).enumerate() {
         *limit = chain.joint_limits(joint, *recorded);
     }
     for (joint, range) in &drive.ranges {
-        limits.0[*joint] = range.map(|v| si(*joint, v));
+        limits.0[*joint] = range.map(|v| chain.joint_unit(*joint).from_display(v));
     }
     let mut nominal_values = arms.nominal_values.clone();
     if frame == TargetFrame::Base {

@@ -121,7 +121,7 @@ impl Sheet<'_> {
             cells.extend(joints.map(|(j, q)| number(format!("{:.3}", units(j).to_display(*q)))));
             let corrections: Vec<String> = self.corrections(point).map(|c| format!("{c:+.3}")).collect();
             cells.push(Cell::new(corrections.join(" ")));
-            cells.push(Cell::new(point.arrival.iter().map(sign).collect::<String>()));
+            cells.push(Cell::new(point.arrival.iter().map(Arrival::symbol).collect::<String>()));
             match &point.reached {
                 Some(r) => cells.extend([
                     number(format!("{:.2}", r.before_m * 1e3)),
@@ -174,12 +174,4 @@ fn kind(point: &SetPoint) -> &'static str {
 
 fn millimetres(at_m: &Vector3<f64>) -> String {
     at_m.iter().map(|v| format!("{:.1}", v * 1e3)).collect::<Vec<String>>().join(", ")
-}
-
-fn sign(side: &Arrival) -> char {
-    match side {
-        Arrival::Positive => '+',
-        Arrival::Negative => '-',
-        Arrival::Unknown => '.',
-    }
 }

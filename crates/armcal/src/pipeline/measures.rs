@@ -4,7 +4,7 @@ use super::{FramePose, FrameSection, Pipeline};
 use crate::error::Error;
 use crate::two_arms::closure::{ClosedChainSection, ClosureKind};
 use armcal_core::{Against, FeatureId, Pose};
-use armcal_model::{FixedPlace, Frame, Length, LengthKnowledge};
+use armcal_model::{FixedPlace, Frame, Knowledge, Length};
 use armcal_recording::GaugeStream;
 use serde::Deserialize;
 
@@ -92,11 +92,11 @@ impl MeasureSection {
 }
 
 /// How well a length is known.
-pub(crate) fn knowledge(length: FramePose, sigma_mm: f64) -> LengthKnowledge {
+pub(crate) fn knowledge(length: FramePose, sigma_mm: f64) -> Knowledge {
     match length {
-        FramePose::Given => LengthKnowledge::Given,
-        FramePose::Measured => LengthKnowledge::Measured { sigma_m: sigma_mm * 1e-3 },
-        FramePose::Estimated => LengthKnowledge::Estimated,
+        FramePose::Given => Knowledge::Given,
+        FramePose::Measured => Knowledge::Measured { sigma_m: sigma_mm * 1e-3, sigma_rad: 0.0 },
+        FramePose::Estimated => Knowledge::Estimated,
     }
 }
 

@@ -64,12 +64,6 @@ pub struct Allowed {
     pub ranges_deg: Vec<(usize, [f64; 2])>,
 }
 
-impl Default for Allowed {
-    fn default() -> Allowed {
-        Allowed { dwells: 6, loads_kg: Vec::new(), margin_deg: 30.0, ranges_deg: Vec::new() }
-    }
-}
-
 /// What to record next and what it will tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Proposal {

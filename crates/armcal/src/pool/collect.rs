@@ -56,7 +56,7 @@ pub fn collect(
     for result in results(folders)? {
         let past = PastObservations::open(&result)?;
         if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
-            return Err(Error::Unpoolable { result, problem });
+            return Err(Error::Result { path: result, problem: format!("cannot be pooled: {problem}") });
         }
         found.extend(past.recordings.into_iter().map(|r| Found { result: result.clone(), recording: r }));
     }
@@ -164,7 +164,9 @@ fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
         let mut here = BTreeSet::new();
         search(folder, &mut here)?;
         if here.is_empty() {
-            return Err(Error::NoResults { folder: folder.clone() });
+            let problem = "holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones \
+                           again";
+            return Err(Error::Result { path: folder.clone(), problem: problem.to_owned() });
         }
         all.extend(here);
     }

@@ -15,7 +15,7 @@ use crate::stages::frames;
 use crate::story;
 use crate::two_arms::check::place_bases;
 use armcal_calibrate::{HoldoutConfig, align_frames, calibrate};
-use armcal_core::{Pose, SetupReport};
+use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_report::{Run, Undiagnosed};
 use std::path::PathBuf;
@@ -58,22 +58,11 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         None
     };
     let mut run = Run {
-        pipeline_name: pipeline.name.clone(),
-        pipeline_text: pipeline.text.clone(),
-        model_texts,
         recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
         board,
-        model,
-        session: frames::session(pipeline, &observations),
-        observations,
-        calibration,
         transfer,
-        setup: SetupReport::default(),
-        diagnosis: None,
-        undiagnosed: None,
-        steps: Vec::new(),
-        alternatives: Vec::new(),
         warnings: collected.warnings,
+        ..story::run_of(pipeline, model_texts, model, observations, calibration)
     };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
     if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {
@@ -97,10 +86,9 @@ fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<
         model.ask_own(collected.recordings.iter().map(|r| own(r, None)).collect(), per_recording);
         return Ok(model);
     }
-    let mut base = frames::frame("base", &pipeline.frames.base, true);
     let measured = pipeline.frames.base.pose == FramePose::Measured;
     let bases: Vec<Pose> = collected.recordings.iter().filter(|_| measured).map(|r| r.base).collect();
-    base.pose = frames::mean_of(&bases).unwrap_or(base.pose);
+    let base = frames::base_frame(&pipeline.frames.base, &bases);
     let knowledge = pipeline.table.as_ref().map_or(Knowledge::Given, |table| match table.pose {
         BoardPose::Estimated => Knowledge::Estimated,
         BoardPose::Measured | BoardPose::Given => frames::measured(table.sigma_mm, table.sigma_deg),

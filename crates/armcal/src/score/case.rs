@@ -3,10 +3,8 @@
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::frames;
 use crate::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
-use armcal_core::Observation;
 use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
@@ -70,9 +68,7 @@ pub fn quick(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     };
     let diagnosis = diagnose(&calibrated, &config)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let suggested = diagnosis.suggested(model.chain().joint_names())?;
-    let after = with(&model, &suggested, &session, observations, &fit, &holdout)?;
-    let answer = answer(&diagnosis, &suggested, &calibration, after.as_ref());
+    let answer = answer(&diagnosis, &calibrated)?;
     Ok((Answer { seconds, calibration_seconds, ..answer }, observed.truth.hidden))
 }
 
@@ -87,12 +83,8 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let suggested = diagnosis.suggested(settled.fitted.geometry.chain().joint_names())?;
-    let session = frames::session(&pipeline, &settled.fitted.observations);
-    let (geometry, observations) = (&settled.fitted.geometry, &settled.fitted.observations);
-    let after = with(geometry, &suggested, &session, observations, &pipeline.fit, &pipeline.holdout)?;
-    let answer = answer(&diagnosis, &suggested, &settled.fitted.calibration, after.as_ref());
-    Ok((Answer { seconds, ..answer }, truth(&place.truth)?.hidden))
+    let of_geometry = Calibrated { model: &settled.fitted.geometry, ..settled.fitted.calibrated(&pipeline) };
+    Ok((Answer { seconds, ..answer(&diagnosis, &of_geometry)? }, truth(&place.truth)?.hidden))
 }
 
 fn truth(path: &Path) -> Result<Truth, Error> {
@@ -104,41 +96,28 @@ fn truth(path: &Path) -> Result<Truth, Error> {
     serde_json::from_str(&text).map_err(Error::Json)
 }
 
-fn with(
-    model: &Model,
-    effects: &[EffectSpec],
-    session: &Session,
-    observations: &[Observation],
-    fit: &FitConfig,
-    holdout: &HoldoutConfig,
-) -> Result<Option<Calibration>, Error> {
-    if effects.is_empty() {
-        return Ok(None);
-    }
-    let extended = model.with_effects(effects, session)?;
-    Ok(Some(calibrate(&extended, observations, fit, holdout)?))
-}
-
-fn answer(
-    diagnosis: &Diagnosis,
-    suggested: &[EffectSpec],
-    before: &Calibration,
-    after: Option<&Calibration>,
-) -> Answer {
+/// The answer to a diagnosis, and what its suggestion does to the held-out points.
+fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, Error> {
+    let Calibrated { model, calibration: before, observations, session, fit, holdout } = calibrated;
+    let suggested = diagnosis.suggested(model.chain().joint_names())?;
+    let after = match suggested.is_empty() {
+        true => None,
+        false => Some(calibrate(&model.with_effects(&suggested, session)?, observations, fit, holdout)?),
+    };
     let held_out_mm = |c: &Calibration| c.judged().fitted.mean_m * 1e3;
-    Answer {
+    Ok(Answer {
         verdict: diagnosis.verdict,
         names: diagnosis.names.clone(),
         sets: diagnosis.effects.iter().map(|e| e.set.clone()).collect(),
         unknown: diagnosis.unknown.as_ref().map(|u| (u.channel.clone(), u.driver.clone())),
         suggested: suggested.iter().map(EffectSpec::to_string).collect(),
         before_mm: held_out_mm(before),
-        after_mm: held_out_mm(after.unwrap_or(before)),
+        after_mm: held_out_mm(after.as_ref().unwrap_or(before)),
         floor_mm: before.noise_floor_m * 1e3,
         dwells: before.residuals.len(),
         seconds: 0.0,
         calibration_seconds: 0.0,
-    }
+    })
 }
 
 /// The model that a pipeline would start from.

@@ -108,10 +108,7 @@ pub(super) fn said(answer: &Answer) -> String {
     match (&answer.unknown, answer.sets.is_empty()) {
         (Some((channel, driver)), true) => format!("{channel} <- {driver}"),
         (None, true) if answer.verdict == Verdict::NothingMissing => "nothing".to_owned(),
-        (None, true) => serde_json::to_value(answer.verdict)
-            .ok()
-            .and_then(|verdict| verdict.as_str().map(str::to_owned))
-            .unwrap_or_default(),
+        (None, true) => answer.verdict.word().to_owned(),
         _ => answer.sets.iter().map(|set| set.join("|")).collect::<Vec<_>>().join(" + "),
     }
 }

@@ -111,8 +111,9 @@ pub fn nominal_model(
             .collect::<Result<Vec<Frame>, Error>>()?,
         _ => Vec::new(),
     };
+    let bases: Vec<Pose> = seen.iter().filter_map(|s| s.base.as_ref().map(|b| b.pose)).collect();
     let frames = Frames {
-        base: base_frame(&pipeline.frames.base, seen),
+        base: base_frame(&pipeline.frames.base, &bases),
         tip: frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation),
         markers: markers(pipeline),
         boards,
@@ -160,7 +161,7 @@ pub fn override_parameters(model: &mut Model, changes: &[ParameterOverride]) -> 
             continue;
         }
         model.set_parameter(&change.name, |p| {
-            let si = |display: f64| display / p.unit.to_display(1.0);
+            let si = |display: f64| p.unit.from_display(display);
             p.free = change.free.unwrap_or(p.free);
             if let Some(bound) = change.bound {
                 (p.lower, p.upper) = (p.nominal - si(bound), p.nominal + si(bound));
@@ -234,18 +235,14 @@ pub fn frame(name: &str, section: &FrameSection, free_rotation: bool) -> Frame {
     Frame { name: name.into(), pose: section.at.into(), knowledge, free_rotation }
 }
 
-/// The base: one frame for all recordings, at the mean of what each recording measured.
-fn base_frame(section: &FrameSection, seen: &[Seen]) -> Frame {
-    let mut base = frame("base", section, true);
-    let poses: Vec<Pose> = seen.iter().filter_map(|s| s.base.as_ref().map(|b| b.pose)).collect();
-    if let Some(mean) = mean_of(&poses) {
-        base.pose = mean;
-    }
-    base
+/// The base: one frame for all recordings, at the mean of what each recording `measured`.
+pub fn base_frame(section: &FrameSection, measured: &[Pose]) -> Frame {
+    let base = frame("base", section, true);
+    Frame { pose: mean_of(measured).unwrap_or(base.pose), ..base }
 }
 
 /// Mean of poses that differ by little: rotations are averaged in the tangent space of the first.
-pub fn mean_of(poses: &[Pose]) -> Option<Pose> {
+fn mean_of(poses: &[Pose]) -> Option<Pose> {
     let first = poses.first()?.rotation;
     let n = poses.len() as f64;
     let position_m = poses.iter().map(|p| p.translation.vector).sum::<Vector3<f64>>() / n;

@@ -194,7 +194,7 @@ impl<'a> Measures<'a> {
             return Ok(());
         }
         self.enough_joined(which)?;
-        observed.observations.extend(self.chosen(which));
+        observed.observations.extend(self.chosen(which, |_| true));
         observed.observations.sort_by_key(|o| o.dwell);
         let used: BTreeSet<DwellId> = observed.observations.iter().map(|o| o.dwell).collect();
         observed.rejections.retain(|r| !used.contains(&r.dwell));
@@ -224,12 +224,8 @@ impl<'a> Measures<'a> {
         }
     }
 
-    fn chosen(&self, which: &[bool]) -> Vec<Observation> {
-        self.chosen_of(which, |_| true)
-    }
-
     /// Those of the measurements that `wanted` accepts, by their places among all.
-    fn chosen_of(&self, which: &[bool], wanted: impl Fn(usize) -> bool) -> Vec<Observation> {
+    fn chosen(&self, which: &[bool], wanted: impl Fn(usize) -> bool) -> Vec<Observation> {
         let chosen = self.all.iter().zip(which).filter(|(c, chosen)| **chosen && wanted(c.measure));
         chosen.map(|(c, _)| c.observation.clone()).collect()
     }
@@ -237,7 +233,7 @@ impl<'a> Measures<'a> {
     /// Holds the chosen dwells of joined tips to a check, where there are any.
     fn check_joined(&self, model: &Model, which: &[bool], check: Check) -> Result<(), Error> {
         let Some((at, joins)) = self.joins() else { return Ok(()) };
-        check(model, joins, &self.chosen_of(which, |measure| measure == at))
+        check(model, joins, &self.chosen(which, |measure| measure == at))
     }
 
     /// The measurement of joined tips, and these.
@@ -255,7 +251,7 @@ impl<'a> Measures<'a> {
             return Ok(());
         };
         let dwells = self.all.iter().filter(|c| c.measure == at).count();
-        let joined = self.chosen_of(which, |measure| measure == at);
+        let joined = self.chosen(which, |measure| measure == at);
         check::enough(closure, &joined, (dwells, self.pipeline.two_arms.is_some()))
     }
 
@@ -271,7 +267,7 @@ impl<'a> Measures<'a> {
             }
         }
         let mut all = sure.to_vec();
-        all.extend(self.chosen(near));
+        all.extend(self.chosen(near, |_| true));
         all.sort_by_key(|o| o.dwell);
         Ok(all)
     }

@@ -1,7 +1,7 @@
 //! From files to dwells: open, read, align the clocks, find the pauses.
 
 use crate::error::Error;
-use crate::pipeline::{FramePose, Pipeline, RecordingEntry};
+use crate::pipeline::{BoardPose, FramePose, Pipeline, RecordingEntry};
 use crate::progress::Progress;
 use crate::setup;
 use crate::stages::effort;
@@ -88,8 +88,7 @@ pub fn dwells_of_all(
     let mut all = entries
         .map(|(index, (entry, recording))| {
             progress.step(&format!("reading {}", entry.name()));
-            let (samples, seen) =
-                dwells_of_one(pipeline, &speed_model, index, entry, &entry.name(), recording)?;
+            let (samples, seen) = dwells_of_one(pipeline, &speed_model, index, entry, recording)?;
             keep(samples);
             Ok(seen)
         })
@@ -205,20 +204,21 @@ fn dwells_of_one(
     speed_model: &Model,
     index: usize,
     entry: &RecordingEntry,
-    name: &str,
     recording: &Recording,
 ) -> Result<(Samples, Seen), Error> {
+    let name = &entry.name();
     let in_recording = |source| Error::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| Error::Dwell { recording: name.to_owned(), source };
 
     let (mut samples, streams, mut warnings) = recording.read(&pipeline.streams).map_err(in_recording)?;
     let expected = speed_model.chain().joint_names().len();
     if samples.joints.joint_rad.len() != expected {
-        return Err(Error::JointCount {
-            recording: name.to_owned(),
-            read: samples.joints.joint_rad.len(),
-            expected,
-        });
+        let read = samples.joints.joint_rad.len();
+        let problem = format!(
+            "{read} joints are read for a model of {expected}; mend `names` in [streams.joints], or the rows of the model file: \
+             the number of joints differs"
+        );
+        return Err(Error::InRecording { recording: name.to_owned(), problem });
     }
     if pipeline.two_arms.is_none() && pipeline.streams.joints.len() > 1 {
         in_order_of(speed_model.chain(), &mut samples.joints, name)?;
@@ -264,11 +264,10 @@ fn dwells_of_one(
     let mut report = recording.report().clone();
     report.streams = streams;
     let fingerprint = Arc::new(Fingerprint::of(&samples));
-    let name = name.to_owned();
     let readings = Readings::of(&samples.joints, repeated, &dwells);
     let (load_kg, more_loads) = pipeline.loads_of(entry);
     let seen = Seen {
-        name,
+        name: name.clone(),
         load_kg,
         more_loads,
         report,
@@ -287,10 +286,13 @@ fn dwells_of_one(
 /// Puts the joints of several streams into the order of the chain, by their names: no list of the pipeline gives it.
 fn in_order_of(chain: &Chain, joints: &mut JointSamples, recording: &str) -> Result<(), Error> {
     let place = |name: &String| {
-        joints.names.iter().position(|read| read == name).ok_or_else(|| Error::JointUnread {
-            recording: recording.to_owned(),
-            joint: name.clone(),
-            read: joints.names.join(", "),
+        joints.names.iter().position(|read| read == name).ok_or_else(|| {
+            let problem = format!(
+                "no [[streams.joints]] reads the joint `{name}` of the model; several streams are put together by the names of the \
+                 model file: they read {}",
+                joints.names.join(", ")
+            );
+            Error::InRecording { recording: recording.to_owned(), problem }
         })
     };
     let order = chain.joint_names().iter().map(place).collect::<Result<Vec<usize>, Error>>()?;
@@ -325,9 +327,9 @@ fn misread(
 }
 
 /// Distance from the median position that all but the worst hundredth of the frames keep [m].
-fn travel_m(positions_m: &[nalgebra::Vector3<f64>]) -> f64 {
+fn travel_m(positions_m: &[Vector3<f64>]) -> f64 {
     let axis = |k: usize| median(&positions_m.iter().map(|p| p[k]).collect::<Vec<_>>());
-    let centre_m = nalgebra::Vector3::new(axis(0), axis(1), axis(2));
+    let centre_m = Vector3::new(axis(0), axis(1), axis(2));
     let distances_m: Vec<f64> = positions_m.iter().map(|p| (p - centre_m).norm()).collect();
     percentile(&distances_m, 0.99)
 }
@@ -339,13 +341,20 @@ fn static_bodies(
     name: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Option<MeanPose>, Option<MeanPose>), Error> {
-    let mut mean = |role, stream: Option<&armcal_core::PoseSamples>, consequence| {
-        let empty = || Error::EmptyStream { recording: name.to_owned(), role, consequence };
+    let mut mean = |role: &str, stream: Option<&PoseSamples>, consequence: &str| {
+        let unusable = |problem: String| Error::InRecording { recording: name.to_owned(), problem };
+        let empty = || {
+            unusable(format!(
+                "the {role} stream has no usable sample, so {consequence}; see `armcal inspect`"
+            ))
+        };
         let samples = stream.filter(|s| !s.is_empty()).ok_or_else(empty)?;
         let (pose, said) =
             mean_pose(samples).map_err(|source| Error::Dwell { recording: name.to_owned(), source })?;
         if !pose.has_orientation {
-            return Err(Error::NoOrientation { recording: name.to_owned(), role });
+            return Err(unusable(format!(
+                "the {role} stream has positions but no orientations; name a topic with poses in [streams.{role}]"
+            )));
         }
         // A stream that names no body would leave open which of the two moved.
         let subject =
@@ -360,7 +369,7 @@ fn static_bodies(
         _ => None,
     };
     let table = match &pipeline.table {
-        Some(t) if t.pose == crate::pipeline::BoardPose::Measured => {
+        Some(t) if t.pose == BoardPose::Measured => {
             Some(mean("table", samples.table.as_ref(), "the board's pose is unknown")?)
         }
         _ => None,

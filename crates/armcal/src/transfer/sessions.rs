@@ -180,7 +180,7 @@ struct CarriedOver {
 impl Carrier<'_> {
     /// Calibrates the first session with these effects and looks at the second with that.
     fn carried(&self, effects: &[EffectSpec]) -> Result<CarriedOver, Error> {
-        let Fitted { geometry, observations, .. } = self.taught;
+        let Fitted { geometry, observations, session, .. } = self.taught;
         let model = with_effects(self.from, geometry, effects, observations)?;
         let calibration = calibrate(&model, observations, &self.from.fit, &HoldoutConfig::None)?;
         let then = PastArms {
@@ -189,9 +189,8 @@ impl Carrier<'_> {
             values: calibration.fit.values(),
             model,
         };
-        let session = frames::session(self.from, observations);
         let judging = &self.judge.observations;
-        let mut placed = place_arms(&then, &session, self.path, self.to, &self.judge.geometry)?;
+        let mut placed = place_arms(&then, session, self.path, self.to, &self.judge.geometry)?;
         let mut warnings = placed.fit_frames(self.to, judging)?;
         warnings.append(&mut placed.warnings);
         let errors = |values: &[f64]| -> Errors {

@@ -99,7 +99,7 @@ pub fn place_bases(geometry: &mut Model, aligned: &[f64]) {
         let own = &geometry.parameters()[geometry.base_parameters(arm)];
         if own.iter().any(|p| p.free && p.role == Role::EstimatedFrame) {
             let base = geometry.arm_base_in_world(aligned, arm);
-            geometry.set_arm_base_start(arm, base);
+            geometry.set_base_start(arm, base);
         }
     }
 }

@@ -125,20 +125,11 @@ impl TwoArms {
             data: file.data,
             recordings: file.recordings.into_iter().map(entry).collect(),
             streams: two.streams(),
-            clock: Default::default(),
             dwell: file.dwell,
-            table: None,
-            markers: Default::default(),
-            points: Default::default(),
-            planes: Default::default(),
-            measure: Default::default(),
             closed_chain: Some(file.closed_chain),
-            sensor: Default::default(),
             model: first.model.clone(),
-            frames: Default::default(),
             parameters: file.parameters,
             effects: file.effects,
-            observations: Default::default(),
             fit: file.fit,
             holdout: file.holdout,
             pool: file.pool,
@@ -147,8 +138,7 @@ impl TwoArms {
             check: file.check,
             output: file.output,
             two_arms: Some(two),
-            folder: PathBuf::new(),
-            text: String::new(),
+            ..Pipeline::default()
         })
     }
 

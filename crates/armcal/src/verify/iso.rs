@@ -12,7 +12,7 @@ use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_report::IsoReport;
-use armcal_verify::{PathError, Polyline};
+use armcal_verify::{PathError, Planned, Polyline};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -41,12 +41,14 @@ pub struct Shown<'a> {
 impl Shown<'_> {
     /// Both assessments.
     pub fn assess(&self) -> Result<IsoReport, Error> {
-        let by = |side: Side| assess(&self.evidence(side), &Settings::default());
+        let by = |values, path| assess(&self.evidence(Side { values, path }), &Settings::default());
         let commands_recorded = self.samples.iter().any(|s| s.set_points.is_some());
-        Ok(IsoReport { commands_recorded, nominal: by(Side::Nominal)?, calibrated: by(Side::Calibrated)? })
+        let nominal = by(&self.placed.nominal, |planned| &planned.before)?;
+        let calibrated = by(&self.placed.calibrated, |planned| &planned.after)?;
+        Ok(IsoReport { commands_recorded, nominal, calibrated })
     }
 
-    fn evidence(&self, side: Side) -> Evidence {
+    fn evidence(&self, side: Side<'_>) -> Evidence {
         let mut visits = Vec::new();
         let mut commands: Vec<Command> = Vec::new();
         for (recording, (seen, samples)) in self.seen.iter().zip(self.samples).enumerate() {
@@ -65,7 +67,7 @@ impl Shown<'_> {
     /// One stop at which the sensor saw the tip.
     fn visit(
         &self,
-        side: Side,
+        side: Side<'_>,
         recording: usize,
         samples: &Samples,
         dwell: &Dwell,
@@ -116,25 +118,24 @@ impl Shown<'_> {
         moving.chain([(dwell.start_ns, tip_m)]).collect()
     }
 
-    fn commanded_m(&self, side: Side, recording: usize, dwell: &Dwell, joint_rad: Vec<f64>) -> Vector3<f64> {
+    fn commanded_m(
+        &self,
+        side: Side<'_>,
+        recording: usize,
+        dwell: &Dwell,
+        joint_rad: Vec<f64>,
+    ) -> Vector3<f64> {
         let (seen, nowhere) = (&self.seen[recording], Reference::position(Vector3::zeros()));
         let o = Observation { joint_rad, ..observe::observation(dwell, seen, nowhere, Matrix3::zeros()) };
-        let p = match side {
-            Side::Nominal => &self.placed.nominal,
-            Side::Calibrated => &self.placed.calibrated,
-        };
-        self.base.predicted_tip_m(p, &o)
+        self.base.predicted_tip_m(side.values, &o)
     }
 
     /// Commanded paths with their runs: motions that were commanded alike are cycles of one path.
-    fn paths(&self, side: Side) -> Vec<PathTest> {
+    fn paths(&self, side: Side<'_>) -> Vec<PathTest> {
         let mut tests: Vec<(Polyline, PathTest)> = Vec::new();
         for motion in self.motions {
             for (id, planned) in &motion.planned {
-                let path = match side {
-                    Side::Nominal => &planned.before,
-                    Side::Calibrated => &planned.after,
-                };
+                let path = (side.path)(planned);
                 if path.length_m() < SHORTEST_PATH_M {
                     continue;
                 }
@@ -157,10 +158,10 @@ impl Shown<'_> {
 }
 
 /// Through which model commands are seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Nominal,
-    Calibrated,
+#[derive(Clone, Copy)]
+struct Side<'a> {
+    values: &'a [f64],
+    path: fn(&Planned) -> &Polyline,
 }
 
 /// A commanded pose.

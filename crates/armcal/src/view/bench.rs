@@ -35,7 +35,7 @@ impl Bench {
                 let pipeline = Pipeline::load(path)?;
                 let settled = story::settle(&pipeline, progress)?;
                 let geometry = settled.fitted.geometry.clone();
-                let (mut run, _) = story::diagnosed(settled, &pipeline, progress)?;
+                let (mut run, _) = settled.diagnosed(&pipeline, progress);
                 crate::refits::add_refits(&mut run, &pipeline, progress)?;
                 (pipeline, geometry, run)
             }

@@ -34,9 +34,13 @@ pub fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
         return Ok((input.to_owned(), Vec::new()));
     }
     let path = input.join(FILE);
-    let text = input::read_to_string(&path)
-        .map_err(|source| Error::NoSource { folder: input.to_owned(), source: Box::new(source) })?;
-    let source: Source = toml::from_str(&text)
-        .map_err(|e| Error::NoSource { folder: input.to_owned(), source: Box::new(e) })?;
+    let unknown = |why: String| Error::Result {
+        path: input.to_owned(),
+        problem: format!(
+            "does not say which pipeline made it (view.toml: {why}); name the pipeline file instead"
+        ),
+    };
+    let text = input::read_to_string(&path).map_err(|e| unknown(e.to_string()))?;
+    let source: Source = toml::from_str(&text).map_err(|e| unknown(e.to_string()))?;
     Ok((input.join(source.pipeline), source.results.iter().map(|r| input.join(r)).collect()))
 }

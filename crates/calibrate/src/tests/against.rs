@@ -3,7 +3,7 @@
 use super::rig;
 use crate::{Fit, FitConfig, HoldoutConfig, calibrate, fit, fit_frames};
 use armcal_core::{Against, DwellId, Observation, Pose, Reference};
-use armcal_model::{Chain, FixedPlace, Frame, Frames, Length, LengthKnowledge, Model};
+use armcal_model::{Chain, FixedPlace, Frame, Frames, Knowledge, Length, Model};
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -25,7 +25,7 @@ fn model() -> Model {
         place("post", Pose::translation(0.5, -0.3, -0.1), false),
         place("plate", Pose::translation(0.3, 0.1, -0.2), true),
     ];
-    let knowledge = LengthKnowledge::Measured { sigma_m: 10e-6 };
+    let knowledge = Knowledge::Measured { sigma_m: 10e-6, sigma_rad: 0.0 };
     let bar = Length { name: "bar".into(), length_m: 0.1504, knowledge };
     rig::tracked_model().against(&places, &[bar]).unwrap()
 }
@@ -150,7 +150,7 @@ fn six_axes() -> Model {
 #[test]
 fn one_point_from_many_sides_leaves_the_scale_open_and_a_known_distance_closes_it() {
     let post = place("post", Pose::translation(-0.7, 0.1, 0.3), false);
-    let bar = Length { name: "bar".into(), length_m: 0.15, knowledge: LengthKnowledge::Given };
+    let bar = Length { name: "bar".into(), length_m: 0.15, knowledge: Knowledge::Given };
     let model = six_axes().against(&[post], &[bar]).unwrap();
     let mut rng = rig::rng(5);
     let mut truth = rig::planted(&model, &mut rng, 0.5);

@@ -6,18 +6,18 @@ use crate::{
 };
 use armcal_core::{Against, DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_lab::pair::{ObservedPair, PairConfig, PairTruth, observe};
-use armcal_model::{ArmFrames, Chain, Frame, Length, LengthKnowledge, Model, ModelError};
+use armcal_model::{ArmFrames, Chain, Frame, Knowledge, Length, Model, ModelError};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How long a link is [m], and how well that is known.
-type Link = (f64, LengthKnowledge);
+type Link = (f64, Knowledge);
 
 const LAB: &str = include_str!("../../../../pipelines/lab/two-arms.toml");
 const RIGHT: &str = include_str!("../../../../pipelines/models/right_arm.toml");
 const LEFT: &str = include_str!("../../../../pipelines/models/left_arm.toml");
-const LINK: Option<Link> = Some((0.2, LengthKnowledge::Given));
+const LINK: Option<Link> = Some((0.2, Knowledge::Given));
 const ONE_POINT: Option<Link> = None;
 const IN_TURN: HoldoutConfig = HoldoutConfig::CavityFolds { k: 5 };
 
@@ -75,7 +75,7 @@ fn placed(link: Option<Link>, observations: &[Observation]) -> Model {
     let mut model = pair(link);
     let aligned = align_frames(&model, observations, &FitConfig::default()).unwrap();
     let base = model.arm_base_in_world(&aligned, 1);
-    model.set_arm_base_start(1, base);
+    model.set_base_start(1, base);
     model
 }
 
@@ -230,7 +230,7 @@ fn without_a_known_length_the_scale_is_open_and_a_known_link_closes_it() {
     assert!(open && (1.8e-3..2.3e-3).contains(&sigma_m), "{open} {sigma_m}");
     let (open, sigma_m) = scale(LINK, Some(200.0));
     assert!(!open && sigma_m < 0.5e-3, "{open} {sigma_m}");
-    let estimated = (0.19, LengthKnowledge::Estimated);
+    let estimated = (0.19, Knowledge::Estimated);
     let (open, _) = scale(Some(estimated), Some(200.0));
     assert!(open, "an unmeasured link knows no scale");
 }
@@ -244,7 +244,7 @@ fn what_cannot_be_joined_is_said() {
     assert!(same.contains("both are named `left`"), "{same}");
     let adrift = says([("right", RIGHT, free()), ("left", LEFT, free())], ONE_POINT);
     assert!(adrift.contains("bases of right and left are both free"), "{adrift}");
-    let short = Some((-0.1, LengthKnowledge::Given));
+    let short = Some((-0.1, Knowledge::Given));
     let short = says([("right", RIGHT, given()), ("left", LEFT, free())], short);
     assert!(short.contains("the length of link is -0.1 m"), "{short}");
 

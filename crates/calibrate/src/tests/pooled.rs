@@ -191,7 +191,7 @@ fn own_bases_and_joint_zeros_are_eliminated_exactly_and_found() {
         let camera =
             Pose::new(Vector3::new(0.5, 0.1 * day as f64, 0.2), Vector3::new(0.0, 0.1, 0.9 * day as f64));
         let mut today = model.clone();
-        today.set_base_start(camera);
+        today.set_base_start(0, camera);
         let mut own = truth.clone();
         let x = today.index("base.x").unwrap();
         own[x..x + 6].copy_from_slice(&today.nominal()[x..x + 6]);

@@ -1,9 +1,9 @@
 //! What is said of one arm by itself, in the names and numbers of all arms that it stands among.
 
 use super::expression::Expression;
+use super::is_of_effect;
 use super::placing::ARM;
 use super::spec::EffectSpec;
-use super::{crossed_backlash, is_of_effect};
 use crate::{Arm, ModelError};
 
 /// The variables of a formula that have the number of a joint behind them.
@@ -34,7 +34,7 @@ impl Arm {
         let expression = spec.expression.as_ref().map(|own| self.expression_among_all(own));
         let mut all = EffectSpec { target, expression, ..spec };
         for (name, value) in &mut all.shape {
-            if kind.name == crossed_backlash::KIND.name && name == "from" {
+            if kind.name == "crossed_backlash" && name == "from" {
                 *value += self.joints.start as f64;
             }
         }

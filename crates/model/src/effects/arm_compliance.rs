@@ -27,8 +27,7 @@
 use super::prelude::*;
 use crate::segment::Motion;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "arm_compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "every joint yields to gravity like a spring",
     family: Family::Elasticity,
     toggle: Toggle::Load,
@@ -47,7 +46,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         "gear_ratio",
         "belt_coupling",
     ],
-    source: include_str!("arm_compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -23,13 +23,11 @@
 use super::prelude::*;
 use crate::segment::Geometry;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "axis_tilt",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["axis not parallel (Hayati beta)"],
     summary: "an axis is not parallel to the one before it",
     family: Family::Geometry,
     confused_with: &["eccentricity", "second_harmonic", "gear_ratio", "belt_coupling"],
-    source: include_str!("axis_tilt.rs"),
     place,
     ..EffectKind::PLAIN
 };

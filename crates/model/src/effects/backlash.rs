@@ -36,15 +36,13 @@
 use super::play::{RESOLVED_DEG, lagging};
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "backlash",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["Coulomb wind-up"],
     summary: "play between encoder and link: the tip depends on the direction of arrival",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
     shapes: &[LED, REST],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
-    source: include_str!("backlash.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -26,8 +26,7 @@
 use super::frame_shift::about;
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "base_compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the base rocks under the weight of the arm",
     family: Family::Elasticity,
     toggle: Toggle::Load,
@@ -48,7 +47,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     ],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
-    source: include_str!("base_compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -26,14 +26,12 @@
 use super::frame_shift::about;
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "bearing_compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the bearing of a joint tilts under the moment across its axis",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     never_negative: &["tilt", "tilt_load"],
     confused_with: &["compliance", "base_compliance", "arm_compliance", "link_bending"],
-    source: include_str!("bearing_compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -27,15 +27,13 @@
 use super::play::{RESOLVED_DEG, lagging};
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "belt_backlash",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["play on the motor side of a belt"],
     summary: "play in a belt from the base: the sum of two joints decides",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
     shapes: &[LED],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
-    source: include_str!("belt_backlash.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -25,15 +25,13 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "belt_compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "compliance of a joint when the next one is driven by a belt from the base",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     shapes: &[SEATED],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
-    source: include_str!("belt_compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -22,13 +22,11 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "belt_coupling",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["coupled wrist"],
     summary: "a joint moves along with the one before it",
     family: Family::Transmission,
     confused_with: &["gear_ratio", "compliance", "eccentricity", "second_harmonic"],
-    source: include_str!("belt_coupling.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -20,14 +20,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "board_scale",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["print shrinkage"],
     summary: "the board is larger or smaller than declared",
     family: Family::Board,
     target: Target::Whole,
     confused_with: &["sensor_scale"],
-    source: include_str!("board_scale.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -27,8 +27,7 @@ use super::prelude::*;
 use super::spec::Since;
 use std::collections::BTreeMap;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "board_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["slipped markers of the board"],
     summary: "the board moved under what measures it, between recordings or at a dwell",
     family: Family::Event,
@@ -36,7 +35,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift"],
-    source: include_str!("board_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };

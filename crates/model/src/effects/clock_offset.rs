@@ -20,13 +20,10 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "clock_offset",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "clocks of robot and sensor differ: an error in proportion to speed",
     family: Family::Timing,
     target: Target::Whole,
-    confused_with: &[],
-    source: include_str!("clock_offset.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -27,8 +27,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["belt stretch", "bending of the last link (last joint)"],
     summary: "a joint yields to gravity like a spring",
     family: Family::Elasticity,
@@ -46,7 +45,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         "gear_ratio",
         "belt_coupling",
     ],
-    source: include_str!("compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

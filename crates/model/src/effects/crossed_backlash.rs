@@ -27,8 +27,7 @@
 use super::play::{RESOLVED_DEG, following};
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "crossed_backlash",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["cable drag"],
     summary: "lost motion of one joint that follows the direction of another",
     family: Family::LostMotion,
@@ -47,7 +46,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         LED,
     ],
     confused_with: &["backlash", "belt_backlash"],
-    source: include_str!("crossed_backlash.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -6,7 +6,7 @@
 use super::kind::EffectKind;
 use super::table::Override;
 use super::{EffectSpec, NominalPose, Session, find, placed};
-use crate::error::nearest;
+use crate::error::hint;
 use crate::{Model, ModelError};
 use armcal_core::Parameter;
 use std::collections::BTreeSet;
@@ -71,8 +71,7 @@ impl Model {
         for declared in self.declared.iter() {
             let known = self.quantities(&declared.wide, session, &zero)?;
             if !known.is_empty() && !known.iter().any(|quantity| declared.quantity.matches(quantity)) {
-                let near = nearest(declared.quantity.as_str(), known.iter().map(String::as_str));
-                let hint = near.map(|n| format!("; did you mean \"{n}\"?")).unwrap_or_default();
+                let hint = hint(declared.quantity.as_str(), known.iter().map(String::as_str));
                 let all = known.into_iter().collect::<Vec<_>>().join(", ");
                 let problem = format!("it has no parameter \"{}\"{hint} It has: {all}", declared.quantity);
                 return Err(ModelError::BadEffect { effect: declared.name.clone(), problem });

@@ -21,13 +21,11 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "eccentricity",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["encoder eccentricity", "gear run-out"],
     summary: "a gear or encoder disc off its centre: an error once a turn",
     family: Family::Transmission,
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    source: include_str!("eccentricity.rs"),
     place,
     ..EffectKind::PLAIN
 };
@@ -41,12 +39,7 @@ pub(super) struct Harmonic {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
-    let deg = 1f64.to_radians();
-    let amplitudes = vec![
-        amplitude("sin", Unit::Radian, 0.4 * deg, 8.0 * deg, "amplitude of sin q"),
-        amplitude("cos", Unit::Radian, 0.4 * deg, 8.0 * deg, "amplitude of cos q"),
-    ];
-    Ok(Placement::new(amplitudes, Harmonic { joint, harmonic: 1.0 }))
+    Ok(Placement::new(amplitudes_wave(0.4, 8.0, " q"), Harmonic { joint, harmonic: 1.0 }))
 }
 
 impl Physics for Harmonic {

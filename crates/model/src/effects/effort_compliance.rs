@@ -20,26 +20,15 @@
 //! # Source
 //! Spong 1987; notes of the project.
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{Placing, amplitude};
-use crate::rigid::Scalar;
-use armcal_core::Unit;
+use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "effort_compliance",
-    aliases: &[],
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a joint yields to the effort its motor measures",
     family: Family::Elasticity,
     toggle: Toggle::Load,
-    target: Target::Joint,
-    offered: Offered::Once,
-    shapes: &[],
-    never_negative: &[],
     confused_with: &["compliance", "hardening_compliance"],
-    source: include_str!("effort_compliance.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -27,8 +27,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "error_curve",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["encoder error map", "gear error curve"],
     summary: "the joint's own repeatable error curve, a Fourier series over its angle",
     family: Family::Transmission,
@@ -56,7 +55,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         },
     ],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
-    source: include_str!("error_curve.rs"),
     place,
     ..EffectKind::PLAIN
 };

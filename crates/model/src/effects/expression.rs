@@ -28,7 +28,7 @@ use super::measure::{Dimension, Measure, dimension, symbol};
 use super::prelude::*;
 use super::spec::joint_index;
 use super::table::unit_of;
-use crate::error::nearest;
+use crate::error::hint;
 use crate::segment::Motion;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
@@ -38,14 +38,11 @@ const LENGTHS: &str = "lengths";
 /// Where a bound is given and no prior: how much of it is a typical size.
 const SIGMA_OF_BOUND: f64 = 0.3;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "expression",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a formula of the user; written in an [[effects]] table",
     family: Family::User,
     target: Target::Whole,
     offered: Offered::Never,
-    confused_with: &[],
-    source: include_str!("expression.rs"),
     place,
     ..EffectKind::PLAIN
 };
@@ -161,9 +158,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 fn unknown_unit(name: &str, unit: &str) -> String {
     let known: Vec<&str> = Unit::ALL.iter().map(|unit| unit.symbol()).collect();
-    let hint = nearest(unit, known.iter().copied())
-        .map(|name| format!("; did you mean \"{name}\"?"))
-        .unwrap_or_default();
+    let hint = hint(unit, known.iter().copied());
     format!("parameter \"{name}\": there is no unit \"{unit}\"{hint} The units are {}", known.join(", "))
 }
 
@@ -206,9 +201,7 @@ fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Va
         .map(str::to_owned)
         .chain(of_joints)
         .collect();
-    let hint = nearest(name, known.iter().map(String::as_str))
-        .map(|near| format!("; did you mean \"{near}\"?"))
-        .unwrap_or_default();
+    let hint = hint(name, known.iter().map(String::as_str));
     Err(format!(
         "the formula has a variable \"{name}\" that is neither a parameter nor one of q1.. s1.. tau1.. effort1.. (to \
          {joints}), temperature, t, load{hint}"
@@ -234,7 +227,7 @@ fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
     let on_path = (0..model.parameters().len()).filter(|index| model.is_on_path(*index));
     let names: Vec<&str> = on_path.map(|index| model.parameters()[index].name.as_str()).collect();
     let all = names.iter().copied().chain(joint_names.iter().map(String::as_str)).chain([LENGTHS]);
-    let hint = nearest(text, all).map(|near| format!("; did you mean \"{near}\"?")).unwrap_or_default();
+    let hint = hint(text, all);
     Err(format!(
         "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of lengths, world.x, world.y, \
          world.z{hint}"

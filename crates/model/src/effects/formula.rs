@@ -1,7 +1,7 @@
 //! Formulas as text: read by exmex, evaluated over dual numbers and over units by the same list of operators.
 
 use super::measure::Measure;
-use crate::error::nearest;
+use crate::error::hint;
 use exmex::{BinOp, Express, FlatEx, MakeOperators, MatchLiteral, Operator};
 use num_dual::{Dual64, DualNum};
 use std::marker::PhantomData;
@@ -164,9 +164,7 @@ fn check_functions(text: &str) -> Result<(), String> {
     let called =
         |(word, after): &(&str, &str)| after.trim_start().starts_with('(') && !FUNCTIONS.contains(word);
     let Some((word, _)) = words(text).find(called) else { return Ok(()) };
-    let hint = nearest(word, FUNCTIONS.into_iter())
-        .map(|name| format!("; did you mean \"{name}\"?"))
-        .unwrap_or_default();
+    let hint = hint(word, FUNCTIONS.into_iter());
     let known = FUNCTIONS.join(", ");
     Err(format!(
         "the formula \"{text}\" calls \"{word}\", which is no function{hint} The functions are {known}"

@@ -20,15 +20,13 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "frame_drift",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["camera creep"],
     summary: "camera frame or base creeps over the session",
     family: Family::Drift,
     toggle: Toggle::Time,
     target: Target::Whole,
     confused_with: &["zero_drift", "thermal_growth", "warm_up", "frame_shift"],
-    source: include_str!("frame_drift.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -25,8 +25,7 @@ use super::prelude::*;
 use crate::rigid::rotation_of_vector;
 use armcal_core::Parameter;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "frame_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["wrongly declared tilt of the board"],
     summary: "robot, board or camera moved, between recordings or at a dwell",
     family: Family::Event,
@@ -34,7 +33,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     confused_with: &["zero_slip", "tool_shift", "board_shift", "frame_drift"],
-    source: include_str!("frame_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };

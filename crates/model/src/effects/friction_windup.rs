@@ -28,14 +28,12 @@
 use super::play::{RESOLVED_DEG, lagging};
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "friction_windup",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a drive wound up by friction that grows with load",
     family: Family::LostMotion,
     toggle: Toggle::Direction,
     shapes: &[LED],
     confused_with: &["backlash"],
-    source: include_str!("friction_windup.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -21,8 +21,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "gear_ratio",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["counts per turn", "pulley diameter"],
     summary: "the gear ratio differs from what is declared",
     family: Family::Transmission,
@@ -35,7 +34,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         "link_bending",
         "base_compliance",
     ],
-    source: include_str!("gear_ratio.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -30,8 +30,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "gravity_backlash",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "play whose flank gravity chooses",
     family: Family::LostMotion,
     toggle: Toggle::Load,
@@ -71,7 +70,6 @@ pub(super) static KIND: EffectKind = EffectKind {
     ],
     never_negative: &["width"],
     confused_with: &["backlash", "compliance", "arm_compliance"],
-    source: include_str!("gravity_backlash.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -25,14 +25,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "hardening_compliance",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a joint yields to gravity like a spring that is not linear",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     shapes: &[SEATED],
     confused_with: &["compliance", "gravity_backlash"],
-    source: include_str!("hardening_compliance.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -27,15 +27,13 @@
 use super::frame_shift::about;
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "link_bending",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a link bends under what it carries",
     family: Family::Elasticity,
     toggle: Toggle::Load,
     shapes: &[SEATED],
     never_negative: &["sag", "sag_load"],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
-    source: include_str!("link_bending.rs"),
     place,
     ..EffectKind::PLAIN
 };

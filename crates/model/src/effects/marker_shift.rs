@@ -20,37 +20,22 @@
 //! Notes of the project.
 
 use super::prelude::*;
+use super::tool_shift::Moved;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "marker_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "a marker on a link came loose, between recordings or at a dwell",
     family: Family::Event,
     toggle: Toggle::Recording,
     target: Target::Marker,
     offered: Offered::Events,
     confused_with: &["tool_shift", "zero_slip"],
-    source: include_str!("marker_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };
 
-#[derive(Debug)]
-struct MarkerShift {
-    /// Index of the marker's x.
-    marker: usize,
-}
-
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let (name, marker) = placing.marker()?;
+    let (name, first) = placing.marker()?;
     placing.event()?;
     let meaning = format!("shift of marker {name} on its link along");
-    Ok(Placement::new(amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &meaning), MarkerShift { marker }))
-}
-
-impl Physics for MarkerShift {
-    fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
-        for (axis, shift) in theta.iter().enumerate() {
-            change.parameter(self.marker + axis, *shift);
-        }
-    }
+    Ok(Placement::new(amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &meaning), Moved { first }))
 }

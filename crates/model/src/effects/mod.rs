@@ -80,51 +80,62 @@ pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;
 pub use spec::{EffectSpec, Since, place_and_moment};
-pub use table::{EffectTable, Extra, Override, Word, effects_toml};
+pub use table::{EffectTable, Override, Word, effects_toml};
 
 pub(crate) use declared::Declared;
 pub(crate) use nominal_pose::NominalPose;
 pub(crate) use placed::Effects;
 
+/// The entries of the catalogue; each is called as its file, whose header is its documentation.
+macro_rules! catalogue {
+    ($($file:ident,)*) => {
+        &[$(&EffectKind {
+            name: stringify!($file),
+            source: include_str!(concat!(stringify!($file), ".rs")),
+            ..$file::KIND
+        }),*]
+    };
+}
+
 /// Every kind of effect, in the order in which people read about them.
-static CATALOGUE: &[&EffectKind] = &[
-    &backlash::KIND,
-    &gravity_backlash::KIND,
-    &friction_windup::KIND,
-    &crossed_backlash::KIND,
-    &belt_backlash::KIND,
-    &compliance::KIND,
-    &arm_compliance::KIND,
-    &hardening_compliance::KIND,
-    &effort_compliance::KIND,
-    &belt_compliance::KIND,
-    &link_bending::KIND,
-    &base_compliance::KIND,
-    &bearing_compliance::KIND,
-    &undeclared_load::KIND,
-    &eccentricity::KIND,
-    &second_harmonic::KIND,
-    &periodic::KIND,
-    &error_curve::KIND,
-    &gear_ratio::KIND,
-    &belt_coupling::KIND,
-    &axis_tilt::KIND,
-    &zero_slip::KIND,
-    &tool_shift::KIND,
-    &marker_shift::KIND,
-    &frame_shift::KIND,
-    &board_shift::KIND,
-    &unsettled_reading::KIND,
-    &zero_drift::KIND,
-    &frame_drift::KIND,
-    &thermal_growth::KIND,
-    &warm_up::KIND,
-    &sensor_scale::KIND,
-    &volume_distortion::KIND,
-    &board_scale::KIND,
-    &seat_offset::KIND,
-    &clock_offset::KIND,
-    &expression::KIND,
+static CATALOGUE: &[&EffectKind] = catalogue![
+    backlash,
+    gravity_backlash,
+    friction_windup,
+    crossed_backlash,
+    belt_backlash,
+    compliance,
+    arm_compliance,
+    hardening_compliance,
+    effort_compliance,
+    belt_compliance,
+    link_bending,
+    base_compliance,
+    bearing_compliance,
+    undeclared_load,
+    eccentricity,
+    second_harmonic,
+    periodic,
+    error_curve,
+    gear_ratio,
+    belt_coupling,
+    axis_tilt,
+    zero_slip,
+    tool_shift,
+    marker_shift,
+    frame_shift,
+    board_shift,
+    unsettled_reading,
+    zero_drift,
+    frame_drift,
+    thermal_growth,
+    warm_up,
+    sensor_scale,
+    volume_distortion,
+    board_scale,
+    seat_offset,
+    clock_offset,
+    expression,
 ];
 
 /// Every kind of effect, in the order in which people read about them.

@@ -22,8 +22,7 @@
 use super::prelude::*;
 use std::f64::consts::TAU;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "periodic",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["pinion or pulley run-out", "tooth mesh", "motor encoder error"],
     summary: "a periodic error many times a turn",
     family: Family::Transmission,
@@ -38,8 +37,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(frequencies),
     }],
-    confused_with: &[],
-    source: include_str!("periodic.rs"),
     place,
     ..EffectKind::PLAIN
 };
@@ -60,12 +57,7 @@ struct Periodic {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
-    let deg = 1f64.to_radians();
-    let amplitudes = vec![
-        amplitude("sin", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of sin(n q)"),
-        amplitude("cos", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of cos(n q)"),
-    ];
-    Ok(Placement::new(amplitudes, Periodic { joint }))
+    Ok(Placement::new(amplitudes_wave(0.15, 3.0, "(n q)"), Periodic { joint }))
 }
 
 /// From the third harmonic to what the readings of the joint can resolve (half a period between neighbours on

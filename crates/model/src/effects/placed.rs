@@ -8,7 +8,7 @@ use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
 use super::state;
-use crate::error::nearest;
+use crate::error::hint;
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::tree::{Route, Tree, TreeAt};
@@ -109,31 +109,25 @@ pub(crate) fn place(
     let count = amplitudes.len();
     let mut parameters = amplitudes;
     let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &placing));
-    parameters.extend(shapes.map(|shape| Parameter {
-        name: shape.name.to_owned(),
-        unit: shape.unit,
-        nominal: placing.shape(shape.name).unwrap_or_default(),
-        lower: shape.lower,
-        upper: shape.upper,
-        prior_sigma: None,
-        assumed: None,
-        free: false,
-        role: Role::Effect,
-        meaning: shape.meaning.to_owned(),
+    parameters.extend(shapes.map(|shape| {
+        let (name, meaning) = (shape.name.to_owned(), shape.meaning.to_owned());
+        let nominal = placing.shape(shape.name).unwrap_or_default();
+        let (lower, upper) = (shape.lower, shape.upper);
+        Parameter { lower, upper, ..Parameter::fixed(name, shape.unit, nominal, Role::Effect, meaning) }
     }));
     let physics = state::in_state(physics, count, &parameters);
     for parameter in &mut parameters {
         model.declared.iter().try_for_each(|declared| declared.apply(spec, parameter)).map_err(bad)?;
     }
     for (quantity, change) in &spec.overrides {
-        let known = || parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
-        let message = || {
-            let hint = nearest(quantity, known().into_iter());
-            let hint = hint.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
-            format!("it has no parameter \"{quantity}\"{hint} It has: {}", known().join(", "))
+        let Some(own) = parameters.iter_mut().find(|p| p.name == *quantity) else {
+            let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+            let hint = hint(quantity, known.iter().copied());
+            return Err(bad(format!(
+                "it has no parameter \"{quantity}\"{hint} It has: {}",
+                known.join(", ")
+            )));
         };
-        let unknown = message();
-        let own = parameters.iter_mut().find(|p| p.name == *quantity).ok_or_else(|| bad(unknown))?;
         change.apply(own).map_err(bad)?;
     }
     for parameter in &mut parameters {

@@ -6,7 +6,7 @@ use super::nominal_pose::NominalPose;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::Model;
-use crate::error::nearest;
+use crate::error::hint;
 use crate::segment::Motion;
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::Vector3;
@@ -88,8 +88,7 @@ impl Placing<'_> {
             ));
         };
         known.iter().find(|(name, _)| name == wanted).copied().ok_or_else(|| {
-            let hint =
-                nearest(wanted, names()).map(|n| format!("; did you mean \"{n}\"?")).unwrap_or_default();
+            let hint = hint(wanted, names());
             format!("there is no marker \"{wanted}\"{hint} The markers are {all}")
         })
     }
@@ -236,17 +235,27 @@ pub(crate) fn amplitude(
     meaning: impl Into<String>,
 ) -> Parameter {
     Parameter {
-        name: quantity.to_owned(),
-        unit,
-        nominal: 0.0,
         lower: -bound,
         upper: bound,
         prior_sigma: Some(prior_sigma),
-        assumed: None,
         free: true,
-        role: Role::Effect,
-        meaning: meaning.into(),
+        ..Parameter::fixed(quantity.to_owned(), unit, 0.0, Role::Effect, meaning.into())
     }
+}
+
+/// Two amplitudes of a wave over a joint's angle [deg]; `angle` is what its sine and cosine are of.
+pub(crate) fn amplitudes_wave(typical_deg: f64, bound_deg: f64, angle: &str) -> Vec<Parameter> {
+    let of = |function: &str| {
+        let meaning = format!("amplitude of {function}{angle}");
+        amplitude(
+            function,
+            Unit::Radian,
+            typical_deg * 1f64.to_radians(),
+            bound_deg * 1f64.to_radians(),
+            meaning,
+        )
+    };
+    vec![of("sin"), of("cos")]
 }
 
 /// Three amplitudes along or about x, y, z.

@@ -22,15 +22,13 @@
 use super::prelude::*;
 use std::ops::Range;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "seat_offset",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["machining error of cavities"],
     summary: "each cavity is a little off: a random offset",
     family: Family::Board,
     target: Target::Whole,
     offered: Offered::Never,
     confused_with: &["board_scale"],
-    source: include_str!("seat_offset.rs"),
     place,
     ..EffectKind::PLAIN
 };

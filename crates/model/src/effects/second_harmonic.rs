@@ -22,23 +22,16 @@
 use super::eccentricity::Harmonic;
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "second_harmonic",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["elliptic ring", "misaligned coupling"],
     summary: "an error twice a turn of the joint",
     family: Family::Transmission,
     confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    source: include_str!("second_harmonic.rs"),
     place,
     ..EffectKind::PLAIN
 };
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.turning_joint()?;
-    let deg = 1f64.to_radians();
-    let amplitudes = vec![
-        amplitude("sin", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of sin 2q"),
-        amplitude("cos", Unit::Radian, 0.15 * deg, 3.0 * deg, "amplitude of cos 2q"),
-    ];
-    Ok(Placement::new(amplitudes, Harmonic { joint, harmonic: 2.0 }))
+    Ok(Placement::new(amplitudes_wave(0.15, 3.0, " 2q"), Harmonic { joint, harmonic: 2.0 }))
 }

@@ -23,14 +23,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "sensor_scale",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["all lengths scaled (its isotropic part)"],
     summary: "the scale of the position sensor is off, for each axis",
     family: Family::Sensor,
     target: Target::Whole,
     confused_with: &["volume_distortion"],
-    source: include_str!("sensor_scale.rs"),
     place,
     ..EffectKind::PLAIN
 };

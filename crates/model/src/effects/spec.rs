@@ -8,7 +8,7 @@ use super::expression::Expression;
 use super::table::Override;
 use super::{EffectKind, Family, Target, catalogue, find};
 use crate::ModelError;
-use crate::error::nearest;
+use crate::error::{hint, nearest};
 use armcal_core::DwellId;
 use std::collections::BTreeMap;
 
@@ -227,9 +227,7 @@ pub(crate) fn joint_index(text: &str, joint_names: &[String]) -> Result<usize, S
         return if within { Ok(number - 1) } else { Err(wrong()) };
     }
     joint_names.iter().position(|name| name == text).ok_or_else(|| {
-        let hint = nearest(text, joint_names.iter().map(String::as_str))
-            .map(|name| format!("; did you mean \"{name}\"?"))
-            .unwrap_or_default();
+        let hint = hint(text, joint_names.iter().map(String::as_str));
         format!("there is no joint \"{text}\"{hint} The joints are {}", joint_names.join(", "))
     })
 }

@@ -20,7 +20,7 @@ use super::Target;
 use super::expression::Expression;
 use super::spec::{EffectSpec, Since, joint_index};
 use crate::ModelError;
-use crate::error::nearest;
+use crate::error::hint;
 use armcal_core::{Parameter, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -47,29 +47,20 @@ pub struct EffectTable {
     pub acts_on: Option<String>,
     /// Shapes by their names, SI; any other key, which [`EffectTable::spec`] then names.
     #[serde(flatten)]
-    pub shape: BTreeMap<String, Extra>,
+    pub shape: BTreeMap<String, Word<f64>>,
     /// Parameters of an expression, or changes to those of another kind.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Override>,
 }
 
-/// A number or a word.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Word {
-    /// A number.
-    Number(usize),
-    /// A word.
-    Text(String),
-}
-
-/// The value of a key that depends on the kind.
+/// A number or a word. The value of a key that depends on the kind is a number of any size: no key of an effect has a text that
+/// is not listed in [`EffectTable`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Extra {
-    /// The number of a shape.
-    Number(f64),
-    /// No key of an effect has a text that is not listed in [`EffectTable`].
+pub enum Word<N = usize> {
+    /// A number.
+    Number(N),
+    /// A word.
     Text(String),
 }
 
@@ -107,7 +98,7 @@ impl Override {
     /// Changes a parameter; what is wrong otherwise.
     pub(crate) fn apply(&self, p: &mut Parameter) -> Result<(), String> {
         let per_unit = match &self.unit {
-            None => 1.0 / p.unit.to_display(1.0),
+            None => p.unit.from_display(1.0),
             Some(text) => match unit_of(text) {
                 Some((unit, si_per_unit)) if unit == p.unit => si_per_unit,
                 _ => return Err(format!("{} is in {}, not in \"{text}\"", p.name, p.unit)),
@@ -130,7 +121,7 @@ impl Override {
 pub(crate) fn unit_of(text: &str) -> Option<(Unit, f64)> {
     Unit::ALL.into_iter().find_map(|unit| {
         let si = (text == unit.symbol()).then_some(1.0);
-        let display = (text == unit.display_symbol()).then(|| 1.0 / unit.to_display(1.0));
+        let display = (text == unit.display_symbol()).then(|| unit.from_display(1.0));
         si.or(display).map(|scale| (unit, scale))
     })
 }
@@ -150,7 +141,7 @@ impl EffectTable {
             None => None,
         };
         for (key, value) in &self.shape {
-            let Extra::Number(value) = value else { return Err(bad(unknown_key(key))) };
+            let Word::Number(value) = value else { return Err(bad(unknown_key(key))) };
             spec.shape.push((key.clone(), *value));
         }
         spec.overrides = self.parameters.clone();
@@ -167,8 +158,7 @@ impl EffectTable {
 
 fn unknown_key(key: &str) -> String {
     let known = ["kind", "target", "since", "name", "formula", "acts_on", "parameters"];
-    let hint = nearest(key, known.into_iter()).map(|near| format!("; did you mean \"{near}\"?"));
-    format!("there is no key \"{key}\"{}", hint.unwrap_or_default())
+    format!("there is no key \"{key}\"{}", hint(key, known.into_iter()))
 }
 
 impl From<&EffectSpec> for EffectTable {
@@ -181,7 +171,7 @@ impl From<&EffectSpec> for EffectTable {
             name: expression.map(|e| e.name.clone()),
             formula: expression.map(|e| e.formula.clone()),
             acts_on: expression.map(|e| e.acts_on.clone()),
-            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Extra::Number(*value))).collect(),
+            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Word::Number(*value))).collect(),
             parameters: spec.overrides.clone(),
         }
     }

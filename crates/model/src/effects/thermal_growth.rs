@@ -21,14 +21,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "thermal_growth",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the links grow with temperature, or steadily with time",
     family: Family::Drift,
     toggle: Toggle::Temperature,
     target: Target::Whole,
     confused_with: &["zero_drift", "frame_drift", "warm_up"],
-    source: include_str!("thermal_growth.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -21,8 +21,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "tool_shift",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["marker shift"],
     summary: "the tool or its marker moved, between recordings or at a dwell",
     family: Family::Event,
@@ -31,28 +30,28 @@ pub(super) static KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift"],
-    source: include_str!("tool_shift.rs"),
     place,
     ..EffectKind::PLAIN
 };
 
+/// A place on a link that moved along its axes.
 #[derive(Debug)]
-struct ToolShift {
-    /// Index of the tip's x.
-    tip: usize,
+pub(super) struct Moved {
+    /// Index of its x.
+    pub first: usize,
 }
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
     let amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift on the last link along");
-    let tip = placing.model.tip_segment(placing.arm()?).parameters.start;
-    Ok(Placement::new(amplitudes, ToolShift { tip }))
+    let first = placing.model.tip_segment(placing.arm()?).parameters.start;
+    Ok(Placement::new(amplitudes, Moved { first }))
 }
 
-impl Physics for ToolShift {
+impl Physics for Moved {
     fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
         for (axis, shift) in theta.iter().enumerate() {
-            change.parameter(self.tip + axis, *shift);
+            change.parameter(self.first + axis, *shift);
         }
     }
 }

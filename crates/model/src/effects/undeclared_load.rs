@@ -22,16 +22,10 @@
 //! # Source
 //! Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9.7 (payload), sec. 11.5 (flexible joints).
 
-use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Offered, Placement, Target, Toggle};
-use super::physics::{Deformation, Physics};
-use super::placing::{ARM, Placing, amplitude};
-use crate::rigid::Scalar;
+use super::prelude::*;
 use crate::segment::Motion;
-use armcal_core::Unit;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "undeclared_load",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["wrong payload"],
     summary: "the load at the tip is not the declared one in a recording, and the joints yield to it",
     family: Family::Elasticity,
@@ -39,10 +33,9 @@ pub(super) static KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Recordings,
     shapes: &[ARM],
-    never_negative: &[],
     confused_with: &["zero_slip", "frame_shift", "tool_shift"],
-    source: include_str!("undeclared_load.rs"),
     place,
+    ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]

@@ -26,15 +26,13 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "unsettled_reading",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["filtered or stale encoder", "set-point read before the arm arrived"],
     summary: "read before the joint, or its reading, had settled: a share of the last move is missing",
     family: Family::Timing,
     toggle: Toggle::Approach,
     shapes: &[SEATED],
     confused_with: &["backlash", "friction_windup"],
-    source: include_str!("unsettled_reading.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -23,14 +23,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "volume_distortion",
+pub(super) const KIND: EffectKind = EffectKind {
     aliases: &["lens distortion"],
     summary: "the position sensor distorts its volume, most at the edge",
     family: Family::Sensor,
     target: Target::Whole,
     confused_with: &["sensor_scale"],
-    source: include_str!("volume_distortion.rs"),
     place,
     ..EffectKind::PLAIN
 };

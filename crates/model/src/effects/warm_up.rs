@@ -21,8 +21,7 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "warm_up",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the links grow while the arm warms up, then level off",
     family: Family::Drift,
     toggle: Toggle::Time,
@@ -39,7 +38,6 @@ pub(super) static KIND: EffectKind = EffectKind {
         values: Some(time_constants),
     }],
     confused_with: &["thermal_growth", "zero_drift", "frame_drift"],
-    source: include_str!("warm_up.rs"),
     place,
     ..EffectKind::PLAIN
 };

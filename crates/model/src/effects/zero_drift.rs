@@ -20,13 +20,11 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "zero_drift",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the zero of an encoder creeps over the session",
     family: Family::Drift,
     toggle: Toggle::Time,
     confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
-    source: include_str!("zero_drift.rs"),
     place,
     ..EffectKind::PLAIN
 };

@@ -23,14 +23,12 @@
 
 use super::prelude::*;
 
-pub(super) static KIND: EffectKind = EffectKind {
-    name: "zero_slip",
+pub(super) const KIND: EffectKind = EffectKind {
     summary: "the zero of an encoder slipped, between recordings or at a dwell",
     family: Family::Event,
     toggle: Toggle::Recording,
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift", "zero_drift"],
-    source: include_str!("zero_slip.rs"),
     place,
     ..EffectKind::PLAIN
 };

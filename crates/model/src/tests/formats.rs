@@ -183,6 +183,6 @@ proptest! {
         let _ = Chain::from_urdf(&mutated, "base", "hand", Path::new("arm.urdf"));
         let model = bare(urdf(oracles::MIXED, "base", "hand"));
         let p: Vec<f64> = model.nominal().iter().map(|x| x + 1e-3).collect();
-        let _ = model.to_urdf(&mutated, Path::new("arm.urdf"), &p);
+        let _ = model.to_urdf(0, &mutated, Path::new("arm.urdf"), &p);
     }
 }

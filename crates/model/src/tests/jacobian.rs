@@ -1,7 +1,7 @@
 //! The exact Jacobian against central differences and against the geometric Jacobian, on random arms.
 
 use super::*;
-use crate::{FixedPlace, Frame, Knowledge, Length, LengthKnowledge};
+use crate::{FixedPlace, Frame, Knowledge, Length};
 use armcal_core::Against;
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
@@ -147,7 +147,7 @@ proptest! {
         off in prop::collection::vec(-0.3..0.3f64, 7),
     ) {
         let places = [(point, false), (plane, true)].map(|(frame, is_plane)| FixedPlace { frame, is_plane });
-        let bar = Length { name: "bar".into(), length_m: 0.4, knowledge: LengthKnowledge::Estimated };
+        let bar = Length { name: "bar".into(), length_m: 0.4, knowledge: Knowledge::Estimated };
         let model = model.against(&places, &[bar]).expect("new names");
         let more = model.nominal().into_iter().skip(p.len()).zip(&off).map(|(value, off)| value + off);
         let p: Vec<f64> = p.into_iter().chain(more).collect();

@@ -1,7 +1,7 @@
 //! Frames, residuals and overrides.
 
 use super::*;
-use crate::{FixedPlace, Frame, Knowledge, Length, LengthKnowledge, ModelError};
+use crate::{FixedPlace, Frame, Knowledge, Length, ModelError};
 use armcal_core::{Against, Role, Unit};
 use nalgebra::UnitQuaternion;
 
@@ -79,7 +79,7 @@ fn distances_and_heights_are_those_of_the_geometry() {
     let places = [("post", Pose::translation(at.x, at.y, at.z), false), ("plate", turned, true)];
     let places =
         places.map(|(name, pose, is_plane)| FixedPlace { frame: Frame::given(name, pose), is_plane });
-    let bar = Length { name: "bar".into(), length_m: 0.45, knowledge: LengthKnowledge::Given };
+    let bar = Length { name: "bar".into(), length_m: 0.45, knowledge: Knowledge::Given };
     let model = bare.against(&places, &[bar]).expect("new names");
     let p = model.nominal();
     let error_m = |reference| {

@@ -10,7 +10,7 @@ fn with_tip(chain: Chain, knowledge: Knowledge) -> Model {
 }
 
 fn written(model: &Model, xml: &str, p: &[f64]) -> String {
-    model.to_urdf(xml, Path::new("arm.urdf"), p).expect("the same URDF").0
+    model.to_urdf(0, xml, Path::new("arm.urdf"), p).expect("the same URDF").0
 }
 
 /// The lines that differ, as (before, after).
@@ -70,7 +70,7 @@ fn the_tip_goes_into_the_joint_that_carries_it() {
 fn a_tip_without_a_place_is_said() {
     let model = with_tip(urdf(oracles::MIXED, "base", "hand"), Knowledge::Estimated);
     let (_, warnings) =
-        model.to_urdf(oracles::MIXED, Path::new("arm.urdf"), &model.nominal()).expect("same URDF");
+        model.to_urdf(0, oracles::MIXED, Path::new("arm.urdf"), &model.nominal()).expect("same URDF");
     assert_eq!(warnings.len(), 1);
     assert!(warnings[0].message.contains("moving joint \"wrist\""));
 }
@@ -79,13 +79,13 @@ fn a_tip_without_a_place_is_said() {
 fn the_wrong_file_is_refused() {
     let model = bare(urdf(oracles::MIXED, "base", "hand"));
     let p = model.nominal();
-    let to = |xml: &str, p: &[f64]| model.to_urdf(xml, Path::new("arm.urdf"), p).expect_err("refused");
+    let to = |xml: &str, p: &[f64]| model.to_urdf(0, xml, Path::new("arm.urdf"), p).expect_err("refused");
     assert!(matches!(to(oracles::PANDA, &p), ModelError::ForeignUrdf { joint, .. } if joint == "turn"));
     assert!(matches!(to(oracles::MIXED, &p[1..]), ModelError::ParameterCount { .. }));
     assert!(matches!(model.chain().to_dh_toml(&p), Err(ModelError::WrongFormat { .. })));
     let rig = bare(dh(RIGHT_ARM));
     assert!(matches!(
-        rig.to_urdf(oracles::MIXED, Path::new("a"), &rig.nominal()),
+        rig.to_urdf(0, oracles::MIXED, Path::new("a"), &rig.nominal()),
         Err(ModelError::WrongFormat { .. })
     ));
 }

@@ -1,10 +1,11 @@
 //! Which joints of a URDF lead from its base to what is measured, and what hangs beside them.
 
-use super::limits;
 use super::reader::{Reader, child};
+use super::{limits, motion_of};
 use crate::ModelError;
-use crate::rigid::{Rigid, rotation_of_vector};
-use crate::segment::{Body, Mimic};
+use crate::rigid::Rigid;
+use crate::segment::{Body, Mimic, moved};
+use nalgebra::Vector3;
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -108,7 +109,7 @@ impl<'a, 'x> Branches<'a, 'x> {
         let Some(mimic) = child(joint, "mimic").filter(|_| joint.attribute("type") != Some("fixed")) else {
             return Ok(None);
         };
-        let subject = format!("joint \"{}\"", joint.attribute("name").unwrap_or_default());
+        let subject = subject(joint);
         let leader = self.reader.required(mimic, &format!("mimic of {subject}"), "joint")?;
         let number = |name: &str, default: f64| match mimic.attribute(name) {
             None => Ok(default),
@@ -125,10 +126,7 @@ impl<'a, 'x> Branches<'a, 'x> {
 
     /// The link that the joint of this name moves, which a joint follows.
     fn link_of(&self, follower: Node<'a, 'x>, leader: &str) -> Result<&'a str, ModelError> {
-        let wrong = |problem: String| {
-            let subject = format!("joint \"{}\"", follower.attribute("name").unwrap_or_default());
-            self.reader.error(follower, subject, problem)
-        };
+        let wrong = |problem: String| self.reader.error(follower, subject(follower), problem);
         let joint = Reader::joints(self.robot).find(|joint| joint.attribute("name") == Some(leader));
         let joint =
             joint.ok_or_else(|| wrong(format!("it mimics \"{leader}\", and there is no such joint")))?;
@@ -137,7 +135,7 @@ impl<'a, 'x> Branches<'a, 'x> {
                 "it mimics \"{leader}\", which mimics another joint itself; name the joint that has a reading"
             )));
         }
-        if !matches!(joint.attribute("type"), Some("revolute" | "continuous" | "prismatic")) {
+        if joint.attribute("type").and_then(motion_of).is_none() {
             return Err(wrong(format!("it mimics \"{leader}\", which does not move")));
         }
         let link = child(joint, "child").and_then(|c| c.attribute("link"));
@@ -170,19 +168,16 @@ impl<'a, 'x> Branches<'a, 'x> {
 
     /// Where a joint puts its link when it is as near to zero as its limits let it be.
     fn at_rest(&self, joint: Node<'a, 'x>) -> Result<Rigid<f64>, ModelError> {
-        let subject = format!("joint \"{}\"", joint.attribute("name").unwrap_or_default());
+        let subject = subject(joint);
         let origin = Rigid::from(&self.reader.origin(joint, &subject)?);
         let value = limits(joint).map_or(0.0, |[low, high]| 0f64.clamp(low, high));
-        let motion = match joint.attribute("type") {
-            Some("revolute" | "continuous") => {
-                let turn = self.reader.axis(joint, &subject)? * value;
-                Rigid { rotation: rotation_of_vector(&turn), ..Rigid::identity() }
-            }
-            Some("prismatic") => {
-                Rigid { translation_m: self.reader.axis(joint, &subject)? * value, ..Rigid::identity() }
-            }
-            _ => Rigid::identity(),
-        };
-        Ok(origin.then(&motion))
+        let motion = motion_of(joint.attribute("type").unwrap_or_default());
+        let axis = motion.map_or(Ok(Vector3::zeros()), |_| self.reader.axis(joint, &subject))?;
+        Ok(origin.then(&moved(&axis, value, motion)))
     }
+}
+
+/// A joint as errors name it.
+fn subject(joint: Node<'_, '_>) -> String {
+    format!("joint \"{}\"", joint.attribute("name").unwrap_or_default())
 }

@@ -94,6 +94,15 @@ impl Chain {
     }
 }
 
+/// How a joint of this type moves; none of one that does not, or in a way that is not known.
+fn motion_of(form: &str) -> Option<Motion> {
+    match form {
+        "revolute" | "continuous" => Some(Motion::Revolute),
+        "prismatic" => Some(Motion::Prismatic),
+        _ => None,
+    }
+}
+
 /// What `<limit>` says of a joint that has ends; what cannot be an interval of readings says nothing.
 fn limits(joint: Node<'_, '_>) -> Option<[f64; 2]> {
     let limit = child(joint, "limit").filter(|_| joint.attribute("type") != Some("continuous"))?;
@@ -126,17 +135,14 @@ impl<'a> Built<'a> {
         let Kept { joint, parent, link } = *kept;
         let name = reader.required(joint, "joint", "name")?;
         let subject = format!("joint \"{name}\"");
-        let motion = match reader.required(joint, &subject, "type")? {
-            "revolute" | "continuous" => Some(Motion::Revolute),
-            "prismatic" => Some(Motion::Prismatic),
-            "fixed" => None,
-            other => {
-                let problem = format!(
-                    "type \"{other}\" cannot be on the chain; it may hold revolute, continuous, prismatic and fixed joints"
-                );
-                return Err(reader.error(joint, subject, problem));
-            }
-        };
+        let form = reader.required(joint, &subject, "type")?;
+        let motion = motion_of(form);
+        if motion.is_none() && form != "fixed" {
+            let problem = format!(
+                "type \"{form}\" cannot be on the chain; it may hold revolute, continuous, prismatic and fixed joints"
+            );
+            return Err(reader.error(joint, subject, problem));
+        }
         let nominal = reader.origin(joint, &subject)?;
         let body = reader.body(reader.robot()?, link)?;
         self.sources.push(UrdfJoint {

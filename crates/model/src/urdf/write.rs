@@ -3,7 +3,7 @@
 use super::reader::{Reader, child, parse};
 use crate::chain::Source;
 use crate::{Model, ModelError};
-use armcal_core::{Pose, Severity, Stage, Warning};
+use armcal_core::{FeatureId, Pose, Severity, Stage, Warning};
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 use std::ops::Range;
@@ -16,15 +16,21 @@ struct Edit {
 }
 
 impl Model {
-    /// The URDF with the calibrated origins of the moving joints; every other byte stays as it was.
+    /// The URDF of an arm with the calibrated origins of its moving joints; every other byte stays as it was.
     ///
-    /// `xml` is the file the chain was read from, `path` its name for errors, `p` the parameter vector. Only
+    /// `xml` is the file its chain was read from, `path` its name for errors, `p` the parameter vector. Only
     /// `xyz` or `rpy` attributes whose value changed are replaced. If the tip frame is calibrated (any of its
     /// parameters is free) it is written into the fixed joint that carries the tip link; where that joint
     /// moves there is no such place, which a warning says. Errors when the chain did not come from a URDF,
     /// when `xml` is not that URDF, or when `p` has the wrong length.
-    pub fn to_urdf(&self, xml: &str, path: &Path, p: &[f64]) -> Result<(String, Vec<Warning>), ModelError> {
-        let chain = self.chain();
+    pub fn to_urdf(
+        &self,
+        arm: usize,
+        xml: &str,
+        path: &Path,
+        p: &[f64],
+    ) -> Result<(String, Vec<Warning>), ModelError> {
+        let (chain, own) = self.chain().arm(arm);
         let Source::Urdf(joints) = &chain.source else {
             return Err(ModelError::WrongFormat { model: chain.name.clone(), format: "URDF" });
         };
@@ -36,8 +42,9 @@ impl Model {
         let robot = reader.robot()?;
         let mut edits = Vec::new();
         let mut warnings = Vec::new();
-        let tip_is_calibrated =
-            self.parameters()[self.tip_segment(0).parameters.clone()].iter().any(|parameter| parameter.free);
+        let tip_is_calibrated = self.parameters()[self.tip_segment(arm).parameters.clone()]
+            .iter()
+            .any(|parameter| parameter.free);
         for joint in joints {
             // A moving joint is two segments: its origin and its motion.
             let carries_tip =
@@ -55,9 +62,9 @@ impl Model {
                     joint: joint.name.clone(),
                 })?;
             let old = reader.origin(node, &format!("joint \"{}\"", joint.name))?;
-            let mut new = Pose::from(&chain.segments[joint.segment].transform(p, &[]));
+            let mut new = Pose::from(&chain.segments[joint.segment].transform(&p[own.clone()], &[]));
             if carries_tip && !joint.moves {
-                new *= self.tip_in_last_link(p);
+                new *= self.feature_in_link(p, FeatureId(arm));
             }
             edits.extend(origin_edits(node, &old, &new, xml));
         }

@@ -6,7 +6,7 @@ use super::joints::{SIGN, ZERO, scale, shift};
 use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::trial::{Change, Inputs};
 use armcal_core::{Parameter, Unit};
-use armcal_model::{EffectTable, Extra, Override, Since, Word};
+use armcal_model::{EffectSpec, EffectTable, Override, Since};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
@@ -79,42 +79,32 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             }));
         }
     }
+    let within = |bound: f64| Override { bound: Some(bound), prior: Some(bound), ..Override::default() };
     for j in 0..names.len() {
-        let spec = EffectTable {
-            target: Some(Word::Number(j + 1)),
-            ..wide("gear_ratio", "scale", RATIO_BOUND, None)
-        };
         let change = format!("the gear ratio of {} estimated", joint(j));
-        let estimated =
-            Estimated { parameter: format!("gear_ratio:{}.scale", j + 1), nominal: 0.0, far: RATIO_OFF };
-        all.push(effect("joint-scale", joint(j), change, RATIO, spec, estimated));
+        let spec = EffectSpec::new("gear_ratio").at(j);
+        let scale = ("scale", within(RATIO_BOUND));
+        all.push(effect("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
     let later = || inputs.seen.iter().enumerate().skip(1);
     for (&j, (r, seen)) in turning.iter().flat_map(|j| later().map(move |r| (j, r))) {
         for start_deg in SLIPS_DEG {
-            let spec = EffectTable {
-                target: Some(Word::Number(j + 1)),
-                since: Some(Word::Text(Since::Recording(r).to_string())),
-                ..wide("zero_slip", "offset", ZERO_BOUND_DEG, Some(("deg", start_deg)))
-            };
             let change = format!("another zero of {} from recording `{}` on", joint(j), seen.name);
-            let estimated = Estimated {
-                parameter: format!("zero_slip:{}@{r}.offset", j + 1),
-                nominal: 0.0,
-                far: SLIPPED_RAD,
-            };
-            all.push(effect("joint-zero", joint(j), change, HOMED, spec, estimated));
+            let spec = EffectSpec::new("zero_slip").at(j).since(Since::Recording(r));
+            let unit = Some("deg".to_owned());
+            let offset = ("offset", Override { unit, start: Some(start_deg), ..within(ZERO_BOUND_DEG) });
+            all.push(effect("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
         }
     }
     for (&j, &start_deg) in turning.iter().flat_map(|j| ZEROS_DEG.iter().map(move |z| (j, z))) {
         let theta = format!("{}.theta", names[j]);
         let Some(p) = inputs.chain.parameters().iter().find(|p| p.name == theta) else { continue };
         let change = format!("another zero of {} ({theta})", joint(j));
-        let estimated = vec![Estimated { parameter: theta.clone(), nominal: p.nominal, far: FAR_ZERO_RAD }];
+        let estimated = vec![Estimated::of(p, FAR_ZERO_RAD)];
         let hypothesis = Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
             i.changes.push(Change { plus: start_deg.to_radians(), ..super::model::widened(&theta) });
         });
-        all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Number));
+        all.push(hypothesis.estimating(Freedom::Number, estimated));
     }
     all.extend(all_zeros(inputs, at_bound));
     all.extend(let_go(inputs));
@@ -134,29 +124,23 @@ fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         let names: Vec<String> = set.iter().map(|p| p.name.clone()).collect();
         let subject = armcal_core::listed(&names);
         let freedom = if set.len() == 1 { Freedom::Number } else { Freedom::Frame };
-        let own =
-            |p: &&Parameter| Estimated { parameter: p.name.clone(), nominal: p.nominal, far: FAR_FREED };
-        let estimated = set.iter().map(own).collect();
+        let estimated = set.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
         let hypothesis = Hypothesis::new("parameter-fixed", subject, change, FIXED, move |i| {
             i.changes.extend(names.iter().map(|name| Change::freed(name, FREED)));
         });
-        all.push(Hypothesis { estimated, ..hypothesis }.with(freedom));
+        all.push(hypothesis.estimating(freedom, estimated));
     }
     if inputs.pipeline.parameters.iter().any(|p| p.free == Some(false)) {
-        let own = |p: &Parameter| Estimated { parameter: p.name.clone(), nominal: p.nominal, far: FAR_FREED };
-        let estimated = parameters.iter().map(own).collect();
+        let estimated = parameters.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
         let change = "all that is held fixed by the pipeline's [[parameters]] estimated";
         let hypothesis = Hypothesis::new("parameter-fixed", "the model", change, FREE, |i| {
             i.pipeline.parameters.retain(|p| p.free != Some(false));
         });
-        all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Frame));
+        all.push(hypothesis.estimating(Freedom::Frame, estimated));
     }
     let estimated: Vec<Estimated> = parameters
         .iter()
-        .filter_map(|p| {
-            let far = FAR_SIGMAS * p.prior_sigma.filter(|_| p.free)?;
-            Some(Estimated { parameter: p.name.clone(), nominal: p.nominal, far })
-        })
+        .filter_map(|p| Some(Estimated::of(p, FAR_SIGMAS * p.prior_sigma.filter(|_| p.free)?)))
         .collect();
     if !estimated.is_empty() {
         let names: Vec<String> = estimated.iter().map(|own| own.parameter.clone()).collect();
@@ -164,7 +148,7 @@ fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         let hypothesis = Hypothesis::new("parameter-bound", "the model", change, PRIORS, move |i| {
             i.changes.extend(names.iter().map(|name| super::model::widened(name)));
         });
-        all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Frame));
+        all.push(hypothesis.estimating(Freedom::Frame, estimated));
     }
     all
 }
@@ -178,8 +162,7 @@ fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
         let change = "the zeros of all joints free to leave their bounds";
         let widen =
             move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| super::model::widened(&p.name)));
-        Hypothesis { estimated: far, ..Hypothesis::new("joint-zero", "all joints", change, ZERO, widen) }
-            .with(Freedom::Number)
+        Hypothesis::new("joint-zero", "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
     })
 }
 
@@ -189,26 +172,13 @@ fn effect(
     subject: String,
     change: String,
     remedy: &'static str,
-    table: EffectTable,
-    estimated: Estimated,
+    spec: EffectSpec,
+    (amplitude, said): (&str, Override),
+    far: f64,
 ) -> Hypothesis {
+    let estimated = Estimated { parameter: format!("{spec}.{amplitude}"), nominal: 0.0, far };
+    let overrides = BTreeMap::from([(amplitude.to_owned(), said)]);
+    let table = EffectTable::from(&EffectSpec { overrides, ..spec });
     let add = move |i: &mut Inputs| i.pipeline.effects.push(table.clone());
-    Hypothesis { estimated: vec![estimated], ..Hypothesis::new(code, subject, change, remedy, add) }
-        .with(Freedom::Number)
-}
-
-/// `from` is the unit and the start.
-fn wide(kind: &str, amplitude: &str, bound: f64, from: Option<(&str, f64)>) -> EffectTable {
-    let (bound, unit) = (Some(bound), from.map(|from| from.0.to_owned()));
-    let change = Override { unit, bound, prior: bound, start: from.map(|from| from.1), free: None };
-    EffectTable {
-        kind: kind.to_owned(),
-        target: None,
-        since: None,
-        name: None,
-        formula: None,
-        acts_on: None,
-        shape: BTreeMap::<String, Extra>::new(),
-        parameters: BTreeMap::from([(amplitude.to_owned(), change)]),
-    }
+    Hypothesis::new(code, subject, change, remedy, add).estimating(Freedom::Number, vec![estimated])
 }

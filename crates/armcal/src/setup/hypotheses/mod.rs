@@ -66,13 +66,13 @@ pub struct Estimated {
 const FAR_BOUNDS: f64 = 1.1;
 
 impl Estimated {
+    fn of(p: &Parameter, far: f64) -> Estimated {
+        Estimated { parameter: p.name.clone(), nominal: p.nominal, far }
+    }
+
     /// A parameter that the fit left on its bound.
     fn beyond(p: &Parameter) -> Estimated {
-        Estimated {
-            parameter: p.name.clone(),
-            nominal: p.nominal,
-            far: FAR_BOUNDS * (p.upper - p.nominal).abs(),
-        }
+        Estimated::of(p, FAR_BOUNDS * (p.upper - p.nominal).abs())
     }
 }
 
@@ -128,6 +128,10 @@ impl Hypothesis {
 
     fn with(self, freedom: Freedom) -> Hypothesis {
         Hypothesis { freedom, ..self }
+    }
+
+    fn estimating(self, freedom: Freedom, estimated: Vec<Estimated>) -> Hypothesis {
+        Hypothesis { freedom, estimated, ..self }
     }
 
     /// The inputs without the mistake.

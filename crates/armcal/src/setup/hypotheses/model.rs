@@ -101,7 +101,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         let change = format!("{subject} free to leave its bounds");
         let hypothesis =
             Hypothesis::new(code, subject, change, remedy, move |i| i.changes.push(widened(&own)));
-        all.push(Hypothesis { estimated: vec![Estimated::beyond(p)], ..hypothesis }.with(Freedom::Number));
+        all.push(hypothesis.estimating(Freedom::Number, vec![Estimated::beyond(p)]));
     }
     if at_bound.len() > 1 {
         let own: Vec<String> = at_bound.iter().map(|p| p.name.clone()).collect();
@@ -110,7 +110,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             i.changes.extend(own.iter().map(|name| widened(name)));
         });
         let estimated = at_bound.iter().map(Estimated::beyond).collect();
-        all.push(Hypothesis { estimated, ..hypothesis }.with(Freedom::Frame));
+        all.push(hypothesis.estimating(Freedom::Frame, estimated));
     }
     all
 }

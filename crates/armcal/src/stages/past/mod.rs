@@ -4,7 +4,7 @@ mod fitted;
 
 use crate::error::Error;
 use crate::pipeline::{FramePose, Pipeline};
-use armcal_core::{Observation, Pose, Role, Severity, Stage, Warning};
+use armcal_core::{Observation, Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
 use armcal_report::{PastArms, PastModel, TipMount};
 use nalgebra::Vector3;
@@ -91,18 +91,19 @@ pub fn place_arms(
         if !matches!(parameter.role, Role::Robot | Role::Effect) {
             continue;
         }
-        let known = then.model.index(&parameter.name).ok_or_else(|| Error::NotInResult {
-            result: origin.to_owned(),
-            parameter: parameter.name.clone(),
+        let Parameter { name, nominal: now, .. } = parameter;
+        let other = |problem| Error::Result { path: origin.to_owned(), problem };
+        let known = then.model.index(name).ok_or_else(|| {
+            other(format!(
+                "has no parameter {name}: its arm is not the one of this pipeline; name the [model] it was calibrated with"
+            ))
         })?;
         let nominal_then = then.model.parameters()[known].nominal;
-        if parameter.role == Role::Robot && (nominal_then - parameter.nominal).abs() > 1e-9 {
-            return Err(Error::OtherArm {
-                result: origin.to_owned(),
-                parameter: parameter.name.clone(),
-                then: nominal_then,
-                now: parameter.nominal,
-            });
+        if parameter.role == Role::Robot && (nominal_then - now).abs() > 1e-9 {
+            return Err(other(format!(
+                "calibrated an arm whose nominal {name} is {nominal_then}, this pipeline's is {now} (SI); name the [model] it was \
+                 calibrated with"
+            )));
         }
         calibrated[at] = then.values[known];
     }
