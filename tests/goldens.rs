@@ -54,8 +54,8 @@ impl Golden {
 
     fn assert_is(&self, expected: &Golden, case: &str) {
         let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= TOLERANCE * scale;
-        let errors = self.judged_m.iter().zip(&expected.judged_m);
-        assert!(errors.clone().all(|(a, b)| near(*a, *b, *b)), "{case}: {errors:?}");
+        let same = self.judged_m.iter().zip(&expected.judged_m).all(|(a, b)| near(*a, *b, *b));
+        assert!(same, "{case}: {:?} m was {:?} m", self.judged_m, expected.judged_m);
         assert!(
             near(self.noise_floor_m, expected.noise_floor_m, expected.noise_floor_m),
             "{case}: the floor"

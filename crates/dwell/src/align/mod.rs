@@ -339,10 +339,7 @@ impl<'a> Streams<'a> {
         if so_far.is_empty() {
             return None;
         }
-        let moved = |from: usize, to: usize| {
-            self.joints.joint_rad.iter().any(|column| (column[to] - column[from]).abs() > RESTING_RAD)
-        };
-        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS, &moved);
+        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS);
         let thin = JointSamples {
             time_ns: rows.iter().map(|row| self.joints.time_ns[*row]).collect(),
             joint_rad: self
@@ -354,8 +351,12 @@ impl<'a> Streams<'a> {
             ..JointSamples::default()
         };
         let origin_ns = shifted(self.tip.time_ns[0], -self.config.initial_offset_s);
+        let (moved, of_row) = where_moved(&thin);
         let speeds = |parameters: &[f64]| {
-            scale.like_robot(predicted(&thin, origin_ns, self.arm, parameters, self.config).speeds(scale.h_s))
+            let tip_m = |row: &usize| (self.arm.tip_m)(&thin.row_rad(*row), parameters);
+            let at_m: Vec<Vector3<f64>> = moved.par_iter().map(tip_m).collect();
+            let path_m = of_row.iter().map(|k| at_m[*k]).collect();
+            scale.like_robot(Track::of(&thin.time_ns, origin_ns, path_m, self.config).speeds(scale.h_s))
         };
         let further = |k: usize| {
             let mut parameters = so_far.to_vec();
@@ -460,6 +461,21 @@ fn predicted(
     let tip_m = |row| (arm.tip_m)(&joints.row_rad(row), parameters);
     let path_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
     Track::of(&joints.time_ns, origin_ns, path_m, config)
+}
+
+/// Rows at which the arm is not where it was at the one before them, and which of these every row is as.
+fn where_moved(joints: &JointSamples) -> (Vec<usize>, Vec<usize>) {
+    let (mut moved, mut of_row) = (Vec::new(), Vec::with_capacity(joints.len()));
+    let rests = |last: usize, row: usize| {
+        joints.joint_rad.iter().all(|column| (column[row] - column[last]).abs() <= RESTING_RAD)
+    };
+    for row in 0..joints.len() {
+        if moved.last().is_none_or(|last| !rests(*last, row)) {
+            moved.push(row);
+        }
+        of_row.push(moved.len() - 1);
+    }
+    (moved, of_row)
 }
 
 fn undetermined() -> DwellError {

@@ -55,20 +55,15 @@ impl Track {
         (distance(&row) <= 2.0 * self.period_s).then(|| self.position_m[row])
     }
 
-    /// Rows no closer to each other than `apart_s`, and of those at rest, by whether the arm `moved` between two rows, the first
-    /// and the last.
-    pub(crate) fn thinned(&self, apart_s: f64, moved: &dyn Fn(usize, usize) -> bool) -> Vec<usize> {
+    /// Rows no closer to each other than `apart_s`.
+    pub(crate) fn thinned(&self, apart_s: f64) -> Vec<usize> {
         let mut kept: Vec<usize> = Vec::new();
         for rows in &self.unbroken {
-            let mut resting = None;
             for row in rows.clone() {
-                match kept.last() {
-                    Some(last) if self.time_s[row] - self.time_s[*last] < apart_s => continue,
-                    Some(last) if *last >= rows.start && !moved(*last, row) => resting = Some(row),
-                    _ => kept.extend(resting.take().into_iter().chain([row])),
+                if kept.last().is_none_or(|last| self.time_s[row] - self.time_s[*last] >= apart_s) {
+                    kept.push(row);
                 }
             }
-            kept.extend(resting);
         }
         kept
     }
