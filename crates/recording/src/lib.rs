@@ -28,6 +28,7 @@ mod extract;
 mod fingerprint;
 mod gather;
 mod guard;
+mod identity;
 mod index;
 pub mod input;
 mod joints;
@@ -55,7 +56,7 @@ mod temperature;
 mod together;
 mod url;
 
-pub use bytes::{Access, identity_of};
+pub use bytes::{Access, identity_of, sha256_of};
 pub use error::{RecordingError, nearest, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime, hash_of};

@@ -1,5 +1,6 @@
 //! Bytes of a file that are read by range, on demand: an object in a store, or a local file that is not mapped.
 
+use crate::identity::named;
 use crate::map::Map;
 use crate::{Fetched, ObjectIdentity, RecordingError};
 use bytes::Bytes;
@@ -101,7 +102,25 @@ impl Ranged {
         let failed = |source| RecordingError::Spool { path: path.to_owned(), bytes: self.size, source };
         let mut copy = tempfile::tempfile().map_err(failed)?;
         self.each_round(&mut |bytes| copy.write_all(bytes).map_err(failed))?;
-        Map::of(&copy).map_err(failed)
+        let mut map = Map::of(&copy).map_err(failed)?;
+        if self.object.is_some() {
+            // The store has identified it.
+            map.hashed = None;
+        }
+        Ok(map)
+    }
+
+    /// What tells its content from any other: what the store says, or a hash, for which all of it is read.
+    pub fn identity(&self) -> Result<String, RecordingError> {
+        if let Some(object) = &self.object {
+            return Ok(object.identity(self.size));
+        }
+        let mut hasher = blake3::Hasher::new();
+        self.each_round(&mut |bytes| {
+            hasher.update(bytes);
+            Ok(())
+        })?;
+        Ok(named(hasher.finalize()))
     }
 
     /// SHA-256 of the whole file, hexadecimal; reads all of it.

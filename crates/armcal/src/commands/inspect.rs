@@ -116,7 +116,7 @@ fn file_line(file: &FileReport) -> String {
 fn identity(file: &FileReport) -> String {
     match &file.object {
         Some(object) => format!("etag {}, changed {}", object.etag, object.last_modified),
-        None => format!("sha256 {}", file.sha256.get(..12).unwrap_or(&file.sha256)),
+        None => file.identity.chars().take("blake3:".len() + 12).collect(),
     }
 }
 

@@ -28,8 +28,8 @@ fn what_a_fit_saw_comes_back_to_the_last_bit() {
     let start = s.run.model.nominal();
     for (index, (then, now)) in past.recordings.iter().zip(&s.run.recordings).enumerate() {
         assert_eq!((&then.name, then.dwells), (&now.name, now.dwells.len()));
-        let hashes: Vec<&str> = now.report.files.iter().map(|f| f.sha256.as_str()).collect();
-        assert_eq!(then.files.iter().map(|f| f.sha256.as_str()).collect::<Vec<_>>(), hashes);
+        let hashes: Vec<&str> = now.report.files.iter().map(|f| f.identity.as_str()).collect();
+        assert_eq!(then.files.iter().map(|f| f.identity.as_str()).collect::<Vec<_>>(), hashes);
         assert_eq!(then.base.pose(), s.run.model.base_in_world(&start));
         assert_eq!(then.board.as_ref().map(|b| b.pose()), s.run.model.board_in_world(&start, index));
     }
