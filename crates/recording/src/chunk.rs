@@ -4,7 +4,7 @@ use crate::records::ChunkHeader;
 use std::io::Read as _;
 
 /// Largest chunk inflated. Writers use 0.75 to 4 MiB; a larger claim than this is damage or an attack.
-const MAX_CHUNK_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_CHUNK_BYTES: u64 = 1 << 30;
 /// A claim of up to this is reserved at once; a larger one grows as the chunk inflates.
 const RESERVED_BYTES: usize = 16 << 20;
 /// What is reserved before anything has been read from a stream: more than a block of either codec at its default.

@@ -81,7 +81,8 @@ mod tests {
     #[test]
     fn pieces_in_any_order_give_the_blake3_of_the_file() {
         for bytes in [1, 1000, PIECE_BYTES, PIECE_BYTES + 1, 3 * PIECE_BYTES, 5 * PIECE_BYTES + 12_345] {
-            let file: Vec<u8> = (0..bytes as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+            let file: Vec<u8> =
+                (0..bytes as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
             let pieces = Pieces::of(bytes);
             let mut rest = bytes;
             // From the end, in stretches that end in the middle of pieces.

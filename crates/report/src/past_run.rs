@@ -211,7 +211,9 @@ fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<PastReco
         match fact {
             "name" => recording.name.clone_from(value),
             // Earlier versions wrote a SHA-256.
-            file if file.ends_with(".identity") || file.ends_with(".sha256") => recording.identities.push(value.clone()),
+            file if file.ends_with(".identity") || file.ends_with(".sha256") => {
+                recording.identities.push(value.clone())
+            }
             _ => {}
         }
     }

@@ -84,7 +84,10 @@ impl Keys {
         #[allow(clippy::disallowed_methods)]
         let known = std::fs::read(&memory).ok().and_then(|text| serde_json::from_slice::<Seen>(&text).ok());
         if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
-            let same = known.schema == SCHEMA && known.path == name && known.bytes == bytes && known.modified_ns == modified_ns;
+            let same = known.schema == SCHEMA
+                && known.path == name
+                && known.bytes == bytes
+                && known.modified_ns == modified_ns;
             // A file system without modification times cannot tell.
             if same && modified_ns != 0 {
                 return Ok(known.identity);

@@ -261,7 +261,8 @@ fn count_once(found: Vec<Found>, warnings: &mut Vec<Warning>) -> Vec<Found> {
         let all = f.recording.observations.len();
         for (first, marks) in &kept {
             let before = f.recording.observations.len();
-            let in_first = |identity: &str| first.recording.files.iter().any(|file| file.identity == identity);
+            let in_first =
+                |identity: &str| first.recording.files.iter().any(|file| file.identity == identity);
             if f.recording.files.iter().all(|file| in_first(&file.identity)) {
                 f.recording.observations.clear();
             } else {

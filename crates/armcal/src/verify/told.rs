@@ -16,7 +16,8 @@ pub fn told(past: &PastModel, seen: &[Seen]) -> Vec<Told> {
         // A model of an earlier version knows files by their SHA-256, which has no name before it.
         let by_sha256 = past.recordings.iter().flat_map(|r| &r.identity).any(|known| !known.contains(':'));
         let is_file = |f: &FileReport| {
-            known(&f.identity) || by_sha256 && f.object.is_none() && sha256_of(&f.path).is_ok_and(|hash| known(&hash))
+            known(&f.identity)
+                || by_sha256 && f.object.is_none() && sha256_of(&f.path).is_ok_and(|hash| known(&hash))
         };
         if !s.report.files.is_empty() && s.report.files.iter().all(is_file) {
             return Some(Told { recording: s.name.clone(), dwells: marks.len(), all: marks.len() });
