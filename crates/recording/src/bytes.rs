@@ -2,10 +2,10 @@
 //!
 //! Everything after [`crate::layout`] asks a [`FileBytes`]; nothing else knows which of the two it is.
 
-use crate::identity::PIECE_BYTES;
 use crate::map::Map;
 use crate::ranges::Ranged;
 use crate::{Fetched, RecordingError, input, url};
+use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
@@ -38,22 +38,23 @@ impl Access {
 /// # Errors
 /// A file or object that cannot be opened or read, is empty or a folder.
 pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
-    match FileBytes::open(path, Access::from_env())? {
-        FileBytes::Mapped(map) => Ok(map.identity()),
-        FileBytes::Ranged(ranged) => ranged.identity(),
-    }
+    FileBytes::open(path, Access::from_env())?.identity()
 }
 
-/// SHA-256 of a whole file, hexadecimal: what `sha256sum` prints. On one core it takes several times as long as
-/// [`identity_of`], so it is for whoever wants to compare.
+/// SHA-256 of a whole file, hexadecimal, for whoever compares it with what `sha256sum` prints.
 ///
 /// # Errors
 /// As [`identity_of`].
 pub fn sha256_of(path: &Path) -> Result<String, RecordingError> {
+    let mut hasher = Sha256::new();
     match FileBytes::open(path, Access::from_env())? {
-        FileBytes::Mapped(map) => Ok(map.sha256_hex()),
-        FileBytes::Ranged(ranged) => ranged.sha256_hex(),
+        FileBytes::Mapped(map) => map.pieces(0..map.len(), |piece| hasher.update(piece)),
+        FileBytes::Ranged(ranged) => ranged.each_round(&mut |piece| {
+            hasher.update(piece);
+            Ok(())
+        })?,
     }
+    Ok(hex::encode(hasher.finalize()))
 }
 
 /// The bytes of one file.
@@ -106,13 +107,20 @@ impl FileBytes {
         }
     }
 
-    /// Hashes what a pass has just read, while it is at hand, and a little of what lies between it and `next`, so that little
-    /// is left over.
-    pub fn hash(&self, range: Range<usize>, next: usize) {
+    /// What tells the content from any other: what the store says, or a hash of all of it.
+    pub fn identity(&self) -> Result<String, RecordingError> {
+        match self {
+            FileBytes::Mapped(map) => Ok(map.identity()),
+            FileBytes::Ranged(ranged) => ranged.identity(),
+        }
+    }
+
+    /// Hashes what a pass has just read, while it is at hand.
+    pub fn hash(&self, range: &Range<usize>) {
         if let FileBytes::Mapped(map) = self
-            && let Some(hashed) = &map.hashed
+            && let Some(pieces) = &map.hashed
         {
-            hashed.hash(map, range.start..next.clamp(range.end, range.end + PIECE_BYTES));
+            pieces.hash(map, range);
         }
     }
 

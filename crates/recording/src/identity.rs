@@ -5,11 +5,12 @@
 //! what no pass came by is read for the hash alone.
 
 use blake3::hazmat::{ChainingValue, HasherExt as _, Mode, merge_subtrees_non_root, merge_subtrees_root};
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// Size of a piece: a power of two of BLAKE3's chunks of 1 KiB, so that each is a subtree.
-pub(crate) const PIECE_BYTES: usize = 256 << 10;
+/// A power of two of BLAKE3's chunks of 1 KiB, so that each piece is a subtree.
+const PIECE_BYTES: usize = 256 << 10;
 
 /// The hashes of the pieces of one file, as far as they are known.
 pub(crate) struct Pieces(Vec<OnceLock<ChainingValue>>);
@@ -21,45 +22,35 @@ impl Pieces {
     }
 
     /// Hashes the pieces that begin in a range of the file.
-    pub fn hash(&self, file: &[u8], begin_in: Range<usize>) {
+    pub fn hash(&self, file: &[u8], begin_in: &Range<usize>) {
         let end = begin_in.end.div_ceil(PIECE_BYTES).min(self.0.len());
-        (begin_in.start.div_ceil(PIECE_BYTES)..end).for_each(|piece| self.piece(file, piece));
+        for piece in begin_in.start.div_ceil(PIECE_BYTES)..end {
+            self.0[piece].get_or_init(|| {
+                let start = piece * PIECE_BYTES;
+                let bytes = &file[start..file.len().min(start + PIECE_BYTES)];
+                blake3::Hasher::new().set_input_offset(start as u64).update(bytes).finalize_non_root()
+            });
+        }
     }
 
-    /// Bytes of the pieces that are not hashed yet.
-    pub fn missing(&self, file: &[u8]) -> Vec<Range<usize>> {
-        let missing = (0..self.0.len()).filter(|piece| self.0[*piece].get().is_none());
-        missing.map(|piece| range(file, piece)).collect()
-    }
-
-    /// The identity, once all pieces are hashed.
-    pub fn identity(&self, file: &[u8]) -> String {
+    /// The identity. What no pass came by is hashed now; `passed` is told of it.
+    pub fn identity(&self, file: &[u8], passed: impl Fn(Range<usize>) + Sync) -> String {
+        self.0.par_iter().enumerate().filter(|(_, piece)| piece.get().is_none()).for_each(|(piece, _)| {
+            let range = piece * PIECE_BYTES..(piece + 1) * PIECE_BYTES;
+            self.hash(file, &range);
+            passed(range);
+        });
         let known: Vec<ChainingValue> = self.0.iter().filter_map(|piece| piece.get().copied()).collect();
         named(match halves(&known) {
             Some((left, right)) => merge_subtrees_root(&subtree(left), &subtree(right), Mode::Hash),
             None => blake3::hash(file),
         })
     }
-
-    fn piece(&self, file: &[u8], piece: usize) {
-        // The only piece of a file is its root, and hashed as that.
-        if self.0.len() > 1 {
-            self.0[piece].get_or_init(|| {
-                let range = range(file, piece);
-                let mut hasher = blake3::Hasher::new();
-                hasher.set_input_offset(range.start as u64).update(&file[range]).finalize_non_root()
-            });
-        }
-    }
 }
 
-/// A hash as an identity: hexadecimal, and by its name, so that nobody takes it for another.
+/// By the name of the hash, so that nobody takes it for another.
 pub(crate) fn named(hash: blake3::Hash) -> String {
     format!("blake3:{}", hash.to_hex())
-}
-
-fn range(file: &[u8], piece: usize) -> Range<usize> {
-    piece * PIECE_BYTES..file.len().min((piece + 1) * PIECE_BYTES)
 }
 
 fn subtree(pieces: &[ChainingValue]) -> ChainingValue {
@@ -69,7 +60,7 @@ fn subtree(pieces: &[ChainingValue]) -> ChainingValue {
     }
 }
 
-/// The left half of a tree is as large as a power of two can be that leaves something to the right.
+/// The left half is as large as a power of two can be that leaves something to the right.
 fn halves(pieces: &[ChainingValue]) -> Option<(&[ChainingValue], &[ChainingValue])> {
     (pieces.len() > 1).then(|| pieces.split_at(pieces.len().next_power_of_two() / 2))
 }
@@ -88,11 +79,12 @@ mod tests {
             // From the end, in stretches that end in the middle of pieces.
             while rest > 0 {
                 let start = rest.saturating_sub(PIECE_BYTES / 3 + 7);
-                pieces.hash(&file, start..rest);
+                pieces.hash(&file, &(start..rest));
                 rest = start;
             }
-            assert!(bytes <= PIECE_BYTES || pieces.missing(&file).is_empty());
-            assert_eq!(pieces.identity(&file), named(blake3::hash(&file)), "{bytes}");
+            let expected = named(blake3::hash(&file));
+            assert_eq!(pieces.identity(&file, |_| panic!("all are hashed")), expected, "{bytes}");
+            assert_eq!(Pieces::of(bytes).identity(&file, drop), expected, "{bytes}");
         }
     }
 }

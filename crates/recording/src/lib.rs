@@ -49,7 +49,6 @@ mod read;
 mod records;
 mod report;
 pub mod ros2;
-mod scalars;
 mod streams;
 mod sweep;
 mod temperature;

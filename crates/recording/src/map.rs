@@ -5,8 +5,6 @@
 //! passes over a map says which stretch it is done with, and the pages leave; they stay in the system's cache.
 
 use crate::identity::Pieces;
-use rayon::prelude::*;
-use sha2::{Digest as _, Sha256};
 use std::fs::File;
 use std::io;
 use std::ops::{Deref, Range};
@@ -76,22 +74,13 @@ impl Map {
         }
     }
 
-    /// SHA-256 of the whole file, hexadecimal.
-    pub fn sha256_hex(&self) -> String {
-        let mut hasher = Sha256::new();
-        self.pieces(0..self.len(), |piece| hasher.update(piece));
-        hex::encode(hasher.finalize())
-    }
-
-    /// What tells its content from any other: what passes have not hashed of it is hashed now.
+    /// What tells its content from any other ([`crate::identity`]).
     pub fn identity(&self) -> String {
-        let new = self.hashed.is_none().then(|| Pieces::of(self.len()));
-        let Some(hashed) = self.hashed.as_ref().or(new.as_ref()) else { return String::new() };
-        hashed.missing(self).into_par_iter().for_each(|range| {
-            hashed.hash(self, range.clone());
-            self.release(range);
-        });
-        hashed.identity(self)
+        let release = |range| self.release(range);
+        match &self.hashed {
+            Some(pieces) => pieces.identity(self, release),
+            None => Pieces::of(self.len()).identity(self, release),
+        }
     }
 }
 

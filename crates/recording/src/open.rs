@@ -242,13 +242,9 @@ impl RecordingFile {
         Ok(file)
     }
 
-    /// A hash of a local file; an object is identified by its store.
+    /// An object is identified by its store, copied or not.
     fn identity(&self) -> Result<String, RecordingError> {
-        match (&self.bytes, self.object()) {
-            (bytes, Some(object)) => Ok(object.identity(bytes.len())),
-            (FileBytes::Mapped(map), None) => Ok(map.identity()),
-            (FileBytes::Ranged(ranged), None) => ranged.identity(),
-        }
+        self.object().map_or_else(|| self.bytes.identity(), |object| Ok(object.identity(self.bytes.len())))
     }
 
     fn object(&self) -> Option<&ObjectIdentity> {

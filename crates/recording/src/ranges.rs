@@ -4,7 +4,6 @@ use crate::identity::named;
 use crate::map::Map;
 use crate::{Fetched, ObjectIdentity, RecordingError};
 use bytes::Bytes;
-use sha2::{Digest as _, Sha256};
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
@@ -102,12 +101,7 @@ impl Ranged {
         let failed = |source| RecordingError::Spool { path: path.to_owned(), bytes: self.size, source };
         let mut copy = tempfile::tempfile().map_err(failed)?;
         self.each_round(&mut |bytes| copy.write_all(bytes).map_err(failed))?;
-        let mut map = Map::of(&copy).map_err(failed)?;
-        if self.object.is_some() {
-            // The store has identified it.
-            map.hashed = None;
-        }
-        Ok(map)
+        Map::of(&copy).map_err(failed)
     }
 
     /// What tells its content from any other: what the store says, or a hash, for which all of it is read.
@@ -123,18 +117,8 @@ impl Ranged {
         Ok(named(hasher.finalize()))
     }
 
-    /// SHA-256 of the whole file, hexadecimal; reads all of it.
-    pub fn sha256_hex(&self) -> Result<String, RecordingError> {
-        let mut hasher = Sha256::new();
-        self.each_round(&mut |bytes| {
-            hasher.update(bytes);
-            Ok(())
-        })?;
-        Ok(hex::encode(hasher.finalize()))
-    }
-
     /// Hands the file to `f` in order, some pieces at a time in memory.
-    fn each_round(
+    pub fn each_round(
         &self,
         f: &mut dyn FnMut(&[u8]) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {

@@ -2,16 +2,13 @@
 
 use crate::open::RecordingFile;
 use crate::records::{Cursor, Message};
-use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, inflated_bytes, records};
+use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records};
 use crate::{Recording, RecordingError};
 use mcap::records::op;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
-
-/// Blocks that are handed out are inflated ahead up to this, and at least one.
-const AHEAD_BYTES: u64 = 128 << 20;
 
 /// A schema as the file has it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -119,12 +116,10 @@ impl Recording {
         ids: &[BTreeSet<u16>],
         f: &mut RawVisitor<'_>,
     ) -> Result<(), RecordingError> {
-        // A few blocks ahead in parallel, so that memory stays at a few of them whatever the file's size, and at one of those
-        // that are large.
-        let mut next = 0..0;
-        while next.end < batch.blocks.len() {
-            next = next.end..self.ahead(batch, next.end);
-            let work = batch.blocks[next.clone()].par_iter().zip(&batch.fetched[next.clone()]);
+        // A few blocks ahead in parallel, so that memory stays at a few of them whatever the file's size.
+        let ahead = 2 * rayon::current_num_threads();
+        for (blocks, fetched) in batch.blocks.chunks(ahead).zip(batch.fetched.chunks(ahead)) {
+            let work = blocks.par_iter().zip(fetched);
             let inflated: Vec<(Cow<'_, [u8]>, BlockSurvey)> =
                 work.map(|(at, fetched)| inflate(&self.files, *at, fetched.as_ref())).collect();
             let mut surveys = Vec::with_capacity(inflated.len());
@@ -151,18 +146,6 @@ impl Recording {
             self.remember(surveys);
         }
         Ok(())
-    }
-
-    /// Where the blocks end that are in memory together with the one at `from`.
-    fn ahead(&self, batch: &Batch<'_>, from: usize) -> usize {
-        let most = batch.blocks.len().min(from + 2 * rayon::current_num_threads());
-        let mut bytes = 0;
-        let fits = |i: &usize| {
-            let at = batch.blocks[*i];
-            bytes += inflated_bytes(&self.files[at.file], at, batch.fetched[*i].as_ref());
-            *i == from || bytes <= AHEAD_BYTES
-        };
-        from + (from..most).take_while(fits).count()
     }
 
     /// Hands every sound attachment to `f`, one at a time in memory, in file order. The first error stops the pass.

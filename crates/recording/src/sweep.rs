@@ -6,24 +6,19 @@
 use crate::RecordingError;
 use crate::bytes::FileBytes;
 use crate::channels::Definitions;
-use crate::chunk::{Inflater, MAX_CHUNK_BYTES};
+use crate::chunk::Inflater;
 use crate::index::{body_of_chunk, holding};
 use crate::layout::{Content, Damage};
 use crate::open::RecordingFile;
-use crate::records::{ChunkHeader, Message, RawRecord, Records};
+use crate::records::{Message, RawRecord, Records};
 use bytes::Bytes;
 use mcap::records::op;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Mutex, PoisonError};
 
 /// Blocks of a file read by ranges are fetched up to this at a time.
 const BATCH_BYTES: usize = 16 << 20;
-/// Chunks that inflate to more than this do so one at a time: memory shall not grow with the number of threads.
-const LARGE_BYTES: u64 = if cfg!(test) { 64 << 10 } else { 64 << 20 };
-/// Held while a large chunk is in memory. Nobody waits for anybody else meanwhile.
-static LARGE: Mutex<()> = Mutex::new(());
 
 /// Names a block: file, then block in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,17 +105,12 @@ pub(crate) fn sweep<C, D: Send>(
     let one = |inflater: &mut Inflater, at: At, fetched: Option<&Bytes>| {
         let file = &files[at.file];
         let mut collector = start(at.file);
-        let large = inflated_bytes(file, at, fetched) > LARGE_BYTES;
-        let turn = large.then(|| LARGE.lock().unwrap_or_else(PoisonError::into_inner));
         let (bytes, damage) = judge(file, at, fetched, inflater);
         let survey = survey(file, at, bytes, damage, |message| each(&mut collector, message));
-        let next = file.layout.blocks.get(at.block + 1).map_or(usize::MAX, |next| next.offset);
+        inflater.done();
         let range = file.layout.blocks[at.block].range();
-        file.bytes.hash(range.clone(), next);
+        file.bytes.hash(&range);
         file.bytes.passed(range);
-        if turn.is_some() {
-            *inflater = Inflater::default();
-        }
         ((at, survey), finish(collector))
     };
     let (mut surveys, mut kept) = (Vec::with_capacity(blocks.len()), Vec::with_capacity(blocks.len()));
@@ -262,15 +252,6 @@ fn stored<'a>(file: &'a RecordingFile, at: At, fetched: Option<&'a Bytes>) -> Re
         (FileBytes::Ranged(_), Some(bytes)) => body_of_chunk(bytes),
         (FileBytes::Ranged(_), None) => Err("it was not read".to_owned()),
     }
-}
-
-/// What a block takes in memory at most [bytes], beside what is mapped or fetched of it.
-pub(crate) fn inflated_bytes(file: &RecordingFile, at: At, fetched: Option<&Bytes>) -> u64 {
-    let header = match file.layout.blocks[at.block].content {
-        Content::Loose(_) => None,
-        _ => stored(file, at, fetched).ok().and_then(ChunkHeader::parse),
-    };
-    header.map_or(0, |(header, _)| header.uncompressed_size.min(MAX_CHUNK_BYTES))
 }
 
 /// The usable record bytes of a block, and what is wrong with the rest.

@@ -64,10 +64,7 @@ impl Store {
         let path = self.results.join(folder).join(ROW);
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
         let text = input::read_to_string(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
-        let mut row: Row = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
-        // A campaign holds thousands of them.
-        row.quantities.shrink_to_fit();
-        Ok(row)
+        serde_json::from_str(&text).map_err(|e| bad(e.to_string()))
     }
 
     /// What the dwells of a result are recognised by.

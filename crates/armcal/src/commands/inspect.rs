@@ -98,7 +98,7 @@ fn file_line(file: &FileReport) -> String {
         file.chunks,
         shortened(&file.profile),
         shortened(&file.library),
-        identity(file),
+        file.identity,
     );
     if let Some(fetched) = file.fetched {
         let _ = write!(line, ", {:.2} MB read by {} requests", fetched.bytes as f64 / 1e6, fetched.requests);
@@ -110,14 +110,6 @@ fn file_line(file: &FileReport) -> String {
         let _ = write!(line, "\n    damaged at byte {offset}: {}", printable(reason));
     }
     line
-}
-
-/// The beginning of a hash is enough for people.
-fn identity(file: &FileReport) -> String {
-    match &file.object {
-        Some(object) => format!("etag {}, changed {}", object.etag, object.last_modified),
-        None => file.identity.chars().take("blake3:".len() + 12).collect(),
-    }
 }
 
 fn channels(channels: &[ChannelReport]) -> Table {
