@@ -119,7 +119,7 @@ fn a_thin_recording_says_where_it_is_from_and_python_reads_it() {
     assert_eq!(metadata["lab"]["operator"], "wl");
     let about = &metadata[EXTRACT_METADATA];
     assert_eq!(about["source0.name"], "whole.mcap");
-    assert_eq!(about["source0.identity"], open(&whole).report().files[0].sha256);
+    assert_eq!(about["source0.identity"], open(&whole).report().files[0].identity);
     let topics: Vec<&str> =
         recording.report().channels.iter().map(|channel| channel.topic.as_str()).collect();
     assert_eq!(topics, ["/camera/info", "/vicon/base/base", "/vicon/table/table", "/vicon/tip/tip"]);

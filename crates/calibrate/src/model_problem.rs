@@ -304,8 +304,8 @@ impl Problem for ModelProblem<'_> {
         };
         let of_blocks = first.start..self.blocks[blocks.end - 1].end;
         let (mut block, mut parts) = (blocks.start, Vec::new());
-        let mut of = |o: &Observation, linearised: (ModelResidual, DMatrix<f64>)| {
-            parts.push(self.used(o, linearised));
+        let mut of = |o: &Observation, residual: ModelResidual, jacobian: DMatrix<f64>| {
+            parts.push(self.used(o, (residual, jacobian)));
             if parts.len() == self.blocks[block].len() {
                 each(block, stacked(std::mem::take(&mut parts)));
                 block += 1;

@@ -12,7 +12,7 @@ pub struct Row {
     pub paths: Vec<String>,
     /// Size of its files [bytes].
     pub bytes: u64,
-    /// What its files hold: SHA-256, hexadecimal, or ETag, size and time of an object.
+    /// What identifies its files; two recordings with the same hold the same.
     pub identity: Vec<String>,
     /// What was declared about its board's tilt, in words; recordings of different tilts have different board poses.
     pub tilt: String,

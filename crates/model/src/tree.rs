@@ -91,7 +91,7 @@ pub(crate) struct TreeAt<'a> {
 /// What is known of a segment before its pose.
 enum Still {
     /// All of it: no joint moves it.
-    Linearised(LinearisedSegment),
+    Linearised(Box<LinearisedSegment>),
     /// Nothing, and how its parameters and its joint move its end is asked of it.
     Asked,
     /// Nothing, and only where it ends is asked.
@@ -103,7 +103,7 @@ impl<'a> TreeAt<'a> {
     pub fn of(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>, asked: Option<&Asked<'_>>) -> TreeAt<'a> {
         let p = p.into();
         let still = |segment: &Segment| match segment.joint {
-            None => Still::Linearised(segment.linearised(&p, &[])),
+            None => Still::Linearised(segment.linearised(&p, &[]).into()),
             Some(_) if asked.is_none_or(|asked| segment.parameters.clone().any(asked)) => Still::Asked,
             Some(_) => Still::Unasked,
         };

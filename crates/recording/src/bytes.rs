@@ -5,6 +5,7 @@
 use crate::map::Map;
 use crate::ranges::Ranged;
 use crate::{Fetched, RecordingError, input, url};
+use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
@@ -37,13 +38,23 @@ impl Access {
 /// # Errors
 /// A file or object that cannot be opened or read, is empty or a folder.
 pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
+    FileBytes::open(path, Access::from_env())?.identity()
+}
+
+/// SHA-256 of a whole file, hexadecimal, for whoever compares it with what `sha256sum` prints.
+///
+/// # Errors
+/// As [`identity_of`].
+pub fn sha256_of(path: &Path) -> Result<String, RecordingError> {
+    let mut hasher = Sha256::new();
     match FileBytes::open(path, Access::from_env())? {
-        FileBytes::Mapped(map) => Ok(map.sha256_hex()),
-        FileBytes::Ranged(ranged) => match &ranged.object {
-            Some(object) => Ok(object.identity(ranged.len())),
-            None => ranged.sha256_hex(),
-        },
+        FileBytes::Mapped(map) => map.pieces(0..map.len(), |piece| hasher.update(piece)),
+        FileBytes::Ranged(ranged) => ranged.each_round(&mut |piece| {
+            hasher.update(piece);
+            Ok(())
+        })?,
     }
+    Ok(hex::encode(hasher.finalize()))
 }
 
 /// The bytes of one file.
@@ -93,6 +104,23 @@ impl FileBytes {
         match self {
             FileBytes::Mapped(map) => Ok(map.get(range).unwrap_or_default().into()),
             FileBytes::Ranged(ranged) => Ok(Vec::from(ranged.read_one(range)?).into()),
+        }
+    }
+
+    /// What tells the content from any other: what the store says, or a hash of all of it.
+    pub fn identity(&self) -> Result<String, RecordingError> {
+        match self {
+            FileBytes::Mapped(map) => Ok(map.identity()),
+            FileBytes::Ranged(ranged) => ranged.identity(),
+        }
+    }
+
+    /// Hashes what a pass has just read, while it is at hand.
+    pub fn hash(&self, range: &Range<usize>) {
+        if let FileBytes::Mapped(map) = self
+            && let Some(pieces) = &map.hashed
+        {
+            pieces.hash(map, range);
         }
     }
 

@@ -2,11 +2,15 @@
 
 use crate::records::ChunkHeader;
 use std::io::Read as _;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Largest chunk inflated. Writers use 0.75 to 4 MiB; a larger claim than this is damage or an attack.
 const MAX_CHUNK_BYTES: u64 = 1 << 30;
 /// A claim of up to this is reserved at once; a larger one grows as the chunk inflates.
 const RESERVED_BYTES: usize = 16 << 20;
+/// Chunks that inflate to more than this are in memory one at a time, however many threads there are.
+const LARGE_BYTES: usize = if cfg!(test) { 64 << 10 } else { 64 << 20 };
+static LARGE: Mutex<()> = Mutex::new(());
 /// What is reserved before anything has been read from a stream: more than a block of either codec at its default.
 const FIRST_STEP_BYTES: usize = 128 << 10;
 /// What one compressed byte can stand for at most: a zstd block of 128 KiB may be a repeated byte, written in 4 (RFC 8878,
@@ -20,9 +24,19 @@ const LZ4_RATIO: u64 = 255;
 pub(crate) struct Inflater {
     zstd: Option<zstd::bulk::Decompressor<'static>>,
     buffer: Vec<u8>,
+    /// Held as long as the buffer holds a large chunk.
+    turn: Option<MutexGuard<'static, ()>>,
 }
 
 impl Inflater {
+    /// Says that the chunk is no longer needed.
+    pub fn done(&mut self) {
+        if self.turn.is_some() {
+            self.buffer = Vec::new();
+            self.turn = None;
+        }
+    }
+
     /// The records of a whole chunk, given the body of its record. Size and CRC have been checked (MCAP allows a
     /// CRC of 0 for "not computed"). The error is the reason why nothing of the chunk may be used.
     pub fn whole<'b>(&'b mut self, body: &'b [u8]) -> Result<&'b [u8], String> {
@@ -44,6 +58,10 @@ impl Inflater {
                 true => Ok(()),
                 false => Err(format!("it claims to inflate to {size} bytes, which {} cannot", packed.len())),
             };
+        if size > LARGE_BYTES && !header.compression.is_empty() && self.turn.is_none() {
+            // Whoever panicked while holding it has taken its buffer along.
+            self.turn = Some(LARGE.lock().unwrap_or_else(PoisonError::into_inner));
+        }
         let data: &[u8] = match header.compression.as_str() {
             "" => packed,
             "zstd" => {
@@ -155,6 +173,7 @@ mod tests {
         let packed = zstd::bulk::compress(&noise, 1).expect("compresses");
         let mut inflater = Inflater::default();
         assert_eq!(inflater.whole(&chunk("zstd", noise.len() as u64, 0, &packed)), Ok(&noise[..]));
+        inflater.done();
         for compression in ["zstd", "lz4"] {
             let mut inflater = Inflater::default();
             let claims_a_gigabyte = chunk(compression, 1 << 30, 0, &packed[..packed.len() / 10]);

@@ -6,40 +6,23 @@ use std::path::PathBuf;
 /// Why a recording could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum RecordingError {
     /// No path was given.
     #[error("a recording needs at least one file, none was given")]
     NoFiles,
     /// A path was given twice.
     #[error("{} is listed twice in one recording: list each split file once", path.display())]
-    ListedTwice {
-        /// The path.
-        path: PathBuf,
-    },
+    ListedTwice { path: PathBuf },
     /// A file could not be opened or mapped.
     #[error("cannot open recording {}: {source}", path.display())]
-    Open {
-        /// The path.
-        path: PathBuf,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
+    Open { path: PathBuf, source: std::io::Error },
     /// A file could not be read on.
     #[error("cannot read recording {}: {source}; was it shortened meanwhile?", path.display())]
-    Read {
-        /// The path.
-        path: PathBuf,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// An object cannot be reached or read.
     #[error("cannot read {url}: {why}")]
-    Object {
-        /// Its URL.
-        url: String,
-        /// Why, and what to do.
-        why: String,
-    },
+    Object { url: String, why: String },
     /// A file without a usable summary cannot be copied to where it can be searched.
     #[error(
         "{} has no usable summary and must be copied to be searched, but its {bytes} bytes cannot be written to {}: \
@@ -48,166 +31,68 @@ pub enum RecordingError {
         std::env::temp_dir().display()
     )]
     Spool {
-        /// The path or URL.
         path: PathBuf,
         /// Size [bytes].
         bytes: u64,
-        /// What the operating system said.
         source: std::io::Error,
     },
     /// A file is not an MCAP file.
     #[error("{} is not an MCAP recording: {why}", path.display())]
-    NotMcap {
-        /// The path.
-        path: PathBuf,
-        /// What was found instead, and what to do.
-        why: String,
-    },
+    NotMcap { path: PathBuf, why: String },
     /// A stream names a topic that no file has.
     #[error(
         "stream `{role}`: no topic {topic:?} in the recording{}; present: {}",
         did_you_mean(nearest),
         list(present)
     )]
-    TopicMissing {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic asked for.
-        topic: String,
-        /// Nearest topic present.
-        nearest: Option<String>,
-        /// Topics present.
-        present: Vec<String>,
-    },
+    TopicMissing { role: &'static str, topic: String, nearest: Option<String>, present: Vec<String> },
     /// No channel matches a topic asked for by name or pattern.
     #[error("no topic {pattern:?} in the recording{}; present: {}", did_you_mean(nearest), list(present))]
-    NoSuchTopic {
-        /// Name or pattern asked for.
-        pattern: String,
-        /// Nearest topic present.
-        nearest: Option<String>,
-        /// Topics present.
-        present: Vec<String>,
-    },
+    NoSuchTopic { pattern: String, nearest: Option<String>, present: Vec<String> },
     /// No channel of the topic can be read in the role.
     #[error("stream `{role}`: topic {topic:?} cannot be read: {why}")]
-    NotDecodable {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic.
-        topic: String,
-        /// Reason for each channel of the topic.
-        why: String,
-    },
+    NotDecodable { role: &'static str, topic: String, why: String },
     /// Several joint streams that cannot be read as one.
     #[error("the joint streams {what}; record them together, and stamp all by one clock")]
-    NotTogether {
-        /// What is wrong.
-        what: String,
-    },
+    NotTogether { what: String },
     /// The topic exists, but no usable row came out of it.
     #[error("stream `{role}`: topic {topic:?} has {messages} messages, but no usable row: {why}")]
-    NoRows {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic.
-        topic: String,
-        /// Messages seen.
-        messages: u64,
-        /// What became of them, and what to do.
-        why: String,
-    },
+    NoRows { role: &'static str, topic: String, messages: u64, why: String },
     /// No message names the wanted joint.
     #[error(
         "stream `joints`: topic {topic:?} has no joint {joint:?}{}; present: {}",
         did_you_mean(nearest),
         list(present)
     )]
-    JointMissing {
-        /// Topic.
-        topic: String,
-        /// Joint asked for.
-        joint: String,
-        /// Nearest joint name present.
-        nearest: Option<String>,
-        /// Joint names present.
-        present: Vec<String>,
-    },
+    JointMissing { topic: String, joint: String, nearest: Option<String>, present: Vec<String> },
     /// The wanted body is not in the stream, or several are and none was chosen.
     #[error("stream `{role}`: topic {topic:?} {why}{}; present: {}", did_you_mean(nearest), list(present))]
-    Body {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic.
-        topic: String,
-        /// What is wrong: missing, or not chosen.
-        why: String,
-        /// Nearest body present.
-        nearest: Option<String>,
-        /// Bodies present.
-        present: Vec<String>,
-    },
+    Body { role: &'static str, topic: String, why: String, nearest: Option<String>, present: Vec<String> },
     /// The numbers of a stream cannot be in the declared unit.
     #[error("stream `{role}`: topic {topic:?}: {why}")]
-    WrongUnit {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic.
-        topic: String,
-        /// What was seen, what it looks like, and what to set.
-        why: String,
-    },
+    WrongUnit { role: &'static str, topic: String, why: String },
     /// A clock was asked for that the stream does not have.
     #[error("stream `{role}`: topic {topic:?} cannot use clock = \"{clock}\": {why}")]
-    NoClock {
-        /// Role of the stream.
-        role: &'static str,
-        /// Topic.
-        topic: String,
-        /// Clock asked for.
-        clock: &'static str,
-        /// Why not, and what to set instead.
-        why: String,
-    },
+    NoClock { role: &'static str, topic: String, clock: &'static str, why: String },
     /// The configuration of the streams contradicts itself.
     #[error("configuration of stream `{role}`: {why}")]
-    Config {
-        /// Role of the stream.
-        role: &'static str,
-        /// What is wrong and what to set.
-        why: String,
-    },
+    Config { role: &'static str, why: String },
     /// A file could not be written.
     #[error("cannot write {}: {why}; nothing was left behind", path.display())]
-    Write {
-        /// The path of the finished file.
-        path: PathBuf,
-        /// What failed.
-        why: String,
-    },
+    Write { path: PathBuf, why: String },
     /// An output would replace an input.
     #[error(
         "{} is an input of this command (read as {}), and no input is ever written over: choose another output",
         path.display(),
         input.display()
     )]
-    IsInput {
-        /// The output.
-        path: PathBuf,
-        /// The input, as it was named.
-        input: PathBuf,
-    },
+    IsInput { path: PathBuf, input: PathBuf },
     /// An output would replace what armcal did not make, or made for something else.
     #[error(
         "{} is there and {what}, so it is not written over: choose another output, or move it away",
         path.display()
     )]
-    NotOurs {
-        /// The output.
-        path: PathBuf,
-        /// What is there.
-        what: String,
-    },
+    NotOurs { path: PathBuf, what: String },
     /// A callback of [`crate::Recording::for_each_raw`] stopped the pass.
     #[error("{0}")]
     Stopped(String),

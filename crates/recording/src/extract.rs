@@ -151,7 +151,7 @@ fn about(recording: &Recording, kept: &Kept) -> BTreeMap<String, String> {
             _ => file.path.to_string_lossy().into_owned(),
         };
         entries.insert(format!("source{i}.name"), name);
-        entries.insert(format!("source{i}.identity"), file.identity());
+        entries.insert(format!("source{i}.identity"), file.identity.clone());
         entries.insert(format!("source{i}.bytes"), file.bytes.to_string());
         entries.insert(format!("source{i}.damaged_parts"), file.damaged.len().to_string());
         let read = if file.source == Source::Index { "index" } else { "scan" };

@@ -8,7 +8,6 @@ use crate::open::ns;
 use crate::poses::PoseTable;
 use crate::raw::RawChannel;
 use crate::records::Message;
-use crate::scalars::ScalarTable;
 use crate::sweep::{blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,7 +59,8 @@ pub(crate) struct Gathered {
     pub stamps: Stamps,
     pub joints: JointTable,
     pub poses: PoseTable,
-    pub scalars: ScalarTable,
+    /// One number a row.
+    pub scalars: Vec<f64>,
 }
 
 impl Gathered {
@@ -71,7 +71,7 @@ impl Gathered {
         self.joints.position.reserve(sum(|part| part.joints.position.len()));
         self.joints.effort.reserve(sum(|part| part.joints.effort.len()));
         self.poses.seen.reserve(sum(|part| part.poses.seen.len()));
-        self.scalars.value.reserve(sum(|part| part.scalars.value.len()));
+        self.scalars.reserve(sum(|part| part.scalars.len()));
     }
 
     fn append(&mut self, mut later: Gathered) {
@@ -82,7 +82,7 @@ impl Gathered {
         self.stamps.append(&mut later.stamps);
         self.joints.append(later.joints);
         self.poses.append(later.poses);
-        self.scalars.append(later.scalars);
+        self.scalars.append(&mut later.scalars);
     }
 }
 
@@ -263,7 +263,7 @@ impl<'a> Batch<'a> {
                 counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
             }
             (Rows::Scalar(rows), _) => {
-                counted.scalars = ScalarTable::of(&rows);
+                counted.scalars = rows.value;
                 counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
             }
             (Rows::Joints(_), _) => {}

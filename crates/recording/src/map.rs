@@ -4,7 +4,7 @@
 //! gigabytes once would therefore look, to whoever watches the memory, like holding all of it. So everything that
 //! passes over a map says which stretch it is done with, and the pages leave; they stay in the system's cache.
 
-use sha2::{Digest as _, Sha256};
+use crate::identity::Pieces;
 use std::fs::File;
 use std::io;
 use std::ops::{Deref, Range};
@@ -15,7 +15,11 @@ const WINDOW_BYTES: usize = 1 << 20;
 const PIECE_BYTES: usize = 4 << 20;
 
 /// A file mapped read-only.
-pub(crate) struct Map(memmap2::Mmap);
+pub(crate) struct Map {
+    bytes: memmap2::Mmap,
+    /// What passes have hashed of it; `None` where they shall not.
+    pub hashed: Option<Pieces>,
+}
 
 impl Map {
     /// Maps a file that is not empty.
@@ -24,8 +28,9 @@ impl Map {
         // SAFETY: the map is read-only and private to this process. Another process that truncates the file while it
         // is mapped can still kill us with SIGBUS; recordings are finished files, which nobody truncates, and where
         // somebody may (`crate::Access`), the file is not mapped.
-        let mapped = unsafe { memmap2::Mmap::map(file) }?;
-        Ok(Map(mapped))
+        let bytes = unsafe { memmap2::Mmap::map(file) }?;
+        let hashed = Some(Pieces::of(bytes.len()));
+        Ok(Map { bytes, hashed })
     }
 
     /// Says that a pass in order of offsets is done with these bytes. They can be read again at any time.
@@ -39,13 +44,13 @@ impl Map {
     /// Takes the pages of a range out of the process's memory.
     #[cfg(unix)]
     pub fn release(&self, range: Range<usize>) {
-        let end = range.end.min(self.0.len());
+        let end = range.end.min(self.len());
         if range.start < end {
             #[expect(unsafe_code, reason = "there is no other way to give pages of a map back")]
             // SAFETY: the map is of a file and nothing writes to it, so pages that leave come back with the same bytes.
             // Memory that cannot be given back is no reason to stop reading.
             let _ = unsafe {
-                self.0.unchecked_advise_range(
+                self.bytes.unchecked_advise_range(
                     memmap2::UncheckedAdvice::DontNeed,
                     range.start,
                     end - range.start,
@@ -63,17 +68,19 @@ impl Map {
         let mut at = range.start;
         while at < range.end {
             let end = range.end.min(at + PIECE_BYTES);
-            f(&self.0[at..end]);
+            f(&self[at..end]);
             self.release(at..end);
             at = end;
         }
     }
 
-    /// SHA-256 of the whole file, hexadecimal.
-    pub fn sha256_hex(&self) -> String {
-        let mut hasher = Sha256::new();
-        self.pieces(0..self.0.len(), |piece| hasher.update(piece));
-        hex::encode(hasher.finalize())
+    /// What tells its content from any other ([`crate::identity`]).
+    pub fn identity(&self) -> String {
+        let release = |range| self.release(range);
+        match &self.hashed {
+            Some(pieces) => pieces.identity(self, release),
+            None => Pieces::of(self.len()).identity(self, release),
+        }
     }
 }
 
@@ -81,6 +88,6 @@ impl Deref for Map {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
-        &self.0
+        &self.bytes
     }
 }

@@ -92,6 +92,16 @@ impl Recording {
         Ok(recording)
     }
 
+    /// Leaves the identity of the files out of the passes over them: whoever does not ask for the report need not pay for it.
+    pub fn without_identity(mut self) -> Recording {
+        for file in &mut self.files {
+            if let FileBytes::Mapped(map) = &mut file.bytes {
+                map.hashed = None;
+            }
+        }
+        self
+    }
+
     /// Files, channels and warnings about them; streams are empty until [`Recording::read`] has named them. The
     /// first call makes a pass over mapped files unless `read` has already made one, and hashes local files. Of files
     /// read by ranges it tells what has been read until then.
@@ -102,7 +112,7 @@ impl Recording {
             if let Ok((found, _)) = sweep(&self.files, &unread, |_| (), |(), _| (), |()| ()) {
                 self.remember(found);
             }
-            let hashes: Vec<_> = self.files.par_iter().map(RecordingFile::sha256_hex).collect();
+            let hashes: Vec<_> = self.files.par_iter().map(RecordingFile::identity).collect();
             let surveys = self.surveys();
             let damage = |(file, hash): (&RecordingFile, &Result<String, RecordingError>), survey| {
                 let mut damage = file.damage(survey);
@@ -232,13 +242,9 @@ impl RecordingFile {
         Ok(file)
     }
 
-    /// Hash of a local file; an object is identified by its store.
-    fn sha256_hex(&self) -> Result<String, RecordingError> {
-        match (&self.bytes, self.object()) {
-            (_, Some(_)) => Ok(String::new()),
-            (FileBytes::Mapped(map), None) => Ok(map.sha256_hex()),
-            (FileBytes::Ranged(ranged), None) => ranged.sha256_hex(),
-        }
+    /// An object is identified by its store, copied or not.
+    fn identity(&self) -> Result<String, RecordingError> {
+        self.object().map_or_else(|| self.bytes.identity(), |object| Ok(object.identity(self.bytes.len())))
     }
 
     fn object(&self) -> Option<&ObjectIdentity> {
@@ -330,11 +336,11 @@ impl RecordingFile {
         damage
     }
 
-    fn report(&self, sha256: &Result<String, RecordingError>, damage: &[Damage]) -> FileReport {
+    fn report(&self, identity: &Result<String, RecordingError>, damage: &[Damage]) -> FileReport {
         FileReport {
             path: self.path.clone(),
             bytes: self.bytes.len(),
-            sha256: sha256.as_ref().cloned().unwrap_or_default(),
+            identity: identity.as_ref().cloned().unwrap_or_default(),
             object: self.object().cloned(),
             fetched: self.copied.as_ref().map(|c| c.fetched).or_else(|| self.bytes.fetched()),
             source: self.layout.source.unwrap_or(Source::Scan),

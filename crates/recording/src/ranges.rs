@@ -1,9 +1,9 @@
 //! Bytes of a file that are read by range, on demand: an object in a store, or a local file that is not mapped.
 
+use crate::identity::named;
 use crate::map::Map;
 use crate::{Fetched, ObjectIdentity, RecordingError};
 use bytes::Bytes;
-use sha2::{Digest as _, Sha256};
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
@@ -104,18 +104,21 @@ impl Ranged {
         Map::of(&copy).map_err(failed)
     }
 
-    /// SHA-256 of the whole file, hexadecimal; reads all of it.
-    pub fn sha256_hex(&self) -> Result<String, RecordingError> {
-        let mut hasher = Sha256::new();
+    /// What tells its content from any other: what the store says, or a hash, for which all of it is read.
+    pub fn identity(&self) -> Result<String, RecordingError> {
+        if let Some(object) = &self.object {
+            return Ok(object.identity(self.size));
+        }
+        let mut hasher = blake3::Hasher::new();
         self.each_round(&mut |bytes| {
             hasher.update(bytes);
             Ok(())
         })?;
-        Ok(hex::encode(hasher.finalize()))
+        Ok(named(hasher.finalize()))
     }
 
     /// Hands the file to `f` in order, some pieces at a time in memory.
-    fn each_round(
+    pub fn each_round(
         &self,
         f: &mut dyn FnMut(&[u8]) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {

@@ -222,7 +222,7 @@ impl<'a> Reading<'a> {
     fn gauge(&mut self, stream: &GaugeStream) -> Result<ScalarSamples, RecordingError> {
         let role = self.role;
         self.refuse_undecoded(role)?;
-        let value = &self.gathered.scalars.value;
+        let value = &self.gathered.scalars;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
         drop_duplicates(&mut rows, &mut counts);
         let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
@@ -235,7 +235,7 @@ impl<'a> Reading<'a> {
     fn temperature(&mut self, stream: &ScalarStream) -> Result<Option<ScalarSamples>, RecordingError> {
         let role = "temperature";
         self.refuse_undecoded(role)?;
-        let value = &self.gathered.scalars.value;
+        let value = &self.gathered.scalars;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
         let scale = Scale::of(&rows.iter().map(|(_, i)| value[*i]).collect::<Vec<_>>());
         let possible: Vec<bool> = rows.iter().map(|(_, i)| scale.celsius(value[*i]).is_some()).collect();

@@ -21,9 +21,10 @@ pub struct FileReport {
     pub path: PathBuf,
     /// Size [bytes].
     pub bytes: u64,
-    /// SHA-256 of the whole file, hexadecimal; empty for an object, which is not read whole to be hashed.
-    pub sha256: String,
-    /// What identifies an object in its store instead.
+    /// What tells its content from any other: `blake3:` and the hash of the whole file, as `b3sum` prints it; of an object,
+    /// which is not read whole to be hashed, `object:` with ETag, size and time of the last change.
+    pub identity: String,
+    /// What identifies an object in its store.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<ObjectIdentity>,
     /// What was read, of a file read by ranges. What was not read was not judged either: the numbers of messages of
@@ -42,16 +43,6 @@ pub struct FileReport {
     pub truncated_at: Option<u64>,
     /// Parts that could not be used: byte offset and reason.
     pub damaged: Vec<(u64, String)>,
-}
-
-impl FileReport {
-    /// What tells this content from any other: the SHA-256, or `object:` with ETag, size and time of the last change.
-    pub fn identity(&self) -> String {
-        match &self.object {
-            Some(object) => object.identity(self.bytes),
-            None => self.sha256.clone(),
-        }
-    }
 }
 
 /// What a store says of an object. A store gives changed content another ETag.

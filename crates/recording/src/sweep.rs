@@ -107,7 +107,10 @@ pub(crate) fn sweep<C, D: Send>(
         let mut collector = start(at.file);
         let (bytes, damage) = judge(file, at, fetched, inflater);
         let survey = survey(file, at, bytes, damage, |message| each(&mut collector, message));
-        file.bytes.passed(file.layout.blocks[at.block].range());
+        inflater.done();
+        let range = file.layout.blocks[at.block].range();
+        file.bytes.hash(&range);
+        file.bytes.passed(range);
         ((at, survey), finish(collector))
     };
     let (mut surveys, mut kept) = (Vec::with_capacity(blocks.len()), Vec::with_capacity(blocks.len()));

@@ -173,7 +173,7 @@ fn about_input(run: &Run) -> BTreeMap<String, String> {
         for (j, file) in recording.files().into_iter().enumerate() {
             let prefix = format!("recording{i}.file{j}");
             entries.insert(format!("{prefix}.path"), file.path);
-            entries.insert(format!("{prefix}.sha256"), file.sha256);
+            entries.insert(format!("{prefix}.identity"), file.identity);
             entries.insert(format!("{prefix}.bytes"), file.bytes.to_string());
             if let Some(read) = recording.report.files.get(j) {
                 entries.insert(format!("{prefix}.profile"), read.profile.clone());

@@ -83,8 +83,9 @@ pub struct Value {
 pub struct RecordingFacts {
     /// Its name.
     pub name: String,
-    /// Hashes of its files.
-    pub sha256: Vec<String>,
+    /// What identifies its files ([`armcal_recording::FileReport::identity`]); in results of earlier versions their SHA-256.
+    #[serde(alias = "sha256")]
+    pub identity: Vec<String>,
     /// Its observed dwells, by which a copy of it is recognised; absent in a model written before this was kept.
     #[serde(default)]
     pub dwells: Option<Vec<DwellMark>>,
@@ -395,7 +396,7 @@ fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFact
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     RecordingFacts {
         name: recording.name.clone(),
-        sha256: recording.files().into_iter().map(|f| f.sha256).collect(),
+        identity: recording.files().into_iter().map(|f| f.identity).collect(),
         dwells: Some(own.iter().map(|o| DwellMark::of(o.time_ns, &o.joint_rad)).collect()),
         last_dwell: own.iter().map(|o| o.dwell.dwell).max().unwrap_or(0),
         last_ns: own.iter().map(|o| o.time_ns).max().unwrap_or(run.session.end_ns),

@@ -61,8 +61,9 @@ pub struct ObservedRecording {
 pub struct ObservedFile {
     /// Path as the pipeline gave it.
     pub path: String,
-    /// SHA-256 of the whole file, hexadecimal.
-    pub sha256: String,
+    /// What identifies it ([`armcal_recording::FileReport::identity`]); in results of earlier versions its SHA-256.
+    #[serde(alias = "sha256")]
+    pub identity: String,
     /// Size [bytes].
     pub bytes: u64,
 }

@@ -112,7 +112,7 @@ impl PastRun {
         };
         let recording = |r: &RecordingRun| PastRecording {
             name: r.name.clone(),
-            identities: r.files().into_iter().map(|f| f.sha256).collect(),
+            identities: r.files().into_iter().map(|f| f.identity).collect(),
             dwells: r.dwells.iter().map(PastDwell::of).collect(),
         };
         PastRun {
@@ -186,7 +186,10 @@ fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<PastReco
         let recording: &mut PastRecording = found.entry(index).or_default();
         match fact {
             "name" => recording.name.clone_from(value),
-            file if file.ends_with(".sha256") => recording.identities.push(value.clone()),
+            // Earlier versions wrote a SHA-256.
+            file if file.ends_with(".identity") || file.ends_with(".sha256") => {
+                recording.identities.push(value.clone())
+            }
             _ => {}
         }
     }

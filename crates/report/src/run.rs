@@ -11,10 +11,9 @@ use armcal_core::{Dwell, DwellId, ErrorStats, Observation, Rejection, Role, Setu
 use armcal_diagnose::{Diagnosis, UNEXPLAINED};
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
-use armcal_recording::{FileReport, RecordingReport};
+use armcal_recording::{FileReport, RecordingReport, sha256_of};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::Vector3;
-use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 
 /// Version of the tool, as every output states it.
@@ -337,7 +336,7 @@ impl RecordingRun {
     pub(crate) fn files(&self) -> Vec<ObservedFile> {
         let file = |f: &FileReport| ObservedFile {
             path: self.given_path(f).to_string_lossy().into_owned(),
-            sha256: f.identity(),
+            identity: f.identity.clone(),
             bytes: f.bytes,
         };
         let read = || self.report.files.iter().map(file).collect();
@@ -349,19 +348,21 @@ impl RecordingRun {
         self.paths.iter().find(|given| file.path.ends_with(given)).unwrap_or(&file.path)
     }
 
-    /// SHA-256 of the file (of an object its [`FileReport::identity`]); of those of all files, one a line, for a split
-    /// recording.
+    /// SHA-256 of the file, for whoever compares it with what `sha256sum` prints; of those of all files, one a line, for a
+    /// split recording. Of an object, and of what an earlier result was made from, the identity stands for it.
     pub fn sha256(&self) -> String {
-        match self.files().as_slice() {
+        let local = |f: &FileReport| match f.object {
+            // A file that is gone by now cannot be compared with anything.
+            None => sha256_of(&f.path).unwrap_or_default(),
+            Some(_) => f.identity.clone(),
+        };
+        let read = || self.report.files.iter().map(local).collect();
+        let earlier = |e: &EarlierResult| e.files.iter().map(|f| f.identity.clone()).collect();
+        let hashes: Vec<String> = self.earlier.as_ref().map_or_else(read, earlier);
+        match hashes.as_slice() {
             [] => String::new(),
-            [file] => file.sha256.clone(),
-            files => {
-                let mut hasher = Sha256::new();
-                for file in files {
-                    hasher.update(format!("{}\n", file.sha256));
-                }
-                hex::encode(hasher.finalize())
-            }
+            [hash] => hash.clone(),
+            hashes => crate::sha256(&hashes.iter().map(|hash| format!("{hash}\n")).collect::<String>()),
         }
     }
 }

@@ -15,7 +15,9 @@ const FOR_THREADS: usize = 100;
 /// Numbers of recordings with all threads.
 const RECORDINGS: [usize; 3] = [10, 100, 1000];
 /// The most recordings may take this many times the memory of the fewest.
-const FLAT: f64 = 1.25;
+const FLAT: f64 = 1.1;
+/// Time on a processor that a recording may take [s].
+const CPU_S: f64 = 0.04;
 
 pub fn section(options: &Options) -> Result<Section> {
     let folder = options.data.join("batch");
@@ -55,6 +57,15 @@ fn threads(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Sec
             format!("{:.0} %", 100.0 * efficiency),
             format!("{:.0} %", 100.0 * cost.spent.cpu_s / core_s),
         ]);
+        if threads == 1 {
+            let each_s = cost.spent.cpu_s / count as f64;
+            section.bar(Bar {
+                what: format!("CPU time of a recording in a batch of {count}, one thread"),
+                limit: format!("<= {CPU_S} s"),
+                measured: format!("{each_s:.3} s"),
+                met: each_s <= CPU_S,
+            });
+        }
         if threads == all {
             section.bar(Bar {
                 what: format!("batch of {count} recordings, efficiency of {threads} threads"),

@@ -9,6 +9,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -16,11 +17,11 @@ use std::path::{Path, PathBuf};
 pub const SERIES: usize = 4;
 /// theta, d, a, alpha [rad, m] of a UR10's rows.
 const ROWS: [[f64; 4]; 6] = [
-    [0.0, 0.1273, 0.0, 1.570_796_326_794_896_6],
+    [0.0, 0.1273, 0.0, FRAC_PI_2],
     [0.0, 0.0, -0.612, 0.0],
     [0.0, 0.0, -0.5723, 0.0],
-    [0.0, 0.163_941, 0.0, 1.570_796_326_794_896_6],
-    [0.0, 0.1157, 0.0, -1.570_796_326_794_896_6],
+    [0.0, 0.163_941, 0.0, FRAC_PI_2],
+    [0.0, 0.1157, 0.0, -FRAC_PI_2],
     [0.0, 0.0922, 0.0, 0.0],
 ];
 const NAMES: [&str; 6] = [

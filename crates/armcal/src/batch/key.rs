@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 /// Raised when results made from the same would be written differently.
-const FORMAT: &str = "armcal.batch/1";
+const FORMAT: &str = "armcal.batch/2";
 /// Format of what is remembered of a file.
-const SCHEMA: &str = "armcal.seen/1";
+const SCHEMA: &str = "armcal.seen/2";
 /// Where the hashes of files are remembered, below the campaign's folder.
 const SEEN: &str = ".inputs";
 
@@ -84,7 +84,10 @@ impl Keys {
         #[allow(clippy::disallowed_methods)]
         let known = std::fs::read(&memory).ok().and_then(|text| serde_json::from_slice::<Seen>(&text).ok());
         if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
-            let same = known.path == name && known.bytes == bytes && known.modified_ns == modified_ns;
+            let same = known.schema == SCHEMA
+                && known.path == name
+                && known.bytes == bytes
+                && known.modified_ns == modified_ns;
             // A file system without modification times cannot tell.
             if same && modified_ns != 0 {
                 return Ok(known.identity);

@@ -90,6 +90,9 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
             }
         };
         progress.advance(&entry.name());
+        if (i + 1) % memory::EVERY == 0 {
+            memory::give_back();
+        }
         (done, skipped)
     })?;
     let skipped = done.iter().filter(|(_, skipped)| *skipped).count();

@@ -93,7 +93,7 @@ fn file_line(file: &FileReport) -> String {
         file.chunks,
         shortened(&file.profile),
         shortened(&file.library),
-        identity(file),
+        file.identity,
     );
     if let Some(fetched) = file.fetched {
         let _ = write!(line, ", {:.2} MB read by {} requests", fetched.bytes as f64 / 1e6, fetched.requests);
@@ -105,14 +105,6 @@ fn file_line(file: &FileReport) -> String {
         let _ = write!(line, "\n    damaged at byte {offset}: {}", printable(reason));
     }
     line
-}
-
-/// The beginning of a hash is enough for people.
-fn identity(file: &FileReport) -> String {
-    match &file.object {
-        Some(object) => format!("etag {}, changed {}", object.etag, object.last_modified),
-        None => format!("sha256 {}", file.sha256.get(..12).unwrap_or(&file.sha256)),
-    }
 }
 
 fn channels(channels: &[ChannelReport]) -> Table {

@@ -263,8 +263,9 @@ fn count_once(found: Vec<Found>, warnings: &mut Vec<Warning>) -> Vec<Found> {
         let all = f.recording.observations.len();
         for (first, marks) in &kept {
             let before = f.recording.observations.len();
-            let in_first = |hash: &str| first.recording.files.iter().any(|file| file.sha256 == hash);
-            if f.recording.files.iter().all(|file| in_first(&file.sha256)) {
+            let in_first =
+                |identity: &str| first.recording.files.iter().any(|file| file.identity == identity);
+            if f.recording.files.iter().all(|file| in_first(&file.identity)) {
                 f.recording.observations.clear();
             } else {
                 let mut twice = also_in(&f.recording.marks(), marks).into_iter();

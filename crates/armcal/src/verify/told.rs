@@ -3,6 +3,7 @@
 use crate::stages::perceive::Seen;
 use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
 use armcal_model::{Chain, Model, PlacedEffect};
+use armcal_recording::{FileReport, sha256_of};
 use armcal_report::{DwellMark, PastModel, Told, also_in};
 use std::collections::BTreeMap;
 
@@ -11,9 +12,14 @@ pub fn told(past: &PastModel, seen: &[Seen]) -> Vec<Told> {
     let of = |s: &Seen| {
         let marks: Vec<DwellMark> =
             s.dwells.iter().map(|d| DwellMark::of(d.mid_ns(), &d.joint_rad)).collect();
-        let is_file = |identity: &String| past.recordings.iter().any(|r| r.sha256.contains(identity));
-        let identities: Vec<String> = s.report.files.iter().map(|f| f.identity()).collect();
-        if !identities.is_empty() && identities.iter().all(is_file) {
+        let known = |identity: &String| past.recordings.iter().any(|r| r.identity.contains(identity));
+        // A model of an earlier version knows files by their SHA-256, which has no name before it.
+        let by_sha256 = past.recordings.iter().flat_map(|r| &r.identity).any(|known| !known.contains(':'));
+        let is_file = |f: &FileReport| {
+            known(&f.identity)
+                || by_sha256 && f.object.is_none() && sha256_of(&f.path).is_ok_and(|hash| known(&hash))
+        };
+        if !s.report.files.is_empty() && s.report.files.iter().all(is_file) {
             return Some(Told { recording: s.name.clone(), dwells: marks.len(), all: marks.len() });
         }
         let known = past.recordings.iter().filter_map(|r| r.dwells.as_ref());

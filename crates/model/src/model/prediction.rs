@@ -56,13 +56,20 @@ impl Model {
         p: &[f64],
         observations: &[&Observation],
         asked: &Asked<'_>,
-        each: &mut dyn FnMut(&Observation, (ModelResidual, DMatrix<f64>)),
+        each: &mut dyn FnMut(&Observation, ModelResidual, DMatrix<f64>),
     ) {
         if self.scopes.is_some() {
-            return observations.iter().for_each(|o| each(o, self.residual_with_jacobian(p, o)));
+            for o in observations {
+                let (residual, jacobian) = self.residual_with_jacobian(p, o);
+                each(o, residual, jacobian);
+            }
+            return;
         }
         let at = Linearisation::of(self, p, observations, asked);
-        observations.iter().for_each(|o| each(o, at.residual_with_jacobian(o)));
+        for o in observations {
+            let (residual, jacobian) = at.residual_with_jacobian(o);
+            each(o, residual, jacobian);
+        }
     }
 
     /// d (predicted - measured) / d joint reading [m/rad] (prismatic: [m/m]), one column a joint, in the world: carries the

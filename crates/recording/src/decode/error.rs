@@ -5,6 +5,7 @@ use crate::shortened;
 
 /// Why a channel or a message cannot be decoded. The caller adds file and topic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum DecodeError {
     /// Nobody here reads this pair of encodings.
     #[error(
@@ -13,59 +14,29 @@ pub enum DecodeError {
         shortened(message),
         shortened(schema)
     )]
-    Encoding {
-        /// Schema encoding of the channel.
-        schema: String,
-        /// Message encoding of the channel.
-        message: String,
-    },
+    Encoding { schema: String, message: String },
     /// The schema text of the channel is unusable.
     #[error("the schema of {} in the file cannot be used: {}", shortened(schema), shortened(why))]
-    Schema {
-        /// Name of the schema.
-        schema: String,
-        /// What is wrong with it, with the line where there is one.
-        why: String,
-    },
+    Schema { schema: String, why: String },
     /// The schema is sound, but holds nothing armcal reads in any role.
     #[error(
         "{} holds no joints, pose or scalar that armcal knows (its fields: {})",
         shortened(schema),
         shortened(fields)
     )]
-    Unknown {
-        /// Name of the schema.
-        schema: String,
-        /// Its fields at the top, comma-separated.
-        fields: String,
-    },
+    Unknown { schema: String, fields: String },
     /// The schema is read in another role than the one asked for.
     #[error("{} holds {found}, not {wanted}: choose another topic for the {wanted}", shortened(schema))]
-    OtherRole {
-        /// Name of the schema.
-        schema: String,
-        /// The role asked for.
-        wanted: Role,
-        /// The role it has.
-        found: Role,
-    },
+    OtherRole { schema: String, wanted: Role, found: Role },
     /// A body was asked for on a channel whose messages do not name bodies.
     #[error(
         "{} does not name the body it tracks: remove `body = \"{body}\"` from this stream",
         shortened(schema)
     )]
-    NoBodyName {
-        /// Name of the schema.
-        schema: String,
-        /// The body asked for.
-        body: String,
-    },
+    NoBodyName { schema: String, body: String },
     /// Several bodies in a channel, and none or an ambiguous one asked for.
     #[error("several bodies on this channel, set `body` to one of: {}", listed(bodies))]
-    SeveralBodies {
-        /// The bodies, in the order of the message.
-        bodies: Vec<String>,
-    },
+    SeveralBodies { bodies: Vec<String> },
     /// The message ends before its schema does.
     #[error("message of {bytes} bytes ends inside a field that needs {needed} bytes at byte {at}")]
     Truncated {
@@ -80,42 +51,24 @@ pub enum DecodeError {
     #[error(
         "CDR encapsulation {id:#06x} is not read; supported are plain CDR, plain CDR2 and delimited CDR2"
     )]
-    Encapsulation {
-        /// Representation identifier.
-        id: u16,
-    },
+    Encapsulation { id: u16 },
     /// The bytes are not a message of the declared encoding.
     #[error("not a valid {encoding} message: {why}")]
-    Malformed {
-        /// Message encoding.
-        encoding: &'static str,
-        /// What was seen.
-        why: String,
-    },
+    Malformed { encoding: &'static str, why: String },
     /// A field that is needed is absent from this message.
     #[error("the message has no {field}")]
-    Missing {
-        /// What is missing.
-        field: String,
-    },
+    Missing { field: String },
     /// Two lists that belong together differ in length.
     #[error("the message has {positions} positions but {others} {of}")]
     Lengths {
-        /// Number of positions.
         positions: usize,
-        /// Number of the others.
         others: usize,
         /// What the others are: `names` or `efforts`.
         of: &'static str,
     },
     /// The rows given are of another role than the plan.
     #[error("a plan for {plan} was given rows for {rows}")]
-    RowsOfOtherRole {
-        /// Role of the plan.
-        plan: Role,
-        /// Role of the rows.
-        rows: Role,
-    },
+    RowsOfOtherRole { plan: Role, rows: Role },
 }
 
 /// At most twenty names.

@@ -21,7 +21,7 @@ mod types;
 mod wire;
 
 pub use error::DecodeError;
-pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRow, ScalarRows};
+pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRows};
 
 use binary::Encoding;
 use shapes::{Shape, Wanted};

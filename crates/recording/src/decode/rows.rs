@@ -39,7 +39,7 @@ impl Rows {
         match self {
             Rows::Joints(rows) => rows.len(),
             Rows::Pose(rows) => rows.len(),
-            Rows::Scalar(rows) => rows.len(),
+            Rows::Scalar(rows) => rows.value.len(),
         }
     }
 
@@ -286,37 +286,6 @@ pub struct ScalarRows {
     pub stamp_ns: Vec<Option<i64>>,
     /// The number, in the message's unit.
     pub value: Vec<f64>,
-}
-
-/// One row of [`ScalarRows`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ScalarRow {
-    /// Header stamp [ns]; `None` where the message has none.
-    pub stamp_ns: Option<i64>,
-    /// The number, in the message's unit.
-    pub value: f64,
-}
-
-impl ScalarRows {
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.stamp_ns.len()
-    }
-
-    /// Whether there are no rows.
-    pub fn is_empty(&self) -> bool {
-        self.stamp_ns.is_empty()
-    }
-
-    /// Row `i`. Panics beyond [`len`](Self::len), like a slice.
-    pub fn row(&self, i: usize) -> ScalarRow {
-        ScalarRow { stamp_ns: self.stamp_ns[i], value: self.value[i] }
-    }
-
-    /// All rows in order.
-    pub fn rows(&self) -> impl ExactSizeIterator<Item = ScalarRow> + '_ {
-        (0..self.len()).map(|i| self.row(i))
-    }
 }
 
 /// Numbers byte strings in order of appearance; the one seen last is found without a search.

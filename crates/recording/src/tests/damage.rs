@@ -48,10 +48,20 @@ fn the_report_hashes_the_file() {
     // sha256sum of the three letters "abc", FIPS 180-2 appendix B.1.
     let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
     let disk = OnDisk::new(&[b"abc".to_vec()]);
-    let map = crate::map::Map::of(&std::fs::File::open(disk.path("part_0.mcap")).expect("there"));
-    assert_eq!(map.expect("mapped").sha256_hex(), abc);
-    let recording = open(&mcap_bytes(&[opaque("/a", 3)], &Style::default()));
-    assert_eq!(recording.report().files[0].sha256.len(), 64);
+    assert_eq!(crate::sha256_of(&disk.path("part_0.mcap")).expect("readable"), abc);
+    // b3sum of the same; and of a recording of many pieces, whoever has hashed them and when.
+    let abc = "blake3:6437b3ac38465133ffb63b75273a8db548c558465d79db03fd359c6cd5bd9d85";
+    assert_eq!(crate::identity_of(&disk.path("part_0.mcap")).expect("readable"), abc);
+    for style in [Style::default(), Style { summary: false, ..Style::default() }] {
+        let bytes = mcap_bytes(&[opaque("/a", 30_000)], &style);
+        assert!(bytes.len() > 1 << 20);
+        let expected = format!("blake3:{}", blake3::hash(&bytes).to_hex());
+        let disk = OnDisk::new(&[bytes]);
+        let open = || disk.open().expect("an MCAP file");
+        assert_eq!(open().report().files[0].identity, expected);
+        assert_eq!(open().without_identity().report().files[0].identity, expected);
+        assert_eq!(crate::identity_of(&disk.path("part_0.mcap")).expect("readable"), expected);
+    }
 }
 
 #[test]

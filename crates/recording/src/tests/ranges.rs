@@ -63,7 +63,7 @@ fn every_layout_gives_the_messages_that_a_map_gives() {
                 assert_eq!(raw_count(&ranged), N + N / 2, "{style:?}");
                 let (report, of_map) = (ranged.report(), mapped.report());
                 assert_eq!(report.channels, of_map.channels, "{style:?}");
-                assert_eq!(report.files[0].sha256, of_map.files[0].sha256);
+                assert_eq!(report.files[0].identity, of_map.files[0].identity);
                 assert!(of_map.files[0].fetched.is_none());
                 let lost = report.warnings.iter().any(|w| w.severity > Severity::Notice);
                 assert!(!lost && report.warnings.len() == usize::from(!summary), "{style:?}: {report:?}");

@@ -22,7 +22,7 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         recording: recording.name.clone(),
         paths: recording.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect(),
         bytes: recording.files().iter().map(|f| f.bytes).sum(),
-        identity: recording.files().into_iter().map(|f| f.sha256).collect(),
+        identity: recording.files().into_iter().map(|f| f.identity).collect(),
         load_kg,
         start_ns: recording.dwells.first().map_or(0, |d| d.mid_ns()),
         end_ns: recording.dwells.last().map_or(0, |d| d.mid_ns()),

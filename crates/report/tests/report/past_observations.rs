@@ -1,7 +1,7 @@
 use crate::synthetic::synthetic;
 use armcal_core::{Observation, Reference};
 use armcal_report::{
-    BoardFacts, OBSERVATIONS_FILE, OutputConfig, PastObservations, observations_json, write_all,
+    BoardFacts, OBSERVATIONS_FILE, OutputConfig, PastModel, PastObservations, observations_json, write_all,
 };
 
 #[test]
@@ -28,13 +28,28 @@ fn what_a_fit_saw_comes_back_to_the_last_bit() {
     let start = s.run.model.nominal();
     for (index, (then, now)) in past.recordings.iter().zip(&s.run.recordings).enumerate() {
         assert_eq!((&then.name, then.dwells), (&now.name, now.dwells.len()));
-        let hashes: Vec<&str> = now.report.files.iter().map(|f| f.sha256.as_str()).collect();
-        assert_eq!(then.files.iter().map(|f| f.sha256.as_str()).collect::<Vec<_>>(), hashes);
+        let hashes: Vec<&str> = now.report.files.iter().map(|f| f.identity.as_str()).collect();
+        assert_eq!(then.files.iter().map(|f| f.identity.as_str()).collect::<Vec<_>>(), hashes);
         assert_eq!(then.base.pose(), s.run.model.base_in_world(&start));
         assert_eq!(then.board.as_ref().map(|b| b.pose()), s.run.model.board_in_world(&start, index));
     }
     let text = std::fs::read_to_string(out.join(OBSERVATIONS_FILE)).unwrap();
     assert_eq!(text, observations_json(&s.run).unwrap());
+
+    // As an earlier version wrote them: files by their SHA-256.
+    let earlier = s.folder.path().join("earlier");
+    std::fs::create_dir(&earlier).unwrap();
+    for file in [OBSERVATIONS_FILE, "model.json"] {
+        let text = std::fs::read_to_string(out.join(file)).unwrap();
+        assert!(text.contains("\"identity\":") && !text.contains("\"sha256\":"), "{file}");
+        std::fs::write(earlier.join(file), text.replace("\"identity\":", "\"sha256\":")).unwrap();
+    }
+    let before = PastObservations::open(&earlier.join(OBSERVATIONS_FILE)).unwrap();
+    let files =
+        |past: &PastObservations| past.recordings.iter().flat_map(|r| r.files.clone()).collect::<Vec<_>>();
+    assert_eq!(files(&before), files(&past));
+    let files = |folder: &std::path::Path| PastModel::open(folder).unwrap().recordings[0].identity.clone();
+    assert_eq!(files(&earlier), files(&out));
 }
 
 #[test]

@@ -186,7 +186,10 @@ fn attachments_and_metadata_are_the_inputs_and_ours() {
     assert_eq!(metadata[1].metadata["operator"], "ü1");
     assert_eq!(metadata[3].metadata["holdout.seed"], "7");
     assert_eq!(metadata[4].metadata["recording2.name"], HOSTILE);
-    assert_eq!(metadata[4].metadata["recording1.file0.sha256"], s.run.recordings[1].report.files[0].sha256);
+    assert_eq!(
+        metadata[4].metadata["recording1.file0.identity"],
+        s.run.recordings[1].report.files[0].identity
+    );
 }
 
 #[test]

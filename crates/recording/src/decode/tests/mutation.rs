@@ -98,7 +98,10 @@ fn rows_from(rows: &Rows, start: usize) -> Vec<String> {
     match rows {
         Rows::Joints(rows) => rows.rows().skip(start).map(|row| format!("{row:?}")).collect(),
         Rows::Pose(rows) => rows.rows().skip(start).map(|row| format!("{row:?}")).collect(),
-        Rows::Scalar(rows) => rows.rows().skip(start).map(|row| format!("{row:?}")).collect(),
+        Rows::Scalar(rows) => {
+            let rows = rows.stamp_ns.iter().zip(&rows.value);
+            rows.skip(start).map(|row| format!("{row:?}")).collect()
+        }
     }
 }
 

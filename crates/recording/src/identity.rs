@@ -1,0 +1,90 @@
+//! What tells the content of a file from any other: its BLAKE3, which `b3sum` prints too.
+//!
+//! BLAKE3 is a tree (O'Connor, Aumasson, Neves, Wilcox-O'Hearn 2020, section 2.1): its parts are hashed in any order by
+//! any thread, and give the same hash. So a pass over a file hashes each piece while the processor has it at hand; only
+//! what no pass came by is read for the hash alone.
+
+use blake3::hazmat::{ChainingValue, HasherExt as _, Mode, merge_subtrees_non_root, merge_subtrees_root};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// A power of two of BLAKE3's chunks of 1 KiB, so that each piece is a subtree.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// The hashes of the pieces of one file, as far as they are known.
+pub(crate) struct Pieces(Vec<OnceLock<ChainingValue>>);
+
+impl Pieces {
+    /// None known yet of a file of this size.
+    pub fn of(bytes: usize) -> Pieces {
+        Pieces((0..bytes.div_ceil(PIECE_BYTES)).map(|_| OnceLock::new()).collect())
+    }
+
+    /// Hashes the pieces that begin in a range of the file.
+    pub fn hash(&self, file: &[u8], begin_in: &Range<usize>) {
+        let end = begin_in.end.div_ceil(PIECE_BYTES).min(self.0.len());
+        for piece in begin_in.start.div_ceil(PIECE_BYTES)..end {
+            self.0[piece].get_or_init(|| {
+                let start = piece * PIECE_BYTES;
+                let bytes = &file[start..file.len().min(start + PIECE_BYTES)];
+                blake3::Hasher::new().set_input_offset(start as u64).update(bytes).finalize_non_root()
+            });
+        }
+    }
+
+    /// The identity. What no pass came by is hashed now; `passed` is told of it.
+    pub fn identity(&self, file: &[u8], passed: impl Fn(Range<usize>) + Sync) -> String {
+        self.0.par_iter().enumerate().filter(|(_, piece)| piece.get().is_none()).for_each(|(piece, _)| {
+            let range = piece * PIECE_BYTES..(piece + 1) * PIECE_BYTES;
+            self.hash(file, &range);
+            passed(range);
+        });
+        let known: Vec<ChainingValue> = self.0.iter().filter_map(|piece| piece.get().copied()).collect();
+        named(match halves(&known) {
+            Some((left, right)) => merge_subtrees_root(&subtree(left), &subtree(right), Mode::Hash),
+            None => blake3::hash(file),
+        })
+    }
+}
+
+/// By the name of the hash, so that nobody takes it for another.
+pub(crate) fn named(hash: blake3::Hash) -> String {
+    format!("blake3:{}", hash.to_hex())
+}
+
+fn subtree(pieces: &[ChainingValue]) -> ChainingValue {
+    match halves(pieces) {
+        Some((left, right)) => merge_subtrees_non_root(&subtree(left), &subtree(right), Mode::Hash),
+        None => pieces.first().copied().unwrap_or_default(),
+    }
+}
+
+/// The left half is as large as a power of two can be that leaves something to the right.
+fn halves(pieces: &[ChainingValue]) -> Option<(&[ChainingValue], &[ChainingValue])> {
+    (pieces.len() > 1).then(|| pieces.split_at(pieces.len().next_power_of_two() / 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_in_any_order_give_the_blake3_of_the_file() {
+        for bytes in [1, 1000, PIECE_BYTES, PIECE_BYTES + 1, 3 * PIECE_BYTES, 5 * PIECE_BYTES + 12_345] {
+            let file: Vec<u8> =
+                (0..bytes as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+            let pieces = Pieces::of(bytes);
+            let mut rest = bytes;
+            // From the end, in stretches that end in the middle of pieces.
+            while rest > 0 {
+                let start = rest.saturating_sub(PIECE_BYTES / 3 + 7);
+                pieces.hash(&file, &(start..rest));
+                rest = start;
+            }
+            let expected = named(blake3::hash(&file));
+            assert_eq!(pieces.identity(&file, |_| panic!("all are hashed")), expected, "{bytes}");
+            assert_eq!(Pieces::of(bytes).identity(&file, drop), expected, "{bytes}");
+        }
+    }
+}
