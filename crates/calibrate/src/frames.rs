@@ -10,7 +10,7 @@ use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, fit};
-use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Role};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Role};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -170,11 +170,7 @@ pub(crate) fn touched_frames(model: &Model, observations: &[&Observation]) -> Ve
     let against: BTreeSet<Against> = observations.iter().filter_map(|o| o.against()).collect();
     let is_used = |place: &usize| against.contains(&Against::Fixed(*place));
     touched.extend(model.places().filter(|(k, ..)| is_used(k)).map(|(_, name, _)| name.to_owned()));
-    let counted = |length: &usize| {
-        observations
-            .iter()
-            .any(|o| matches!(o.reference, Reference::Apart { length: own, .. } if own == *length))
-    };
+    let counted = |length: &usize| observations.iter().any(|o| o.length() == Some(*length));
     let lengths = model.lengths().enumerate().filter(|(k, _)| counted(k));
     touched.extend(lengths.map(|(_, (name, _))| name.to_owned()));
     let observed: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();
@@ -450,7 +446,7 @@ fn mean_orientation(
 ) -> UnitQuaternion<f64> {
     let mut sum = Matrix3::zeros();
     for (o, frame) in observations.iter().zip(frames) {
-        if let Reference::Tracked { orientation: Some(measured), .. } = &o.reference {
+        if let Some((measured, _)) = o.seen_orientation() {
             sum += (frame.rotation.inverse() * measured).to_rotation_matrix().into_inner();
         }
     }

@@ -9,7 +9,7 @@ use crate::joined::scale;
 use crate::poses::measured_together;
 use crate::problem::{Known, Linearised, Problem, Symmetry};
 use crate::{CalibrateError, FitConfig, Objective};
-use armcal_core::{Observation, Parameter, Reference};
+use armcal_core::{Observation, Parameter};
 use armcal_model::{Asked, Model, ModelResidual};
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use std::ops::Range;
@@ -141,14 +141,8 @@ impl<'a> ModelProblem<'a> {
 
     /// The rows of an observation that are used.
     fn rows(&self, o: &Observation) -> usize {
-        match &o.reference {
-            Reference::Tracked { orientation: Some(_), orientation_sigma_rad, .. }
-                if self.use_orientation && *orientation_sigma_rad > 0.0 =>
-            {
-                6
-            }
-            _ => o.position_rows(),
-        }
+        let is_known = |(_, sigma_rad): (_, f64)| self.use_orientation && sigma_rad > 0.0;
+        if o.seen_orientation().is_some_and(is_known) { 6 } else { o.position_rows() }
     }
 
     /// The rows of each observation among those of all, in the order given.
@@ -211,8 +205,8 @@ impl<'a> ModelProblem<'a> {
         }
         let mut covariance = DMatrix::zeros(rows, rows);
         covariance.view_mut((0, 0), (3, 3)).copy_from(&o.covariance_m2);
-        if let Reference::Tracked { orientation_sigma_rad, .. } = &o.reference {
-            (3..rows).for_each(|k| covariance[(k, k)] = orientation_sigma_rad.powi(2));
+        if let Some((_, sigma_rad)) = o.seen_orientation() {
+            (3..rows).for_each(|k| covariance[(k, k)] = sigma_rad.powi(2));
         }
         covariance
     }
@@ -376,18 +370,7 @@ pub(crate) fn describe(o: &Observation) -> String {
 fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
     let observation = describe(o);
     check_joints(o, &observation)?;
-    let (what, values): (&'static str, Vec<f64>) = match &o.reference {
-        Reference::Seated { in_board_m, .. } => {
-            ("the position of the cavity", in_board_m.iter().copied().collect())
-        }
-        Reference::Tracked { position_m, .. } => {
-            ("the measured position", position_m.iter().copied().collect())
-        }
-        Reference::Apart { reading_m, .. } | Reference::Above { reading_m, .. } => {
-            ("the reading", vec![*reading_m])
-        }
-        Reference::Joined { .. } => ("nothing", Vec::new()),
-    };
+    let (what, values) = o.measured_values();
     if !values.iter().all(|v| v.is_finite()) {
         return Err(not_finite(o, &observation, what));
     }

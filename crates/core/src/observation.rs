@@ -1,62 +1,8 @@
 //! What the fit sees: a joint reading and a reference for where the tip was.
 
-use crate::{Arrival, DwellId};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-/// How the true position of the tip is known.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Reference {
-    /// The tip is seated in a cavity of the board; the board's pose is a frame of the model.
-    Seated {
-        /// Name of the cavity on the board.
-        cavity: String,
-        /// Centre of the seated tip in the frame of the (tilted) board [m].
-        in_board_m: Vector3<f64>,
-    },
-    /// A sensor saw the tip, in the sensor's frame.
-    Tracked {
-        /// Position of the tracked body [m].
-        position_m: Vector3<f64>,
-        /// Orientation of the tracked body, where it is used.
-        orientation: Option<UnitQuaternion<f64>>,
-        /// Standard error of the orientation per axis [rad]; infinite, in JSON `null`, where there is none.
-        #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
-        orientation_sigma_rad: f64,
-    },
-    /// It is in one point with another place of the model.
-    Joined {
-        /// The other place.
-        to: Against,
-    },
-    /// Its distance from another place was measured: `p[length] + reading`, as of a rigid link, or of a ballbar.
-    Apart {
-        /// The other place.
-        from: Against,
-        /// Which of the model's lengths, by its place among them.
-        length: usize,
-        /// What an instrument shows beyond that length [m]; zero without one.
-        reading_m: f64,
-    },
-    /// Its height above a plane was measured, along the plane's z axis: zero where it touches, else what a gauge shows.
-    Above {
-        /// Which of the model's fixed places.
-        plane: usize,
-        /// The height [m].
-        reading_m: f64,
-    },
-}
-
-/// A place that something can be measured against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Against {
-    /// A point of the arms.
-    Feature(FeatureId),
-    /// A point or a plane that is fixed in the world, by its place among the model's.
-    Fixed(usize),
-}
+use crate::{Against, Arrival, DwellId, Reference};
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 /// A point of the arm that is measured, by its place among the model's: the tip first (one of each arm), then the markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
@@ -133,13 +79,6 @@ pub struct Observation {
     pub covariance_m2: Matrix3<f64>,
 }
 
-impl Reference {
-    /// A position the sensor saw [m], its frame; no orientation.
-    pub fn position(position_m: Vector3<f64>) -> Reference {
-        Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 }
-    }
-}
-
 impl Observation {
     /// A joint reading [rad] and where the tip was; both exact, and nothing else known about the dwell.
     pub fn bare(dwell: DwellId, joint_rad: Vec<f64>, reference: Reference) -> Observation {
@@ -178,73 +117,25 @@ impl Observation {
         self.more_loads.iter().fold(self.load_kg, |sum, load| sum + load.kg)
     }
 
-    /// The cavity, if the tip was seated.
-    pub fn cavity(&self) -> Option<&str> {
-        match &self.reference {
-            Reference::Seated { cavity, .. } => Some(cavity),
-            _ => None,
-        }
-    }
-
-    /// Centre of the cavity that the tip was seated in, in the frame of the board [m].
-    pub fn in_board_m(&self) -> Option<&Vector3<f64>> {
-        match &self.reference {
-            Reference::Seated { in_board_m, .. } => Some(in_board_m),
-            _ => None,
-        }
-    }
-
-    /// Where a sensor saw it [m].
-    pub fn seen_m(&self) -> Option<&Vector3<f64>> {
-        match &self.reference {
-            Reference::Tracked { position_m, .. } => Some(position_m),
-            _ => None,
-        }
-    }
-
-    /// Whether a sensor saw where it was.
-    pub fn is_tracked(&self) -> bool {
-        matches!(self.reference, Reference::Tracked { .. })
-    }
-
-    /// The place of the model that it was measured against; none of what a sensor saw, or of a cavity.
-    pub fn against(&self) -> Option<Against> {
-        match self.reference {
-            Reference::Joined { to } => Some(to),
-            Reference::Apart { from, .. } => Some(from),
-            Reference::Above { plane, .. } => Some(Against::Fixed(plane)),
-            Reference::Seated { .. } | Reference::Tracked { .. } => None,
-        }
-    }
-
     /// What was measured; a dwell has one observation of each.
     pub fn what(&self) -> Measured {
         (self.feature, self.against())
     }
 
-    /// Whether two points of the arms are each other's reference.
-    pub fn is_joined(&self) -> bool {
-        matches!(self.against(), Some(Against::Feature(_)))
-    }
-
-    /// Whether one number was measured, a distance or a height, and not a position.
-    pub fn is_scalar(&self) -> bool {
-        matches!(self.reference, Reference::Apart { .. } | Reference::Above { .. })
+    /// Whether a sensor saw where it was.
+    pub fn is_tracked(&self) -> bool {
+        self.seen_m().is_some()
     }
 
     /// Rows of position: one of a distance or a height, three otherwise.
     pub fn position_rows(&self) -> usize {
         if self.is_scalar() { 1 } else { 3 }
     }
-}
 
-/// A number, or nothing for infinity, which JSON does not have.
-fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    value.is_finite().then_some(*value).serialize(serializer)
-}
-
-fn finite_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    /// Whether two points of the arms are each other's reference.
+    pub fn is_joined(&self) -> bool {
+        matches!(self.against(), Some(Against::Feature(_)))
+    }
 }
 
 /// A dwell that does not take part in the fit. It stays visible in every output.

@@ -14,7 +14,7 @@ use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frame, Frames, Marker, Masses, ModelError};
-use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Unit};
 use features::Feature;
 pub use features::LinkFrame;
 pub use scopes::RecordingStart;
@@ -238,12 +238,12 @@ impl Model {
     /// That there is what an observation was measured against.
     fn check_against(&self, o: &Observation) -> Result<(), ModelError> {
         let unknown = |what, index, known| Err(ModelError::NoPlace { dwell: o.dwell, what, index, known });
-        match (o.against(), &o.reference) {
+        match (o.against(), o.length()) {
             (Some(Against::Fixed(place)), _) if place >= self.fixed.len() => {
                 unknown("place", place, self.fixed.len())
             }
-            (_, Reference::Apart { length, .. }) if *length >= self.lengths.len() => {
-                unknown("length", *length, self.lengths.len())
+            (_, Some(length)) if length >= self.lengths.len() => {
+                unknown("length", length, self.lengths.len())
             }
             _ => Ok(()),
         }

@@ -2,7 +2,7 @@
 
 use crate::run::Run;
 use crate::text::{millimetres, printable};
-use armcal_core::{Against, Observation, Reference};
+use armcal_core::{Against, Observation};
 use serde::Serialize;
 
 /// How the words for a direction begin in which both arms grow together.
@@ -38,10 +38,7 @@ impl<'a> TwoArms<'a> {
 
 /// The length of the link between the tips [m]; none where they are in one point.
 fn link_length_m(run: &Run, p: &[f64]) -> Option<f64> {
-    let length = |o: &Observation| match o.reference {
-        Reference::Apart { from: Against::Feature(_), length, .. } => Some(length),
-        _ => None,
-    };
+    let length = |o: &Observation| o.length().filter(|_| o.is_joined());
     let length = run.observations.iter().find_map(length)?;
     run.model.lengths().nth(length).map(|(_, index)| p[index])
 }

@@ -45,7 +45,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for BoardScale {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        if let Reference::Seated { in_board_m, .. } = &x.observation.reference {
+        if let Some(in_board_m) = x.observation.in_board_m() {
             change.seat_m.x += theta[0] * in_board_m.x;
             change.seat_m.y += theta[1] * in_board_m.y;
         }

@@ -62,7 +62,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for BoardShift {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let Reference::Seated { in_board_m, .. } = &x.observation.reference else { return };
+        let Some(in_board_m) = x.observation.in_board_m() else { return };
         let recording = x.observation.dwell.recording;
         let middle_m = self.middles_m.get(&recording).copied().unwrap_or_else(Vector3::zeros);
         let arm_m = (in_board_m - middle_m).map(D::from);

@@ -7,5 +7,5 @@ pub(super) use super::placing::{ARM, Placing, amplitude, amplitudes_wave, amplit
 pub(super) use super::shares::Shares;
 pub(super) use super::state::{LED, REST, SEATED};
 pub(super) use crate::rigid::Scalar;
-pub(super) use armcal_core::{Observation, Reference, Unit};
+pub(super) use armcal_core::{Observation, Unit};
 pub(super) use nalgebra::Vector3;

@@ -58,8 +58,8 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 impl SeatOffset {
     /// Where the offset of the observation's cavity begins.
     fn first(&self, x: &Drivers<'_>) -> Option<usize> {
-        let Reference::Seated { cavity, .. } = &x.observation.reference else { return None };
-        self.cavities.binary_search(cavity).ok().map(|index| 3 * index)
+        let cavity = x.observation.cavity()?;
+        self.cavities.binary_search_by(|own| own.as_str().cmp(cavity)).ok().map(|index| 3 * index)
     }
 }
 

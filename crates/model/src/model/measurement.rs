@@ -98,10 +98,7 @@ impl Sides {
 impl Model {
     /// Index of the length that the distance of an observation counts from.
     pub(super) fn length_of(&self, o: &Observation) -> Option<usize> {
-        match o.reference {
-            Reference::Apart { length, .. } => self.lengths.get(length).copied(),
-            _ => None,
-        }
+        self.lengths.get(o.length()?).copied()
     }
 
     /// What a distance or a height should be [m]; zero where the tip should be in a point.

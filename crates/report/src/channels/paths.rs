@@ -4,7 +4,7 @@ use super::shapes::{at, pose};
 use super::{Messages, WORLD, start_ns, timestamp, to_sensor_ns};
 use crate::points::Point;
 use crate::run::RecordingRun;
-use armcal_core::{Pose, Reference};
+use armcal_core::Pose;
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 
@@ -32,13 +32,14 @@ pub(super) fn put(recording: &RecordingRun, points: &[&Point], out: &mut Message
 /// The measured tip; published when the sensor says it saw it.
 fn put_tip(recording: &RecordingRun, point: &Point, out: &mut Messages) {
     let time_ns = point.observation.time_ns;
-    let (publish_ns, tip) = match &point.observation.reference {
-        Reference::Tracked { orientation, .. } => {
+    let (publish_ns, tip) = match point.observation.is_tracked() {
+        true => {
             let stamp_ns = recording.clock.as_ref().map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
-            let rotation = orientation.unwrap_or_default();
+            let rotation =
+                point.observation.seen_orientation().map_or_else(Default::default, |(seen, _)| *seen);
             (stamp_ns, pose(&Pose::from_parts(point.measured_m.into(), rotation)))
         }
-        _ => (time_ns, at(&point.measured_m)),
+        false => (time_ns, at(&point.measured_m)),
     };
     let message =
         fox::PoseInFrame { timestamp: Some(timestamp(time_ns)), frame_id: WORLD.into(), pose: Some(tip) };

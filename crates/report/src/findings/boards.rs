@@ -4,8 +4,8 @@ use crate::channels::count;
 use crate::points::{Point, extent};
 use crate::proto::BoardErrors;
 use crate::run::Run;
+use armcal_core::Pose;
 use armcal_core::robust::percentile;
-use armcal_core::{Pose, Reference};
 use nalgebra::Vector3;
 
 /// Distances between neighbouring cavities that a large error vector may cover: shorter ones cannot be seen in a panel that
@@ -33,7 +33,7 @@ pub(super) fn board_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Ve
 fn drawable(p: &Point) -> bool {
     let numbers =
         p.steps_m.iter().chain([&p.residual.nominal_m, &p.residual.fitted_m]).flat_map(Vector3::iter);
-    matches!(p.observation.reference, Reference::Seated { .. }) && numbers.copied().all(f64::is_finite)
+    p.observation.cavity().is_some() && numbers.copied().all(f64::is_finite)
 }
 
 fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnification: f64) -> BoardErrors {
@@ -44,8 +44,10 @@ fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnificatio
         ..Default::default()
     };
     for p in own {
-        let Reference::Seated { cavity, in_board_m } = &p.observation.reference else { continue };
-        m.cavity.push(cavity.clone());
+        let Some((cavity, in_board_m)) = p.observation.cavity().zip(p.observation.in_board_m()) else {
+            continue;
+        };
+        m.cavity.push(cavity.to_owned());
         m.dwell.push(count(p.observation.dwell.dwell));
         m.x_mm.push(in_board_m.x * 1e3);
         m.y_mm.push(in_board_m.y * 1e3);

@@ -9,7 +9,7 @@ pub use bodies::still_tip;
 
 use super::trial::Inputs;
 use crate::story::Fitted;
-use armcal_core::{Certainty, Observation, Pose, Reference, Role, SetupFinding};
+use armcal_core::{Certainty, Observation, Pose, Role, SetupFinding};
 use armcal_table::Tilt;
 use nalgebra::{Matrix3, Vector3};
 
@@ -68,10 +68,7 @@ fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
     let Some(board) = inputs.board.as_ref().filter(|b| b.mechanism.is_some()) else { return Vec::new() };
     let values = fitted.calibration.fit.values();
     let pose = |r: usize| -> Option<(Pose, Pose)> {
-        let seated_m = |o: &Observation| match &o.reference {
-            Reference::Seated { in_board_m, .. } if o.dwell.recording == r => Some(*in_board_m),
-            _ => None,
-        };
+        let seated_m = |o: &Observation| o.in_board_m().copied().filter(|_| o.dwell.recording == r);
         let seated_m: Vec<Vector3<f64>> = fitted.observations.iter().filter_map(seated_m).collect();
         if seated_m.len() < 4 || width_m(&seated_m) < FLAT_M {
             return None;

@@ -1,0 +1,148 @@
+//! What an observation is measured against: the one place where its kinds are told apart, beside the rows that the model makes
+//! of them.
+
+use crate::{FeatureId, Observation};
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// How the true position of the tip is known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Reference {
+    /// The tip is seated in a cavity of the board; the board's pose is a frame of the model.
+    Seated {
+        /// Name of the cavity on the board.
+        cavity: String,
+        /// Centre of the seated tip in the frame of the (tilted) board [m].
+        in_board_m: Vector3<f64>,
+    },
+    /// A sensor saw the tip, in the sensor's frame.
+    Tracked {
+        /// Position of the tracked body [m].
+        position_m: Vector3<f64>,
+        /// Orientation of the tracked body, where it is used.
+        orientation: Option<UnitQuaternion<f64>>,
+        /// Standard error of the orientation per axis [rad]; infinite, in JSON `null`, where there is none.
+        #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
+        orientation_sigma_rad: f64,
+    },
+    /// It is in one point with another place of the model.
+    Joined {
+        /// The other place.
+        to: Against,
+    },
+    /// Its distance from another place was measured: `p[length] + reading`, as of a rigid link, or of a ballbar.
+    Apart {
+        /// The other place.
+        from: Against,
+        /// Which of the model's lengths, by its place among them.
+        length: usize,
+        /// What an instrument shows beyond that length [m]; zero without one.
+        reading_m: f64,
+    },
+    /// Its height above a plane was measured, along the plane's z axis: zero where it touches, else what a gauge shows.
+    Above {
+        /// Which of the model's fixed places.
+        plane: usize,
+        /// The height [m].
+        reading_m: f64,
+    },
+}
+
+/// A place that something can be measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// A point of the arms.
+    Feature(FeatureId),
+    /// A point or a plane that is fixed in the world, by its place among the model's.
+    Fixed(usize),
+}
+
+impl Reference {
+    /// A position the sensor saw [m], its frame; no orientation.
+    pub fn position(position_m: Vector3<f64>) -> Reference {
+        Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 }
+    }
+}
+
+/// What the kind of its reference says of an observation; everybody else asks these.
+impl Observation {
+    /// The cavity, if the tip was seated.
+    pub fn cavity(&self) -> Option<&str> {
+        match &self.reference {
+            Reference::Seated { cavity, .. } => Some(cavity),
+            _ => None,
+        }
+    }
+
+    /// Centre of the cavity that the tip was seated in, in the frame of the board [m].
+    pub fn in_board_m(&self) -> Option<&Vector3<f64>> {
+        match &self.reference {
+            Reference::Seated { in_board_m, .. } => Some(in_board_m),
+            _ => None,
+        }
+    }
+
+    /// Where a sensor saw it [m].
+    pub fn seen_m(&self) -> Option<&Vector3<f64>> {
+        match &self.reference {
+            Reference::Tracked { position_m, .. } => Some(position_m),
+            _ => None,
+        }
+    }
+
+    /// How a sensor saw it turned, and the standard error of that about each axis [rad].
+    pub fn seen_orientation(&self) -> Option<(&UnitQuaternion<f64>, f64)> {
+        match &self.reference {
+            Reference::Tracked { orientation, orientation_sigma_rad, .. } => {
+                Some((orientation.as_ref()?, *orientation_sigma_rad))
+            }
+            _ => None,
+        }
+    }
+
+    /// The place of the model that it was measured against; none of what a sensor saw, or of a cavity.
+    pub fn against(&self) -> Option<Against> {
+        match self.reference {
+            Reference::Joined { to } => Some(to),
+            Reference::Apart { from, .. } => Some(from),
+            Reference::Above { plane, .. } => Some(Against::Fixed(plane)),
+            Reference::Seated { .. } | Reference::Tracked { .. } => None,
+        }
+    }
+
+    /// Which of the model's lengths a distance counts from.
+    pub fn length(&self) -> Option<usize> {
+        match self.reference {
+            Reference::Apart { length, .. } => Some(length),
+            _ => None,
+        }
+    }
+
+    /// Whether one number was measured, a distance or a height, and not a position.
+    pub fn is_scalar(&self) -> bool {
+        matches!(self.reference, Reference::Apart { .. } | Reference::Above { .. })
+    }
+
+    /// What was measured, in words, and its coordinates or the one number [m]; none of what is only joined.
+    pub fn measured_values(&self) -> (&'static str, &[f64]) {
+        match &self.reference {
+            Reference::Seated { in_board_m, .. } => ("the position of the cavity", in_board_m.as_slice()),
+            Reference::Tracked { position_m, .. } => ("the measured position", position_m.as_slice()),
+            Reference::Apart { reading_m, .. } | Reference::Above { reading_m, .. } => {
+                ("the reading", std::slice::from_ref(reading_m))
+            }
+            Reference::Joined { .. } => ("nothing", &[]),
+        }
+    }
+}
+
+/// A number, or nothing for infinity, which JSON does not have.
+fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    value.is_finite().then_some(*value).serialize(serializer)
+}
+
+fn finite_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+}
