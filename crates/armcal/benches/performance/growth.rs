@@ -42,7 +42,7 @@ pub fn section(options: &Options) -> Result<Section> {
         table.row([poses.to_string()].into_iter().chain(cells(0)).chain(cells(1)));
         for (_, diagnosed, most_s, most_mib) in BARS.iter().filter(|bar| bar.0 == poses) {
             let cost = &costs[usize::from(*diagnosed)];
-            let what = if *diagnosed { "with diagnosis of all of them" } else { "without diagnosis" };
+            let what = if *diagnosed { "with diagnosis" } else { "without diagnosis" };
             let memory = if most_mib.is_finite() { format!(", {most_mib} MiB") } else { String::new() };
             section.bar(Bar {
                 what: format!("{poses} poses, 6 axes, 10 folds, {what}, one core"),
