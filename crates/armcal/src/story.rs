@@ -208,7 +208,8 @@ impl Settled {
 
     /// Everything for the report, without a diagnosis.
     pub fn into_run(self, pipeline: &Pipeline) -> (Run, Vec<Recording>) {
-        let Fitted { model, observations, calibration, places, rejections, rounds, .. } = self.fitted;
+        let Fitted { model, observations, session, calibration, places, rejections, rounds, .. } =
+            self.fitted;
         let mut warnings = closing_warnings(rounds, places.iter().any(Option::is_some), &calibration);
         warnings.extend(frames::links_without_mass(pipeline, &self.inputs.chain));
         let run = Run {
@@ -216,7 +217,7 @@ impl Settled {
             board: self.inputs.board,
             setup: self.setup,
             warnings,
-            ..run_of(pipeline, self.model_texts, model, observations, calibration)
+            ..run_of(pipeline, self.model_texts, model, (observations, session), calibration)
         };
         (run, self.recordings)
     }
@@ -227,7 +228,7 @@ pub(crate) fn run_of(
     pipeline: &Pipeline,
     model_texts: Vec<String>,
     model: Model,
-    observations: Vec<Observation>,
+    (observations, session): (Vec<Observation>, Session),
     calibration: Calibration,
 ) -> Run {
     Run {
@@ -237,7 +238,7 @@ pub(crate) fn run_of(
         recordings: Vec::new(),
         board: None,
         model,
-        session: frames::session(pipeline, &observations),
+        session,
         observations,
         calibration,
         transfer: None,

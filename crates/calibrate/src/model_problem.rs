@@ -7,7 +7,7 @@
 
 use crate::joined::scale;
 use crate::poses::measured_together;
-use crate::problem::{Known, Linearised, Problem, Symmetry};
+use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter};
 use armcal_model::{Asked, Model, ModelResidual};
@@ -286,13 +286,7 @@ impl Problem for ModelProblem<'_> {
         stacked(self.of_block(block).iter().map(of).collect())
     }
 
-    fn linearised_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        asked: &Asked<'_>,
-        each: &mut dyn FnMut(usize, Linearised),
-    ) {
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
         let Some(first) = self.blocks.get(blocks.start).filter(|_| !blocks.is_empty()) else {
             return;
         };

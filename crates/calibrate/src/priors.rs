@@ -13,7 +13,7 @@
 
 use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
-use crate::problem::{Known, Linearised, Problem, Symmetry};
+use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
 use crate::statistics::posterior;
 use crate::whitened::{Axis, Whitened};
 use crate::wider::wider;
@@ -66,13 +66,7 @@ impl Problem for WithPriors<'_> {
         self.problem.linearised(block, p)
     }
 
-    fn linearised_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        asked: &Asked<'_>,
-        each: &mut dyn FnMut(usize, Linearised),
-    ) {
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
         self.problem.linearised_each(blocks, p, asked, each);
     }
 

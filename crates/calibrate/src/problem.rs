@@ -9,6 +9,9 @@ use std::ops::Range;
 /// Residual rows and their derivative, one column a parameter.
 pub type Linearised = (DVector<f64>, DMatrix<f64>);
 
+/// What is told of one block after the other: its number, and its rows.
+pub type Told<'a> = dyn FnMut(usize, Linearised) + 'a;
+
 /// A motion of the parameters that no observation of a problem can ever see.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Symmetry {
@@ -56,13 +59,7 @@ pub trait Problem: Sync {
     /// fixed ones may be zero.
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised;
     /// Calls `each` with [`Problem::linearised`] of these blocks, in order; columns that are not `asked` for may be zero.
-    fn linearised_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        _asked: &Asked<'_>,
-        each: &mut dyn FnMut(usize, Linearised),
-    ) {
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64], _asked: &Asked<'_>, each: &mut Told<'_>) {
         blocks.for_each(|block| each(block, self.linearised(block, p)));
     }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
@@ -112,13 +109,7 @@ impl<P: Problem + ?Sized> Problem for &P {
         (**self).linearised(block, p)
     }
 
-    fn linearised_each(
-        &self,
-        blocks: Range<usize>,
-        p: &[f64],
-        asked: &Asked<'_>,
-        each: &mut dyn FnMut(usize, Linearised),
-    ) {
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
         (**self).linearised_each(blocks, p, asked, each);
     }
 

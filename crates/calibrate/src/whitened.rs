@@ -213,8 +213,8 @@ impl<'a> Whitened<'a> {
         let height = self.offsets[at_group.blocks.end] - first;
         let (mut stacked, mut jacobian) =
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
-        let mut asked = vec![false; self.problem.parameters().len()];
-        at_group.columns.iter().flatten().for_each(|column| asked[*column] = true);
+        // Of a pool a group knows few of all parameters.
+        let asked = |column: usize| at_group.columns.contains(&Some(column));
         let mut done = Ok(());
         let mut put = |block: usize, (raw, full): Linearised| {
             self.finite(block, raw.as_slice(), "the residual")?;
@@ -233,7 +233,7 @@ impl<'a> Whitened<'a> {
             }
             Ok(())
         };
-        self.problem.linearised_each(at_group.blocks.clone(), p, &|k| asked[k], &mut |block, linearised| {
+        self.problem.linearised_each(at_group.blocks.clone(), p, &asked, &mut |block, linearised| {
             if done.is_ok() {
                 done = put(block, linearised);
             }

@@ -57,12 +57,13 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
     } else {
         None
     };
+    let session = frames::session(pipeline, &observations);
     let mut run = Run {
         recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
         board,
         transfer,
         warnings: collected.warnings,
-        ..story::run_of(pipeline, model_texts, model, observations, calibration)
+        ..story::run_of(pipeline, model_texts, model, (observations, session), calibration)
     };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
     if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {

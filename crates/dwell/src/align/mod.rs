@@ -2,6 +2,7 @@
 
 mod coarse;
 mod declared;
+mod deviated;
 mod fine;
 mod jump;
 mod profile;
@@ -14,15 +15,14 @@ mod warnings;
 use armcal_core::robust::percentile;
 use armcal_core::{JointSamples, PoseSamples, Warning};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
 use coarse::Coarse;
+use deviated::predicted;
 use fine::{Point, Problem, Start};
-use profile::SpeedProfile;
 use scale::{Scale, Track};
-use spread::{Deviations, FURTHER, Fine};
+use spread::Fine;
 use stamps::Stamps;
 
 const DOING: &str = "aligning the clocks";
@@ -38,12 +38,6 @@ const POSITIONS: usize = 400;
 
 /// Lengths of the smoothing kernels, in units of the shortest.
 const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
-
-/// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
-const TRIED_ROWS: f64 = 5.0;
-
-/// Motion of a joint [rad] (prismatic: [m]) up to which the tip is where it was, whatever the uncertain parameters.
-const RESTING_RAD: f64 = 1e-4;
 
 /// Times the uncertain parameters are estimated anew, and the change at which they stay, in standard deviations.
 const MODEL_ROUNDS: usize = 3;
@@ -135,6 +129,8 @@ struct Streams<'a> {
     /// From the shortest kernel to the longest.
     scales: Vec<Scale>,
     reference_s: f64,
+    /// Where robot times count from.
+    robot_origin_ns: i64,
 }
 
 /// A fine estimate before its last step, and the correlation of the profiles under it.
@@ -183,7 +179,8 @@ impl<'a> Streams<'a> {
                 Err(reason) => first_reason = first_reason.or(Some(reason)),
             }
         }
-        let streams = Streams { joints, tip, arm, config, sensor, robot, scales, reference_s };
+        let streams =
+            Streams { joints, tip, arm, config, sensor, robot, scales, reference_s, robot_origin_ns };
         match first_reason {
             Some(DwellError::Broken { stream, needed_s, .. }) if streams.scales.is_empty() => {
                 Err(DwellError::Broken { stream, needed_s, rows: streams.rows_in_words() })
@@ -323,50 +320,6 @@ impl<'a> Streams<'a> {
         best
     }
 
-    /// The speeds that the model with these parameters predicts.
-    fn robot_speeds(&self, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
-        if parameters.iter().all(|p| *p == 0.0) {
-            return scale.robot.clone();
-        }
-        let origin_ns = shifted(self.tip.time_ns[0], -self.config.initial_offset_s);
-        scale.like_robot(
-            predicted(self.joints, origin_ns, self.arm, parameters, self.config).speeds(scale.h_s),
-        )
-    }
-
-    /// Speeds with each uncertain parameter further off in turn; none where there are no such parameters.
-    fn deviations(&self, scale: &Scale, so_far: &[f64]) -> Option<Deviations> {
-        if so_far.is_empty() {
-            return None;
-        }
-        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS);
-        let thin = JointSamples {
-            time_ns: rows.iter().map(|row| self.joints.time_ns[*row]).collect(),
-            joint_rad: self
-                .joints
-                .joint_rad
-                .iter()
-                .map(|c| rows.iter().map(|row| c[*row]).collect())
-                .collect(),
-            ..JointSamples::default()
-        };
-        let origin_ns = shifted(self.tip.time_ns[0], -self.config.initial_offset_s);
-        let (moved, of_row) = where_moved(&thin);
-        let speeds = |parameters: &[f64]| {
-            let tip_m = |row: &usize| (self.arm.tip_m)(&thin.row_rad(*row), parameters);
-            let at_m: Vec<Vector3<f64>> = moved.par_iter().map(tip_m).collect();
-            let path_m = of_row.iter().map(|k| at_m[*k]).collect();
-            scale.like_robot(Track::of(&thin.time_ns, origin_ns, path_m, self.config).speeds(scale.h_s))
-        };
-        let further = |k: usize| {
-            let mut parameters = so_far.to_vec();
-            parameters[k] += FURTHER;
-            speeds(&parameters)
-        };
-        let deviated = (0..so_far.len()).into_par_iter().map(further).collect();
-        Some(Deviations { so_far: so_far.to_vec(), now: speeds(so_far), deviated })
-    }
-
     /// Median ratio of measured to predicted distances of the tip between distant moments. Positions do not
     /// depend on the path between them, so this tells a wrong unit whatever the correlation of the speeds.
     fn ratio(&self, coarse: &Coarse) -> f64 {
@@ -448,34 +401,6 @@ impl<'a> Streams<'a> {
             declared: false,
         }
     }
-}
-
-/// The path that a model predicts of the joints' readings.
-fn predicted(
-    joints: &JointSamples,
-    origin_ns: i64,
-    arm: NominalArm<'_>,
-    parameters: &[f64],
-    config: &ClockConfig,
-) -> Track {
-    let tip_m = |row| (arm.tip_m)(&joints.row_rad(row), parameters);
-    let path_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
-    Track::of(&joints.time_ns, origin_ns, path_m, config)
-}
-
-/// Rows at which the arm is not where it was at the one before them, and which of these every row is as.
-fn where_moved(joints: &JointSamples) -> (Vec<usize>, Vec<usize>) {
-    let (mut moved, mut of_row) = (Vec::new(), Vec::with_capacity(joints.len()));
-    let rests = |last: usize, row: usize| {
-        joints.joint_rad.iter().all(|column| (column[row] - column[last]).abs() <= RESTING_RAD)
-    };
-    for row in 0..joints.len() {
-        if moved.last().is_none_or(|last| !rests(*last, row)) {
-            moved.push(row);
-        }
-        of_row.push(moved.len() - 1);
-    }
-    (moved, of_row)
 }
 
 fn undetermined() -> DwellError {

@@ -35,8 +35,7 @@ fn put_tip(recording: &RecordingRun, point: &Point, out: &mut Messages) {
     let (publish_ns, tip) = match point.observation.is_tracked() {
         true => {
             let stamp_ns = recording.clock.as_ref().map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
-            let rotation =
-                point.observation.seen_orientation().map_or_else(Default::default, |(seen, _)| *seen);
+            let rotation = point.observation.seen_orientation().map(|(seen, _)| *seen).unwrap_or_default();
             (stamp_ns, pose(&Pose::from_parts(point.measured_m.into(), rotation)))
         }
         false => (time_ns, at(&point.measured_m)),
