@@ -6,10 +6,11 @@
 //!
 //! (Djogbenou, MacKinnon, Nielsen, QED 1383; Westfall and Young 1993.) With `c_kg = B_k,g' (I - H_gg)^(-1/2) e~_g`
 //! for an orthonormal basis `B_k` of the projected candidate, all scores of all resamplings are one matrix product
-//! `C W`. The sign flips come from a counter-based generator, one stream a dataset, so threads do not matter.
+//! `C W`. `B_k = (G - Q Q'G) A^(-1/2)` is never put together: what is asked of it are products with `G` and `Q`. The sign flips come from a counter-based generator, one stream a dataset, so threads do not matter.
 
 use crate::config::DiagnosisConfig;
-use crate::projection::{Projection, eigen};
+use crate::problem::{Columns, DwellRow};
+use crate::projection::{Gram, Projection, eigen};
 use crate::special::ln_f_tail;
 use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
@@ -22,17 +23,20 @@ const BLOCK: usize = 128;
 
 /// One candidate in the projected space.
 #[derive(Debug, Clone)]
-pub(crate) struct Direction {
-    /// Orthonormal columns: data rows of `G~ A^(-1/2)`.
-    pub basis: DMatrix<f64>,
+pub(crate) struct Direction<'a> {
+    /// Its columns as the data have them, times this factor.
+    columns: (&'a Columns, f64),
+    /// `A^(-1/2)`: what makes them orthonormal once the geometry is projected out.
+    root: DMatrix<f64>,
+    /// `Q'G A^(-1/2)`.
+    spent: DMatrix<f64>,
     /// Score `S = |A^(-1/2) G~'e~|^2` (formula 6).
     pub score: f64,
 }
 
-impl Direction {
-    /// From columns as the data have them.
-    pub fn new(projection: &Projection, columns: &DMatrix<f64>) -> Direction {
-        let gram = projection.gram(columns);
+impl<'a> Direction<'a> {
+    /// From columns times a factor, and the products of these.
+    pub fn new(columns: &'a Columns, factor: f64, gram: &Gram) -> Direction<'a> {
         let (w, v) = eigen(&gram.a, gram.raw.max());
         let keep: Vec<usize> = (0..w.len()).filter(|k| w[*k] > 0.0).collect();
         let mut root = DMatrix::zeros(v.nrows(), keep.len());
@@ -40,12 +44,63 @@ impl Direction {
             root.set_column(c, &(v.column(*k) / w[*k].sqrt()));
         }
         let score = root.tr_mul(&gram.g).norm_squared();
-        Direction { basis: projection.project(columns) * root, score }
+        Direction { columns: (columns, factor), spent: &gram.spent * &root, root, score }
     }
 
     /// Rank.
     pub fn rank(&self) -> usize {
-        self.basis.ncols()
+        self.root.ncols()
+    }
+
+    /// Column g: `B_g' u_g`; `spent` has `Q_g' u_g`.
+    fn contributions(&self, drawn: &Drawn<'_>, spent: &DMatrix<f64>) -> DMatrix<f64> {
+        let (columns, factor) = self.columns;
+        let own = match columns.factors() {
+            Some((base, basis)) => {
+                let (with, m) = (drawn.of_dwells(base), basis.ncols());
+                let mut own = DMatrix::zeros(base.ncols() * m, drawn.clusters.len());
+                for (mut column, dwells) in own.column_iter_mut().zip(drawn.clusters) {
+                    for (k, value) in column.iter_mut().enumerate() {
+                        *value = dwells.iter().map(|d| with[(*d, k / m)] * basis[(*d, k % m)]).sum();
+                    }
+                }
+                own
+            }
+            None => match columns {
+                Columns::Dense(m) => drawn.of_clusters(m),
+                _ => DMatrix::zeros(columns.len(), drawn.clusters.len()),
+            },
+        };
+        self.root.tr_mul(&own) * factor - self.spent.tr_mul(spent)
+    }
+}
+
+/// `u_g = (I - H_gg)^(-1/2) e_g` of every cluster of dwells.
+struct Drawn<'a> {
+    dwells: &'a [DwellRow],
+    clusters: &'a [Vec<usize>],
+    /// All of them, in the rows of the data.
+    u: DVector<f64>,
+}
+
+impl Drawn<'_> {
+    /// What columns say of `u` dwell by dwell: dwells x m.
+    fn of_dwells(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut with = DMatrix::zeros(self.dwells.len(), columns.ncols());
+        for (column, mut with) in columns.column_iter().zip(with.column_iter_mut()) {
+            for (with, dwell) in with.iter_mut().zip(self.dwells) {
+                *with = dwell.range().map(|row| column[row] * self.u[row]).sum();
+            }
+        }
+        with
+    }
+
+    /// The same cluster by cluster: m x clusters.
+    fn of_clusters(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let with = self.of_dwells(columns);
+        DMatrix::from_fn(columns.ncols(), self.clusters.len(), |k, g| {
+            self.clusters[g].iter().map(|d| with[(*d, k)]).sum()
+        })
     }
 }
 
@@ -68,11 +123,11 @@ fn surprise(s: f64, m: f64, rss: f64, dof: f64) -> f64 {
     -ln_f_tail(s / m / left, m, (dof - m).max(1.0))
 }
 
-/// Bootstraps all candidates together. `clusters` names the rows of each cluster.
+/// Bootstraps all candidates together. `clusters` names the dwells of each cluster.
 pub(crate) fn wild_cluster(
     projection: &Projection,
-    candidates: &[Direction],
-    clusters: &[Vec<usize>],
+    candidates: &[Direction<'_>],
+    (dwells, clusters): (&[DwellRow], &[Vec<usize>]),
     config: &DiagnosisConfig,
 ) -> Vec<Significance> {
     let (rss, dof) = (projection.rss, projection.dof());
@@ -84,11 +139,17 @@ pub(crate) fn wild_cluster(
         .zip(&ranks)
         .map(|(s, m)| if *m == 0 { 0.0 } else { surprise(*s, *m as f64, rss, dof) })
         .collect();
-    let corrected: Vec<DVector<f64>> =
-        clusters.iter().map(|rows| inflated(projection, &residual, rows)).collect();
-    let power = DMatrix::from_fn(1, clusters.len(), |_, g| corrected[g].norm_squared());
+    let mut drawn = Drawn { dwells, clusters, u: DVector::zeros(residual.len()) };
+    let mut power = DMatrix::zeros(1, clusters.len());
+    for (g, members) in clusters.iter().enumerate() {
+        let rows: Vec<usize> = members.iter().flat_map(|d| dwells[*d].range()).collect();
+        let u = inflated(projection, &residual, &rows);
+        power[(0, g)] = u.norm_squared();
+        rows.iter().zip(u.iter()).for_each(|(row, u)| drawn.u[*row] = *u);
+    }
     let signs = signs(clusters.len(), config);
-    let spent = contributions(&projection.q, clusters, &corrected) * &signs;
+    let of_geometry = drawn.of_clusters(&projection.q);
+    let spent = &of_geometry * &signs;
     let total = power * signs.map(|w| w * w);
     let left: Vec<f64> =
         spent.column_iter().zip(total.iter()).map(|(c, t)| (t - c.norm_squared()).max(1e-12)).collect();
@@ -100,13 +161,14 @@ pub(crate) fn wild_cluster(
     // Many small products are one large one.
     for block in present.chunks(BLOCK) {
         let width = block.iter().map(|k| ranks[*k]).sum();
-        let mut stacked = DMatrix::zeros(residual.len(), width);
+        let mut stacked = DMatrix::zeros(width, clusters.len());
         let mut at = 0;
         for k in block {
-            stacked.columns_mut(at, ranks[*k]).copy_from(&candidates[*k].basis);
+            let own = candidates[*k].contributions(&drawn, &of_geometry);
+            stacked.rows_mut(at, ranks[*k]).copy_from(&own);
             at += ranks[*k];
         }
-        let drawn = contributions(&stacked, clusters, &corrected) * &signs;
+        let drawn = stacked * &signs;
         let mut at = 0;
         for &k in block {
             let best = top.entry(ranks[k]).or_insert_with(|| vec![0.0; config.resamplings]);
@@ -159,17 +221,6 @@ fn inflated(projection: &Projection, residual: &DVector<f64>, rows: &[usize]) ->
         *t *= if *h > 1e-12 { (1.0 - h).max(1e-3).powf(-0.5) - 1.0 } else { 0.0 };
     }
     e + vectors * t
-}
-
-/// Column g: `basis_g' u_g`.
-fn contributions(basis: &DMatrix<f64>, clusters: &[Vec<usize>], corrected: &[DVector<f64>]) -> DMatrix<f64> {
-    let mut c = DMatrix::zeros(basis.ncols(), clusters.len());
-    for (g, (rows, u)) in clusters.iter().zip(corrected).enumerate() {
-        for k in 0..basis.ncols() {
-            c[(k, g)] = rows.iter().zip(u.iter()).map(|(r, u)| basis[(*r, k)] * u).sum();
-        }
-    }
-    c
 }
 
 /// Rademacher signs, or Webb's six points below 12 clusters.

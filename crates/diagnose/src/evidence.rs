@@ -1,18 +1,16 @@
 //! Evidence of a term with a physical amplitude prior, noise variance marginalised (notes 4.6, formula 8).
 
 use crate::config::DiagnosisConfig;
+use crate::grams::each_gram;
 use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
-use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVector};
 
 /// Above this many columns a factor for each amplitude is cheaper than one eigen-decomposition.
 const EIGEN_COLUMNS: usize = 12;
-/// Columns stacked into one matrix product.
-const BLOCK_COLUMNS: usize = 1200;
 
 /// What columns promise to explain, before they are weighed in full: from `[x_k' r, |x_k|^2]` of each column and the
 /// residual, both whitened, `sum_k (x_k' r)^2 / (1 + |x_k|^2)`, the fall of the squared residual if they were independent
@@ -86,7 +84,7 @@ pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -
 }
 
 impl Metric {
-    fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
+    pub(crate) fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
         let whitener = Whitener::new(noise, amplitude, problem);
         let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
         let mut geometry = problem.geometry.clone();
@@ -169,7 +167,7 @@ fn penalised(gram: &Gram, scales: &[f64]) -> Vec<(f64, f64)> {
     scales.iter().map(at).collect()
 }
 
-/// ln (weight x Bayes factor) of every term in every metric: one matrix product a metric. `result[term][metric]`.
+/// ln (weight x Bayes factor) of every term in every metric. `result[term][metric]`.
 pub(crate) fn over_noise(
     terms: &[&Columns],
     problem: &Problem,
@@ -177,39 +175,11 @@ pub(crate) fn over_noise(
     metrics: &[Metric],
     config: &DiagnosisConfig,
 ) -> Vec<Vec<f64>> {
-    let mut result = vec![Vec::with_capacity(metrics.len()); terms.len()];
-    let mut from = 0;
-    while from < terms.len() {
-        // Blocks keep the memory of a thousand scan points bounded.
-        let (mut to, mut width) = (from, 0);
-        while to < terms.len() && (to == from || width + terms[to].len() <= BLOCK_COLUMNS) {
-            width += terms[to].len();
-            to += 1;
-        }
-        let mut stacked = DMatrix::zeros(problem.rows(), width);
-        let mut at = 0;
-        for t in &terms[from..to] {
-            stacked.columns_mut(at, t.len()).copy_from(&t.dense(&problem.dwells, 1.0 / scale));
-            at += t.len();
-        }
-        for m in metrics {
-            let white = m.whitened(stacked.clone());
-            let spent = inner(&m.projection.q, &white);
-            let score = white.tr_mul(&m.projection.residual) - spent.tr_mul(&m.projection.z);
-            let mut at = 0;
-            for (k, t) in terms[from..to].iter().enumerate() {
-                let (x, c) = (white.columns(at, t.len()), spent.columns(at, t.len()));
-                let full = x.transpose() * x;
-                let gram = Gram {
-                    raw: full.diagonal(),
-                    a: full - c.transpose() * c,
-                    g: score.rows(at, t.len()).into_owned(),
-                };
-                result[from + k].push(m.ln_weight + m.ln_bayes(&gram, config));
-                at += t.len();
-            }
-        }
-        from = to;
+    let mut result = vec![vec![0.0; metrics.len()]; terms.len()];
+    for (k, metric) in metrics.iter().enumerate() {
+        each_gram(terms, problem, 1.0 / scale, metric, &mut |term, gram| {
+            result[term][k] = metric.ln_weight + metric.ln_bayes(gram, config);
+        });
     }
     result
 }

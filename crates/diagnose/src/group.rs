@@ -2,7 +2,7 @@
 
 use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use std::sync::Arc;
 
 /// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
@@ -44,10 +44,8 @@ pub(crate) fn one_frequency(scans: &[Scan], dwells: &[DwellRow], residual: &DVec
     if joints.len() < 2 {
         return None;
     }
-    let joints: Vec<Vec<Point<'_>>> = joints
-        .into_iter()
-        .map(|s| s.points.iter().filter_map(|p| Point::of(p, dwells, residual)).collect())
-        .collect();
+    let joints: Vec<Vec<Point<'_>>> =
+        joints.into_iter().map(|scan| Point::all(scan, dwells, residual)).collect();
     let finest = joints.iter().max_by_key(|points| points.len())?;
     let at = |frequency: f64| {
         let members: Vec<&Point<'_>> =
@@ -75,10 +73,26 @@ struct Point<'s> {
 }
 
 impl<'s> Point<'s> {
-    fn of(candidate: &'s Candidate, dwells: &[DwellRow], residual: &DVector<f64>) -> Option<Point<'s>> {
-        let columns = candidate.columns.dense(dwells, 1.0);
-        let sums = columns.column_iter().map(|x| [x.dot(residual), x.norm_squared()]);
-        Some(Point { frequency: frequency(candidate)?, promise: promise(sums), candidate })
+    /// Those of the scan of one joint, which share its column.
+    fn all(scan: &'s Scan, dwells: &[DwellRow], residual: &DVector<f64>) -> Vec<Point<'s>> {
+        let Some(base) = scan.points.first().and_then(|p| p.columns.base()) else { return Vec::new() };
+        let of_dwell = |a: DVectorView<'_, f64>, b: DVectorView<'_, f64>| -> Vec<f64> {
+            dwells.iter().map(|d| d.range().map(|row| a[row] * b[row]).sum()).collect()
+        };
+        let with: Vec<[Vec<f64>; 2]> =
+            base.column_iter().map(|x| [of_dwell(x, residual.as_view()), of_dwell(x, x)]).collect();
+        let of = |candidate: &'s Candidate| {
+            let (_, basis) = candidate.columns.factors()?;
+            let sums = with.iter().flat_map(|[with_residual, square]| {
+                basis.column_iter().map(move |f| {
+                    let weighted = f.iter().zip(with_residual.iter().zip(square));
+                    weighted
+                        .fold([0.0, 0.0], |[r, s], (f, (with, square))| [r + f * with, s + f * f * square])
+                })
+            });
+            Some(Point { frequency: frequency(candidate)?, promise: promise(sums), candidate })
+        };
+        scan.points.iter().filter_map(of).collect()
     }
 }
 

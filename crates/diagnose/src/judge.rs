@@ -6,10 +6,11 @@ use crate::confusion::{OneStep, half_width, likeness, one_step};
 use crate::contrasts::{Contrast, contrast};
 use crate::crossval::{Group, by_place, by_recording, by_stretch, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
+use crate::grams::each_gram;
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::places::units;
-use crate::problem::{Amplitude, Problem, Scan};
+use crate::problem::{Amplitude, Columns, Problem, Scan};
 use crate::projection::Gram;
 use crate::weigh::Weighed;
 use nalgebra::DVector;
@@ -19,6 +20,9 @@ use std::collections::BTreeMap;
 const BLOCK: usize = 8;
 /// Fewest clusters for clustering by place alone.
 const MIN_CLUSTERS: usize = 12;
+/// Most clusters that are drawn: of more, neighbours keep their sign together, which says nothing else where they are
+/// independent and no less where they are not.
+const MOST_CLUSTERS: usize = 400;
 /// Most points of one scan in the bootstrap.
 const GATE_POINTS: usize = 80;
 /// Probability not worth a look.
@@ -97,19 +101,30 @@ pub(crate) enum Grade {
     Named,
 }
 
-/// Judges an entry of a weighed problem.
-pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: &DiagnosisConfig) -> Judged {
-    let white = &weighed.metrics[0];
-    let projection = &white.projection;
-    let dense = |k: usize| weighed.dense(&weighed.entries[k].candidate.columns, problem);
+/// The significance of every entry of a weighed problem, among all that was tried.
+pub(crate) fn significance(
+    problem: &Problem,
+    weighed: &Weighed,
+    config: &DiagnosisConfig,
+) -> Vec<Significance> {
     let directions = gate_directions(problem, weighed);
-    let rows = |g: Vec<usize>| g.into_iter().flat_map(|i| problem.dwells[i].range()).collect();
-    let clusters: Vec<Vec<usize>> = clusters(problem, weighed).into_iter().map(rows).collect();
-    let all = wild_cluster(projection, &directions, &clusters, config);
-    let significance = all[..weighed.entries.len()].to_vec();
+    let clusters = clusters(problem, weighed);
+    let projection = &weighed.metrics[0].projection;
+    let mut all = wild_cluster(projection, &directions, (&problem.dwells, &clusters), config);
+    all.truncate(weighed.entries.len());
+    all
+}
 
-    let own = dense(entry);
-    let gram = projection.gram(&own);
+/// Judges an entry of a weighed problem, given the significance of all.
+pub(crate) fn judge(
+    problem: &Problem,
+    weighed: &Weighed,
+    significance: &[Significance],
+    entry: usize,
+    config: &DiagnosisConfig,
+) -> Judged {
+    let projection = &weighed.metrics[0].projection;
+    let gram = projection.gram(&weighed.dense(&weighed.entries[entry].candidate.columns, problem));
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
@@ -138,7 +153,7 @@ pub(crate) fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: 
     Judged {
         entry,
         gram,
-        significance,
+        significance: significance.to_vec(),
         places,
         recordings,
         set,
@@ -168,13 +183,18 @@ fn impossible(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<
 }
 
 /// Projected directions of all entries, then of every other point of the scans: the maximum runs over all of them.
-fn gate_directions(problem: &Problem, weighed: &Weighed) -> Vec<Direction> {
-    let projection = &weighed.metrics[0].projection;
+fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direction<'p>> {
     let entries = weighed.entries.iter().map(|e| &e.candidate.columns);
     // Neighbours on a grid are nearly the same column: a thinned grid has nearly the same maximum.
     let thin = |s: &Scan| s.points.len().div_ceil(GATE_POINTS).max(1);
     let points = problem.scans.iter().flat_map(|s| s.points.iter().step_by(thin(s))).map(|c| &c.columns);
-    entries.chain(points).map(|c| Direction::new(projection, &weighed.dense(c, problem))).collect()
+    let all: Vec<&Columns> = entries.chain(points).collect();
+    let factor = 1.0 / weighed.scale;
+    let mut directions = vec![None; all.len()];
+    each_gram(&all, problem, factor, &weighed.metrics[0], &mut |k, gram| {
+        directions[k] = Some(Direction::new(all[k], factor, gram));
+    });
+    directions.into_iter().flatten().collect()
 }
 
 /// Dwells that keep their sign together: as the noise seems to repeat.
@@ -194,10 +214,10 @@ pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> 
         groups.entry(key).or_default().push(i);
     }
     if groups.len() < MIN_CLUSTERS {
-        (0..problem.dwells.len()).map(|i| vec![i]).collect()
-    } else {
-        groups.into_values().collect()
+        return (0..problem.dwells.len()).map(|i| vec![i]).collect();
     }
+    let groups: Vec<Vec<usize>> = groups.into_values().collect();
+    groups.chunks(groups.len().div_ceil(MOST_CLUSTERS)).map(<[_]>::concat).collect()
 }
 
 /// Groups to leave out: places, or stretches of time when the noise has memory (neighbours in time would tell).

@@ -4,6 +4,7 @@
 //! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`]) builds problems from
 //! a model and refits it. In the order of the story:
 //!
+//! * `columns`, `grams`: what might be missing as columns, and what is asked of thousands of them;
 //! * `projection`: what the geometry could do is taken out, prior rows and all;
 //! * `noise`, `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete under every kind of noise;
 //! * `knowledge`: what the user says of the arm decides which of the catalogue are tried;
@@ -29,6 +30,7 @@ mod absence;
 mod bootstrap;
 mod cells;
 mod channels;
+mod columns;
 mod combination;
 mod compare;
 mod conclude;
@@ -46,6 +48,7 @@ mod evidence;
 mod explain;
 mod expression;
 mod forward;
+mod grams;
 mod group;
 mod held_out;
 mod implied;
@@ -69,6 +72,7 @@ mod rests;
 mod ripple;
 mod rivals;
 mod rooms;
+mod scans;
 mod special;
 mod stretches;
 mod structure;

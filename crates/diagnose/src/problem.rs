@@ -1,6 +1,8 @@
 //! What a diagnosis sees: whitened residuals and the columns that could explain them. No model knowledge.
 
 use crate::DiagnoseError;
+pub use crate::columns::Columns;
+use crate::columns::Cut;
 use crate::crossval::EFFECT_PRECISION;
 use crate::whitener::Whitener;
 use armcal_core::{DwellId, Measured, Unit};
@@ -211,66 +213,6 @@ pub struct Channel {
     pub columns: Arc<DMatrix<f64>>,
 }
 
-/// Whitened columns, stored or as a product that is cheap to keep.
-#[derive(Debug, Clone)]
-pub enum Columns {
-    /// As they are: rows x m.
-    Dense(Arc<DMatrix<f64>>),
-    /// Every column of `base` (rows x c) times every column of `basis` (dwells x m) at the row's dwell.
-    Product {
-        /// Unit columns.
-        base: Arc<DMatrix<f64>>,
-        /// Values at the dwells.
-        basis: Arc<DMatrix<f64>>,
-    },
-}
-
-impl Columns {
-    /// Number of columns.
-    pub fn len(&self) -> usize {
-        match self {
-            Columns::Dense(m) => m.ncols(),
-            Columns::Product { base, basis } => base.ncols() * basis.ncols(),
-        }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The columns, times `factor`. Products are ordered channel axis by channel axis.
-    pub fn dense(&self, dwells: &[DwellRow], factor: f64) -> DMatrix<f64> {
-        match self {
-            Columns::Dense(m) => m.as_ref() * factor,
-            Columns::Product { base, basis } => {
-                let mut out = DMatrix::zeros(base.nrows(), self.len());
-                for c in 0..base.ncols() {
-                    for b in 0..basis.ncols() {
-                        let mut column = out.column_mut(c * basis.ncols() + b);
-                        for (i, dwell) in dwells.iter().enumerate() {
-                            let value = basis[(i, b)] * factor;
-                            if value != 0.0 {
-                                for row in dwell.range() {
-                                    column[row] = base[(row, c)] * value;
-                                }
-                            }
-                        }
-                    }
-                }
-                out
-            }
-        }
-    }
-
-    fn rows(&self) -> usize {
-        match self {
-            Columns::Dense(m) => m.nrows(),
-            Columns::Product { base, .. } => base.nrows(),
-        }
-    }
-}
-
 impl Problem {
     /// Number of residual rows.
     pub fn rows(&self) -> usize {
@@ -317,7 +259,7 @@ impl Problem {
             return Err(DiagnoseError::NotFinite { what: "the residual or the geometry".to_string() });
         }
         for c in &self.candidates {
-            if !c.columns.dense(&self.dwells, 1.0).iter().all(|v| v.is_finite()) {
+            if !c.columns.is_finite() {
                 return Err(DiagnoseError::NotFinite { what: format!("candidate {}", c.spec) });
             }
         }
@@ -370,30 +312,16 @@ impl Problem {
             at += dwell.rows;
             dwell
         });
-        // Products share their base: the cut of a base is kept for all that use it.
-        let mut cut: Vec<[Arc<DMatrix<f64>>; 2]> = Vec::new();
-        let mut shared = |m: &Arc<DMatrix<f64>>, rows: &[usize]| {
-            if let Some([_, done]) = cut.iter().find(|c| Arc::ptr_eq(&c[0], m)) {
-                return done.clone();
-            }
-            let done = Arc::new(m.select_rows(rows));
-            cut.push([m.clone(), done.clone()]);
-            done
-        };
-        let mut columns = |c: &Columns| match c {
-            Columns::Dense(m) => Columns::Dense(Arc::new(m.select_rows(&rows))),
-            Columns::Product { base, basis } => {
-                Columns::Product { base: shared(base, &rows), basis: Arc::new(basis.select_rows(&kept)) }
-            }
-        };
-        let mut candidate = |c: &Candidate| Candidate { columns: columns(&c.columns), ..c.clone() };
+        let mut cut = Cut::default();
+        let mut candidate =
+            |c: &Candidate| Candidate { columns: c.columns.select(&kept, &rows, &mut cut), ..c.clone() };
         let candidates = self.candidates.iter().map(&mut candidate).collect();
         let scan = |s: &Scan| Scan { points: s.points.iter().map(&mut candidate).collect(), ..s.clone() };
         let scans = self.scans.iter().map(scan).collect();
         let channels = self
             .channels
             .iter()
-            .map(|c| Channel { columns: Arc::new(c.columns.select_rows(&rows)), ..c.clone() })
+            .map(|c| Channel { columns: cut.of(&c.columns, &rows), ..c.clone() })
             .collect();
         Problem {
             dwells: dwells.collect(),

@@ -39,6 +39,20 @@ pub(crate) struct Gram {
     pub g: DVector<f64>,
     /// Squared norms of the columns before projection.
     pub raw: DVector<f64>,
+    /// `Q'G`: what the geometry takes over.
+    pub spent: DMatrix<f64>,
+}
+
+impl Gram {
+    /// Of so many columns, nothing yet.
+    pub fn zeros(columns: usize, geometry: usize) -> Gram {
+        Gram {
+            a: DMatrix::zeros(columns, columns),
+            g: DVector::zeros(columns),
+            raw: DVector::zeros(columns),
+            spent: DMatrix::zeros(geometry, columns),
+        }
+    }
 }
 
 impl Projection {
@@ -99,6 +113,7 @@ impl Projection {
             raw: full.diagonal(),
             a: full - gram(&c),
             g: columns.tr_mul(&self.residual) - c.tr_mul(&self.z),
+            spent: c,
         }
     }
 

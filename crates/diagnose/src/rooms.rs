@@ -1,14 +1,16 @@
 //! Problems with effects and unlisted shapes in their base, each weighed once.
 
 use crate::DiagnoseError;
+use crate::bootstrap::Significance;
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
-use crate::judge::{Judged, independent_groups, judge};
+use crate::judge::{Judged, independent_groups, judge, significance};
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
 use crate::rivals::AfterRefit;
 use crate::weigh::{Weighed, weigh};
 use armcal_model::Toggle;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -24,16 +26,23 @@ pub(crate) struct Room {
     pub problem: Problem,
     /// Weighed.
     pub weighed: Weighed,
-    judged: std::cell::RefCell<BTreeMap<usize, Judged>>,
+    significance: OnceCell<Vec<Significance>>,
+    judged: RefCell<BTreeMap<usize, Judged>>,
 }
 
 impl Room {
+    fn new(accepted: Vec<String>, problem: Problem, weighed: Weighed) -> Room {
+        Room { accepted, problem, weighed, significance: OnceCell::new(), judged: RefCell::default() }
+    }
+
     /// Judges an entry, once.
     pub fn judge(&self, entry: usize, config: &DiagnosisConfig) -> Judged {
         if let Some(done) = self.judged.borrow().get(&entry) {
             return done.clone();
         }
-        let judged = judge(&self.problem, &self.weighed, entry, config);
+        let significance =
+            self.significance.get_or_init(|| significance(&self.problem, &self.weighed, config));
+        let judged = judge(&self.problem, &self.weighed, significance, entry, config);
         self.judged.borrow_mut().insert(entry, judged.clone());
         judged
     }
@@ -63,9 +72,8 @@ impl<'a> Rooms<'a> {
         first: (Problem, Weighed),
         config: &'a DiagnosisConfig,
     ) -> Rooms<'a> {
-        let room =
-            Room { accepted: Vec::new(), problem: first.0, weighed: first.1, judged: Default::default() };
-        Rooms { refit, keep, config, known: vec![Rc::new(room)] }
+        let room = Rc::new(Room::new(Vec::new(), first.0, first.1));
+        Rooms { refit, keep, config, known: vec![room] }
     }
 
     /// The room with these effects in the base.
@@ -76,7 +84,7 @@ impl<'a> Rooms<'a> {
         }
         let problem = self.bare(accepted)?;
         let weighed = weigh(&problem, self.config);
-        let room = Rc::new(Room { accepted: names, problem, weighed, judged: Default::default() });
+        let room = Rc::new(Room::new(names, problem, weighed));
         self.known.push(room.clone());
         Ok(room)
     }

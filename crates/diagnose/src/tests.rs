@@ -334,13 +334,11 @@ fn bootstrap_p_values_are_uniform_under_noise() {
         let p = small(200 + seed);
         let projection =
             Projection::new(&p.geometry, &p.geometry_precision, &p.geometry_offset, p.residual.clone());
-        let directions: Vec<_> = p
-            .candidates
-            .iter()
-            .map(|c| crate::bootstrap::Direction::new(&projection, &c.columns.dense(&p.dwells, 1.0)))
-            .collect();
-        let clusters: Vec<Vec<usize>> = p.dwells.iter().map(|d| d.range().collect()).collect();
-        let all = crate::bootstrap::wild_cluster(&projection, &directions, &clusters, &config);
+        let grams = p.candidates.iter().map(|c| (c, projection.gram(&c.columns.dense(&p.dwells, 1.0))));
+        let directions: Vec<_> =
+            grams.map(|(c, gram)| crate::bootstrap::Direction::new(&c.columns, 1.0, &gram)).collect();
+        let clusters: Vec<Vec<usize>> = (0..p.dwells.len()).map(|i| vec![i]).collect();
+        let all = crate::bootstrap::wild_cluster(&projection, &directions, (&p.dwells, &clusters), &config);
         below += usize::from(all.iter().any(|s| s.p_adjusted <= 0.05));
     }
     assert!(below <= 8, "{below} of 60");

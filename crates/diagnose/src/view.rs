@@ -8,10 +8,9 @@ use crate::DiagnoseError;
 use crate::group::{one_frequency, with_groups};
 use crate::knowledge::Knowledge;
 use crate::places::places;
-use crate::problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
-use crate::stretches::stretches;
+use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem};
 use armcal_calibrate::{FitConfig, LinearPose, Linearisation, linearise};
-use armcal_core::{DwellId, Observation};
+use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
 use nalgebra::{DMatrix, Matrix3};
 use std::collections::BTreeMap;
@@ -38,7 +37,7 @@ impl View<'_> {
         let base = self.linearised(&[])?.1;
         let channels = self.channels(&base);
         let dwells = self.dwells(&base);
-        let mut scans = self.scans(&channels, &base)?;
+        let (candidates, mut scans) = self.candidates_and_scans(&specs, &channels, &base)?;
         scans.extend(one_frequency(&scans, &dwells, &base.residual));
         Ok(Problem {
             dwells,
@@ -46,7 +45,7 @@ impl View<'_> {
             geometry: -&base.jacobian,
             geometry_offset: base.axes.iter().map(|a| a.offset).collect::<Vec<_>>().into(),
             geometry_precision: base.axes.iter().map(|a| a.precision).collect::<Vec<_>>().into(),
-            candidates: with_groups(self.candidates(&specs)?),
+            candidates: with_groups(candidates),
             scans,
             channels,
         })
@@ -54,7 +53,7 @@ impl View<'_> {
 
     /// Whether an effect may explain something: the model has it not yet, whatever a pipeline says of its parameters, and
     /// the user does not rule it out.
-    fn tried(&self, spec: &EffectSpec) -> bool {
+    pub(crate) fn tried(&self, spec: &EffectSpec) -> bool {
         let name = spec.to_string();
         let taken = self.model.effects().iter().any(|e| e.spec.to_string() == name);
         !taken && self.knowledge.tries(spec)
@@ -69,7 +68,7 @@ impl View<'_> {
         Ok((model, linear))
     }
 
-    fn candidates(&self, specs: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
+    pub(crate) fn candidates(&self, specs: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
         if specs.is_empty() {
             return Ok(Vec::new());
         }
@@ -133,7 +132,7 @@ impl View<'_> {
         }
     }
 
-    fn target(&self, spec: &EffectSpec) -> String {
+    pub(crate) fn target(&self, spec: &EffectSpec) -> String {
         let joint = spec.target.and_then(|j| self.model.chain().joint_names().get(j).cloned());
         let at = spec.marker.as_ref().map(|name| format!("marker {name}")).or(joint);
         match (at, &spec.since) {
@@ -149,122 +148,8 @@ impl View<'_> {
         }
     }
 
-    /// Every family with a shape: products where the shape switches or modulates, columns of their own otherwise.
-    fn scans(&self, channels: &[Channel], base: &Linearisation) -> Result<Vec<Scan>, DiagnoseError> {
-        let dwells: Vec<DwellId> = self.poses(base).map(|o| o.dwell).collect();
-        let Some(first) = dwells.iter().min().copied() else { return Ok(Vec::new()) };
-        let mut scans = Vec::new();
-        for (family, mut members) in self.model.scans(self.session, self.observations) {
-            members.retain(|spec| self.tried(spec));
-            if members.is_empty() {
-                continue;
-            }
-            let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
-            if steps {
-                scans.extend(self.events(&family, first, &members, &dwells, base)?);
-                continue;
-            }
-            let joint = family.target.map(|j| format!("joint{}", j + 1));
-            let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
-            let points = match channel {
-                Some(channel) if family.kind == "periodic" => self.modulated(channel, &members, base)?,
-                _ => self.candidates(&members)?,
-            };
-            scans.push(Scan::of(family.to_string(), points));
-        }
-        Ok(scans)
-    }
-
-    /// An event from each of some dwells on, and one that ends again.
-    fn events(
-        &self,
-        family: &EffectSpec,
-        first: DwellId,
-        steps: &[EffectSpec],
-        dwells: &[DwellId],
-        base: &Linearisation,
-    ) -> Result<Vec<Scan>, DiagnoseError> {
-        let always = family.clone().since(Since::Dwell(first));
-        let all = self.candidates(&[always])?;
-        let Some(whole) = all.first() else { return Ok(Vec::new()) };
-        let steps = Scan::of(family.to_string(), self.switched(whole, steps, dwells));
-        Ok(std::iter::once(steps).chain(self.passing(family, whole, dwells, base)).collect())
-    }
-
-    /// An event that ends again, in the stretches of dwells where it promises most.
-    fn passing(
-        &self,
-        family: &EffectSpec,
-        whole: &Candidate,
-        dwells: &[DwellId],
-        base: &Linearisation,
-    ) -> Option<Scan> {
-        let Columns::Dense(columns) = &whole.columns else { return None };
-        let rows: Vec<_> = base.poses.iter().map(|pose| pose.rows.clone()).collect();
-        let found = stretches(dwells, &rows, columns, &base.residual);
-        let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
-        let members: Vec<EffectSpec> =
-            found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
-        let points = self.switched(whole, &members, dwells);
-        (!points.is_empty()).then(|| Scan {
-            name: format!("{family} for some dwells"),
-            tried: found.tried,
-            points,
-        })
-    }
-
-    /// One column for all events: the effect in all dwells, `whole`, switched on where the event acts.
-    fn switched(&self, whole: &Candidate, members: &[EffectSpec], dwells: &[DwellId]) -> Vec<Candidate> {
-        let Columns::Dense(base) = &whole.columns else { return Vec::new() };
-        let at = |member: &EffectSpec| {
-            let since = member.since.as_ref();
-            let on = |dwell: &DwellId| f64::from(since.is_some_and(|s| s.holds(*dwell)));
-            let basis = DMatrix::from_iterator(dwells.len(), 1, dwells.iter().map(on));
-            Candidate {
-                spec: member.to_string(),
-                known: self.knowledge.acts(member).map(str::to_owned),
-                target: self.target(member),
-                columns: Columns::Product { base: base.clone(), basis: Arc::new(basis) },
-                ..whole.clone()
-            }
-        };
-        members.iter().map(at).collect()
-    }
-
-    /// A periodic error turns its joint by a sine and a cosine of the reading.
-    fn modulated(
-        &self,
-        channel: &Channel,
-        members: &[EffectSpec],
-        base: &Linearisation,
-    ) -> Result<Vec<Candidate>, DiagnoseError> {
-        let Some(first) = members.first() else { return Ok(Vec::new()) };
-        let like = self.candidates(std::slice::from_ref(first))?;
-        let Some(like) = like.first() else { return Ok(Vec::new()) };
-        if like.amplitudes.len() < 2 {
-            // One of the two is held: what is left is no product.
-            return self.candidates(members);
-        }
-        let joint = first.target.unwrap_or_default();
-        let at = |member: &EffectSpec| {
-            let frequency = member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1);
-            let turned: Vec<f64> = self.poses(base).map(|o| frequency * o.joint_rad[joint]).collect();
-            let basis = DMatrix::from_fn(turned.len(), 2, |i, k| {
-                let (sine, cosine) = turned[i].sin_cos();
-                like.amplitudes[k].typical * if k == 0 { sine } else { cosine }
-            });
-            Candidate {
-                spec: member.to_string(),
-                known: self.knowledge.acts(member).map(str::to_owned),
-                columns: Columns::Product { base: channel.columns.clone(), basis: Arc::new(basis) },
-                ..like.clone()
-            }
-        };
-        Ok(members.iter().map(at).collect())
-    }
-
     /// One observation of each pose: what it says of the arm holds of all of them.
-    fn poses<'l>(&self, linear: &'l Linearisation) -> impl Iterator<Item = &'l Observation>
+    pub(crate) fn poses<'l>(&self, linear: &'l Linearisation) -> impl Iterator<Item = &'l Observation>
     where
         Self: 'l,
     {

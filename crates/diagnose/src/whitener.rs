@@ -14,6 +14,7 @@ use armcal_calibrate::{gram, inner};
 use armcal_core::{DwellId, Measured};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Correlation length of the short memory [dwells].
 const MEMORY_DWELLS: f64 = 3.0;
@@ -30,6 +31,8 @@ pub(crate) struct Whitener {
 enum Kind {
     /// A factor for each row.
     Rows(DVector<f64>),
+    /// For each dwell its rows and p: `x - p p'x` is whitened.
+    Dwells(Vec<(Range<usize>, DVector<f64>)>),
     /// A factor, and for each group its rows and P: `x - P P'x` times the factor is whitened.
     Groups(f64, Vec<(Vec<usize>, DMatrix<f64>)>),
     /// For each row: the row it remembers, decay to it, gain, and 1/sqrt of the innovation's variance.
@@ -79,6 +82,11 @@ impl Whitener {
         Whitener { kind: Kind::Then(all.into_iter().map(|one| one.kind).collect()), ln_det }
     }
 
+    /// Whether rows of a dwell are whitened by themselves, and the same in every column.
+    pub fn keeps_dwells_apart(&self) -> bool {
+        self.kind.keeps_dwells_apart()
+    }
+
     /// Whitens columns in place.
     pub fn apply(&self, columns: &mut DMatrix<f64>) {
         self.kind.apply(columns);
@@ -86,6 +94,15 @@ impl Whitener {
 }
 
 impl Kind {
+    fn keeps_dwells_apart(&self) -> bool {
+        match self {
+            Kind::Rows(_) => true,
+            Kind::Dwells(_) => true,
+            Kind::Groups(..) | Kind::Memory(_) => false,
+            Kind::Then(all) => all.iter().all(Kind::keeps_dwells_apart),
+        }
+    }
+
     fn apply(&self, columns: &mut DMatrix<f64>) {
         match self {
             Kind::Groups(unit, groups) => {
@@ -100,6 +117,15 @@ impl Kind {
                 }
             }
             Kind::Then(all) => all.iter().for_each(|one| one.apply(columns)),
+            Kind::Dwells(dwells) => {
+                for mut column in columns.column_iter_mut() {
+                    for (rows, p) in dwells {
+                        let mut own = column.rows_mut(rows.start, rows.len());
+                        let share = p.dot(&own);
+                        own.axpy(-share, p, 1.0);
+                    }
+                }
+            }
             Kind::Rows(factors) => {
                 columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
             }
@@ -176,14 +202,14 @@ fn scaled(problem: &Problem, variance: f64, those: impl Fn(&DwellRow, &Part) -> 
 /// `I + b^2 v v'` in every dwell.
 fn slack(v: &DVector<f64>, problem: &Problem, b: f64) -> Whitener {
     let mut ln_det = 0.0;
-    let mut group = |dwell: &DwellRow| {
+    let mut of = |dwell: &DwellRow| {
         let own = v.rows(dwell.first_row, dwell.rows).into_owned();
         let (p, grown) = shares(&DMatrix::from_column_slice(dwell.rows, 1, own.as_slice()), b);
         ln_det += grown;
-        (dwell.range().collect(), p)
+        (dwell.range(), p.column(0).into_owned())
     };
-    let groups = problem.dwells.iter().map(&mut group).collect();
-    Whitener { kind: Kind::Groups(1.0, groups), ln_det }
+    let dwells = problem.dwells.iter().map(&mut of).collect();
+    Whitener { kind: Kind::Dwells(dwells), ln_det }
 }
 
 fn groups(problem: &Problem, b: f64, by_recording: bool) -> Whitener {

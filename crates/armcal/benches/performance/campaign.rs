@@ -69,7 +69,7 @@ pub fn place(folder: &Path, poses: usize, diagnosed: bool, models: &Path) -> Res
          [streams.tip]\ntopic = \"/tracker/tip\"\n\n[streams.base]\ntopic = \"/tracker/base\"\n\n\
          [model]\ndh = \"{}\"\n\n[frames.base]\npose = \"measured\"\nsigma_mm = 0.02\nsigma_deg = 0.001\n\n\
          [frames.tip]\npose = \"estimated\"\nat = {{ xyz_m = [0.0, 0.0, 0.1] }}\n\n\
-         [holdout]\nkind = \"cavity-folds\"\nk = 10\n\n[diagnosis]\nenabled = {diagnosed}\n",
+         [pool]\nper_recording = [\"base.*\"]\n\n[holdout]\nkind = \"cavity-folds\"\nk = 10\n\n[diagnosis]\nenabled = {diagnosed}\n",
         models.join("ur10.toml").display()
     );
     let pipeline = folder.join(format!("pipeline-{diagnosed}.toml"));

@@ -2,13 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use super::*;
-use crate::problem::{Candidate, Columns};
+use super::{judge as judge_among, *};
+use crate::problem::Candidate;
 use crate::tests::{entry, outside, own, planted, quick, room};
 use crate::weigh::weigh;
 use armcal_core::DwellId;
 use nalgebra::DMatrix;
 use std::sync::Arc;
+
+/// Judges an entry among all that a weighed problem tries.
+fn judge(problem: &Problem, weighed: &Weighed, entry: usize, config: &DiagnosisConfig) -> Judged {
+    judge_among(problem, weighed, &significance(problem, weighed, config), entry, config)
+}
 
 /// A planted play, weighed and judged.
 fn judged() -> (Problem, Weighed, Judged) {

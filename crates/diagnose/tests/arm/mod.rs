@@ -397,6 +397,8 @@ pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
     let scale = |c: &mut Columns| match c {
         Columns::Dense(m) => *m = Arc::new(m.as_ref() * factor),
         Columns::Product { basis, .. } => *basis = Arc::new(basis.as_ref() * factor),
+        Columns::Wave { sizes, .. } => sizes.iter_mut().for_each(|size| *size *= factor),
+        Columns::Within { base, .. } => *base = Arc::new(base.as_ref() * factor),
     };
     p.candidates.iter_mut().for_each(|c| scale(&mut c.columns));
     p.scans.iter_mut().flat_map(|s| &mut s.points).for_each(|c| scale(&mut c.columns));

@@ -1,0 +1,189 @@
+//! Whitened columns of what might be missing: stored, or as products that are cheap to keep and to weigh.
+//!
+//! A product is a base, a few columns of rows, times functions known at the dwells: a joint's column times functions of an
+//! angle, an effect's columns where it acts. What is asked of it dwell by dwell costs the base once and then a number or
+//! two a dwell and function, never the rows.
+
+use crate::problem::DwellRow;
+use nalgebra::DMatrix;
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Whitened columns.
+#[derive(Debug, Clone)]
+pub enum Columns {
+    /// As they are: rows x m.
+    Dense(Arc<DMatrix<f64>>),
+    /// Every column of `base` (rows x c) times every column of `basis` (dwells x m) at the row's dwell.
+    Product {
+        /// Unit columns.
+        base: Arc<DMatrix<f64>>,
+        /// Values at the dwells.
+        basis: Arc<DMatrix<f64>>,
+    },
+    /// Every column of `base` times the sine and the cosine of an angle's multiple.
+    Wave {
+        /// Unit columns.
+        base: Arc<DMatrix<f64>>,
+        /// The angle at each dwell [rad].
+        angle_rad: Arc<Vec<f64>>,
+        /// Periods in a turn of it.
+        per_turn: f64,
+        /// Size of the sine and of the cosine.
+        sizes: [f64; 2],
+    },
+    /// `base` in some of the dwells, as they follow each other, and nothing in the others.
+    Within {
+        /// The columns.
+        base: Arc<DMatrix<f64>>,
+        /// The place of each dwell in the order of time.
+        places: Arc<Vec<usize>>,
+        /// The places of those in which it acts.
+        on: Range<usize>,
+    },
+}
+
+impl Columns {
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        match self {
+            Columns::Dense(m) => m.ncols(),
+            Columns::Product { base, basis } => base.ncols() * basis.ncols(),
+            Columns::Wave { base, .. } => 2 * base.ncols(),
+            Columns::Within { base, .. } => base.ncols(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        match self {
+            Columns::Dense(base)
+            | Columns::Product { base, .. }
+            | Columns::Wave { base, .. }
+            | Columns::Within { base, .. } => base.nrows(),
+        }
+    }
+
+    /// The base of a product.
+    pub(crate) fn base(&self) -> Option<&Arc<DMatrix<f64>>> {
+        match self {
+            Columns::Dense(_) => None,
+            Columns::Product { base, .. } | Columns::Wave { base, .. } | Columns::Within { base, .. } => {
+                Some(base)
+            }
+        }
+    }
+
+    /// Of a product its base, and the functions at the dwells (dwells x m).
+    pub(crate) fn factors(&self) -> Option<(&Arc<DMatrix<f64>>, Cow<'_, DMatrix<f64>>)> {
+        match self {
+            Columns::Dense(_) => None,
+            Columns::Product { base, basis } => Some((base, Cow::Borrowed(basis))),
+            Columns::Wave { base, angle_rad, per_turn, sizes } => {
+                let mut basis = DMatrix::zeros(angle_rad.len(), 2);
+                for (i, angle) in angle_rad.iter().enumerate() {
+                    let (sine, cosine) = (per_turn * angle).sin_cos();
+                    (basis[(i, 0)], basis[(i, 1)]) = (sizes[0] * sine, sizes[1] * cosine);
+                }
+                Some((base, Cow::Owned(basis)))
+            }
+            Columns::Within { base, places, on } => {
+                let on = places.iter().map(|place| f64::from(on.contains(place)));
+                Some((base, Cow::Owned(DMatrix::from_iterator(places.len(), 1, on))))
+            }
+        }
+    }
+
+    /// The columns, times `factor`. Products are ordered base column by base column.
+    pub fn dense(&self, dwells: &[DwellRow], factor: f64) -> DMatrix<f64> {
+        let (base, basis) = match (self, self.factors()) {
+            (_, Some(factors)) => factors,
+            (Columns::Dense(m), _) => return m.as_ref() * factor,
+            (_, None) => return DMatrix::zeros(self.rows(), 0),
+        };
+        let mut out = DMatrix::zeros(base.nrows(), self.len());
+        for c in 0..base.ncols() {
+            for b in 0..basis.ncols() {
+                let mut column = out.column_mut(c * basis.ncols() + b);
+                for (i, dwell) in dwells.iter().enumerate() {
+                    let value = basis[(i, b)] * factor;
+                    if value != 0.0 {
+                        for row in dwell.range() {
+                            column[row] = base[(row, c)] * value;
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Whether every number in them is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite = |m: &DMatrix<f64>| m.iter().all(|v| v.is_finite());
+        match (self, self.factors()) {
+            (Columns::Dense(m), _) => finite(m),
+            (_, Some((base, basis))) => finite(base) && finite(&basis),
+            (_, None) => true,
+        }
+    }
+
+    /// The same without some dwells: those `kept`, and their `rows`. `cut` remembers what bases, which products share, were
+    /// cut to.
+    pub(crate) fn select(&self, kept: &[usize], rows: &[usize], cut: &mut Cut) -> Columns {
+        match self {
+            Columns::Dense(m) => Columns::Dense(Arc::new(m.select_rows(rows))),
+            Columns::Product { base, basis } => {
+                Columns::Product { base: cut.of(base, rows), basis: Arc::new(basis.select_rows(kept)) }
+            }
+            Columns::Wave { base, angle_rad, per_turn, sizes } => Columns::Wave {
+                base: cut.of(base, rows),
+                angle_rad: cut.numbers(angle_rad, kept),
+                per_turn: *per_turn,
+                sizes: *sizes,
+            },
+            Columns::Within { base, places, on } => {
+                Columns::Within { base: cut.of(base, rows), places: cut.places(places, kept), on: on.clone() }
+            }
+        }
+    }
+}
+
+/// What is shared by many columns, each with what it was cut to.
+#[derive(Default)]
+pub(crate) struct Cut {
+    bases: Vec<[Arc<DMatrix<f64>>; 2]>,
+    numbers: Vec<[Arc<Vec<f64>>; 2]>,
+    places: Vec<[Arc<Vec<usize>>; 2]>,
+}
+
+impl Cut {
+    /// A base with these rows alone.
+    pub fn of(&mut self, base: &Arc<DMatrix<f64>>, rows: &[usize]) -> Arc<DMatrix<f64>> {
+        once(&mut self.bases, base, |m| m.select_rows(rows))
+    }
+
+    fn numbers(&mut self, all: &Arc<Vec<f64>>, kept: &[usize]) -> Arc<Vec<f64>> {
+        once(&mut self.numbers, all, |v| kept.iter().map(|i| v[*i]).collect())
+    }
+
+    fn places(&mut self, all: &Arc<Vec<usize>>, kept: &[usize]) -> Arc<Vec<usize>> {
+        once(&mut self.places, all, |v| kept.iter().map(|i| v[*i]).collect())
+    }
+}
+
+/// What `make` makes of something shared, made once.
+fn once<T>(known: &mut Vec<[Arc<T>; 2]>, of: &Arc<T>, make: impl FnOnce(&T) -> T) -> Arc<T> {
+    if let Some([_, done]) = known.iter().find(|[from, _]| Arc::ptr_eq(from, of)) {
+        return done.clone();
+    }
+    let done = Arc::new(make(of));
+    known.push([of.clone(), done.clone()]);
+    done
+}

@@ -1,0 +1,188 @@
+//! Families with a shape to be searched, seen by a fitted model's observations: each value of the shape as columns.
+
+use crate::DiagnoseError;
+use crate::problem::{Candidate, Channel, Columns, Scan};
+use crate::stretches::stretches;
+use crate::view::View;
+use armcal_calibrate::Linearisation;
+use armcal_core::DwellId;
+use armcal_model::{EffectSpec, Since};
+use std::ops::Range;
+use std::sync::Arc;
+
+impl View<'_> {
+    /// The catalogue, and every family with a shape: products where the shape switches or modulates, columns of their own
+    /// otherwise. One linearisation serves all that acts in proportion to its size.
+    pub(crate) fn candidates_and_scans(
+        &self,
+        specs: &[EffectSpec],
+        channels: &[Channel],
+        base: &Linearisation,
+    ) -> Result<(Vec<Candidate>, Vec<Scan>), DiagnoseError> {
+        let times = Times::of(self.poses(base).map(|o| o.dwell));
+        let mut families = Vec::new();
+        for (family, mut members) in self.model.scans(self.session, self.observations) {
+            members.retain(|spec| self.tried(spec));
+            if !members.is_empty() {
+                families.push((Scanned::of(&family, &members, channels, &times), family, members));
+            }
+        }
+        let like = families.iter().flat_map(|(scanned, _, members)| scanned.like(members));
+        let all: Vec<EffectSpec> = specs.iter().cloned().chain(like).collect();
+        let mut all = self.candidates(&all)?.into_iter();
+        let candidates = all.by_ref().take(specs.len()).collect();
+        let mut scans = Vec::new();
+        for (scanned, family, members) in families {
+            let like: Vec<Candidate> = all.by_ref().take(scanned.like(&members).count()).collect();
+            let points = match (scanned, like.first()) {
+                (Scanned::Steps(_), Some(whole)) => {
+                    let steps = self.switched(whole, &members, &times);
+                    scans.push(Scan::of(family.to_string(), steps));
+                    scans.extend(self.passing(&family, whole, &times, base));
+                    continue;
+                }
+                (Scanned::Waves(channel), Some(like)) => self.modulated(channel, like, &members, base),
+                _ => None,
+            };
+            // No product, or one of two amplitudes is held: what is left is none.
+            let points = points.map_or_else(|| self.candidates(&members), Ok)?;
+            scans.push(Scan::of(family.to_string(), points));
+        }
+        Ok((candidates, scans))
+    }
+
+    /// An event that ends again, in the stretches of dwells where it promises most.
+    fn passing(
+        &self,
+        family: &EffectSpec,
+        whole: &Candidate,
+        times: &Times,
+        base: &Linearisation,
+    ) -> Option<Scan> {
+        let Columns::Dense(columns) = &whole.columns else { return None };
+        let rows: Vec<_> = base.poses.iter().map(|pose| pose.rows.clone()).collect();
+        let found = stretches(&times.dwells, &rows, columns, &base.residual);
+        let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
+        let members: Vec<EffectSpec> =
+            found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
+        let points = self.switched(whole, &members, times);
+        (!points.is_empty()).then(|| Scan {
+            name: format!("{family} for some dwells"),
+            tried: found.tried,
+            points,
+        })
+    }
+
+    /// The effect in all dwells, `whole`, switched on where each event acts.
+    fn switched(&self, whole: &Candidate, members: &[EffectSpec], times: &Times) -> Vec<Candidate> {
+        let Columns::Dense(base) = &whole.columns else { return Vec::new() };
+        let at = |member: &EffectSpec| Candidate {
+            spec: member.to_string(),
+            known: self.knowledge.acts(member).map(str::to_owned),
+            target: self.target(member),
+            columns: Columns::Within {
+                base: base.clone(),
+                places: times.places.clone(),
+                on: times.on(member.since.as_ref()),
+            },
+            ..whole.clone()
+        };
+        members.iter().map(at).collect()
+    }
+
+    /// A periodic error turns its joint by a sine and a cosine of the reading; none where one of the two is held.
+    fn modulated(
+        &self,
+        channel: &Channel,
+        like: &Candidate,
+        members: &[EffectSpec],
+        base: &Linearisation,
+    ) -> Option<Vec<Candidate>> {
+        let [sine, cosine] = like.amplitudes.as_slice() else { return None };
+        let joint = members.first()?.target?;
+        let angle_rad = Arc::new(self.poses(base).map(|o| o.joint_rad[joint]).collect::<Vec<_>>());
+        let at = |member: &EffectSpec| Candidate {
+            spec: member.to_string(),
+            known: self.knowledge.acts(member).map(str::to_owned),
+            columns: Columns::Wave {
+                base: channel.columns.clone(),
+                angle_rad: angle_rad.clone(),
+                per_turn: member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1),
+                sizes: [sine.typical, cosine.typical],
+            },
+            ..like.clone()
+        };
+        Some(members.iter().map(at).collect())
+    }
+}
+
+/// How the members of a family with a shape become columns.
+enum Scanned<'c> {
+    /// Of the effect that acts from the first dwell on.
+    Steps(EffectSpec),
+    /// Of a joint that is turned over its own angle.
+    Waves(&'c Channel),
+    /// Each by itself.
+    Alone,
+}
+
+impl<'c> Scanned<'c> {
+    fn of(
+        family: &EffectSpec,
+        members: &[EffectSpec],
+        channels: &'c [Channel],
+        times: &Times,
+    ) -> Scanned<'c> {
+        let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
+        if let Some(first) = times.order.first().filter(|_| steps) {
+            return Scanned::Steps(family.clone().since(Since::Dwell(*first)));
+        }
+        let joint = family.target.map(|j| format!("joint{}", j + 1));
+        let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
+        channel.filter(|_| family.kind == "periodic").map_or(Scanned::Alone, Scanned::Waves)
+    }
+
+    /// The effects whose columns say what those of all members are.
+    fn like<'m>(&'m self, members: &'m [EffectSpec]) -> impl Iterator<Item = EffectSpec> + use<'m> {
+        let own = match self {
+            Scanned::Steps(always) => std::slice::from_ref(always),
+            Scanned::Waves(_) => &members[..members.len().min(1)],
+            Scanned::Alone => &[],
+        };
+        own.iter().cloned()
+    }
+}
+
+/// The dwells in the order of the problem, and as they follow each other.
+struct Times {
+    dwells: Vec<DwellId>,
+    order: Vec<DwellId>,
+    /// The place of each dwell in the order.
+    places: Arc<Vec<usize>>,
+}
+
+impl Times {
+    fn of(dwells: impl Iterator<Item = DwellId>) -> Times {
+        let dwells: Vec<DwellId> = dwells.collect();
+        let mut order = dwells.clone();
+        order.sort_unstable();
+        let places = dwells.iter().map(|dwell| order.partition_point(|other| other < dwell)).collect();
+        Times { dwells, order, places: Arc::new(places) }
+    }
+
+    /// The places of the dwells in which an event acts.
+    fn on(&self, since: Option<&Since>) -> Range<usize> {
+        let from = |first: DwellId| self.order.partition_point(|dwell| *dwell < first);
+        match since {
+            None => 0..0,
+            Some(Since::Dwell(first)) => from(*first)..self.order.len(),
+            Some(Since::Recording(recording)) => {
+                let start = |recording| from(DwellId { recording, dwell: 0 });
+                start(*recording)..start(recording + 1)
+            }
+            Some(Since::Dwells { first, last }) => {
+                from(*first)..from(DwellId { recording: first.recording, dwell: last + 1 })
+            }
+        }
+    }
+}

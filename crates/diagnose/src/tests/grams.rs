@@ -1,0 +1,74 @@
+//! Products that were never put together against the same columns put together.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use super::*;
+use crate::noise::Noise;
+use crate::tests::planted;
+
+/// Columns of every form: a product of a base of two columns, waves, events that begin, end and never act, and dense ones.
+fn forms(problem: &Problem) -> Vec<Columns> {
+    let (rows, n) = (problem.rows(), problem.dwells.len());
+    let base = Arc::new(DMatrix::from_fn(rows, 2, |i, k| ((i + 3 * k) as f64 * 0.7).sin()));
+    let basis = Arc::new(DMatrix::from_fn(n, 3, |i, k| ((i * (k + 2)) as f64 * 0.11).cos()));
+    let angle_rad = Arc::new((0..n).map(|i| (i as f64 * 0.37).sin()).collect::<Vec<_>>());
+    // The order of time is not that of the rows.
+    let places = Arc::new((0..n).map(|i| (i * 7) % n).collect::<Vec<_>>());
+    assert!(n % 7 != 0, "a permutation");
+    let wave = |per_turn| Columns::Wave {
+        base: base.clone(),
+        angle_rad: angle_rad.clone(),
+        per_turn,
+        sizes: [0.3, -1.2],
+    };
+    let within = |on| Columns::Within { base: base.clone(), places: places.clone(), on };
+    vec![
+        Columns::Product { base: base.clone(), basis },
+        wave(4.0),
+        within(5..n),
+        Columns::Dense(Arc::new(DMatrix::from_fn(rows, 2, |i, k| ((i * i + k) as f64).cos()))),
+        within(9..31),
+        wave(23.5),
+        within(0..0),
+        within(n - 1..n),
+    ]
+}
+
+#[test]
+fn products_weigh_as_what_they_stand_for_under_every_noise() {
+    let problem = planted(&[("backlash:1", 1.0)], 0, 3);
+    let forms = forms(&problem);
+    let terms: Vec<&Columns> = forms.iter().collect();
+    let mut kinds: Vec<Noise> = Vec::new();
+    for kind in Noise::available(&problem) {
+        let metric = Metric::new(kind, 0.7, &problem, 1.3);
+        let mut seen = 0;
+        each_gram(&terms, &problem, 1.0 / 1.3, &metric, &mut |k, found| {
+            let whole = metric.gram(&terms[k].dense(&problem.dwells, 1.0 / 1.3));
+            let size = whole.raw.max().max(1.0);
+            assert!((&found.a - &whole.a).amax() < 1e-10 * size, "{kind:?}, term {k}: A");
+            assert!((&found.g - &whole.g).amax() < 1e-10 * size, "{kind:?}, term {k}: g");
+            assert!((&found.raw - &whole.raw).amax() < 1e-10 * size, "{kind:?}, term {k}: norms");
+            assert!((&found.spent - &whole.spent).amax() < 1e-10 * size, "{kind:?}, term {k}: Q'G");
+            seen += 1;
+        });
+        assert_eq!(seen, terms.len(), "each once");
+        kinds.push(kind);
+    }
+    assert!(kinds.contains(&Noise::Memory) && kinds.contains(&Noise::Slack(0)), "{kinds:?}");
+}
+
+#[test]
+fn what_is_left_of_products_without_some_dwells_is_what_is_left_of_their_columns() {
+    let problem = planted(&[], 0, 4);
+    let keep: Vec<bool> = (0..problem.dwells.len()).map(|i| i % 5 != 2).collect();
+    let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
+    let rows: Vec<usize> = kept.iter().flat_map(|i| problem.dwells[*i].range()).collect();
+    let fewer = problem.without(&keep);
+    let mut cut = crate::columns::Cut::default();
+    for columns in forms(&problem) {
+        let expected = columns.dense(&problem.dwells, 1.0).select_rows(&rows);
+        let found = columns.select(&kept, &rows, &mut cut).dense(&fewer.dwells, 1.0);
+        assert_eq!(found, expected);
+    }
+}
