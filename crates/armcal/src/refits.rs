@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story::{calibrated, chosen_again};
-use armcal_calibrate::{calibrate, holdout_turns};
+use armcal_calibrate::{calibrate_beside, holdout_turns};
 use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::ParameterReport;
 use armcal_model::EffectSpec;
@@ -143,6 +143,7 @@ fn alternatives(run: &Run, pipeline: &Pipeline) -> Vec<Refit> {
 /// The run's model with more effects, calibrated on its observations.
 fn refit(run: &Run, pipeline: &Pipeline, effects: &[EffectSpec]) -> Result<Refit, Error> {
     let model = run.model.with_effects(effects, &run.session)?;
-    let calibration = calibrate(&model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
+    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
+    let calibration = calibrate_beside(Some(&run.calibration), &model, &run.observations, fit, holdout)?;
     Ok(Refit { effects: effects.iter().map(EffectSpec::to_string).collect(), model, calibration })
 }

@@ -17,6 +17,7 @@ use crate::frames;
 use crate::holdout::{self, Holdout};
 use crate::model_problem::{ModelProblem, describe, position_covariance_m2, whitened};
 use crate::noise::expected_norm_m;
+use crate::nominal::{self, Nominal};
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::priors::scales_of;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
@@ -33,12 +34,25 @@ pub fn calibrate(
     config: &FitConfig,
     holdout: &HoldoutConfig,
 ) -> Result<Calibration, CalibrateError> {
+    calibrate_beside(None, model, observations, config, holdout)
+}
+
+/// [`calibrate`] where a calibration of the same arm with fewer effects, on the same observations and hold-out, is at hand:
+/// effects that do nothing at nominal leave the nominal arm and its frames as they are there.
+pub fn calibrate_beside(
+    other: Option<&Calibration>,
+    model: &Model,
+    observations: &[Observation],
+    config: &FitConfig,
+    holdout: &HoldoutConfig,
+) -> Result<Calibration, CalibrateError> {
     config.check()?;
     if observations.is_empty() {
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
     let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
-    judged(&Judge { model, observations, config }, &holdout)
+    let nominal = other.and_then(|other| nominal::of_turns(other, model)).unwrap_or_default();
+    judged(&Judge { model, observations, config, nominal }, &holdout)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -56,15 +70,15 @@ pub fn holdout_turns(
 /// Fits in the turns of the hold-out and pools their errors.
 fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, CalibrateError> {
     if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
-        let turn = judge.turn(held, None)?;
+        let turn = judge.turn((held, judge.nominal.turns.first()), None)?;
         return gathered(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
-    let last = judge.turn(&[], None)?;
+    let last = judge.turn((&[], judge.nominal.of_all.as_ref()), None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
     let near = (judge.config.objective != Objective::Paper).then_some(&last);
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
-    let turns: Vec<Result<Turn, CalibrateError>> =
-        holdout.turns.par_iter().map(|held| judge.turn(held, near)).collect();
+    let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
+    let turns: Vec<Result<Turn, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
     gathered(judge, holdout, &turns, last)
 }
@@ -155,6 +169,7 @@ fn gathered(
         noise_floor_m,
         prediction_factor,
         turn_sigma_ratio,
+        turn_nominal_values: turns.iter().map(|turn| turn.nominal_values.clone()).collect(),
         warnings,
     };
     calibration.warnings.extend(fit_warnings::above_floor(&calibration));
@@ -174,11 +189,17 @@ struct Judge<'a> {
     model: &'a Model,
     observations: &'a [Observation],
     config: &'a FitConfig,
+    nominal: Nominal,
 }
 
 impl Judge<'_> {
-    /// Fits without the observations `held`, from nominal or from the turn `near` that saw them too.
-    fn turn(&self, held: &[usize], near: Option<&Turn>) -> Result<Turn, CalibrateError> {
+    /// Fits without the observations `held`, from nominal or from the turn `near` that saw them too. Where the nominal arm and
+    /// its frames are known they are not looked for.
+    fn turn(
+        &self,
+        (held, nominal): (&[usize], Option<&Vec<f64>>),
+        near: Option<&Turn>,
+    ) -> Result<Turn, CalibrateError> {
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let side = |held: bool| {
             let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
@@ -188,9 +209,10 @@ impl Judge<'_> {
         let unseen = self.frames_only_in(&test, &train);
         let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
-        let mut nominal_values = match near {
-            Some(near) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
-            None => frames::fit_on(&train, self.config)?,
+        let mut nominal_values = match (nominal, near) {
+            (Some(known), _) => known.clone(),
+            (None, Some(near)) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
+            (None, None) => frames::fit_on(&train, self.config)?,
         };
         let free = |p: &Parameter| p.free && !of_unseen(p);
         let mut fit = match near.map(|near| self.near(&near.fit, &nominal_values, &of_unseen)) {
@@ -199,7 +221,9 @@ impl Judge<'_> {
         };
         let mut warnings = Vec::new();
         if !unseen.is_empty() {
-            nominal_values = frames::fit_some(&test, nominal_values, self.config, &of_unseen)?;
+            if nominal.is_none() {
+                nominal_values = frames::fit_some(&test, nominal_values, self.config, &of_unseen)?;
+            }
             let start = frames::fit_some(&test, fit.values(), self.config, &of_unseen)?;
             let frozen = fit_problem(&test, &start, &|p| p.free && of_unseen(p), self.config)?;
             adopt(&mut fit, &frozen, &of_unseen);

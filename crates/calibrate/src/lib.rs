@@ -32,6 +32,7 @@ mod linearise;
 mod loss;
 mod model_problem;
 mod noise;
+mod nominal;
 mod outcome;
 mod paired;
 mod paper;
@@ -53,7 +54,7 @@ mod words;
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
 mod tests;
 
-pub use calibration::{calibrate, holdout_turns};
+pub use calibration::{calibrate, calibrate_beside, holdout_turns};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use covariance::Covariance;
 pub use error::CalibrateError;

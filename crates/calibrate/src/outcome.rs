@@ -135,6 +135,8 @@ pub struct Calibration {
     /// How much less certain each parameter is in the turn of the hold-out that says the least of it, in the order of
     /// `fit.estimates`: its standard deviation there over that of `fit`; empty where nothing was held out in turns.
     pub turn_sigma_ratio: Vec<f64>,
+    /// [`Calibration::nominal_values`] as each turn of the hold-out has them.
+    pub turn_nominal_values: Vec<Vec<f64>>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }

@@ -59,7 +59,8 @@ pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisCon
                 driver_name: driver.name.clone(),
                 columns: Columns::Product {
                     base: channel.columns.clone(),
-                    basis: Arc::new(&driver.basis * unit_si),
+                    basis: driver.basis.clone(),
+                    size: unit_si,
                 },
                 unit_si,
             });
@@ -90,7 +91,8 @@ pub(crate) fn discrepancies(problem: &Problem, config: &DiagnosisConfig) -> Vec<
             driver_name: name.to_string(),
             columns: Columns::Product {
                 base: base.clone(),
-                basis: Arc::new(functions * (config.unlisted_effect_mm * 1e-3 / 3f64.sqrt())),
+                basis: Arc::new(functions),
+                size: config.unlisted_effect_mm * 1e-3 / 3f64.sqrt(),
             },
             unit_si: config.unlisted_effect_mm * 1e-3 / 3f64.sqrt(),
         });

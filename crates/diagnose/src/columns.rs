@@ -21,6 +21,8 @@ pub enum Columns {
         base: Arc<DMatrix<f64>>,
         /// Values at the dwells.
         basis: Arc<DMatrix<f64>>,
+        /// Times this.
+        size: f64,
     },
     /// Every column of `base` times the sine and the cosine of an angle's multiple.
     Wave {
@@ -49,7 +51,7 @@ impl Columns {
     pub fn len(&self) -> usize {
         match self {
             Columns::Dense(m) => m.ncols(),
-            Columns::Product { base, basis } => base.ncols() * basis.ncols(),
+            Columns::Product { base, basis, .. } => base.ncols() * basis.ncols(),
             Columns::Wave { base, .. } => 2 * base.ncols(),
             Columns::Within { base, .. } => base.ncols(),
         }
@@ -84,20 +86,40 @@ impl Columns {
     pub(crate) fn factors(&self) -> Option<(&Arc<DMatrix<f64>>, Cow<'_, DMatrix<f64>>)> {
         match self {
             Columns::Dense(_) => None,
-            Columns::Product { base, basis } => Some((base, Cow::Borrowed(basis))),
+            Columns::Product { base, basis, size } if *size == 1.0 => Some((base, Cow::Borrowed(basis))),
+            Columns::Product { base, basis, size } => Some((base, Cow::Owned(basis.as_ref() * *size))),
             Columns::Wave { base, angle_rad, per_turn, sizes } => {
-                let mut basis = DMatrix::zeros(angle_rad.len(), 2);
-                for (i, angle) in angle_rad.iter().enumerate() {
-                    let (sine, cosine) = (per_turn * angle).sin_cos();
-                    (basis[(i, 0)], basis[(i, 1)]) = (sizes[0] * sine, sizes[1] * cosine);
-                }
-                Some((base, Cow::Owned(basis)))
+                Some((base, Cow::Owned(Turning::new(angle_rad, *per_turn).sized(sizes))))
             }
             Columns::Within { base, places, on } => {
                 let on = places.iter().map(|place| f64::from(on.contains(place)));
                 Some((base, Cow::Owned(DMatrix::from_iterator(places.len(), 1, on))))
             }
         }
+    }
+
+    /// The functions of many terms, those that have any. Of waves over one angle at even steps each is the one before it
+    /// turned by the step, which costs no sine.
+    pub(crate) fn functions<'c>(terms: impl Iterator<Item = &'c Columns>) -> Vec<Cow<'c, DMatrix<f64>>> {
+        let mut all = Vec::new();
+        let mut turning: Option<Turning<'c>> = None;
+        for term in terms {
+            match (term, turning.as_mut()) {
+                (Columns::Wave { angle_rad, per_turn, sizes, .. }, Some(wave))
+                    if Arc::ptr_eq(angle_rad, wave.angle_rad) =>
+                {
+                    wave.turn(*per_turn);
+                    all.push(Cow::Owned(wave.sized(sizes)));
+                }
+                (Columns::Wave { angle_rad, per_turn, sizes, .. }, _) => {
+                    let wave = Turning::new(angle_rad, *per_turn);
+                    all.push(Cow::Owned(wave.sized(sizes)));
+                    turning = Some(wave);
+                }
+                _ => all.extend(term.factors().map(|(_, functions)| functions)),
+            }
+        }
+        all
     }
 
     /// The columns, times `factor`. Products are ordered base column by base column.
@@ -139,8 +161,9 @@ impl Columns {
     pub(crate) fn select(&self, kept: &[usize], rows: &[usize], cut: &mut Cut) -> Columns {
         match self {
             Columns::Dense(m) => Columns::Dense(Arc::new(m.select_rows(rows))),
-            Columns::Product { base, basis } => {
-                Columns::Product { base: cut.of(base, rows), basis: Arc::new(basis.select_rows(kept)) }
+            Columns::Product { base, basis, size } => {
+                let basis = Arc::new(basis.select_rows(kept));
+                Columns::Product { base: cut.of(base, rows), basis, size: *size }
             }
             Columns::Wave { base, angle_rad, per_turn, sizes } => Columns::Wave {
                 base: cut.of(base, rows),
@@ -153,6 +176,41 @@ impl Columns {
             }
         }
     }
+}
+
+/// Sine and cosine of the multiples of an angle, one multiple after the other.
+struct Turning<'c> {
+    angle_rad: &'c Arc<Vec<f64>>,
+    per_turn: f64,
+    now: Vec<[f64; 2]>,
+    /// The last step, and what it turns each dwell by.
+    step: (f64, Vec<[f64; 2]>),
+}
+
+impl<'c> Turning<'c> {
+    fn new(angle_rad: &'c Arc<Vec<f64>>, per_turn: f64) -> Turning<'c> {
+        Turning { angle_rad, per_turn, now: waves(angle_rad, per_turn), step: (0.0, Vec::new()) }
+    }
+
+    /// On to another multiple.
+    fn turn(&mut self, per_turn: f64) {
+        let step = per_turn - self.per_turn;
+        if self.step.0 != step {
+            self.step = (step, waves(self.angle_rad, step));
+        }
+        for (now, [sine, cosine]) in self.now.iter_mut().zip(&self.step.1) {
+            *now = [now[0] * cosine + now[1] * sine, now[1] * cosine - now[0] * sine];
+        }
+        self.per_turn = per_turn;
+    }
+
+    fn sized(&self, sizes: &[f64; 2]) -> DMatrix<f64> {
+        DMatrix::from_fn(self.now.len(), 2, |i, k| sizes[k] * self.now[i][k])
+    }
+}
+
+fn waves(angle_rad: &[f64], per_turn: f64) -> Vec<[f64; 2]> {
+    angle_rad.iter().map(|angle| <[f64; 2]>::from((per_turn * angle).sin_cos())).collect()
 }
 
 /// What is shared by many columns, each with what it was cut to.

@@ -3,6 +3,7 @@
 use crate::problem::Problem;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Functions kept for a smooth driver, and for a joint's own angle in detail.
 const FUNCTIONS: usize = 8;
@@ -53,7 +54,7 @@ pub(crate) struct Driver {
     /// Its value at each dwell; of a direction along an angle, the angle.
     pub value: Vec<f64>,
     /// Functions of it at the dwells: dwells x m.
-    pub basis: DMatrix<f64>,
+    pub basis: Arc<DMatrix<f64>>,
     /// Kernel behind a smooth basis, for evaluation between the dwells.
     pub kernel: Option<Kernel>,
 }
@@ -85,7 +86,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     for j in 0..joints {
         let value = column(&|d| d.arrival[j]);
         if varies(&value) {
-            let basis = with_pose(&value);
+            let basis = Arc::new(with_pose(&value));
             let kind = DriverKind::Direction(j);
             all.push(Driver { name: format!("s{}", j + 1), kind, value, basis, kernel: None });
             all.extend(direction_along(problem, j));
@@ -94,7 +95,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     let load = column(&|d| d.load_kg);
     if varies(&load) {
         let (mean, sd) = moments(&load);
-        let basis = with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>());
+        let basis = Arc::new(with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>()));
         all.push(Driver {
             name: "load".to_string(),
             kind: DriverKind::Load,
@@ -113,7 +114,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
             name: "recording".to_string(),
             kind: DriverKind::Recording,
             value,
-            basis,
+            basis: Arc::new(basis),
             kernel: None,
         });
     }
@@ -124,7 +125,7 @@ fn direction_along(problem: &Problem, joint: usize) -> Option<Driver> {
     let angle = problem.dwells.iter().map(|d| d.joint_rad[joint]).collect();
     let (name, kind) = (format!("s{0}*q{0}", joint + 1), DriverKind::DirectionAlong(joint));
     let mut driver = smooth(name, angle, kind)?;
-    for (d, mut row) in problem.dwells.iter().zip(driver.basis.row_iter_mut()) {
+    for (d, mut row) in problem.dwells.iter().zip(Arc::make_mut(&mut driver.basis).row_iter_mut()) {
         row *= d.arrival[joint];
     }
     Some(driver)
@@ -169,7 +170,7 @@ fn smooth(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
     for (i, v) in value.iter().enumerate() {
         basis.set_row(i, &kernel.at(*v).transpose());
     }
-    Some(Driver { name, kind, value, basis, kernel: Some(kernel) })
+    Some(Driver { name, kind, value, basis: Arc::new(basis), kernel: Some(kernel) })
 }
 
 /// Leading functions of a mixture of two squared-exponential kernels over the range of the data (Nystroem on a grid,

@@ -48,7 +48,7 @@ pub(crate) fn expression(
                 (0..family.basis.ncols()).map(|k| config.unlisted_effect_mm * 1e-3 / rms(k)).collect();
             let mut basis = family.basis.clone();
             basis.column_iter_mut().zip(&unit).for_each(|(mut column, u)| column *= *u);
-            let columns = Columns::Product { base: base.clone(), basis: Arc::new(basis) };
+            let columns = Columns::Product { base: base.clone(), basis: Arc::new(basis), size: 1.0 };
             (family, unit, columns)
         })
         .collect();

@@ -142,11 +142,11 @@ impl<'p> ByDwell<'p> {
 
     /// Of terms that are functions times this base.
     fn of_functions(&self, terms: &[&Columns], block: &[usize], each: &mut dyn FnMut(usize, &Gram)) {
-        let functions: Vec<_> = block.iter().filter_map(|k| Some((*k, terms[*k].factors()?.1))).collect();
-        let width = functions.iter().map(|(_, basis)| basis.ncols()).sum();
+        let functions = Columns::functions(block.iter().map(|k| terms[*k]));
+        let width = functions.iter().map(|basis| basis.ncols()).sum();
         let mut stacked = DMatrix::zeros(self.square.nrows(), width);
         let mut at = 0;
-        for (_, basis) in &functions {
+        for basis in &functions {
             stacked.columns_mut(at, basis.ncols()).copy_from(basis);
             at += basis.ncols();
         }
@@ -154,7 +154,7 @@ impl<'p> ByDwell<'p> {
         // Rows of Q' X, column by column of the base.
         let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(|q| inner(q, &stacked)).collect();
         let mut at = 0;
-        for (k, basis) in &functions {
+        for (k, basis) in block.iter().zip(&functions) {
             let m = basis.ncols();
             let own = |i: usize| spent[i].columns(at, m);
             let mut gram = Gram::zeros(m * self.c, self.projection.q.ncols());

@@ -3,6 +3,7 @@
 use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
 use nalgebra::{DMatrix, DVector, DVectorView};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
@@ -81,8 +82,8 @@ impl<'s> Point<'s> {
         };
         let with: Vec<[Vec<f64>; 2]> =
             base.column_iter().map(|x| [of_dwell(x, residual.as_view()), of_dwell(x, x)]).collect();
-        let of = |candidate: &'s Candidate| {
-            let (_, basis) = candidate.columns.factors()?;
+        let functions = Columns::functions(scan.points.iter().map(|p| &p.columns));
+        let of = |(candidate, basis): (&'s Candidate, Cow<'_, DMatrix<f64>>)| {
             let sums = with.iter().flat_map(|[with_residual, square]| {
                 basis.column_iter().map(move |f| {
                     let weighted = f.iter().zip(with_residual.iter().zip(square));
@@ -92,7 +93,7 @@ impl<'s> Point<'s> {
             });
             Some(Point { frequency: frequency(candidate)?, promise: promise(sums), candidate })
         };
-        scan.points.iter().filter_map(of).collect()
+        scan.points.iter().zip(functions).filter_map(of).collect()
     }
 }
 

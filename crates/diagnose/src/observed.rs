@@ -9,7 +9,7 @@ use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{
-    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate, fit_problem, gram, linearise,
+    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fit_problem, gram, linearise,
 };
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
@@ -36,7 +36,8 @@ impl Calibrated<'_> {
     /// The model with more effects, on the same observations and hold-out; none where this leaves no way to fit it.
     pub(crate) fn with(&self, effects: Vec<EffectSpec>) -> Option<Refitted> {
         let model = self.model.with_effects(&effects, self.session).ok()?;
-        let calibration = calibrate(&model, self.observations, self.fit, self.holdout).ok()?;
+        let beside = Some(self.calibration);
+        let calibration = calibrate_beside(beside, &model, self.observations, self.fit, self.holdout).ok()?;
         Some(Refitted { effects, model, calibration, warnings: Vec::new() })
     }
 }
@@ -56,7 +57,7 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         session,
         fit,
         fits: BTreeMap::new(),
-        known: BTreeMap::new(),
+        last: None,
         sizes: BTreeMap::new(),
         knowledge: Knowledge::of(config, joint_names)?,
     };
@@ -100,8 +101,8 @@ struct ModelRefit<'a> {
     fit: &'a FitConfig,
     /// Every set of effects fitted so far.
     fits: BTreeMap<Vec<String>, (Model, Vec<f64>)>,
-    /// The problems around those fits, with candidates at the sizes known so far.
-    known: BTreeMap<Vec<String>, Problem>,
+    /// The last problem around one of those fits, with candidates at the sizes known so far.
+    last: Option<(Vec<String>, Problem)>,
     /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
     sizes: BTreeMap<String, Option<f64>>,
     knowledge: Knowledge,
@@ -141,12 +142,12 @@ impl ModelRefit<'_> {
 impl Refit for ModelRefit<'_> {
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let names = names(accepted);
-        if let Some(problem) = self.known.get(&names) {
+        if let Some((_, problem)) = self.last.as_ref().filter(|(of, _)| *of == names) {
             return Ok(problem.clone());
         }
         let (model, values) = self.fitted(&names)?;
         let problem = self.view(&model, &values).problem()?;
-        self.known.insert(names, problem.clone());
+        self.last = Some((names, problem.clone()));
         Ok(problem)
     }
 
@@ -183,7 +184,7 @@ impl Refit for ModelRefit<'_> {
         let changed = size != 0.0 && self.view(&model, &values).bends(&spec, size)?;
         self.sizes.insert(candidate.spec.clone(), changed.then_some(size));
         if changed {
-            self.known.clear();
+            self.last = None;
         }
         Ok(changed)
     }

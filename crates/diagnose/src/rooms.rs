@@ -11,17 +11,19 @@ use crate::rivals::AfterRefit;
 use crate::weigh::{Weighed, weigh};
 use armcal_model::Toggle;
 use std::cell::{OnceCell, RefCell};
-use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::collections::{BTreeMap, VecDeque};
+use std::rc::{Rc, Weak};
 use std::sync::Arc;
 
 /// Family of a shape that joins the base without a name.
 const UNLISTED: &str = "unlisted";
+/// Dwells of all rooms together that are kept for whoever asks next; and of how many rooms at least and at most.
+const LAST_DWELLS: usize = 8000;
+const LAST_ROOMS: [usize; 2] = [2, 16];
 
 /// A problem with some effects in its base, weighed; judgements are kept by entry.
 #[derive(Debug, Clone)]
 pub(crate) struct Room {
-    accepted: Vec<String>,
     /// The problem.
     pub problem: Problem,
     /// Weighed.
@@ -31,8 +33,8 @@ pub(crate) struct Room {
 }
 
 impl Room {
-    fn new(accepted: Vec<String>, problem: Problem, weighed: Weighed) -> Room {
-        Room { accepted, problem, weighed, significance: OnceCell::new(), judged: RefCell::default() }
+    fn new(problem: Problem, weighed: Weighed) -> Room {
+        Room { problem, weighed, significance: OnceCell::new(), judged: RefCell::default() }
     }
 
     /// Judges an entry, once.
@@ -61,7 +63,10 @@ pub(crate) struct Rooms<'a> {
     refit: &'a mut dyn Refit,
     keep: Vec<bool>,
     config: &'a DiagnosisConfig,
-    known: Vec<Rc<Room>>,
+    /// Those that may be asked for again. A room of thousands of poses is tens of megabytes: but for the last ones they live
+    /// as long as somebody else needs them, and are made again otherwise.
+    known: Vec<(Vec<String>, Weak<Room>)>,
+    last: VecDeque<Rc<Room>>,
 }
 
 impl<'a> Rooms<'a> {
@@ -72,21 +77,35 @@ impl<'a> Rooms<'a> {
         first: (Problem, Weighed),
         config: &'a DiagnosisConfig,
     ) -> Rooms<'a> {
-        let room = Rc::new(Room::new(Vec::new(), first.0, first.1));
-        Rooms { refit, keep, config, known: vec![room] }
+        let room = Rc::new(Room::new(first.0, first.1));
+        let mut rooms = Rooms { refit, keep, config, known: Vec::new(), last: VecDeque::new() };
+        rooms.remember(Vec::new(), &room);
+        rooms
     }
 
     /// The room with these effects in the base.
     pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<Room>, DiagnoseError> {
         let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
-        if let Some(known) = self.known.iter().find(|r| r.accepted == names) {
-            return Ok(known.clone());
+        let known = self.known.iter().find(|(accepted, _)| *accepted == names);
+        if let Some(room) = known.and_then(|(_, room)| room.upgrade()) {
+            return Ok(room);
         }
         let problem = self.bare(accepted)?;
         let weighed = weigh(&problem, self.config);
-        let room = Rc::new(Room::new(names, problem, weighed));
-        self.known.push(room.clone());
+        let room = Rc::new(Room::new(problem, weighed));
+        self.known.retain(|(_, room)| room.strong_count() > 0);
+        self.remember(names, &room);
         Ok(room)
+    }
+
+    fn remember(&mut self, accepted: Vec<String>, room: &Rc<Room>) {
+        self.known.push((accepted, Rc::downgrade(room)));
+        self.last.push_back(room.clone());
+        let [fewest, most] = LAST_ROOMS;
+        let kept = (LAST_DWELLS / room.problem.dwells.len().max(1)).clamp(fewest, most);
+        while self.last.len() > kept {
+            self.last.pop_front();
+        }
     }
 
     /// Whether a refit with a candidate changed what it would do: then all rooms are weighed anew.
@@ -95,6 +114,7 @@ impl<'a> Rooms<'a> {
         let changed = self.refit.refine(&named, candidate)?;
         if changed {
             self.known.clear();
+            self.last.clear();
         }
         Ok(changed)
     }

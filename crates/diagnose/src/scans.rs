@@ -2,13 +2,16 @@
 
 use crate::DiagnoseError;
 use crate::problem::{Candidate, Channel, Columns, Scan};
-use crate::stretches::stretches;
+use crate::stretches::{running, stretches, within};
 use crate::view::View;
 use armcal_calibrate::Linearisation;
 use armcal_core::DwellId;
 use armcal_model::{EffectSpec, Since};
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Steps of an effect that are weighed in full.
+const MOST_STEPS: usize = 400;
 
 impl View<'_> {
     /// The catalogue, and every family with a shape: products where the shape switches or modulates, columns of their own
@@ -36,8 +39,10 @@ impl View<'_> {
             let like: Vec<Candidate> = all.by_ref().take(scanned.like(&members).count()).collect();
             let points = match (scanned, like.first()) {
                 (Scanned::Steps(_), Some(whole)) => {
-                    let steps = self.switched(whole, &members, &times);
-                    scans.push(Scan::of(family.to_string(), steps));
+                    let tried = members.len();
+                    let best = times.most_promising(members, whole, base);
+                    let points = self.switched(whole, &best, &times);
+                    scans.push(Scan { name: family.to_string(), points, tried });
                     scans.extend(self.passing(&family, whole, &times, base));
                     continue;
                 }
@@ -60,8 +65,7 @@ impl View<'_> {
         base: &Linearisation,
     ) -> Option<Scan> {
         let Columns::Dense(columns) = &whole.columns else { return None };
-        let rows: Vec<_> = base.poses.iter().map(|pose| pose.rows.clone()).collect();
-        let found = stretches(&times.dwells, &rows, columns, &base.residual);
+        let found = stretches(&times.dwells, &rows(base), columns, &base.residual);
         let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
         let members: Vec<EffectSpec> =
             found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
@@ -116,6 +120,11 @@ impl View<'_> {
     }
 }
 
+/// Rows of each dwell.
+fn rows(base: &Linearisation) -> Vec<Range<usize>> {
+    base.poses.iter().map(|pose| pose.rows.clone()).collect()
+}
+
 /// How the members of a family with a shape become columns.
 enum Scanned<'c> {
     /// Of the effect that acts from the first dwell on.
@@ -168,6 +177,31 @@ impl Times {
         order.sort_unstable();
         let places = dwells.iter().map(|dwell| order.partition_point(|other| other < dwell)).collect();
         Times { dwells, order, places: Arc::new(places) }
+    }
+
+    /// Of very many steps of an effect those that promise most, in the order of time.
+    fn most_promising(
+        &self,
+        steps: Vec<EffectSpec>,
+        whole: &Candidate,
+        base: &Linearisation,
+    ) -> Vec<EffectSpec> {
+        let Columns::Dense(columns) = &whole.columns else { return steps };
+        if steps.len() <= MOST_STEPS {
+            return steps;
+        }
+        let mut in_time: Vec<usize> = (0..self.dwells.len()).collect();
+        in_time.sort_unstable_by_key(|i| self.places[*i]);
+        let sums = running(&in_time, &rows(base), columns, &base.residual);
+        let promise = |step: &EffectSpec| {
+            let on = self.on(step.since.as_ref());
+            within(&sums[on.start], &sums[on.end])
+        };
+        let mut order: Vec<(f64, usize)> = steps.iter().map(promise).zip(0..).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut best: Vec<usize> = order.into_iter().take(MOST_STEPS).map(|(_, k)| k).collect();
+        best.sort_unstable();
+        best.into_iter().map(|k| steps[k].clone()).collect()
     }
 
     /// The places of the dwells in which an event acts.

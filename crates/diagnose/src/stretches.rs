@@ -48,9 +48,7 @@ pub(crate) fn stretches(
                 // What begins or ends with the session is a step, what all but fills a recording is that recording's.
                 let step = ends.is_some_and(|ends| ends[0] == first || ends[1] == last);
                 if !step && length + least <= members.len() {
-                    let ends = sums[from].iter().zip(&sums[from + length]);
-                    let within = ends.map(|(b, a)| [a[0] - b[0], a[1] - b[1]]);
-                    tried.push((promise(within), (first, last.dwell)));
+                    tried.push((within(&sums[from], &sums[from + length]), (first, last.dwell)));
                 }
             }
         }
@@ -60,8 +58,13 @@ pub(crate) fn stretches(
     Stretches { best, tried: tried.len() }
 }
 
+/// What columns promise in the members between two of [`running`] sums.
+pub(crate) fn within(before: &[[f64; 2]], until: &[[f64; 2]]) -> f64 {
+    promise(before.iter().zip(until).map(|(b, a)| [a[0] - b[0], a[1] - b[1]]))
+}
+
 /// `X_ik' r_i` and `|X_ik|^2` summed over the members before each, for every column k.
-fn running(
+pub(crate) fn running(
     members: &[usize],
     rows: &[Range<usize>],
     columns: &DMatrix<f64>,

@@ -57,7 +57,7 @@ pub(crate) fn described(
         shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
         if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
             let per = driver.basis.ncols();
-            let curve = best.unit_si * (&driver.basis * theta.rows(axis * per, per));
+            let curve = best.unit_si * (driver.basis.as_ref() * theta.rows(axis * per, per));
             strongest = peak(&driver.value, curve.as_slice(), per);
             let typical_rad = to_digits(beside_slow(&driver.value, curve.as_slice()), 2);
             series = Some(Series { harmonics: resolved(&driver.value), typical_rad });

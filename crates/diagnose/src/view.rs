@@ -171,7 +171,7 @@ impl View<'_> {
                 time_s: drivers.time_s,
                 joint_rad: o.joint_rad.clone(),
                 arrival: drivers.arrival.clone(),
-                torque_nm: drivers.torque.iter().map(|t| t.total_nm()).collect(),
+                torque_nm: drivers.torque().iter().map(|t| t.total_nm()).collect(),
                 load_kg: o.all_loads_kg(),
                 temperature_c: o.temperature_c,
                 place,

@@ -18,6 +18,11 @@ use nalgebra::DMatrix;
 const RESCALE_ABOVE: f64 = 4.0;
 /// Points of a scan weighed under every kind of noise.
 const SCAN_POINTS: usize = 32;
+/// Entries of the catalogue, the best under white noise, by which the size of every other kind of noise is chosen.
+const SCOUTS: usize = 32;
+/// Up to so many dwells everything unlisted is weighed under every kind of noise; of more, so many shapes of a family.
+const ALL_SHAPES_DWELLS: usize = 400;
+const SHAPES: usize = 64;
 
 /// One entry of the catalogue: a candidate, or a scan at its best point.
 #[derive(Debug, Clone)]
@@ -75,10 +80,15 @@ pub(crate) fn weigh(problem: &Problem, config: &DiagnosisConfig) -> Weighed {
 pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Weighed {
     let all = metrics(problem, scale, config);
     let listed: Vec<&Columns> = problem.candidates.iter().map(|c| &c.columns).collect();
-    let mut scout = over_noise(&listed, problem, scale, &all, config);
+    let white = over_noise(&listed, problem, scale, &all[..1], config);
+    let best: Vec<&Columns> = promising(&white, SCOUTS).into_iter().map(|k| listed[k]).collect();
+    let mut scout = over_noise(&best, problem, scale, &all, config);
     scout.push(all.iter().map(|m| m.ln_weight).collect());
     let kept = leading(&all, &scout);
-    let metrics: Vec<Metric> = kept.iter().map(|m| all[*m].clone()).collect();
+    let mut all: Vec<Option<Metric>> = all.into_iter().map(Some).collect();
+    let metrics: Vec<Metric> = kept.iter().filter_map(|m| all[*m].take()).collect();
+    drop(all);
+    let weighed = beside_white(&listed, white, problem, scale, &metrics, config);
     let drivers = drivers(problem);
     let null: Vec<f64> = metrics.iter().map(|m| m.ln_weight).collect();
     let ln_null = ln_sum_exp(null.iter().copied());
@@ -89,8 +99,7 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     let count = (problem.candidates.len() + problem.scans.len()).max(1) as f64;
     let share = (config.prior_catalogue / count).ln();
     let mut entries = Vec::new();
-    for (candidate, scouted) in problem.candidates.iter().zip(&scout) {
-        let ln: Vec<f64> = kept.iter().map(|m| scouted[*m]).collect();
+    for (candidate, ln) in problem.candidates.iter().zip(weighed) {
         let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
         by_metric.push(plus(&ln, share));
         entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0 });
@@ -113,7 +122,7 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     for family in [cells, smooth] {
         let share = (config.prior_unknown / families / family.len().max(1) as f64).ln();
         let columns: Vec<&Columns> = family.iter().map(|u| &u.columns).collect();
-        let parts = over_noise(&columns, problem, scale, &metrics, config);
+        let parts = unlisted_over_noise(&columns, problem, scale, &metrics, config);
         for (what, ln) in family.into_iter().zip(parts) {
             let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
             by_metric.push(plus(&ln, share));
@@ -137,6 +146,54 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     Weighed { scale, metrics, drivers, entries, given, unlisted, p_nothing, p_unlisted, p_noise }
 }
 
+/// The terms with the largest evidence under white noise, `white[term][0]`, at most so many.
+fn promising(white: &[Vec<f64>], most: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..white.len()).collect();
+    order.sort_by(|a, b| white[*b][0].total_cmp(&white[*a][0]));
+    order.truncate(most);
+    order
+}
+
+/// ln (weight x Bayes factor) of terms in every metric, given that under white noise.
+fn beside_white(
+    terms: &[&Columns],
+    mut white: Vec<Vec<f64>>,
+    problem: &Problem,
+    scale: f64,
+    metrics: &[Metric],
+    config: &DiagnosisConfig,
+) -> Vec<Vec<f64>> {
+    let others = over_noise(terms, problem, scale, &metrics[1..], config);
+    white.iter_mut().zip(others).for_each(|(all, others)| all.extend(others));
+    white
+}
+
+/// The same of what is not listed: of many dwells only the most promising shapes are weighed under every noise. The others
+/// are taken to say there what they say under white noise, or nothing if that is more.
+fn unlisted_over_noise(
+    terms: &[&Columns],
+    problem: &Problem,
+    scale: f64,
+    metrics: &[Metric],
+    config: &DiagnosisConfig,
+) -> Vec<Vec<f64>> {
+    let white = over_noise(terms, problem, scale, &metrics[..1], config);
+    if problem.dwells.len() <= ALL_SHAPES_DWELLS {
+        return beside_white(terms, white, problem, scale, metrics, config);
+    }
+    let order = promising(&white, SHAPES);
+    let ln_white = metrics[0].ln_weight;
+    let as_white =
+        |ln: &Vec<f64>| metrics.iter().map(|m| m.ln_weight + (ln[0] - ln_white).min(0.0)).collect();
+    let mut all: Vec<Vec<f64>> = white.iter().map(as_white).collect();
+    let best: Vec<&Columns> = order.iter().map(|k| terms[*k]).collect();
+    let own = order.iter().map(|k| white[*k].clone()).collect();
+    let exact = beside_white(&best, own, problem, scale, metrics, config);
+    all.iter_mut().zip(white).for_each(|(all, white)| all[0] = white[0]);
+    order.into_iter().zip(exact).for_each(|(k, ln)| all[k] = ln);
+    all
+}
+
 /// ln (weight x Bayes factor) of every point of a scan in every metric. Under white noise all points are weighed, under
 /// the others the points that white noise likes best; the rest are taken to say nothing there.
 fn scanned(
@@ -148,9 +205,7 @@ fn scanned(
 ) -> Vec<Vec<f64>> {
     let points: Vec<&Columns> = scan.points.iter().map(|c| &c.columns).collect();
     let white = over_noise(&points, problem, scale, &metrics[..1], config);
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|a, b| white[*b][0].total_cmp(&white[*a][0]));
-    order.truncate(SCAN_POINTS);
+    let order = promising(&white, SCAN_POINTS);
     let leading: Vec<&Columns> = order.iter().map(|k| points[*k]).collect();
     let others = over_noise(&leading, problem, scale, &metrics[1..], config);
     let silent = |w: &Vec<f64>| w.iter().copied().chain(metrics[1..].iter().map(|m| m.ln_weight)).collect();

@@ -23,7 +23,7 @@ fn forms(problem: &Problem) -> Vec<Columns> {
     };
     let within = |on| Columns::Within { base: base.clone(), places: places.clone(), on };
     vec![
-        Columns::Product { base: base.clone(), basis },
+        Columns::Product { base: base.clone(), basis, size: 0.8 },
         wave(4.0),
         within(5..n),
         Columns::Dense(Arc::new(DMatrix::from_fn(rows, 2, |i, k| ((i * i + k) as f64).cos()))),

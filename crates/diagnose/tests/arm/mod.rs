@@ -318,7 +318,7 @@ fn periodic_scan(poses: &[Pose], j: usize, joint: &Arc<DMatrix<f64>>) -> Scan {
                 })
                 .collect(),
             toggle: Toggle::None,
-            columns: Columns::Product { base: joint.clone(), basis: Arc::new(basis) },
+            columns: Columns::Product { base: joint.clone(), basis: Arc::new(basis), size: 1.0 },
         }
     });
     Scan::of(format!("periodic:{}", j + 1), points.collect())
@@ -396,7 +396,7 @@ pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
     }
     let scale = |c: &mut Columns| match c {
         Columns::Dense(m) => *m = Arc::new(m.as_ref() * factor),
-        Columns::Product { basis, .. } => *basis = Arc::new(basis.as_ref() * factor),
+        Columns::Product { size, .. } => *size *= factor,
         Columns::Wave { sizes, .. } => sizes.iter_mut().for_each(|size| *size *= factor),
         Columns::Within { base, .. } => *base = Arc::new(base.as_ref() * factor),
     };

@@ -77,7 +77,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 impl Physics for ArmCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         for (c, &joint) in theta.iter().zip(&self.joints) {
-            let torque = &x.torque[joint];
+            let torque = &x.torque()[joint];
             change.joint(joint, *c * (torque.links_nm + torque.load_nm));
         }
     }

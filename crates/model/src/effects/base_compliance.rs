@@ -83,12 +83,13 @@ fn heights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
 
 impl Physics for BaseCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let base = &x.pose.bases[self.arm];
-        let (gravity, all) = (&x.gravity_mps2, x.pose.links_of(self.arm));
-        let links = x.pose.moment_nm(&base.translation_m, all.clone(), gravity);
-        let outer = x.pose.moment_nm(&base.translation_m, (all.start + OUTER).min(all.end)..all.end, gravity);
+        let base = &x.pose().bases[self.arm];
+        let (gravity, all) = (x.gravity_mps2(), x.pose().links_of(self.arm));
+        let links = x.pose().moment_nm(&base.translation_m, all.clone(), gravity);
+        let outer =
+            x.pose().moment_nm(&base.translation_m, (all.start + OUTER).min(all.end)..all.end, gravity);
         let load = x
-            .pose
+            .pose()
             .over_loads(x.observation, &all, |at_m, kg| (at_m - base.translation_m).cross(gravity) * kg);
         let turn = [0, 1, 2].map(|k| {
             let axis = base.rotation.column(k);

@@ -58,7 +58,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for BearingCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let (pose, gravity) = (&x.pose, &x.gravity_mps2);
+        let (pose, gravity) = (x.pose(), x.gravity_mps2());
         let joint = &pose.joints[self.joint];
         let across = |moment: Vector3<f64>| moment - joint.axis * joint.axis.dot(&moment);
         let links = across(pose.moment_nm(&joint.origin_m, joint.links.clone(), gravity));

@@ -64,7 +64,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for BeltCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let (inner, own) = (&x.torque[self.joint - 1], &x.torque[self.joint]);
+        let (inner, own) = (&x.torque()[self.joint - 1], &x.torque()[self.joint]);
         let mut angle = theta[0] * (inner.links_nm - self.sense * own.links_nm);
         if self.load {
             angle += theta[1] * (inner.load_nm - self.sense * own.load_nm);

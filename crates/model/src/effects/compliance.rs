@@ -68,6 +68,6 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for Compliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        change.joint(self.joint, self.shares.torque(theta, &x.torque[self.joint]));
+        change.joint(self.joint, self.shares.torque(theta, &x.torque()[self.joint]));
     }
 }

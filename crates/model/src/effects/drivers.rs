@@ -4,8 +4,10 @@
 
 use super::nominal_pose::NominalPose;
 use super::session::Session;
+use crate::Model;
 use armcal_core::{Load, Observation};
 use nalgebra::Vector3;
+use std::sync::OnceLock;
 
 /// Gravity torque on one joint at the nominal chain, split so that unknown masses can be told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,59 +27,89 @@ impl Torque {
     }
 }
 
-/// Everything that may drive an effect in one observation.
-#[derive(Debug, Clone, PartialEq)]
+/// Everything that may drive an effect in one observation. What takes following the nominal arm is worked out when it is first
+/// asked for.
+#[derive(Debug, Clone)]
 pub struct Drivers<'o> {
     /// The observation itself: readings, effort, load, temperature, reference.
     pub observation: &'o Observation,
     /// Direction of arrival of each joint: +1, -1, or 0 where it is not known.
     pub arrival: Vec<f64>,
-    /// Gravity torque on each joint.
-    pub torque: Vec<Torque>,
     /// Time since the start of the session [s].
     pub time_s: f64,
     /// The same as a fraction of the session, 0 to 1.
     pub session_fraction: f64,
     /// Temperature above the session's mean [K]; 0 where it is not known.
     pub warming_k: f64,
-    /// Gravity in the world [m/s^2].
-    pub gravity_mps2: Vector3<f64>,
-    pub(crate) pose: NominalPose,
-    /// Where the board was measured in the world [m], in the recording of a seated tip.
-    pub(crate) board_m: Option<Vector3<f64>>,
+    model: &'o Model,
+    session: &'o Session,
+    posed: OnceLock<Posed>,
+}
+
+/// The nominal arm in the pose of an observation, and what weighs on it.
+#[derive(Debug, Clone)]
+struct Posed {
+    arm: NominalPose,
+    torque: Vec<Torque>,
+    gravity_mps2: Vector3<f64>,
 }
 
 impl<'o> Drivers<'o> {
-    pub(crate) fn of(
-        session: &Session,
-        pose: NominalPose,
-        board_m: Option<Vector3<f64>>,
-        o: &'o Observation,
-    ) -> Drivers<'o> {
-        let gravity = gravity_in_world(session, &pose);
-        let torque = (0..pose.joints.len())
-            .map(|j| Torque {
-                links_nm: pose.torque_nm(j, false, &gravity),
-                outer_nm: pose.torque_nm(j, true, &gravity),
-                load_nm: load_nm(&pose, j, &gravity, o),
-            })
-            .collect();
+    pub(crate) fn of(model: &'o Model, session: &'o Session, o: &'o Observation) -> Drivers<'o> {
         let time_s = (o.time_ns - session.start_ns) as f64 * 1e-9;
         let duration_s = session.duration_s();
         let warming = o.temperature_c.zip(session.reference_temperature_c).map(|(now, mean)| now - mean);
         Drivers {
             observation: o,
-            arrival: (0..pose.joints.len())
+            arrival: (0..model.joint_count())
                 .map(|j| o.arrival.get(j).map_or(0.0, |arrival| arrival.sign()))
                 .collect(),
-            torque,
             time_s,
             session_fraction: if duration_s > 0.0 { time_s / duration_s } else { 0.0 },
             warming_k: warming.unwrap_or(0.0),
-            gravity_mps2: gravity,
-            pose,
-            board_m,
+            model,
+            session,
+            posed: OnceLock::new(),
         }
+    }
+
+    fn posed(&self) -> &Posed {
+        self.posed.get_or_init(|| {
+            let o = self.observation;
+            let arm = self.model.nominal_pose(&self.model.nominal(), &o.joint_rad);
+            let gravity = gravity_in_world(self.session, &arm);
+            let torque = (0..arm.joints.len())
+                .map(|j| Torque {
+                    links_nm: arm.torque_nm(j, false, &gravity),
+                    outer_nm: arm.torque_nm(j, true, &gravity),
+                    load_nm: load_nm(&arm, j, &gravity, o),
+                })
+                .collect();
+            Posed { arm, torque, gravity_mps2: gravity }
+        })
+    }
+
+    /// Gravity torque on each joint.
+    pub fn torque(&self) -> &[Torque] {
+        &self.posed().torque
+    }
+
+    /// Gravity in the world [m/s^2].
+    pub fn gravity_mps2(&self) -> &Vector3<f64> {
+        &self.posed().gravity_mps2
+    }
+
+    /// The nominal arm.
+    pub(crate) fn pose(&self) -> &NominalPose {
+        &self.posed().arm
+    }
+
+    /// Where the board was measured in the world [m], in the recording of a seated tip.
+    pub(crate) fn board_m(&self) -> Option<Vector3<f64>> {
+        let (o, nominal) = (self.observation, self.model.nominal());
+        let seated = o.cavity().is_some();
+        let board = seated.then(|| self.model.board_in_world(&nominal, o.dwell.recording)).flatten();
+        board.map(|board| board.translation.vector)
     }
 
     /// Reading of a joint [rad] (prismatic: [m]); NaN where the observation has none.
@@ -87,7 +119,7 @@ impl<'o> Drivers<'o> {
 
     /// Where the base was measured in the world [m].
     pub(crate) fn base_m(&self) -> Vector3<f64> {
-        self.pose.bases[0].translation_m
+        self.pose().bases[0].translation_m
     }
 
     /// How far the joint's reading is from that of the rest before [rad] (prismatic: [m]); 0 where that is not known.
@@ -97,7 +129,7 @@ impl<'o> Drivers<'o> {
 
     /// Generalised force on a joint of one kilogram at the tip of its arm [N m] (prismatic: [N]).
     pub(crate) fn kilogram_nm(&self, joint: usize) -> f64 {
-        self.pose.kilogram_nm(joint, self.pose.tip_of(joint), &self.gravity_mps2)
+        self.pose().kilogram_nm(joint, self.pose().tip_of(joint), self.gravity_mps2())
     }
 
     /// What the joint's encoder went through before it came to rest; empty where that is not known.

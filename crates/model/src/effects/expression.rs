@@ -270,7 +270,7 @@ impl Variable {
             Variable::Parameter(k) => theta[k],
             Variable::Reading(joint) => x.joint_rad(joint),
             Variable::Arrival(joint) => x.arrival[joint],
-            Variable::Torque(joint) => x.torque[joint].total_nm(),
+            Variable::Torque(joint) => x.torque()[joint].total_nm(),
             Variable::Effort(joint) => o.effort_of(joint).unwrap_or(f64::NAN),
             Variable::Temperature => o.temperature_c.unwrap_or(f64::NAN),
             Variable::Time => x.time_s,

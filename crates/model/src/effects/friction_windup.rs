@@ -57,7 +57,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for FrictionWindup {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let torque = &x.torque[self.joint];
+        let torque = &x.torque()[self.joint];
         let links = torque.links_nm.abs();
         let outer = torque.outer_nm * torque.links_nm.signum();
         let load = torque.total_nm().abs() - links;

@@ -111,7 +111,7 @@ fn weights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
 impl Physics for GravityBacklash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let [width, friction, smoothing, outer] = [theta[0], theta[1], theta[2], theta[3]];
-        let torque = &x.torque[self.joint];
+        let torque = &x.torque()[self.joint];
         let load = (outer * torque.outer_nm + (torque.total_nm() - torque.outer_nm)) * self.per_torque;
         let contact = (friction * x.arrival[self.joint] - load) / smoothing;
         change.joint(self.joint, width * contact.tanh() * -0.5);

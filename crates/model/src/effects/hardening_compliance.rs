@@ -68,7 +68,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for HardeningCompliance {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let torque = &x.torque[self.joint];
+        let torque = &x.torque()[self.joint];
         let relative = torque.total_nm() * self.per_torque;
         let bent = theta[self.cubic] * relative.powi(3) + theta[self.cubic + 1] * relative.powi(5);
         change.joint(self.joint, self.shares.torque(theta, torque) + bent);

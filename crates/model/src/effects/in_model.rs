@@ -101,15 +101,8 @@ impl Model {
     }
 
     /// What drives the effects in an observation.
-    pub fn drivers<'o>(&self, session: &Session, o: &'o Observation) -> Drivers<'o> {
-        if let Some(model) = self.known_by(o) {
-            return model.drivers(session, o);
-        }
-        let nominal = self.nominal();
-        let pose = self.nominal_pose(&nominal, &o.joint_rad);
-        let seated = o.cavity().is_some();
-        let board = seated.then(|| self.board_in_world(&nominal, o.dwell.recording)).flatten();
-        Drivers::of(session, pose, board.map(|board| board.translation.vector), o)
+    pub fn drivers<'o>(&'o self, session: &'o Session, o: &'o Observation) -> Drivers<'o> {
+        Drivers::of(self.known_by(o).unwrap_or(self), session, o)
     }
 
     /// Whether an effect could be added here, with something for a fit to find.
@@ -171,7 +164,7 @@ impl Session {
 
 impl Effects {
     /// The drivers of an observation for this model.
-    pub fn drivers<'o>(&self, model: &Model, o: &'o Observation) -> Drivers<'o> {
+    pub fn drivers<'o>(&'o self, model: &'o Model, o: &'o Observation) -> Drivers<'o> {
         model.drivers(&self.session, o)
     }
 }

@@ -84,12 +84,12 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 
 impl Physics for LinkBending {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
-        let pose = &x.pose;
+        let pose = x.pose();
         let own = pose.joints[self.link].links.start;
         // Where it was placed, it has one end.
         let Some((from, end)) = pose.beam_m(own) else { return };
         let beam = end - from;
-        let gravity = &x.gravity_mps2;
+        let gravity = x.gravity_mps2();
         let outer_kg: f64 = pose.outer(self.link).map(|k| pose.link_mass_kg(k)).sum();
         let links_n = gravity * (outer_kg + OWN_SHARE * pose.link_mass_kg(own));
         let links_nm = pose.moment_nm(&end, pose.outer(self.link), gravity);

@@ -339,7 +339,9 @@ impl Effects {
     /// How much further than the base the sensor moves what the tip is compared with: the tip itself, or the board it
     /// is seated in. The base was measured by the same sensor, so that its own shift is in the model already.
     fn seen_m(&self, p: &[f64], x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Vector3<f64> {
-        let (Some(at_m), base_m) = (sensed_m(x, tip_m), x.base_m()) else { return Vector3::zeros() };
+        // Where nothing distorts, the nominal arm need not be followed.
+        let seen = self.distorting(x).next().and_then(|_| sensed_m(x, tip_m));
+        let Some((at_m, base_m)) = seen.map(|at_m| (at_m, x.base_m())) else { return Vector3::zeros() };
         let moved = |effect: &PlacedEffect| {
             let theta = &p[effect.parameters.clone()];
             effect.physics.predict_seen(theta, &at_m) - effect.physics.predict_seen(theta, &base_m)
@@ -356,7 +358,8 @@ impl Effects {
         parameters: &mut [(usize, Twist)],
         joints: &mut [(usize, Twist)],
     ) {
-        let Some(at_m) = sensed_m(x, &tip.translation_m) else { return };
+        let seen = self.distorting(x).next().and_then(|_| sensed_m(x, &tip.translation_m));
+        let Some(at_m) = seen else { return };
         let tracked = x.observation.is_tracked();
         let (point, base) = (at_m.map(Dual64::from), x.base_m().map(Dual64::from));
         let mut stretch = Matrix3::identity();
@@ -380,9 +383,6 @@ impl Effects {
                 lanes[k].eps = 0.0;
                 own.push((effect.parameters.start + k, change));
             }
-        }
-        if own.is_empty() {
-            return;
         }
         for (_, twist) in parameters.iter_mut().chain(joints) {
             twist.translation_m = stretch * twist.translation_m;
@@ -426,6 +426,6 @@ fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
 
 /// The point the sensor measured in the world [m]: the tip, or the board it is seated in; none of what no sensor saw.
 fn sensed_m(x: &Drivers<'_>, tip_m: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let seated = || x.observation.cavity().and(x.board_m);
+    let seated = || x.observation.cavity().and(x.board_m());
     if x.observation.is_tracked() { Some(*tip_m) } else { seated() }
 }

@@ -39,7 +39,7 @@ pub(crate) fn feels_gravity(torques_nm: &[Vec<f64>]) -> Vec<bool> {
 
 /// Gravity's torque on every joint, `[joint][observation]` [N m].
 pub(super) fn torques_nm(run: &Run) -> Vec<Vec<f64>> {
-    let of = |o| run.model.drivers(&run.session, o).torque;
+    let of = |o| run.model.drivers(&run.session, o).torque().to_vec();
     let driven: Vec<_> = run.observations.iter().map(of).collect();
     let joints = 0..run.model.joint_count();
     joints.map(|j| driven.iter().map(|torque| torque[j].total_nm()).collect()).collect()

@@ -98,7 +98,7 @@ fn drivers(run: &Run) -> Vec<Driver> {
         Some(Masses::Uniform) => "links of 2.5 kg/m",
         None => "links as in the URDF or of 2.5 kg/m",
     };
-    let of_joint = |j: usize| driven.iter().map(|d| d.torque[j].total_nm()).collect();
+    let of_joint = |j: usize| driven.iter().map(|d| d.torque()[j].total_nm()).collect();
     let torques_nm: Vec<Vec<f64>> = (0..names.len()).map(of_joint).collect();
     let felt = feels_gravity(&torques_nm);
     for (j, name) in names.iter().enumerate().filter(|(j, _)| felt[*j]) {

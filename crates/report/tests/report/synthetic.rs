@@ -328,6 +328,7 @@ fn calibration(model: &Model, observations: &[Observation], fitted: &[f64]) -> C
         noise_floor_m: 1.8e-4,
         prediction_factor: 1.1,
         turn_sigma_ratio: Vec::new(),
+        turn_nominal_values: Vec::new(),
         warnings: Vec::new(),
     }
 }

@@ -78,7 +78,7 @@ fn by_hand_nm(model: &Model, o: &Observation, weights: &[(&str, [f64; 3], f64)])
 
 fn torques_nm(model: &Model, o: &Observation) -> Vec<f64> {
     let session = Session::of(std::slice::from_ref(o));
-    model.drivers(&session, o).torque.iter().map(|torque| torque.total_nm()).collect()
+    model.drivers(&session, o).torque().iter().map(|torque| torque.total_nm()).collect()
 }
 
 fn assert_near(found: &[f64], expected: &[f64]) {

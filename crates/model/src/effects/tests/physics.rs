@@ -51,7 +51,7 @@ fn masses_and_centres_of_a_urdf_make_the_torque() {
     let model = weighed(true);
     let session = Session::of(&[]);
     let o = tracked(&[0.0, 0.0], &Pose::identity());
-    let torque = model.drivers(&session, &o).torque;
+    let torque = model.drivers(&session, &o).torque().to_vec();
     // About joint 2: the forearm at 0.1 m, the tool at 0.4 + 0.05 m; about joint 1 half a metre further out, and the
     // upper arm at 0.2 m. A weight at +x turns about +y.
     let outer = |lever: f64| G * (2.0 * (lever + 0.1) + 0.5 * (lever + 0.45));
@@ -61,7 +61,7 @@ fn masses_and_centres_of_a_urdf_make_the_torque() {
     // Without masses: 2.5 kg a metre.
     let plain = weighed(false);
     assert_eq!((model.masses(), plain.masses()), (Some(Masses::Urdf), Some(Masses::Uniform)));
-    let torque = plain.drivers(&session, &o).torque;
+    let torque = plain.drivers(&session, &o).torque().to_vec();
     assert!((torque[1].total_nm() - G * 2.5 * 0.4 * 0.2).abs() < 1e-9, "{torque:?}");
 }
 
@@ -71,7 +71,7 @@ fn torque_is_the_slope_of_the_potential_energy() {
         for o in observations(&model, 6, true) {
             let session = Session::of(std::slice::from_ref(&o));
             let drivers = model.drivers(&session, &o);
-            for (j, torque) in drivers.torque.iter().enumerate() {
+            for (j, torque) in drivers.torque().iter().enumerate() {
                 let energy = |step: f64| {
                     let mut q = o.joint_rad.clone();
                     q[j] += step;
@@ -223,7 +223,7 @@ fn gravity_in_the_base_goes_before_gravity_in_the_world() {
         gravity_in_world_mps2: Vector3::x(),
         ..session.clone()
     };
-    for (a, b) in model.drivers(&session, &o).torque.iter().zip(&model.drivers(&other, &o).torque) {
+    for (a, b) in model.drivers(&session, &o).torque().iter().zip(&model.drivers(&other, &o).torque()) {
         assert!((a.total_nm() - b.total_nm()).abs() < 1e-12);
     }
 }
