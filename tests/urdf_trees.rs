@@ -180,7 +180,7 @@ fn differences(model: &Model, o: &Observation, answer: &Value) -> [f64; 3] {
         }
     }
     let session = Session::of(std::slice::from_ref(o));
-    for (j, own) in model.drivers(&session, o).torque.iter().enumerate() {
+    for (j, own) in model.drivers(&session, o).torque().iter().enumerate() {
         torque = torque.max((own.links_nm - number(format!("/torques/{j}"))).abs());
         // By virtual work: what a reading lifts of each load.
         let lifted = |load: Load| -9.80665 * load.kg * number(format!("/motions/{}/2/{j}", load.at.0));

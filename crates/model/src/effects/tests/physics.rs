@@ -223,7 +223,7 @@ fn gravity_in_the_base_goes_before_gravity_in_the_world() {
         gravity_in_world_mps2: Vector3::x(),
         ..session.clone()
     };
-    for (a, b) in model.drivers(&session, &o).torque().iter().zip(&model.drivers(&other, &o).torque()) {
+    for (a, b) in model.drivers(&session, &o).torque().iter().zip(model.drivers(&other, &o).torque()) {
         assert!((a.total_nm() - b.total_nm()).abs() < 1e-12);
     }
 }
