@@ -2,7 +2,7 @@ use crate::support::{armcal, python_with, quick_pipeline, read_json, root, run_p
 use armcal_core::{FeatureId, Parameter, Pose, Unit};
 use armcal_model::{Chain, Frames, Model};
 use armcal_report::{PastArms, PastModel, PastObservations};
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -247,7 +247,11 @@ fn every_format_is_read_by_others_as_the_arm_that_was_calibrated() {
     cases.extend(panda.cases(folder, "urdf", &[], &urdf("panda", &["pinocchio"], "ball_link")));
     let xacro = Asked { extension: "xacro", ..urdf("panda", &["xacro"], "ball_link") };
     cases.extend(panda.cases(folder, "xacro", &[], &xacro));
-    cases.extend(panda.cases(folder, "mjcf", &[], &Asked::tip("panda", simulators)));
+    cases.extend(panda.cases(folder, "mjcf", &[], &Asked::tip("panda", &["mujoco"])));
+    // Pinocchio 4.1 puts a site on a body without a joint where its parent is: it is asked for the body.
+    let behind = panda.arms.model.feature_in_link(&panda.arms.values, FeatureId::TIP);
+    let body = Asked { place: "ball_link", behind, ..Asked::tip("panda", &["pinocchio"]) };
+    cases.extend(panda.cases(folder, "mjcf", &[], &body));
     cases.extend(panda.cases(folder, "sdf", &[], &sdf("panda")));
     cases.extend(panda.cases(folder, "dh-csv", &[], &rows(&panda, "panda", 1e-9)));
 
@@ -327,6 +331,36 @@ fn what_is_left_is_what_the_effects_do() {
     let zeros = left("joint-zeros");
     println!("nominal {nominal:.2} mm, with joint zeros {zeros:.2} mm");
     assert!(zeros > 0.1 && zeros < nominal, "{zeros} {nominal}");
+
+    // As the controller has it: its nominal arm with the offsets of the file, its base measured anew.
+    let Some(python) = python_with("numpy, yaml") else { return };
+    let arms = PastModel::open(&result).expect("a result").arms().expect("its models");
+    let joints = arms.geometry.chain().joint_names();
+    let question = json!({"reader": "offsets", "path": folder.join("joint-zeros"), "joints": joints});
+    let answer = answers(&python, &[&question], folder).remove(0);
+    let offsets: Vec<f64> = serde_json::from_value(answer[0].clone()).expect("offsets");
+    let observed = PastObservations::open(&result.join("observations.json")).expect("observations");
+    let tips = observed.recordings.iter().flat_map(|r| &r.observations).map(|o| {
+        let read: Vec<f64> = o.joint_rad.iter().zip(&offsets).map(|(q, offset)| q + offset).collect();
+        let nominal = arms.geometry.tip_in_base(&arms.nominal_values, &read);
+        let calibrated = arms.geometry.tip_in_base(&arms.values, &o.joint_rad);
+        [nominal.translation.vector, calibrated.translation.vector]
+    });
+    let own = 1e3 * mean_after_alignment(&tips.collect::<Vec<_>>());
+    assert!((own - zeros).abs() < 1e-4, "{own} against {zeros} mm");
+}
+
+/// Mean distance between points and where they should be, after the one motion that brings them nearest (Arun, Huang and
+/// Blostein 1987).
+fn mean_after_alignment(pairs: &[[Vector3<f64>; 2]]) -> f64 {
+    let n = pairs.len() as f64;
+    let [from, to] = [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).sum::<Vector3<f64>>() / n);
+    let spread: Matrix3<f64> = pairs.iter().map(|[a, b]| (a - from) * (b - to).transpose()).sum();
+    let svd = spread.svd(true, true);
+    let (u, v) = (svd.u.expect("U"), svd.v_t.expect("V").transpose());
+    let proper = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (v * u.transpose()).determinant()));
+    let turn = v * proper * u.transpose();
+    pairs.iter().map(|[a, b]| (turn * (a - from) + to - b).norm()).sum::<f64>() / n
 }
 
 /// What cannot be written is refused by name, with nothing left behind.

@@ -152,7 +152,7 @@ def by_rows(case, path):
 
 
 def by_offsets(case, path):
-    """Offsets by joint, in the order of the case."""
+    """Offsets of the joints, in their order."""
     import yaml
 
     offsets = yaml.safe_load(Path(path).read_text())["joint_offsets"]

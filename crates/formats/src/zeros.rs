@@ -7,8 +7,8 @@
 //! min over o, f:  sum_i | tip(q_i) - nominal(q_i + o, f) |^2,
 //! ```
 //!
-//! by Gauss-Newton steps of least length, in units of [`ZERO_RAD`] and [`FRAME`]; `f` are the frames that the calibration
-//! estimated, which whoever uses the nominal arm measures again anyhow: what a frame can take up, such as a turn of the base
+//! by Gauss-Newton steps of least length, in units of 0.01 rad for a zero and 1 m or rad for a frame; `f` are the frames that the calibration
+//! was free to move, which whoever uses the nominal arm measures again anyhow: what a frame can take up, such as a turn of the base
 //! beside the first joint's zero, is left to it.
 
 use crate::ur::yaml_number;

@@ -125,7 +125,7 @@ impl Said<'_> {
         ] {
             let mut table = plain_table();
             table.set_content_arrangement(ContentArrangement::Dynamic).set_width(100);
-            lines.iter().for_each(|line| drop(table.add_row(["-", line])));
+            table.add_rows(lines.iter().map(|line| ["-", line]));
             text +=
                 &if lines.is_empty() { String::new() } else { format!("\n{title}\n{}", table_text(&table)) };
         }
