@@ -118,12 +118,17 @@ fn plain_blocks(text: &str) -> Vec<(usize, &str, Vec<&str>)> {
     blocks
 }
 
-/// What a command prints, run in the repository with its results elsewhere.
+/// What a command prints, run in the repository with its results elsewhere; `write out` in a folder where `out` is the result of
+/// the README's main job.
 fn printed(command: &str, out: &Path) -> String {
     let mut armcal = Command::new(env!("CARGO_BIN_EXE_armcal"));
     armcal.current_dir(root()).args(command.split(' '));
     if command.starts_with("run ") {
         armcal.arg("--out").arg(out);
+    }
+    if command.starts_with("write out ") {
+        run_pipeline(&root().join("pipelines/paper.toml"), &out.join("out"), &[0]);
+        armcal.current_dir(out);
     }
     let output = armcal.output().expect("starting armcal");
     assert!(output.status.success(), "armcal {command}: {}", String::from_utf8_lossy(&output.stderr));

@@ -88,6 +88,10 @@ mod report_page;
 
 /// Do set-points computed through the calibrated model bring the rig to where it is sent?
 mod compensation;
+
+/// Do public parsers read what is written for robots, planners and simulators as the arm that was calibrated?
+mod written_formats;
+
 /// Is a recording that is there twice, in whatever encoding or in part, refused or counted once, and never another?
 mod counted_once;
 

@@ -30,7 +30,13 @@ const READ: [(&str, &str); 21] = [
     ("view", "input"),
     ("simulate", "lab"),
 ];
-const READ_TOO: [(&str, &str); 3] = [("extract", "inputs"), ("extract", "pipeline"), ("export", "pipeline")];
+const READ_TOO: [(&str, &str); 5] = [
+    ("extract", "inputs"),
+    ("extract", "pipeline"),
+    ("export", "pipeline"),
+    ("write", "result"),
+    ("write", "hash_from"),
+];
 
 /// A new command with an output, or a new option, must be tried here.
 #[test]
@@ -241,6 +247,10 @@ fn a_result_is_replaced_by_its_own_kind_only() {
         ("result/report.html", vec!["compare", "result", "result", "--html", "result/report.html"]),
         ("result/parameters.toml", vec!["pool", "p.toml", "result", "--out", "result"]),
         ("lab/roll.mcap", vec!["simulate", "lab.toml", "--out", "lab", "--seed", "9"]),
+        (
+            "result/observations.json",
+            vec!["write", "result", "--as", "mjcf", "--out", "result/observations.json"],
+        ),
         ("moves.mcap", vec!["extract", "normal.mcap", "--topic", "*", "--out", "moves.mcap"]),
     ] {
         let output = world.armcal(&arguments);
@@ -253,6 +263,8 @@ fn a_result_is_replaced_by_its_own_kind_only() {
         vec!["extract", "normal.mcap", "--topic", "/joint*", "--out", "thin.mcap"],
         vec!["compensate", "result", "targets.csv", "--mcap", "moves.mcap", "--approach", "3"],
         vec!["compensate", "result", "targets.csv", "--mcap", "moves.mcap"],
+        vec!["write", "result", "--as", "dh-csv"],
+        vec!["write", "result", "--as", "dh-csv"],
         vec!["run", "p.toml", "--out", "result"],
         vec!["verify", "result", "p.toml", "--out", "result"],
         vec!["verify", "result", "p.toml", "--out", "result"],

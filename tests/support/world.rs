@@ -239,6 +239,13 @@ pub fn cases() -> Vec<Case> {
         of(["compensate", "out"], "--out", &compensate, results.to_vec(), Place::File),
         of(["compensate", "mcap"], "--mcap", &compensate, results.to_vec(), Place::File),
         of(
+            ["write", "out"],
+            "--out",
+            &["write", "result", "--as", "joint-zeros"],
+            vec!["result/model.json", "result/observations.json"],
+            Place::File,
+        ),
+        of(
             ["simulate", "out"],
             "--out",
             &["simulate", "lab.toml"],
@@ -273,6 +280,7 @@ pub fn printing() -> Vec<Vec<&'static str>> {
         vec!["verify", "result", "p.toml"],
         vec!["transfer", "p.toml", "other.toml"],
         vec!["compensate", "result", "targets.csv"],
+        vec!["write", "result", "--as", "sdf"],
         vec!["view", "p.toml"],
         vec!["score", "nothing", "--seeds", "1"],
         vec!["simulate", "--hide", "nothing"],

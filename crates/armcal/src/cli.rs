@@ -1,6 +1,6 @@
 //! Everything a user can type.
 
-use crate::commands::{add, check, compensate, extract, plan, score};
+use crate::commands::{add, check, compensate, extract, plan, score, write};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -182,6 +182,8 @@ pub enum Command {
     },
     /// Set-points that bring the calibrated arm to Cartesian targets: its model with all effects, inverted.
     Compensate(compensate::Request),
+    /// The calibrated arm in what robots, planners and simulators read: what a format cannot carry, and how far off that is.
+    Write(write::Request),
     /// The report of a run, served to this machine's browser only: any combination of effects and any hold-out is
     /// refitted as you choose it.
     View {

@@ -129,6 +129,9 @@ pub enum Error {
     /// No set-point.
     #[error(transparent)]
     Compensate(#[from] armcal_compensate::CompensateError),
+    /// A format that cannot hold the arm.
+    #[error(transparent)]
+    Format(#[from] armcal_formats::FormatError),
     /// Writing set-points as CSV.
     #[error("writing the set-points as CSV: {0}")]
     Csv(csv::Error),

@@ -25,6 +25,7 @@ pub mod transfer;
 pub mod two_arms;
 pub mod verify;
 pub mod view;
+pub mod write;
 
 pub use error::Error;
 pub use pipeline::Pipeline;

@@ -144,6 +144,50 @@ impl Chain {
     }
 }
 
+/// A row of a DH table at some values, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DhRow {
+    /// Its name.
+    pub name: String,
+    /// How its joint moves; none of a fixed row.
+    pub motion: Option<Motion>,
+    /// Angle about z, without the joint's reading [rad].
+    pub theta_rad: f64,
+    /// Offset along z, without the joint's reading [m].
+    pub d_m: f64,
+    /// Length along x [m].
+    pub a_m: f64,
+    /// Twist about x [rad].
+    pub alpha_rad: f64,
+    /// Hayati's tilt about y [rad]; zero where the row has none.
+    pub beta_rad: f64,
+}
+
+impl Chain {
+    /// The rows of the DH table that it came from, at these `values` of its parameters, and their convention: `standard` or
+    /// `modified`; none where it came from a URDF.
+    pub fn dh_rows(&self, values: &[f64]) -> Option<(&'static str, Vec<DhRow>)> {
+        let Source::Dh(table) = &self.source else { return None };
+        let convention = match table.convention {
+            Convention::Standard => "standard",
+            Convention::Modified => "modified",
+        };
+        let row = |segment: &Segment| {
+            let own = &values[segment.parameters.clone()];
+            DhRow {
+                name: segment.frame.clone().unwrap_or_default(),
+                motion: segment.joint.map(|joint| joint.motion),
+                theta_rad: own[0],
+                d_m: own[1],
+                a_m: own[2],
+                alpha_rad: own[3],
+                beta_rad: own.get(4).copied().unwrap_or(0.0),
+            }
+        };
+        Some((convention, self.segments.iter().map(row).collect()))
+    }
+}
+
 impl DhTable {
     fn check(&self, path: &Path) -> Result<(), ModelError> {
         self.deviation.unwrap_or_default().check(path)?;

@@ -29,6 +29,7 @@ mod model;
 mod residual;
 mod rigid;
 mod segment;
+mod skeleton;
 mod tree;
 mod twist;
 mod urdf;
@@ -39,6 +40,7 @@ mod tests;
 pub use arms::{Arm, ArmFrames};
 pub use chain::Chain;
 pub use deviation::Deviation;
+pub use dh_toml::DhRow;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, Offered, Override, PlacedEffect,
     Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find, is_of_effect,
@@ -50,4 +52,7 @@ pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
 pub use model::{LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;
+pub use segment::Motion;
+pub use skeleton::{Bone, Moving, Place, Skeleton};
 pub use tree::Asked;
+pub use urdf::{CalibratedOrigins, roll_pitch_yaw_of, three_numbers};

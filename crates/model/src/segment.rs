@@ -19,7 +19,7 @@ type Lanes = DualSVec64<MAX_PARAMETERS>;
 
 /// How a joint moves its segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Motion {
+pub enum Motion {
     /// About the joint's axis [rad].
     Revolute,
     /// Along the joint's axis [m].
@@ -169,6 +169,28 @@ impl Segment {
         let q = Lanes::from(self.reading(joints));
         let q = if self.joint.is_some() { q.derivative(own.len()) } else { q };
         LinearisedSegment::from(&self.local(&lanes[..own.len()], q))
+    }
+
+    /// What is constant before and behind the motion of its joint: `transform = before * motion * behind`.
+    pub fn parted(&self, p: &[f64]) -> (Rigid<f64>, Rigid<f64>) {
+        let own = &p[self.parameters.clone()];
+        match (&self.geometry, self.joint) {
+            (Geometry::ModifiedDh { hayati }, Some(_)) => {
+                let behind = with_beta(modified_dh(own[0], own[1], 0.0, 0.0), own, *hayati);
+                (modified_dh(0.0, 0.0, own[2], own[3]), behind)
+            }
+            (Geometry::StandardDh { .. }, Some(_)) => (Rigid::identity(), self.local(own, 0.0)),
+            (Geometry::Axis(_), _) => (Rigid::identity(), Rigid::identity()),
+            _ => (self.local(own, 0.0), Rigid::identity()),
+        }
+    }
+
+    /// The axis that its joint turns about or slides along.
+    pub fn axis(&self) -> Vector3<f64> {
+        match &self.geometry {
+            Geometry::Axis(axis) => *axis,
+            _ => Vector3::z(),
+        }
     }
 
     fn reading(&self, joints: &[f64]) -> f64 {

@@ -37,7 +37,7 @@ const RECORDS: [(&str, &str); 4] = [
 ];
 
 /// Kind, beginning, and a part of the head of texts that are marked otherwise.
-const SIGNATURES: [(&str, &str, &str); 11] = [
+const SIGNATURES: [(&str, &str, &str); 12] = [
     ("parameters", "# Parameters of the calibrated arm. value, nominal, sigma and ci95", ""),
     ("pooled-parameters", "# Parameters of an arm calibrated on many recordings at once. ", ""),
     ("closed-chain-parameters", "# Parameters of two arms in a closed chain. ", ""),
@@ -45,6 +45,7 @@ const SIGNATURES: [(&str, &str, &str); 11] = [
     ("layout", "{\n  \"version\": 1,\n  \"variables\": {},\n  \"userScripts\": {},\n", "/armcal/"),
     ("legacy-layout", "{\n  \"configById\": {", "!armcal1\""),
     ("set-points", "name,kind,t_s,x_m,y_m,z_m,nominal.", "set_point."),
+    ("dh-rows", "joint,type,convention,theta_deg,d_mm,a_mm,alpha_deg\n", ""),
     ("junit", "<?xml ", "<testsuites name=\"armcal check\""),
     ("check-summary", "### ", "\n| check | measured | limit | |\n"),
     ("check-summary", "### ", ": no check was made, the run failed\n"),

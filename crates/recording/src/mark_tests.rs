@@ -23,6 +23,7 @@ fn texts_of_armcal_are_known_and_others_are_not() {
         ("# Where `armcal view` finds the pipeline of these results.\npipeline = 'p'\n", "view"),
         ("<!doctype html>\n<title>rig – armcal</title>\n", "page"),
         ("name,kind,t_s,x_m,y_m,z_m,nominal.joint1_rad,set_point.joint1_rad\n", "set-points"),
+        ("joint,type,convention,theta_deg,d_mm,a_mm,alpha_deg\njoint1,", "dh-rows"),
     ] {
         assert_eq!(kind_of(text).as_deref(), Some(kind), "{text}");
     }
@@ -36,6 +37,7 @@ fn texts_of_armcal_are_known_and_others_are_not() {
         "name = 'armcal'\n# armcal\n",
         "<!doctype html>\n<title>my robots</title>\n",
         "name,kind,t_s,x_m\n",
+        "joint,type,convention,theta_deg,d_mm\n",
         "\u{0}\u{1}# armcal.view/1",
     ] {
         assert_eq!(kind_of(text), None, "{text}");

@@ -60,6 +60,7 @@ pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};
 pub use error::ReportError;
 pub use look_at::look_at;
+pub use model_file::marked_xml;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use pairing::{Side, Unpaired};
 pub use past_model::{PastArms, PastModel, RecordingFacts, Value};

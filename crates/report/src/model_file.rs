@@ -61,7 +61,7 @@ fn calibrated(
 
 /// The text with the mark as a comment behind the XML declaration, where it has none yet: the nominal model may itself be a
 /// calibrated one.
-fn marked_xml(text: String) -> String {
+pub fn marked_xml(text: String) -> String {
     let comment = format!("<!-- {MARK} -->");
     if text.contains(&comment) {
         return text;

@@ -268,6 +268,23 @@ impl PastModel {
         &self.session
     }
 
+    /// The URDF that an arm came from and the link that its base is; none of one from a DH table.
+    pub fn urdf(&self, arm: usize) -> Option<(&str, &str)> {
+        let chain = match &self.chain {
+            ChainText::Arms { arms } => &arms.get(arm)?.chain,
+            one => one,
+        };
+        match chain {
+            ChainText::Urdf { text, base_link, .. } => Some((text, base_link)),
+            _ => None,
+        }
+    }
+
+    /// Whether the fit could change a parameter.
+    pub fn was_free(&self, index: usize) -> bool {
+        self.parameters.get(index).is_some_and(|value| value.sigma > 0.0)
+    }
+
     /// The nominal arm, or arms, in the frames.
     fn geometry(&self, chain: Chain) -> Result<Model, ModelError> {
         let place = |p: &PlaceFacts| FixedPlace { frame: p.frame.frame(), is_plane: p.is_plane };

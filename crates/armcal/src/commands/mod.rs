@@ -18,6 +18,7 @@ mod simulate;
 mod transfer;
 mod verify;
 mod view;
+pub mod write;
 
 use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
@@ -77,6 +78,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         Command::Verify { result, pipeline, out, json } => {
             verify::run(result, pipeline, out.as_deref(), *json)
         }
+        Command::Write(asked) => write::run(asked),
         Command::View { input, port } => view::run(input, *port),
         Command::Export { pipeline, out } => export::run(pipeline, out),
         Command::Extract(asked) => extract::run(asked),

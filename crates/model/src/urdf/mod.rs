@@ -14,6 +14,7 @@ mod write;
 
 use branches::{Branches, Kept};
 use reader::{Reader, child, parse};
+pub use write::{CalibratedOrigins, roll_pitch_yaw_of, three_numbers};
 
 use crate::chain::Source;
 use crate::rigid::Rigid;

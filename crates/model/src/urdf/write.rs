@@ -15,6 +15,9 @@ struct Edit {
     text: String,
 }
 
+/// Origins by the names of their joints, and what of the calibration is in none of them.
+pub type CalibratedOrigins<'m> = (Vec<(&'m str, Pose)>, Vec<Warning>);
+
 impl Model {
     /// The URDF of an arm with the calibrated origins of its moving joints; every other byte stays as it was.
     ///
@@ -30,6 +33,42 @@ impl Model {
         path: &Path,
         p: &[f64],
     ) -> Result<(String, Vec<Warning>), ModelError> {
+        let tip = self.feature_parameters(FeatureId(arm)).any(|index| self.parameters()[index].free);
+        self.to_urdf_with(arm, tip, xml, path, p)
+    }
+
+    /// [`Model::to_urdf`], said from outside whether the tip frame was calibrated: a model that was read back does not know.
+    pub fn to_urdf_with(
+        &self,
+        arm: usize,
+        tip: bool,
+        xml: &str,
+        path: &Path,
+        p: &[f64],
+    ) -> Result<(String, Vec<Warning>), ModelError> {
+        let (origins, warnings) = self.calibrated_origins(arm, tip, p)?;
+        let document = parse(xml, path)?;
+        let reader = Reader { document: &document, path };
+        let robot = reader.robot()?;
+        let mut edits = Vec::new();
+        for (name, new) in origins {
+            let node = Reader::joints(robot)
+                .find(|node| node.attribute("name") == Some(name))
+                .ok_or_else(|| ModelError::ForeignUrdf { path: path.to_owned(), joint: name.to_owned() })?;
+            let old = reader.origin(node, &format!("joint \"{name}\""))?;
+            edits.extend(origin_edits(node, &old, &new, xml));
+        }
+        Ok((apply(xml, edits), warnings))
+    }
+
+    /// The origins that calibration changes, by the names of their joints in the URDF: of every moving joint and, with `tip`, of
+    /// the fixed joint that carries the tip link. Errors as [`Model::to_urdf`].
+    pub fn calibrated_origins(
+        &self,
+        arm: usize,
+        tip: bool,
+        p: &[f64],
+    ) -> Result<CalibratedOrigins<'_>, ModelError> {
         let (chain, own) = self.chain().arm(arm);
         let Source::Urdf(joints) = &chain.source else {
             return Err(ModelError::WrongFormat { model: chain.name.clone(), format: "URDF" });
@@ -37,38 +76,23 @@ impl Model {
         if p.len() != self.parameters().len() {
             return Err(ModelError::ParameterCount { actual: p.len(), expected: self.parameters().len() });
         }
-        let document = parse(xml, path)?;
-        let reader = Reader { document: &document, path };
-        let robot = reader.robot()?;
-        let mut edits = Vec::new();
-        let mut warnings = Vec::new();
-        let tip_is_calibrated = self.parameters()[self.tip_segment(arm).parameters.clone()]
-            .iter()
-            .any(|parameter| parameter.free);
+        let (mut origins, mut warnings) = (Vec::new(), Vec::new());
         for joint in joints {
             // A moving joint is two segments: its origin and its motion.
-            let carries_tip =
-                tip_is_calibrated && chain.end == Some(joint.segment + usize::from(joint.moves));
+            let carries_tip = tip && chain.end == Some(joint.segment + usize::from(joint.moves));
             if carries_tip && joint.moves {
                 warnings.push(tip_not_written(&joint.name));
             }
             if !joint.moves && !carries_tip {
                 continue;
             }
-            let node = Reader::joints(robot)
-                .find(|node| node.attribute("name") == Some(joint.name.as_str()))
-                .ok_or_else(|| ModelError::ForeignUrdf {
-                    path: path.to_owned(),
-                    joint: joint.name.clone(),
-                })?;
-            let old = reader.origin(node, &format!("joint \"{}\"", joint.name))?;
-            let mut new = Pose::from(&chain.segments[joint.segment].transform(&p[own.clone()], &[]));
+            let mut origin = Pose::from(&chain.segments[joint.segment].transform(&p[own.clone()], &[]));
             if carries_tip && !joint.moves {
-                new *= self.feature_in_link(p, FeatureId(arm));
+                origin *= self.feature_in_link(p, FeatureId(arm));
             }
-            edits.extend(origin_edits(node, &old, &new, xml));
+            origins.push((joint.name.as_str(), origin));
         }
-        Ok((apply(xml, edits), warnings))
+        Ok((origins, warnings))
     }
 }
 
@@ -90,11 +114,8 @@ fn origin_edits(joint: Node<'_, '_>, old: &Pose, new: &Pose, xml: &str) -> Vec<E
     let moved = old.translation.vector != new.translation.vector;
     // Rotation matrices that differ by rounding only are the same numbers in the file.
     let turned = old.rotation.angle_to(&new.rotation) > 1e-15;
-    let xyz = moved.then(|| ("xyz", numbers(&new.translation.vector)));
-    let rpy = turned.then(|| {
-        let matrix = new.rotation.to_rotation_matrix().into_inner();
-        ("rpy", numbers(&roll_pitch_yaw_rad(&matrix)))
-    });
+    let xyz = moved.then(|| ("xyz", three_numbers(&new.translation.vector)));
+    let rpy = turned.then(|| ("rpy", three_numbers(&roll_pitch_yaw_of(new))));
     let changes: Vec<(&str, String)> = xyz.into_iter().chain(rpy).collect();
     if changes.is_empty() {
         return Vec::new();
@@ -137,9 +158,14 @@ fn after_start_tag(element: Node<'_, '_>, xml: &str) -> usize {
 }
 
 /// Shortest decimal numbers that read back as the same bits.
-fn numbers(v: &Vector3<f64>) -> String {
+pub fn three_numbers(v: &Vector3<f64>) -> String {
     // Adding zero turns -0 into 0.
     format!("{:?} {:?} {:?}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
+}
+
+/// Fixed-axis roll, pitch, yaw [rad] of a rotation, as URDF, SDF and ROS read them.
+pub fn roll_pitch_yaw_of(pose: &Pose) -> Vector3<f64> {
+    roll_pitch_yaw_rad(&pose.rotation.to_rotation_matrix().into_inner())
 }
 
 /// Fixed-axis roll, pitch, yaw with `R = Rz(yaw) Ry(pitch) Rx(roll)`, accurate at every pitch: yaw is taken
