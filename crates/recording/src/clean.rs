@@ -35,7 +35,8 @@ impl Kept {
         let before = self.len();
         let mut kept = 0;
         for place in 0..before {
-            let (time_ns, row) = (self.time_ns[place], self.file_row.as_ref().map_or(place, |rows| rows[place]));
+            let (time_ns, row) =
+                (self.time_ns[place], self.file_row.as_ref().map_or(place, |rows| rows[place]));
             if drop(time_ns, row) {
                 self.file_row.get_or_insert_with(|| (0..before).collect());
                 continue;

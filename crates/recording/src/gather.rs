@@ -119,7 +119,9 @@ pub(crate) fn gather(
     let (surveys, stretches) = sweep(
         &recording.files,
         &blocks(&recording.files, &channels),
-        |share| requests.iter().zip(&rows).map(|(r, rows)| Stretch::new(r.kind, share * rows)).collect::<Vec<_>>(),
+        |share| {
+            requests.iter().zip(&rows).map(|(r, rows)| Stretch::new(r.kind, share * rows)).collect::<Vec<_>>()
+        },
         |streams, at, message| {
             for target in wanted[at.file].get(&message.channel_id).into_iter().flatten() {
                 streams[target.request].take(at, target, message);
@@ -127,7 +129,8 @@ pub(crate) fn gather(
         },
     )?;
     recording.remember(surveys);
-    let mut parts: Vec<Vec<Gathered>> = requests.iter().map(|_| Vec::with_capacity(stretches.len())).collect();
+    let mut parts: Vec<Vec<Gathered>> =
+        requests.iter().map(|_| Vec::with_capacity(stretches.len())).collect();
     for stretch in stretches {
         parts.iter_mut().zip(stretch).for_each(|(parts, part)| parts.push(part.gathered));
     }
@@ -140,7 +143,8 @@ fn declared(recording: &Recording, wanted: &[BTreeMap<u16, Vec<Target>>], reques
     let of_file = |(file, wanted): (&RecordingFile, &BTreeMap<u16, Vec<Target>>)| {
         let counts = file.layout.statistics.as_ref().map(|s| &s.channel_message_counts);
         let of_request = wanted.iter().filter(|(_, targets)| targets.iter().any(|t| t.request == request));
-        let declared = of_request.filter_map(|(id, _)| counts?.get(id)).fold(0, |sum: u64, n| sum.saturating_add(*n));
+        let declared =
+            of_request.filter_map(|(id, _)| counts?.get(id)).fold(0, |sum: u64, n| sum.saturating_add(*n));
         declared.min(file.bytes.len() / LEAST_BYTES) as f64
     };
     recording.files.iter().zip(wanted).map(of_file).sum()

@@ -69,7 +69,9 @@ impl JointTable {
         }
         let joints = parts.first().map_or(0, |part| part.position.len());
         let mut column = |pick: fn(&mut JointTable) -> &mut Vec<Vec<f64>>| -> Vec<Vec<Vec<f64>>> {
-            (0..joints).map(|j| parts.iter_mut().map(|part| std::mem::take(&mut pick(part)[j])).collect()).collect()
+            (0..joints)
+                .map(|j| parts.iter_mut().map(|part| std::mem::take(&mut pick(part)[j])).collect())
+                .collect()
         };
         let (position, effort) = (column(|t| &mut t.position), column(|t| &mut t.effort));
         whole.position = position.into_par_iter().map(joined).collect();

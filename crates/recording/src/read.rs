@@ -11,6 +11,7 @@ use crate::{
 };
 use crate::{joints, poses, together};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
+use rayon::prelude::*;
 
 impl Recording {
     /// Reads the wanted streams: one pass over the recording, only wanted channels decoded, chunks in parallel, the
@@ -30,42 +31,41 @@ impl Recording {
         streams.joints.iter().chain(&streams.set_points).try_for_each(joints::check_config)?;
         let requests = requests(streams);
         let gathered = gather(self, &requests)?;
+        let read = |((place, request), gathered): ((usize, &Request<'_>), Gathered)| {
+            let mut stage = Reading::new(request, gathered);
+            let columns = stage.columns(request, place, streams)?;
+            Ok((columns, stage.report, stage.warnings))
+        };
+        let streams_read =
+            requests.par_iter().enumerate().zip(gathered).map(read).collect::<Vec<Result<_, _>>>();
         let (mut samples, mut reports, mut warnings) = (Samples::default(), Vec::new(), Vec::new());
-        let (mut of_joints, mut joints) = (streams.joints.iter(), Vec::new());
-        for (request, stream) in requests.iter().zip(gathered) {
-            let mut stage = Reading::new(request, stream, &mut warnings);
-            match request.role {
-                "joints" => joints.extend(of_joints.next().map(|s| stage.joints(s)).transpose()?),
-                "set_points" => {
-                    samples.set_points = streams.set_points.as_ref().map(|s| stage.joints(s)).transpose()?
-                }
-                "temperature" => {
-                    let read = streams.temperature.as_ref().map(|s| stage.temperature(s)).transpose()?;
-                    samples.temperature = read.flatten();
-                }
-                "gauges" => {
-                    let stream = request.name.and_then(|name| streams.gauges.get_key_value(name));
-                    if let Some((name, gauge)) = stream {
-                        samples.gauges.insert(name.clone(), stage.gauge(gauge)?);
-                    }
-                }
-                "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
-                "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
-                "table" => samples.table = streams.table.as_ref().map(|s| stage.poses(s)).transpose()?,
-                _ => {
-                    let stream = request.name.and_then(|name| streams.bodies.get_key_value(name));
-                    if let Some((name, seen)) = stream.map(|(name, s)| (name, stage.marker(s))) {
-                        seen?.into_iter().for_each(|seen| {
-                            samples.bodies.insert(name.clone(), seen);
-                        });
-                    }
-                }
+        let mut joints = Vec::new();
+        for (request, read) in requests.iter().zip(streams_read) {
+            let (columns, report, said) = read?;
+            reports.push(report);
+            warnings.extend(said);
+            let name = request.name.map(str::to_owned);
+            match (request.role, columns) {
+                ("joints", Columns::Joints(read)) => joints.extend(read),
+                (_, Columns::Joints(read)) => samples.set_points = read,
+                ("temperature", Columns::Scalars(read)) => samples.temperature = read,
+                (_, Columns::Scalars(read)) => samples.gauges.extend(name.zip(read)),
+                ("tip", Columns::Poses(read)) => samples.tip = read,
+                ("base", Columns::Poses(read)) => samples.base = read,
+                ("table", Columns::Poses(read)) => samples.table = read,
+                (_, Columns::Poses(read)) => samples.bodies.extend(name.zip(read)),
             }
-            reports.push(stage.report);
         }
         samples.joints = together::as_one(&streams.joints, joints)?;
         Ok((samples, reports, warnings))
     }
+}
+
+/// What is read of one stream; `None` where it holds nothing and that is no error.
+enum Columns {
+    Joints(Option<JointSamples>),
+    Poses(Option<PoseSamples>),
+    Scalars(Option<ScalarSamples>),
 }
 
 fn requests(streams: &Streams) -> Vec<Request<'_>> {
@@ -106,15 +106,15 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
 }
 
 /// One stream on its way from rows to columns.
-struct Reading<'a> {
+struct Reading {
     role: &'static str,
     gathered: Gathered,
     report: StreamReport,
-    warnings: &'a mut Vec<Warning>,
+    warnings: Vec<Warning>,
 }
 
-impl<'a> Reading<'a> {
-    fn new(request: &Request<'_>, gathered: Gathered, warnings: &'a mut Vec<Warning>) -> Reading<'a> {
+impl Reading {
+    fn new(request: &Request<'_>, gathered: Gathered) -> Reading {
         let report = StreamReport {
             role: request.name.map_or(request.role.to_owned(), |name| format!("{}.{name}", request.role)),
             topic: request.topic.to_owned(),
@@ -135,11 +135,43 @@ impl<'a> Reading<'a> {
             largest_gap_s: 0.0,
             quantisation_rad: Vec::new(),
         };
-        Reading { role: request.role, gathered, report, warnings }
+        Reading { role: request.role, gathered, report, warnings: Vec::new() }
+    }
+
+    /// The columns of the stream of these that stands at `place` among the requests, which begin with the joints.
+    fn columns(
+        &mut self,
+        request: &Request<'_>,
+        place: usize,
+        streams: &Streams,
+    ) -> Result<Columns, RecordingError> {
+        let mut joints = |stream: Option<&JointStream>| stream.map(|s| self.joints(s)).transpose();
+        Ok(match (request.role, request.name) {
+            ("joints", _) => Columns::Joints(joints(streams.joints.get(place))?),
+            ("set_points", _) => Columns::Joints(joints(streams.set_points.as_ref())?),
+            ("temperature", _) => {
+                let read = streams.temperature.as_ref().map(|s| self.temperature(s)).transpose()?;
+                Columns::Scalars(read.flatten())
+            }
+            ("gauges", Some(name)) => {
+                Columns::Scalars(streams.gauges.get(name).map(|s| self.gauge(s)).transpose()?)
+            }
+            (_, Some(name)) => {
+                Columns::Poses(streams.bodies.get(name).map(|s| self.marker(s)).transpose()?.flatten())
+            }
+            (role, None) => {
+                let stream = match role {
+                    "tip" => &streams.tip,
+                    "base" => &streams.base,
+                    _ => &streams.table,
+                };
+                Columns::Poses(stream.as_ref().map(|s| self.poses(s)).transpose()?)
+            }
+        })
     }
 
     fn joints(&mut self, stream: &JointStream) -> Result<JointSamples, RecordingError> {
-        let (role, first) = (self.role, self.warnings.len());
+        let role = self.role;
         self.refuse_undecoded(role)?;
         let table = std::mem::take(&mut self.gathered.joints);
         if self.gathered.messages > 0 && table.position.iter().all(Vec::is_empty) {
@@ -164,9 +196,7 @@ impl<'a> Reading<'a> {
         self.finish(role, &time_ns, counts)?;
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
-        for (said, arm) in
-            self.warnings[first..].iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?)))
-        {
+        for (said, arm) in self.warnings.iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?))) {
             said.subject = format!("{arm}: {}", said.subject);
         }
         Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm })

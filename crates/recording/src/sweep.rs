@@ -4,13 +4,14 @@
 //! are that may hold a wanted channel: some at a time, the next ones on their way while these are worked on.
 
 use crate::RecordingError;
+use crate::budget::BUDGET_BYTES;
 use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
 use crate::index::{body_of_chunk, holding};
 use crate::layout::{Content, Damage};
 use crate::open::RecordingFile;
-use crate::records::{Message, RawRecord, Records};
+use crate::records::{ChunkHeader, Message, RawRecord, Records};
 use bytes::Bytes;
 use mcap::records::op;
 use rayon::prelude::*;
@@ -194,6 +195,27 @@ fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, Rec
         _ => vec![None; blocks.len()],
     };
     Ok(Batch { blocks, fetched })
+}
+
+/// How many blocks from the first on are inflated together: at most `most`, and within the budget by what they claim.
+pub(crate) fn together(
+    files: &[RecordingFile],
+    blocks: &[At],
+    fetched: &[Option<Bytes>],
+    most: usize,
+) -> usize {
+    let claim = |(at, fetched): (&At, &Option<Bytes>)| {
+        let (file, fetched) = (&files[at.file], fetched.as_ref());
+        let body = stored(file, *at, fetched).unwrap_or_default();
+        let loose = matches!(file.layout.blocks[at.block].content, Content::Loose(_));
+        let header = if loose { None } else { ChunkHeader::parse(body) };
+        header.map_or(0, |(header, _)| header.uncompressed_size)
+    };
+    let sums = blocks.iter().zip(fetched).scan(0_u64, |sum, block| {
+        *sum = sum.saturating_add(claim(block));
+        Some(*sum)
+    });
+    sums.take(most).take_while(|sum| *sum <= BUDGET_BYTES as u64).count().max(1)
 }
 
 /// The records of a block, held for passes that hand messages out in order, and the survey of it. A bad one is empty.
