@@ -52,8 +52,8 @@ pub(crate) struct Verdict {
 
 /// Removes from rows of `seen` what was not seen. `frozen` rows are judged by [`reject_frozen`], after duplicates are gone.
 pub(crate) fn reject_unseen(rows: &mut Kept, seen: &[Seen]) -> Verdict {
-    let mut occluded = Occlusion::default();
-    occluded.flagged = rows.drop_where(|_, i| seen[i].flagged);
+    let flagged = rows.drop_where(|_, i| seen[i].flagged);
+    let mut occluded = Occlusion { flagged, ..Occlusion::default() };
     if !rows.file_rows().all(|i| seen[i].is_zero()) {
         occluded.zero = rows.drop_where(|_, i| seen[i].is_zero());
     }
