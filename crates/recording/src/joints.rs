@@ -26,7 +26,8 @@ pub(crate) struct JointTable {
     /// Fewest values seen in a message without names.
     pub unnamed: Option<usize>,
     /// The names of the row before, and where the wanted joints are in them.
-    last_names: Option<(Arc<[String]>, Option<Vec<usize>>)>,
+    last_names: Option<Arc<[String]>>,
+    last_columns: Option<Vec<usize>>,
 }
 
 impl JointTable {
@@ -35,11 +36,12 @@ impl JointTable {
         if row.names.is_empty() {
             self.unnamed = Some(self.unnamed.map_or(row.position.len(), |n| n.min(row.position.len())));
         }
-        if self.last_names.as_ref().is_none_or(|(names, _)| !Arc::ptr_eq(names, row.names)) {
+        if self.last_names.as_ref().is_none_or(|names| !Arc::ptr_eq(names, row.names)) {
             self.present.extend(row.names.iter().cloned());
-            self.last_names = Some((Arc::clone(row.names), columns(row.names, wanted)));
+            self.last_names = Some(Arc::clone(row.names));
+            self.last_columns = columns(row.names, wanted);
         }
-        let at = self.last_names.as_ref().and_then(|(_, at)| at.as_ref());
+        let at = self.last_columns.as_ref();
         let Some(at) = at.filter(|at| at.iter().all(|k| *k < row.position.len())) else {
             self.other += 1;
             return false;
