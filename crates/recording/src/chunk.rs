@@ -1,16 +1,16 @@
 //! Inflating a chunk, and judging it before any of its messages is used.
 
+use crate::budget::Share;
 use crate::records::ChunkHeader;
 use std::io::Read as _;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Largest chunk inflated. Writers use 0.75 to 4 MiB; a larger claim than this is damage or an attack.
 const MAX_CHUNK_BYTES: u64 = 1 << 30;
 /// A claim of up to this is reserved at once; a larger one grows as the chunk inflates.
 const RESERVED_BYTES: usize = 16 << 20;
-/// Chunks that inflate to more than this are in memory one at a time, however many threads there are.
-const LARGE_BYTES: usize = if cfg!(test) { 64 << 10 } else { 64 << 20 };
-static LARGE: Mutex<()> = Mutex::new(());
+/// Chunks that inflate to more than this share a budget, however many threads there are; smaller ones stay in the buffer
+/// of their thread.
+const LARGE_BYTES: usize = if cfg!(test) { 64 << 10 } else { RESERVED_BYTES };
 /// What is reserved before anything has been read from a stream: more than a block of either codec at its default.
 const FIRST_STEP_BYTES: usize = 128 << 10;
 /// What one compressed byte can stand for at most: a zstd block of 128 KiB may be a repeated byte, written in 4 (RFC 8878,
@@ -25,15 +25,15 @@ pub(crate) struct Inflater {
     zstd: Option<zstd::bulk::Decompressor<'static>>,
     buffer: Vec<u8>,
     /// Held as long as the buffer holds a large chunk.
-    turn: Option<MutexGuard<'static, ()>>,
+    share: Option<Share>,
 }
 
 impl Inflater {
     /// Says that the chunk is no longer needed.
     pub fn done(&mut self) {
-        if self.turn.is_some() {
+        if self.share.is_some() {
             self.buffer = Vec::new();
-            self.turn = None;
+            self.share = None;
         }
     }
 
@@ -58,9 +58,8 @@ impl Inflater {
                 true => Ok(()),
                 false => Err(format!("it claims to inflate to {size} bytes, which {} cannot", packed.len())),
             };
-        if size > LARGE_BYTES && !header.compression.is_empty() && self.turn.is_none() {
-            // Whoever panicked while holding it has taken its buffer along.
-            self.turn = Some(LARGE.lock().unwrap_or_else(PoisonError::into_inner));
+        if size > LARGE_BYTES && !header.compression.is_empty() && self.share.is_none() {
+            self.share = Some(Share::of(size));
         }
         let data: &[u8] = match header.compression.as_str() {
             "" => packed,

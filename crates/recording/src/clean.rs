@@ -1,6 +1,6 @@
 //! From rows in file order to rows in strictly increasing time, counting what is dropped and moved.
 
-use armcal_core::robust::median;
+use armcal_core::robust::percentile_in;
 
 /// Counts of cleaning.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -11,48 +11,98 @@ pub(crate) struct Counts {
     pub duplicate: u64,
 }
 
-/// Indices of the usable rows, sorted by time; rows with equal stamps stay in file order and are all kept.
-/// `finite[i]` says whether row `i` has only finite numbers.
-pub(crate) fn in_time_order(
-    time_ns: &[Option<i64>],
-    finite: impl Fn(usize) -> bool,
-) -> (Vec<(i64, usize)>, Counts) {
+/// The rows that are used, in order of time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// Time of each.
+    pub time_ns: Vec<i64>,
+    /// Which row of the file each is; `None` while it is every one of them in file order, as it mostly is.
+    file_row: Option<Vec<usize>>,
+}
+
+impl Kept {
+    pub fn len(&self) -> usize {
+        self.time_ns.len()
+    }
+
+    /// The place in the file of each row.
+    pub fn file_rows(&self) -> impl Iterator<Item = usize> + Clone {
+        (0..self.len()).map(|place| self.file_row.as_ref().map_or(place, |rows| rows[place]))
+    }
+
+    /// Drops rows, given the time of each and its place in the file; how many they were.
+    pub fn drop_where(&mut self, mut drop: impl FnMut(i64, usize) -> bool) -> u64 {
+        let before = self.len();
+        let mut kept = 0;
+        for place in 0..before {
+            let (time_ns, row) =
+                (self.time_ns[place], self.file_row.as_ref().map_or(place, |rows| rows[place]));
+            if drop(time_ns, row) {
+                self.file_row.get_or_insert_with(|| (0..before).collect());
+                continue;
+            }
+            if let Some(rows) = &mut self.file_row {
+                (self.time_ns[kept], rows[kept]) = (time_ns, row);
+            }
+            kept += 1;
+        }
+        self.time_ns.truncate(kept);
+        self.file_row.iter_mut().for_each(|rows| rows.truncate(kept));
+        (before - kept) as u64
+    }
+
+    /// The values of these rows in their order, of columns in file order.
+    pub fn of_columns(&self, columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        match &self.file_row {
+            None => columns,
+            Some(rows) => columns.iter().map(|column| rows.iter().map(|i| column[*i]).collect()).collect(),
+        }
+    }
+}
+
+/// The usable rows, sorted by time; rows with equal stamps stay in file order and are all kept.
+/// `finite(i)` says whether row `i` has only finite numbers.
+pub(crate) fn in_time_order(time_ns: &[Option<i64>], finite: impl Fn(usize) -> bool) -> (Kept, Counts) {
     let mut counts = Counts::default();
-    let mut rows = Vec::with_capacity(time_ns.len());
+    let all = time_ns.iter().map(|time| time.unwrap_or(i64::MIN)).collect();
+    let mut kept = Kept { time_ns: all, file_row: None };
     let mut latest = i64::MIN;
-    for (i, time) in time_ns.iter().enumerate() {
-        let Some(time) = *time else {
+    kept.drop_where(|_, i| {
+        let Some(time) = time_ns[i] else {
             counts.unstamped += 1;
-            continue;
+            return true;
         };
         if !finite(i) {
             counts.non_finite += 1;
-            continue;
+            return true;
         }
         counts.backward += u64::from(time < latest);
         latest = latest.max(time);
-        rows.push((time, i));
-    }
+        false
+    });
     if counts.backward > 0 {
+        let mut rows: Vec<(i64, usize)> = kept.time_ns.iter().copied().zip(kept.file_rows()).collect();
         rows.sort_by_key(|(time, _)| *time);
+        let (time_ns, file_row) = rows.into_iter().unzip();
+        kept = Kept { time_ns, file_row: Some(file_row) };
     }
-    (rows, counts)
+    (kept, counts)
 }
 
 /// Keeps the first of rows with the same stamp.
-pub(crate) fn drop_duplicates(rows: &mut Vec<(i64, usize)>, counts: &mut Counts) {
-    let before = rows.len();
-    rows.dedup_by_key(|(time, _)| *time);
-    counts.duplicate += (before - rows.len()) as u64;
+pub(crate) fn drop_duplicates(rows: &mut Kept, counts: &mut Counts) {
+    let mut before = None;
+    counts.duplicate += rows.drop_where(|time_ns, _| before.replace(time_ns) == Some(time_ns));
 }
 
 /// Median rate [Hz] and largest gap [s]; both 0 for fewer than two rows.
 pub(crate) fn rate_and_gap(time_ns: &[i64]) -> (f64, f64) {
-    let steps_s: Vec<f64> = time_ns.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 * 1e-9).collect();
+    let mut steps_s: Vec<f64> = time_ns.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 * 1e-9).collect();
     if steps_s.is_empty() {
         return (0.0, 0.0);
     }
-    (1.0 / median(&steps_s), steps_s.iter().copied().fold(0.0, f64::max))
+    let largest_s = steps_s.iter().copied().fold(0.0, f64::max);
+    (1.0 / percentile_in(&mut steps_s, 0.5), largest_s)
 }
 
 /// Step of the grid all values lie on, if they lie on one.
@@ -92,7 +142,7 @@ mod tests {
         let time = [Some(10), Some(30), Some(20), Some(30), None, Some(40), Some(50)];
         let (mut rows, mut counts) = in_time_order(&time, |i| i != 5);
         drop_duplicates(&mut rows, &mut counts);
-        assert_eq!(rows, [(10, 0), (20, 2), (30, 1), (50, 6)]);
+        assert_eq!(rows, Kept { time_ns: vec![10, 20, 30, 50], file_row: Some(vec![0, 2, 1, 6]) });
         assert_eq!(counts, Counts { non_finite: 1, unstamped: 1, backward: 1, duplicate: 1 });
     }
 

@@ -5,7 +5,8 @@
 //! part of every report.
 
 use crate::Clock;
-use armcal_core::robust::percentile;
+use crate::gather::joined;
+use armcal_core::robust::{percentile, percentile_in};
 
 /// Share of header stamps that must be set for the header clock to be used.
 const SET_SHARE: f64 = 0.99;
@@ -33,33 +34,35 @@ pub(crate) struct Stamps {
 }
 
 impl Stamps {
-    pub fn append(&mut self, other: &mut Stamps) {
-        self.header_ns.append(&mut other.header_ns);
-        self.publish_ns.append(&mut other.publish_ns);
-        self.log_ns.append(&mut other.log_ns);
+    /// Adds a row.
+    pub fn push(&mut self, header_ns: Option<i64>, publish_ns: i64, log_ns: i64) {
+        self.header_ns.push(header_ns);
+        self.publish_ns.push(publish_ns);
+        self.log_ns.push(log_ns);
     }
 
-    /// Makes room for more rows.
-    pub fn reserve(&mut self, more: usize) {
-        self.header_ns.reserve(more);
-        self.publish_ns.reserve(more);
-        self.log_ns.reserve(more);
+    /// Makes room for rows, if there is any.
+    pub fn make_room(&mut self, rows: usize) {
+        let _ = self.header_ns.try_reserve_exact(rows);
+        let _ = self.publish_ns.try_reserve_exact(rows);
+        let _ = self.log_ns.try_reserve_exact(rows);
     }
 
-    /// Keeps only these rows, given by their indices in rising order.
-    pub fn keep(&mut self, rows: &[usize]) {
-        if rows.len() == self.log_ns.len() {
-            return;
-        }
-        self.header_ns = rows.iter().map(|i| self.header_ns[*i]).collect();
-        self.publish_ns = rows.iter().map(|i| self.publish_ns[*i]).collect();
-        self.log_ns = rows.iter().map(|i| self.log_ns[*i]).collect();
+    /// The rows of part after part.
+    pub fn of(parts: Vec<Stamps>) -> Stamps {
+        let parts = parts.into_iter().map(|part| (part.header_ns, (part.publish_ns, part.log_ns)));
+        let (header_ns, (publish_ns, log_ns)): (Vec<_>, (Vec<_>, Vec<_>)) = parts.unzip();
+        Stamps { header_ns: joined(header_ns), publish_ns: joined(publish_ns), log_ns: joined(log_ns) }
     }
 
-    /// Time of each row on the given clock; `None` for a row without it.
-    pub fn on(&self, clock: Clock) -> Vec<Option<i64>> {
+    /// Takes out the time of each row on the given clock; `None` for a row without it.
+    pub fn on(&mut self, clock: Clock) -> Vec<Option<i64>> {
         match clock {
-            Clock::Header => self.header_ns.iter().map(|t| t.filter(|ns| *ns > 0)).collect(),
+            Clock::Header => {
+                let mut time = std::mem::take(&mut self.header_ns);
+                time.iter_mut().filter(|t| t.is_some_and(|ns| ns <= 0)).for_each(|t| *t = None);
+                time
+            }
             Clock::Publish => self.publish_ns.iter().copied().map(Some).collect(),
             Clock::Log => self.log_ns.iter().copied().map(Some).collect(),
         }
@@ -71,14 +74,17 @@ impl Stamps {
 /// A stamp is stray when it lies far outside the bulk of the header stamps and does not follow log time as they do:
 /// a recorder that stalls, log times that are wrong, or a second session in the same file break only one of the two.
 pub(crate) fn drop_stray(time_ns: &mut [Option<i64>], log_ns: &[i64]) -> u64 {
-    let set: Vec<f64> = time_ns.iter().flatten().map(|t| *t as f64 * 1e-9).collect();
     let latency_s = |time: &Option<i64>, log: &i64| time.map(|t| log.saturating_sub(t) as f64 * 1e-9);
-    let late: Vec<f64> = time_ns.iter().zip(log_ns).filter_map(|(t, log)| latency_s(t, log)).collect();
-    if set.is_empty() {
+    let late = time_ns.iter().zip(log_ns).filter_map(|(t, log)| latency_s(t, log));
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (least_s, most_s) = late.clone().fold(ends, |(least, most), s| (least.min(s), most.max(s)));
+    if most_s - least_s <= STRAY_SPREADS * SPREAD_S {
+        // Nobody is further from the median than that, and it is the smallest margin.
         return 0;
     }
-    let (first_s, last_s) = (percentile(&set, 0.01), percentile(&set, 0.99));
-    let usual_s = percentile(&late, 0.5);
+    let usual_s = percentile_in(&mut late.collect::<Vec<f64>>(), 0.5);
+    let mut set: Vec<f64> = time_ns.iter().flatten().map(|t| *t as f64 * 1e-9).collect();
+    let (first_s, last_s) = (percentile_in(&mut set, 0.01), percentile_in(&mut set, 0.99));
     let margin_s = STRAY_SPREADS * SPREAD_S.max(SPREAD_SHARE * (last_s - first_s));
     let mut strays = 0;
     for (time, log) in time_ns.iter_mut().zip(log_ns) {
@@ -109,42 +115,49 @@ pub(crate) fn choose(stamps: &Stamps) -> (Clock, String) {
 /// Why the header stamps can be trusted, or why not.
 pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
     let rows = stamps.header_ns.len();
-    let mut in_log_order: Vec<usize> = (0..rows).collect();
-    in_log_order.sort_by_key(|&i| stamps.log_ns[i]);
-    let set: Vec<(i64, i64)> = in_log_order
-        .iter()
-        .filter_map(|&i| stamps.header_ns[i].filter(|ns| *ns > 0).map(|h| (h, stamps.log_ns[i])))
-        .collect();
-    if set.is_empty() {
+    let in_log_order = (!stamps.log_ns.is_sorted()).then(|| {
+        let mut order: Vec<usize> = (0..rows).collect();
+        order.sort_by_key(|&i| stamps.log_ns[i]);
+        order
+    });
+    let row = |place: usize| in_log_order.as_ref().map_or(place, |order| order[place]);
+    let stamp = |i: usize| stamps.header_ns[i].filter(|ns| *ns > 0).map(|header| (header, stamps.log_ns[i]));
+    let set = (0..rows).filter_map(|place| stamp(row(place)));
+    let (mut stamped, mut backward, mut repeated, mut before) = (0, 0, 0, i64::MIN);
+    for (header, _) in set.clone() {
+        stamped += 1;
+        backward += usize::from(header < before);
+        repeated += usize::from(header == before);
+        before = header;
+    }
+    if stamped == 0 {
         let carried = stamps.header_ns.iter().any(Option::is_some);
         return Err(if carried { "header stamps are all zero" } else { "messages carry no stamp" }.to_owned());
     }
-    if (set.len() as f64) < SET_SHARE * rows as f64 {
-        return Err(format!("{} of {rows} header stamps are missing or zero", rows - set.len()));
+    if (stamped as f64) < SET_SHARE * rows as f64 {
+        return Err(format!("{} of {rows} header stamps are missing or zero", rows - stamped));
     }
-    let steps = set.windows(2);
-    let backward = steps.clone().filter(|w| w[1].0 < w[0].0).count();
     if backward as f64 > BACKWARD_SHARE * rows as f64 {
         return Err(format!("header stamps go backwards {backward} times in {rows} rows"));
     }
-    let repeated = steps.filter(|w| w[1].0 == w[0].0).count();
     if repeated as f64 > REPEATED_SHARE * rows as f64 {
         return Err(format!("{repeated} of {rows} header stamps repeat the one before"));
     }
-    judge_spread(&set)
+    judge_spread(set)
 }
 
 /// Stamps must run like the log clock, whatever their offset from it.
-fn judge_spread(set: &[(i64, i64)]) -> Result<String, String> {
-    let log = || set.iter().map(|(_, log)| *log);
+fn judge_spread(set: impl Iterator<Item = (i64, i64)> + Clone) -> Result<String, String> {
+    let log = || set.clone().map(|(_, log)| log);
     let duration_s = seconds(log().min(), log().max());
     if duration_s == 0.0 {
         return Ok("header stamps are set and increase; log time stands still".to_owned());
     }
-    let latency_s: Vec<f64> = set.iter().map(|(h, log)| log.saturating_sub(*h) as f64 * 1e-9).collect();
-    let spread_s = percentile(&latency_s, 0.99) - percentile(&latency_s, 0.01);
+    let mut latency_s: Vec<f64> = Vec::with_capacity(set.size_hint().1.unwrap_or(0));
+    latency_s.extend(set.clone().map(|(h, log)| log.saturating_sub(h) as f64 * 1e-9));
+    let spread_s = percentile_in(&mut latency_s, 0.99) - percentile_in(&mut latency_s, 0.01);
     if spread_s > SPREAD_S.max(SPREAD_SHARE * duration_s) {
-        if log_is_to_blame(set) {
+        if log_is_to_blame(&set.collect::<Vec<_>>()) {
             return Ok(format!(
                 "header stamps are set and evenly spaced; log time is not, it lags by up to {spread_s:.1} s as that of a \
                  recorder that stalls"

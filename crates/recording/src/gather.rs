@@ -4,18 +4,20 @@ use crate::clock::Stamps;
 use crate::decode::{Plan, Role, Rows};
 use crate::error::nearest;
 use crate::joints::JointTable;
-use crate::open::ns;
+use crate::open::{RecordingFile, ns};
 use crate::poses::PoseTable;
 use crate::raw::RawChannel;
 use crate::records::Message;
-use crate::sweep::{blocks, sweep};
+use crate::sweep::{At, blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Row-less messages of a filtered stream looked into for the names of the bodies they hold.
 const BODIES_SAMPLED: u64 = 20;
+/// Room is made for at most a message in so many bytes of a file.
+const LEAST_BYTES: u64 = 16;
 
 /// One stream asked for.
 #[derive(Debug, Clone, Copy)]
@@ -64,26 +66,34 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    /// Makes room for the rows of all parts at once, so that millions of rows are copied once.
-    fn reserve<'a>(&mut self, parts: impl Iterator<Item = &'a Gathered> + Clone) {
-        let sum = |length: fn(&Gathered) -> usize| parts.clone().map(length).sum::<usize>();
-        self.stamps.reserve(sum(|part| part.stamps.log_ns.len()));
-        self.joints.position.reserve(sum(|part| part.joints.position.len()));
-        self.joints.effort.reserve(sum(|part| part.joints.effort.len()));
-        self.poses.seen.reserve(sum(|part| part.poses.seen.len()));
-        self.scalars.reserve(sum(|part| part.scalars.len()));
+    /// Puts together what stretch after stretch gave.
+    fn of(mut stretches: Vec<Gathered>) -> Gathered {
+        let mut whole = Gathered::default();
+        for part in &mut stretches {
+            whole.messages += part.messages;
+            whole.undecodable += part.undecodable;
+            whole.first_error = whole.first_error.take().or(part.first_error.take());
+            whole.other_bodies.append(&mut part.other_bodies);
+        }
+        let each = stretches.into_iter().map(|part| ((part.stamps, part.scalars), (part.joints, part.poses)));
+        let ((stamps, scalars), (joints, poses)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) = each.unzip();
+        let (stamps, (joints, poses)) = rayon::join(
+            || Stamps::of(stamps),
+            || rayon::join(|| JointTable::of(joints), || PoseTable::of(poses)),
+        );
+        Gathered { stamps, joints, poses, scalars: joined(scalars), ..whole }
     }
+}
 
-    fn append(&mut self, mut later: Gathered) {
-        self.messages += later.messages;
-        self.undecodable += later.undecodable;
-        self.first_error = self.first_error.take().or(later.first_error);
-        self.other_bodies.append(&mut later.other_bodies);
-        self.stamps.append(&mut later.stamps);
-        self.joints.append(later.joints);
-        self.poses.append(later.poses);
-        self.scalars.append(&mut later.scalars);
+/// One column of its parts in order, copied once if there are several.
+pub(crate) fn joined<T>(mut parts: Vec<Vec<T>>) -> Vec<T> {
+    parts.retain(|part| !part.is_empty());
+    if parts.len() < 2 {
+        return parts.pop().unwrap_or_default();
     }
+    let mut whole = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    parts.into_iter().for_each(|mut part| whole.append(&mut part));
+    whole
 }
 
 /// A channel's plan for one request.
@@ -100,36 +110,44 @@ pub(crate) fn gather(
 ) -> Result<Vec<Gathered>, RecordingError> {
     let mut wanted: Vec<BTreeMap<u16, Vec<Target>>> = Vec::new();
     wanted.resize_with(recording.files.len(), BTreeMap::new);
-    let mut gathered: Vec<Gathered> = Vec::new();
+    let mut unreadable = Vec::new();
     for (index, request) in requests.iter().enumerate() {
-        let unreadable = target(recording, index, request, &mut wanted)?;
-        gathered.push(Gathered { unreadable, ..Gathered::default() });
+        unreadable.push(target(recording, index, request, &mut wanted)?);
     }
     let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
-    // Blocks of a recording are alike: one makes room for as many rows as the fullest so far had.
-    let most_rows: Vec<AtomicUsize> = requests.iter().map(|_| AtomicUsize::new(0)).collect();
-    let start = |r: (&Request<'_>, _)| Batch::new(r.0.kind.role(), r.1);
-    let (surveys, blocks) = sweep(
+    let rows: Vec<f64> = (0..requests.len()).map(|request| declared(recording, &wanted, request)).collect();
+    let (surveys, stretches) = sweep(
         &recording.files,
         &blocks(&recording.files, &channels),
-        |file| (file, requests.iter().zip(&most_rows).map(start).collect::<Vec<_>>()),
-        |(file, batches), message| {
-            for target in wanted[*file].get(&message.channel_id).into_iter().flatten() {
-                batches[target.request].take(target, message);
+        |share| {
+            requests.iter().zip(&rows).map(|(r, rows)| Stretch::new(r.kind, share * rows)).collect::<Vec<_>>()
+        },
+        |streams, at, message| {
+            for target in wanted[at.file].get(&message.channel_id).into_iter().flatten() {
+                streams[target.request].take(at, target, message);
             }
         },
-        |(_, batches)| batches.into_iter().zip(requests).map(|(b, r)| b.finish(r)).collect::<Vec<_>>(),
     )?;
     recording.remember(surveys);
-    for (index, whole) in gathered.iter_mut().enumerate() {
-        whole.reserve(blocks.iter().filter_map(|block| block.get(index)));
+    let mut parts: Vec<Vec<Gathered>> =
+        requests.iter().map(|_| Vec::with_capacity(stretches.len())).collect();
+    for stretch in stretches {
+        parts.iter_mut().zip(stretch).for_each(|(parts, part)| parts.push(part.gathered));
     }
-    for block in blocks {
-        for (whole, part) in gathered.iter_mut().zip(block) {
-            whole.append(part);
-        }
-    }
-    Ok(gathered)
+    let whole = parts.into_par_iter().zip(unreadable);
+    Ok(whole.map(|(parts, unreadable)| Gathered { unreadable, ..Gathered::of(parts) }).collect())
+}
+
+/// How many messages the files say that there are for a request: what room is made for, believed no further than that.
+fn declared(recording: &Recording, wanted: &[BTreeMap<u16, Vec<Target>>], request: usize) -> f64 {
+    let of_file = |(file, wanted): (&RecordingFile, &BTreeMap<u16, Vec<Target>>)| {
+        let counts = file.layout.statistics.as_ref().map(|s| &s.channel_message_counts);
+        let of_request = wanted.iter().filter(|(_, targets)| targets.iter().any(|t| t.request == request));
+        let declared =
+            of_request.filter_map(|(id, _)| counts?.get(id)).fold(0, |sum: u64, n| sum.saturating_add(*n));
+        declared.min(file.bytes.len() / LEAST_BYTES) as f64
+    };
+    recording.files.iter().zip(wanted).map(of_file).sum()
 }
 
 /// Compiles a plan for every channel of the topic that can be read, and returns why the others cannot.
@@ -193,81 +211,69 @@ fn compile(channel: &Arc<RawChannel>, kind: Kind<'_>) -> Result<(Plan, f64), Str
     Ok((plan, to_m))
 }
 
-/// One stream's rows of one block.
-struct Batch<'a> {
+/// One stream's rows of a stretch of blocks.
+struct Stretch<'a> {
+    kind: Kind<'a>,
+    /// Those of one message, on their way to where they stay.
     rows: Rows,
-    /// Rows that room is made for as soon as there is one.
-    most_rows: &'a AtomicUsize,
-    log_ns: Vec<i64>,
-    publish_ns: Vec<i64>,
-    to_m: Vec<f64>,
-    counted: Gathered,
-    sampled: u64,
+    gathered: Gathered,
+    /// Row-less messages that were looked into, of a block.
+    sampled: (Option<At>, u64),
 }
 
-impl<'a> Batch<'a> {
-    fn new(role: Role, most_rows: &'a AtomicUsize) -> Batch<'a> {
-        Batch {
-            rows: Rows::new(role),
-            most_rows,
-            log_ns: Vec::new(),
-            publish_ns: Vec::new(),
-            to_m: Vec::new(),
-            counted: Gathered::default(),
-            sampled: 0,
+impl<'a> Stretch<'a> {
+    /// With room for about so many rows. Whatever cannot be had in advance is had when there are rows.
+    fn new(kind: Kind<'a>, rows: f64) -> Stretch<'a> {
+        let mut gathered = Gathered::default();
+        // Stretches are not quite alike.
+        let room = (1.05 * rows).ceil() as usize;
+        gathered.stamps.make_room(room);
+        match kind {
+            Kind::Joints { wanted } => gathered.joints.make_room(room, wanted.len()),
+            Kind::Pose { .. } => _ = gathered.poses.seen.try_reserve_exact(room),
+            Kind::Scalar => _ = gathered.scalars.try_reserve_exact(room),
         }
+        Stretch { kind, rows: Rows::new(kind.role()), gathered, sampled: (None, 0) }
     }
 
-    fn take(&mut self, target: &Target, message: &Message<'_>) {
-        self.counted.messages += 1;
-        let before = self.rows.len();
-        if let Err(e) = target.plan.decode(message.data, &mut self.rows) {
-            self.counted.undecodable += 1;
-            self.counted.first_error.get_or_insert_with(|| e.to_string());
+    fn take(&mut self, at: At, target: &Target, message: &Message<'_>) {
+        let Stretch { rows, gathered, .. } = self;
+        gathered.messages += 1;
+        rows.clear();
+        if let Err(e) = target.plan.decode(message.data, rows) {
+            gathered.undecodable += 1;
+            gathered.first_error.get_or_insert_with(|| e.to_string());
         }
-        let added = self.rows.len();
-        if before == 0 && added > 0 {
-            self.reserve();
-        }
-        self.log_ns.resize(added, ns(message.log_ns));
-        self.publish_ns.resize(added, ns(message.publish_ns));
-        self.to_m.resize(added, target.to_m);
-        if added == before && self.sampled < BODIES_SAMPLED {
-            self.sampled += 1;
-            self.counted.other_bodies.extend(target.plan.bodies(message.data).unwrap_or_default());
-        }
-    }
-
-    /// Makes room for the rows to be expected, once it is known what a row is like.
-    fn reserve(&mut self) {
-        let more = self.most_rows.load(Ordering::Relaxed);
-        self.rows.reserve(more);
-        self.log_ns.reserve(more);
-        self.publish_ns.reserve(more);
-        self.to_m.reserve(more);
-    }
-
-    /// Keeps of the rows what the stream wants.
-    fn finish(self, request: &Request<'_>) -> Gathered {
-        let Batch { rows, most_rows, log_ns, publish_ns, to_m, mut counted, .. } = self;
-        most_rows.fetch_max(rows.len(), Ordering::Relaxed);
-        match (rows, request.kind) {
+        let Gathered { stamps, joints, poses, scalars, .. } = gathered;
+        let mut stamp = |header_ns| stamps.push(header_ns, ns(message.publish_ns), ns(message.log_ns));
+        match (&*rows, self.kind) {
             (Rows::Joints(rows), Kind::Joints { wanted }) => {
-                let (joints, kept) = JointTable::select(&rows, wanted);
-                counted.joints = joints;
-                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
-                counted.stamps.keep(&kept);
+                let kept = rows.rows().filter(|row| joints.take(row, wanted));
+                kept.for_each(|row| stamp(row.stamp_ns));
             }
-            (Rows::Pose(rows), _) => {
-                counted.poses = PoseTable::of(&rows, &to_m);
-                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
-            }
+            (Rows::Pose(rows), _) => rows.rows().for_each(|row| {
+                poses.take(&row, target.to_m);
+                stamp(row.stamp_ns);
+            }),
             (Rows::Scalar(rows), _) => {
-                counted.scalars = rows.value;
-                counted.stamps = Stamps { header_ns: rows.stamp_ns, publish_ns, log_ns };
+                scalars.extend_from_slice(&rows.value);
+                rows.stamp_ns.iter().for_each(|header_ns| stamp(*header_ns));
             }
             (Rows::Joints(_), _) => {}
         }
-        counted
+        if self.rows.is_empty() {
+            self.look_for_bodies(at, target, message);
+        }
+    }
+
+    /// Remembers which bodies a message without a row holds, of the first of them in each block.
+    fn look_for_bodies(&mut self, at: At, target: &Target, message: &Message<'_>) {
+        if self.sampled.0 != Some(at) {
+            self.sampled = (Some(at), 0);
+        }
+        if self.sampled.1 < BODIES_SAMPLED {
+            self.sampled.1 += 1;
+            self.gathered.other_bodies.extend(target.plan.bodies(message.data).unwrap_or_default());
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Joint rows to columns in the order of the model: selection by name, units, quantisation.
 
 use crate::clean::quantisation_step;
-use crate::decode::JointRows;
+use crate::decode::JointRow;
 use crate::error::nearest;
+use crate::gather::joined;
 use crate::{JointStream, JointUnit, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -11,60 +12,73 @@ use std::sync::Arc;
 
 const ROLE: &str = "joints";
 
-/// Readings of the wanted joints, row after row.
+/// Readings of the wanted joints.
 #[derive(Debug, Default)]
 pub(crate) struct JointTable {
-    /// Positions in the unit of the message; row `i` is `[i * joints .. (i + 1) * joints]`.
-    pub position: Vec<f64>,
+    /// One column a joint, in the unit of the message.
+    pub position: Vec<Vec<f64>>,
     /// Efforts alike, NaN where a row has none.
-    pub effort: Vec<f64>,
+    pub effort: Vec<Vec<f64>>,
     /// Messages that hold only other joints, or only some of the wanted ones.
     pub other: u64,
     /// Joint names seen; empty when no message names any.
     pub present: BTreeSet<String>,
     /// Fewest values seen in a message without names.
     pub unnamed: Option<usize>,
+    /// The names of the row before, and where the wanted joints are in them.
+    last_names: Option<Arc<[String]>>,
+    last_columns: Option<Vec<usize>>,
 }
 
 impl JointTable {
-    /// Takes the wanted joints out of decoded rows, and returns which rows have them all.
-    pub fn select(rows: &JointRows, wanted: &[String]) -> (JointTable, Vec<usize>) {
-        let mut table = JointTable::default();
-        for list in rows.name_lists() {
-            table.present.extend(list.iter().cloned());
+    /// Takes the wanted joints out of a row; `false` if it does not have them all.
+    pub fn take(&mut self, row: &JointRow<'_>, wanted: &[String]) -> bool {
+        if row.names.is_empty() {
+            self.unnamed = Some(self.unnamed.map_or(row.position.len(), |n| n.min(row.position.len())));
         }
-        let mut kept = Vec::with_capacity(rows.len());
-        table.position.reserve(rows.len() * wanted.len());
-        table.effort.reserve(rows.len() * wanted.len());
-        // The names of the row before, and where the wanted joints are in them.
-        let mut last_names: Option<&Arc<[String]>> = None;
-        let mut last_columns: Option<Vec<usize>> = None;
-        for (i, row) in rows.rows().enumerate() {
-            if row.names.is_empty() {
-                table.unnamed = Some(table.unnamed.map_or(row.position.len(), |n| n.min(row.position.len())));
-            }
-            if last_names.is_none_or(|names| !Arc::ptr_eq(names, row.names)) {
-                (last_names, last_columns) = (Some(row.names), columns(row.names, wanted));
-            }
-            let Some(columns) = last_columns.as_ref().filter(|c| c.iter().all(|k| *k < row.position.len()))
-            else {
-                table.other += 1;
-                continue;
-            };
-            table.position.extend(columns.iter().map(|k| row.position[*k]));
-            table.effort.extend(columns.iter().map(|k| row.effort.get(*k).copied().unwrap_or(f64::NAN)));
-            kept.push(i);
+        if self.last_names.as_ref().is_none_or(|names| !Arc::ptr_eq(names, row.names)) {
+            self.present.extend(row.names.iter().cloned());
+            self.last_names = Some(Arc::clone(row.names));
+            self.last_columns = columns(row.names, wanted);
         }
-        (table, kept)
+        let at = self.last_columns.as_ref();
+        let Some(at) = at.filter(|at| at.iter().all(|k| *k < row.position.len())) else {
+            self.other += 1;
+            return false;
+        };
+        for ((k, position), effort) in at.iter().zip(&mut self.position).zip(&mut self.effort) {
+            position.push(row.position[*k]);
+            effort.push(row.effort.get(*k).copied().unwrap_or(f64::NAN));
+        }
+        true
     }
 
-    /// Adds the rows of a later block.
-    pub fn append(&mut self, mut later: JointTable) {
-        self.position.append(&mut later.position);
-        self.effort.append(&mut later.effort);
-        self.other += later.other;
-        self.present.append(&mut later.present);
-        self.unnamed = self.unnamed.into_iter().chain(later.unnamed).min();
+    /// Makes the columns, with room for rows where it can be had.
+    pub fn make_room(&mut self, rows: usize, joints: usize) {
+        for columns in [&mut self.position, &mut self.effort] {
+            columns.resize_with(joints, Vec::new);
+            columns.iter_mut().for_each(|column| _ = column.try_reserve_exact(rows));
+        }
+    }
+
+    /// The rows of part after part.
+    pub fn of(mut parts: Vec<JointTable>) -> JointTable {
+        let mut whole = JointTable::default();
+        for part in &mut parts {
+            whole.other += part.other;
+            whole.present.append(&mut part.present);
+            whole.unnamed = whole.unnamed.into_iter().chain(part.unnamed).min();
+        }
+        let joints = parts.first().map_or(0, |part| part.position.len());
+        let mut column = |pick: fn(&mut JointTable) -> &mut Vec<Vec<f64>>| -> Vec<Vec<Vec<f64>>> {
+            (0..joints)
+                .map(|j| parts.iter_mut().map(|part| std::mem::take(&mut pick(part)[j])).collect())
+                .collect()
+        };
+        let (position, effort) = (column(|t| &mut t.position), column(|t| &mut t.effort));
+        whole.position = position.into_par_iter().map(joined).collect();
+        whole.effort = effort.into_par_iter().map(joined).collect();
+        whole
     }
 
     /// Why not a single row had all the wanted joints.
@@ -135,28 +149,27 @@ pub(crate) fn check_config(stream: &JointStream) -> Result<(), RecordingError> {
     Ok(())
 }
 
-/// One column a joint [rad], from the given rows of the table.
-pub(crate) fn to_rad(table: &JointTable, rows: &[usize], stream: &JointStream) -> Vec<Vec<f64>> {
-    let joints = stream.names.len();
-    let convert = |j: usize, x: f64| match stream.unit {
-        JointUnit::Rad => x,
-        JointUnit::Deg => x.to_radians(),
-        JointUnit::Counts => stream.encoders.get(j).map_or(f64::NAN, |e| e.to_rad(x)),
-    };
-    let column = |j: usize| rows.iter().map(|i| convert(j, table.position[i * joints + j])).collect();
-    (0..joints).into_par_iter().map(column).collect()
+/// Readings of joint after joint in radians.
+pub(crate) fn to_rad(joints: &mut [Vec<f64>], stream: &JointStream) {
+    joints.par_iter_mut().enumerate().for_each(|(j, column)| match (stream.unit, stream.encoders.get(j)) {
+        (JointUnit::Rad, _) => {}
+        (JointUnit::Deg, _) => column.iter_mut().for_each(|x| *x = x.to_radians()),
+        (JointUnit::Counts, Some(encoder)) => column.iter_mut().for_each(|x| *x = encoder.to_rad(*x)),
+        (JointUnit::Counts, None) => column.fill(f64::NAN),
+    });
 }
 
-/// One column of efforts a joint [N m], NaN where a row has none; `None` where no row has any.
-pub(crate) fn effort(table: &JointTable, rows: &[usize], joints: usize) -> Option<Vec<Vec<f64>>> {
-    let column = |j: usize| rows.iter().map(|i| table.effort[i * joints + j]).collect::<Vec<f64>>();
-    let columns: Vec<Vec<f64>> = (0..joints).map(column).collect();
+/// The efforts [N m] of joint after joint; `None` where no row has any.
+pub(crate) fn effort(columns: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     columns.iter().flatten().any(|e| e.is_finite()).then_some(columns)
 }
 
 /// Refuses readings that cannot be in the declared unit.
 pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result<(), RecordingError> {
     let limit_rad = stream.max_turns * TAU;
+    if joint_rad.iter().flatten().all(|q| q.abs() <= limit_rad) {
+        return Ok(());
+    }
     let reach = |column: &Vec<f64>| {
         let mut magnitude: Vec<f64> = column.iter().map(|q| q.abs()).collect();
         if magnitude.is_empty() {
@@ -198,15 +211,21 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
     Err(RecordingError::WrongUnit { role: ROLE, topic: stream.topic.clone(), why })
 }
 
-/// Whether the readings of row `i` are ones that a joint can have; a flipped bit gives the others.
-pub(crate) fn is_possible(joint_rad: &[Vec<f64>], i: usize, stream: &JointStream) -> bool {
-    joint_rad.iter().all(|column| column[i].abs() <= 10.0 * stream.max_turns * TAU)
+/// Whether the readings of each row are ones that a joint can have; a flipped bit gives the others. `None` where all are.
+pub(crate) fn possible(joint_rad: &[Vec<f64>], stream: &JointStream) -> Option<Vec<bool>> {
+    let possible = |q: &f64| q.abs() <= 10.0 * stream.max_turns * TAU;
+    let rows = joint_rad.first().map_or(0, Vec::len);
+    let row = |i: usize| joint_rad.iter().all(|column| possible(&column[i]));
+    (!joint_rad.iter().flatten().all(possible)).then(|| (0..rows).map(row).collect())
 }
 
 /// What makes degrees look like radians, if they do: every joint stays within a turn's worth of radians.
 pub(crate) fn looks_like_radians(joint_rad: &[Vec<f64>], stream: &JointStream) -> Option<String> {
+    if stream.unit != JointUnit::Deg {
+        return None;
+    }
     let largest_deg = joint_rad.iter().flatten().map(|q| q.to_degrees().abs()).fold(0.0, f64::max);
-    (stream.unit == JointUnit::Deg && largest_deg < TAU).then(|| {
+    (largest_deg < TAU).then(|| {
         format!("no joint leaves {largest_deg:.2} deg around zero; if the readings are radians, set unit = \"rad\"")
     })
 }

@@ -19,6 +19,10 @@ use std::ops::Range;
 const LOOSE_BLOCK_BYTES: usize = 1 << 20;
 /// Footer record and end magic.
 const FOOTER_BYTES: usize = ENVELOPE + 20;
+/// What the system brings into memory at least when the head of a record is looked at.
+const TOUCHED_BYTES: usize = 64 << 10;
+/// Pages of the walk are given back by so much that is in memory.
+const RELEASED_BYTES: usize = 4 << 20;
 /// A chunk at the end of a cut file counts as zero-filled from here on.
 const ZERO_TAIL_BYTES: usize = 16;
 
@@ -124,6 +128,7 @@ impl Layout {
     }
 
     fn walk_data(&mut self, map: &Map, records: &mut Records<'_>) -> DataSection {
+        let (mut released_to, mut touched) = (0, 0);
         for record in records {
             let record = match record {
                 Ok(record) => record,
@@ -137,7 +142,12 @@ impl Layout {
                 op::FOOTER => return DataSection::Ended(record.offset),
                 _ => self.take(&record),
             }
-            map.passed(record.offset..body(&record).end);
+            touched += record.body.len().min(TOUCHED_BYTES);
+            if touched >= RELEASED_BYTES {
+                let end = body(&record).end;
+                map.release(released_to..end);
+                (released_to, touched) = (end, 0);
+            }
         }
         DataSection::Stopped(Stop::CutOff(map.len()))
     }

@@ -3,7 +3,7 @@
 //! Reading, in the order data flows through the modules:
 //! `bytes` (a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`) ->
 //! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
-//! `chunk` (inflated and checked) -> `sweep` (all blocks in parallel, results in file order) ->
+//! `chunk` (inflated and checked, within a `budget`) -> `sweep` (all blocks in parallel, results in file order) ->
 //! `decode` (messages to rows) -> `gather` (rows of a stream) -> `read` (columns: clock, cleaning, units).
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
@@ -17,6 +17,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod atomic;
+mod budget;
 mod bytes;
 mod channels;
 mod chunk;

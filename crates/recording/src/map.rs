@@ -10,7 +10,7 @@ use std::io;
 use std::ops::{Deref, Range};
 
 /// A map is given back in stretches of this size: large enough that it costs no time.
-const WINDOW_BYTES: usize = 1 << 20;
+const WINDOW_BYTES: usize = 4 << 20;
 /// A whole file is hashed in pieces of this size.
 const PIECE_BYTES: usize = 4 << 20;
 

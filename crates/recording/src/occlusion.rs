@@ -13,6 +13,7 @@
 //!    only where the motion does; its rest is not occlusion. A stream that is constant throughout is one run, and kept.
 
 use crate::Occlusion;
+use crate::clean::Kept;
 use armcal_core::robust::percentile;
 
 /// Shortest run of equal poses that can be frozen.
@@ -49,18 +50,17 @@ pub(crate) struct Verdict {
     pub oriented: bool,
 }
 
-/// Removes from `rows` (time and index into `seen`, in time order) what was not seen. `frozen` rows are judged by
-/// [`reject_frozen`], after duplicates are gone.
-pub(crate) fn reject_unseen(rows: &mut Vec<(i64, usize)>, seen: &[Seen]) -> Verdict {
-    let mut occluded = Occlusion::default();
-    drop_where(rows, &mut occluded.flagged, |i| seen[i].flagged);
-    if !rows.iter().all(|(_, i)| seen[*i].is_zero()) {
-        drop_where(rows, &mut occluded.zero, |i| seen[i].is_zero());
+/// Removes from rows of `seen` what was not seen. `frozen` rows are judged by [`reject_frozen`], after duplicates are gone.
+pub(crate) fn reject_unseen(rows: &mut Kept, seen: &[Seen]) -> Verdict {
+    let flagged = rows.drop_where(|_, i| seen[i].flagged);
+    let mut occluded = Occlusion { flagged, ..Occlusion::default() };
+    if !rows.file_rows().all(|i| seen[i].is_zero()) {
+        occluded.zero = rows.drop_where(|_, i| seen[i].is_zero());
     }
-    let with_quaternion = rows.iter().filter(|(_, i)| seen[*i].quaternion_xyzw.is_some()).count();
-    let oriented = rows.iter().any(|(_, i)| seen[*i].has_unit_quaternion());
+    let with_quaternion = rows.file_rows().filter(|i| seen[*i].quaternion_xyzw.is_some()).count();
+    let oriented = rows.file_rows().any(|i| seen[i].has_unit_quaternion());
     if oriented && with_quaternion == rows.len() {
-        drop_where(rows, &mut occluded.non_unit_quaternion, |i| !seen[i].has_unit_quaternion());
+        occluded.non_unit_quaternion = rows.drop_where(|_, i| !seen[i].has_unit_quaternion());
     }
     Verdict {
         occluded,
@@ -69,8 +69,8 @@ pub(crate) fn reject_unseen(rows: &mut Vec<(i64, usize)>, seen: &[Seen]) -> Verd
 }
 
 /// Removes the repeats of frozen poses and returns how many they were.
-pub(crate) fn reject_frozen(rows: &mut Vec<(i64, usize)>, seen: &[Seen]) -> u64 {
-    let poses: Vec<&Seen> = rows.iter().map(|(_, i)| &seen[*i]).collect();
+pub(crate) fn reject_frozen(rows: &mut Kept, seen: &[Seen]) -> u64 {
+    let poses: Vec<&Seen> = rows.file_rows().map(|i| &seen[i]).collect();
     let runs: Vec<usize> = poses.chunk_by(|a, b| same_bits(a, b)).map(<[_]>::len).collect();
     let lengths: Vec<f64> = runs.iter().map(|n| *n as f64).collect();
     let usual = percentile(&lengths, 0.95);
@@ -80,10 +80,8 @@ pub(crate) fn reject_frozen(rows: &mut Vec<(i64, usize)>, seen: &[Seen]) -> u64 
     let frozen = |length: usize| length >= FROZEN_ROWS && length as f64 > 4.0 * usual;
     let keep: Vec<bool> =
         runs.iter().flat_map(|&length| (0..length).map(move |k| k == 0 || !frozen(length))).collect();
-    let before = rows.len();
     let mut keep = keep.into_iter();
-    rows.retain(|_| keep.next().unwrap_or(true));
-    (before - rows.len()) as u64
+    rows.drop_where(|_, _| !keep.next().unwrap_or(true))
 }
 
 /// Share of turns back among consecutive triples of runs: about 2/3 for a resting sensor's noise, 0 for smooth motion.
@@ -106,12 +104,6 @@ fn same_bits(a: &Seen, b: &Seen) -> bool {
         && bits(a.quaternion_xyzw) == bits(b.quaternion_xyzw)
 }
 
-fn drop_where(rows: &mut Vec<(i64, usize)>, count: &mut u64, drop: impl Fn(usize) -> bool) {
-    let before = rows.len();
-    rows.retain(|(_, i)| !drop(*i));
-    *count += (before - rows.len()) as u64;
-}
-
 fn norm(q: &[f64; 4]) -> f64 {
     q.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
@@ -119,6 +111,7 @@ fn norm(q: &[f64; 4]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clean::in_time_order;
 
     /// Rest, a smooth move, rest; `noise` in metres from a small generator.
     fn stream(noise: f64) -> Vec<Seen> {
@@ -137,8 +130,9 @@ mod tests {
             .collect()
     }
 
-    fn rows(seen: &[Seen]) -> Vec<(i64, usize)> {
-        (0..seen.len()).map(|i| (i as i64, i)).collect()
+    fn rows(seen: &[Seen]) -> Kept {
+        let time: Vec<Option<i64>> = (0..seen.len()).map(|i| Some(i as i64)).collect();
+        in_time_order(&time, |_| true).0
     }
 
     #[test]
@@ -156,7 +150,7 @@ mod tests {
         assert!(verdict.oriented);
         assert_eq!(verdict.occluded, Occlusion { zero: 1, frozen: 20, non_unit_quaternion: 1, flagged: 1 });
         assert_eq!(rows.len(), 800 - 23);
-        assert!(rows.iter().any(|(_, i)| *i == 99), "the first of the run was measured");
+        assert!(rows.file_rows().any(|i| i == 99), "the first of the run was measured");
     }
 
     #[test]

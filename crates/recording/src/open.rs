@@ -109,7 +109,7 @@ impl Recording {
         self.report.get_or_init(|| {
             let unread = self.unread();
             // Only fetching can fail, and of mapped files nothing is fetched.
-            if let Ok((found, _)) = sweep(&self.files, &unread, |_| (), |(), _| (), |()| ()) {
+            if let Ok((found, _)) = sweep(&self.files, &unread, |_| (), |(), _, _| ()) {
                 self.remember(found);
             }
             let hashes: Vec<_> = self.files.par_iter().map(RecordingFile::identity).collect();
@@ -164,7 +164,7 @@ impl Recording {
     /// Looks into the chunks for definitions where no summary repeats them all.
     fn complete_definitions(&mut self) -> Result<(), RecordingError> {
         if self.files.iter().any(|f| !f.layout.definitions_complete) {
-            let (found, _) = sweep(&self.files, &self.unread(), |_| (), |(), _| (), |()| ())?;
+            let (found, _) = sweep(&self.files, &self.unread(), |_| (), |(), _, _| ())?;
             self.remember(found);
             let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
             for (file, survey) in self.files.iter_mut().zip(surveys) {

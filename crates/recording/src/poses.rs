@@ -1,7 +1,9 @@
 //! Pose rows to columns: body, frame, unit, occlusion, orientation.
 
-use crate::decode::PoseRows;
+use crate::clean::Kept;
+use crate::decode::PoseRow;
 use crate::error::nearest;
+use crate::gather::joined;
 use crate::occlusion::Seen;
 use crate::{LengthUnit, PoseStream, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -21,22 +23,30 @@ pub(crate) struct PoseTable {
 }
 
 impl PoseTable {
-    /// Rows with `to_m[i]` metres in the unit of row `i`.
-    pub fn of(rows: &PoseRows, to_m: &[f64]) -> PoseTable {
-        let seen = rows.rows().zip(to_m).map(|(row, to_m)| Seen {
+    /// Adds a row with `to_m` metres in its unit.
+    pub fn take(&mut self, row: &PoseRow<'_>, to_m: f64) {
+        self.seen.push(Seen {
             position_m: row.position.map(|x| x * to_m),
             quaternion_xyzw: row.quaternion_xyzw,
             flagged: row.occluded,
         });
-        let texts = |list: Vec<&str>| list.into_iter().map(str::to_owned).collect();
-        PoseTable { seen: seen.collect(), frames: texts(rows.frames()), bodies: texts(rows.bodies()) }
+        for (texts, text) in [(&mut self.frames, row.frame_id), (&mut self.bodies, row.body)] {
+            if !texts.contains(text) {
+                texts.insert(text.to_owned());
+            }
+        }
     }
 
-    /// Adds the rows of a later block.
-    pub fn append(&mut self, mut later: PoseTable) {
-        self.seen.append(&mut later.seen);
-        self.frames.append(&mut later.frames);
-        self.bodies.append(&mut later.bodies);
+    /// The rows of part after part.
+    pub fn of(parts: Vec<PoseTable>) -> PoseTable {
+        let mut whole = PoseTable::default();
+        let each = parts.into_iter().map(|mut part| {
+            whole.frames.append(&mut part.frames);
+            whole.bodies.append(&mut part.bodies);
+            part.seen
+        });
+        let seen = joined(each.collect());
+        PoseTable { seen, ..whole }
     }
 
     /// Whether all numbers of row `i` are finite.
@@ -84,10 +94,15 @@ pub(crate) fn body_missing(
 pub(crate) fn check_unit(
     role: &'static str,
     stream: &PoseStream,
-    position_m: &[Vector3<f64>],
+    table: &PoseTable,
+    rows: &Kept,
 ) -> Result<(), RecordingError> {
+    let reaches = rows.file_rows().map(|i| Vector3::from(table.seen[i].position_m).norm());
+    if reaches.clone().all(|reach_m| reach_m <= ROOM_M) {
+        return Ok(());
+    }
     // Rows of exactly zero are occluded, and in every unit.
-    let mut reach_m: Vec<f64> = position_m.iter().map(|p| p.norm()).filter(|r| *r > 0.0).collect();
+    let mut reach_m: Vec<f64> = reaches.filter(|r| *r > 0.0).collect();
     if reach_m.is_empty() {
         return Ok(());
     }
@@ -110,14 +125,17 @@ pub(crate) fn check_unit(
 }
 
 /// Whether a position is one that a laboratory can hold; a flipped bit gives the others.
-pub(crate) fn is_possible(position_m: &Vector3<f64>) -> bool {
-    position_m.norm() <= 10.0 * ROOM_M
+pub(crate) fn is_possible(pose: &Seen) -> bool {
+    Vector3::from(pose.position_m).norm() <= 10.0 * ROOM_M
 }
 
 /// What makes millimetres look like metres, if they do.
 pub(crate) fn looks_like_metres(stream: &PoseStream, position_m: &[Vector3<f64>]) -> Option<String> {
+    if stream.unit != LengthUnit::Mm {
+        return None;
+    }
     let reach_m = position_m.iter().map(|p| p.norm()).fold(0.0, f64::max);
-    (stream.unit == LengthUnit::Mm && reach_m < 0.01 && reach_m > 0.0).then(|| {
+    (reach_m < 0.01 && reach_m > 0.0).then(|| {
         format!(
             "the body stays within {:.3} mm of the origin; if that is metres, set unit = \"m\"",
             reach_m * 1e3
@@ -126,15 +144,15 @@ pub(crate) fn looks_like_metres(stream: &PoseStream, position_m: &[Vector3<f64>]
 }
 
 /// Positions [m] of the given rows.
-pub(crate) fn positions(table: &PoseTable, rows: &[usize]) -> Vec<Vector3<f64>> {
-    rows.iter().map(|i| Vector3::from(table.seen[*i].position_m)).collect()
+pub(crate) fn positions(table: &PoseTable, rows: &Kept) -> Vec<Vector3<f64>> {
+    rows.file_rows().map(|i| Vector3::from(table.seen[i].position_m)).collect()
 }
 
 /// Orientations of the given rows, all of which have a quaternion of about unit length.
-pub(crate) fn orientations(table: &PoseTable, rows: &[usize]) -> Option<Vec<UnitQuaternion<f64>>> {
-    let unit = |i: &usize| {
-        let [x, y, z, w] = table.seen[*i].quaternion_xyzw?;
+pub(crate) fn orientations(table: &PoseTable, rows: &Kept) -> Option<Vec<UnitQuaternion<f64>>> {
+    let unit = |i: usize| {
+        let [x, y, z, w] = table.seen[i].quaternion_xyzw?;
         Some(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
     };
-    rows.iter().map(unit).collect()
+    rows.file_rows().map(unit).collect()
 }

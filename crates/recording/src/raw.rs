@@ -2,7 +2,7 @@
 
 use crate::open::RecordingFile;
 use crate::records::{Cursor, Message};
-use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records};
+use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records, together};
 use crate::{Recording, RecordingError};
 use mcap::records::op;
 use rayon::prelude::*;
@@ -118,7 +118,12 @@ impl Recording {
     ) -> Result<(), RecordingError> {
         // A few blocks ahead in parallel, so that memory stays at a few of them whatever the file's size.
         let ahead = 2 * rayon::current_num_threads();
-        for (blocks, fetched) in batch.blocks.chunks(ahead).zip(batch.fetched.chunks(ahead)) {
+        let (mut blocks_left, mut fetched_left) = (batch.blocks, &batch.fetched[..]);
+        while !blocks_left.is_empty() {
+            let count = together(&self.files, blocks_left, fetched_left, ahead);
+            let (blocks, fetched);
+            (blocks, blocks_left) = blocks_left.split_at(count);
+            (fetched, fetched_left) = fetched_left.split_at(count);
             let work = blocks.par_iter().zip(fetched);
             let inflated: Vec<(Cow<'_, [u8]>, BlockSurvey)> =
                 work.map(|(at, fetched)| inflate(&self.files, *at, fetched.as_ref())).collect();

@@ -1,6 +1,6 @@
 //! The streams of a pipeline, read into columns.
 
-use crate::clean::{Counts, drop_duplicates, in_time_order, rate_and_gap};
+use crate::clean::{Counts, Kept, drop_duplicates, in_time_order, rate_and_gap};
 use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
@@ -11,6 +11,7 @@ use crate::{
 };
 use crate::{joints, poses, together};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
+use rayon::prelude::*;
 
 impl Recording {
     /// Reads the wanted streams: one pass over the recording, only wanted channels decoded, chunks in parallel, the
@@ -30,42 +31,41 @@ impl Recording {
         streams.joints.iter().chain(&streams.set_points).try_for_each(joints::check_config)?;
         let requests = requests(streams);
         let gathered = gather(self, &requests)?;
+        let read = |((place, request), gathered): ((usize, &Request<'_>), Gathered)| {
+            let mut stage = Reading::new(request, gathered);
+            let columns = stage.columns(request, place, streams)?;
+            Ok((columns, stage.report, stage.warnings))
+        };
+        let streams_read =
+            requests.par_iter().enumerate().zip(gathered).map(read).collect::<Vec<Result<_, _>>>();
         let (mut samples, mut reports, mut warnings) = (Samples::default(), Vec::new(), Vec::new());
-        let (mut of_joints, mut joints) = (streams.joints.iter(), Vec::new());
-        for (request, stream) in requests.iter().zip(&gathered) {
-            let mut stage = Reading::new(request, stream, &mut warnings);
-            match request.role {
-                "joints" => joints.extend(of_joints.next().map(|s| stage.joints(s)).transpose()?),
-                "set_points" => {
-                    samples.set_points = streams.set_points.as_ref().map(|s| stage.joints(s)).transpose()?
-                }
-                "temperature" => {
-                    let read = streams.temperature.as_ref().map(|s| stage.temperature(s)).transpose()?;
-                    samples.temperature = read.flatten();
-                }
-                "gauges" => {
-                    let stream = request.name.and_then(|name| streams.gauges.get_key_value(name));
-                    if let Some((name, gauge)) = stream {
-                        samples.gauges.insert(name.clone(), stage.gauge(gauge)?);
-                    }
-                }
-                "tip" => samples.tip = streams.tip.as_ref().map(|s| stage.poses(s)).transpose()?,
-                "base" => samples.base = streams.base.as_ref().map(|s| stage.poses(s)).transpose()?,
-                "table" => samples.table = streams.table.as_ref().map(|s| stage.poses(s)).transpose()?,
-                _ => {
-                    let stream = request.name.and_then(|name| streams.bodies.get_key_value(name));
-                    if let Some((name, seen)) = stream.map(|(name, s)| (name, stage.marker(s))) {
-                        seen?.into_iter().for_each(|seen| {
-                            samples.bodies.insert(name.clone(), seen);
-                        });
-                    }
-                }
+        let mut joints = Vec::new();
+        for (request, read) in requests.iter().zip(streams_read) {
+            let (columns, report, said) = read?;
+            reports.push(report);
+            warnings.extend(said);
+            let name = request.name.map(str::to_owned);
+            match (request.role, columns) {
+                ("joints", Columns::Joints(read)) => joints.extend(read),
+                (_, Columns::Joints(read)) => samples.set_points = read,
+                ("temperature", Columns::Scalars(read)) => samples.temperature = read,
+                (_, Columns::Scalars(read)) => samples.gauges.extend(name.zip(read)),
+                ("tip", Columns::Poses(read)) => samples.tip = read,
+                ("base", Columns::Poses(read)) => samples.base = read,
+                ("table", Columns::Poses(read)) => samples.table = read,
+                (_, Columns::Poses(read)) => samples.bodies.extend(name.zip(read)),
             }
-            reports.push(stage.report);
         }
         samples.joints = together::as_one(&streams.joints, joints)?;
         Ok((samples, reports, warnings))
     }
+}
+
+/// What is read of one stream; `None` where it holds nothing and that is no error.
+enum Columns {
+    Joints(Option<JointSamples>),
+    Poses(Option<PoseSamples>),
+    Scalars(Option<ScalarSamples>),
 }
 
 fn requests(streams: &Streams) -> Vec<Request<'_>> {
@@ -106,15 +106,15 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
 }
 
 /// One stream on its way from rows to columns.
-struct Reading<'a> {
+struct Reading {
     role: &'static str,
-    gathered: &'a Gathered,
+    gathered: Gathered,
     report: StreamReport,
-    warnings: &'a mut Vec<Warning>,
+    warnings: Vec<Warning>,
 }
 
-impl<'a> Reading<'a> {
-    fn new(request: &Request<'_>, gathered: &'a Gathered, warnings: &'a mut Vec<Warning>) -> Reading<'a> {
+impl Reading {
+    fn new(request: &Request<'_>, gathered: Gathered) -> Reading {
         let report = StreamReport {
             role: request.name.map_or(request.role.to_owned(), |name| format!("{}.{name}", request.role)),
             topic: request.topic.to_owned(),
@@ -135,34 +135,68 @@ impl<'a> Reading<'a> {
             largest_gap_s: 0.0,
             quantisation_rad: Vec::new(),
         };
-        Reading { role: request.role, gathered, report, warnings }
+        Reading { role: request.role, gathered, report, warnings: Vec::new() }
+    }
+
+    /// The columns of the stream of these that stands at `place` among the requests, which begin with the joints.
+    fn columns(
+        &mut self,
+        request: &Request<'_>,
+        place: usize,
+        streams: &Streams,
+    ) -> Result<Columns, RecordingError> {
+        let mut joints = |stream: Option<&JointStream>| stream.map(|s| self.joints(s)).transpose();
+        Ok(match (request.role, request.name) {
+            ("joints", _) => Columns::Joints(joints(streams.joints.get(place))?),
+            ("set_points", _) => Columns::Joints(joints(streams.set_points.as_ref())?),
+            ("temperature", _) => {
+                let read = streams.temperature.as_ref().map(|s| self.temperature(s)).transpose()?;
+                Columns::Scalars(read.flatten())
+            }
+            ("gauges", Some(name)) => {
+                Columns::Scalars(streams.gauges.get(name).map(|s| self.gauge(s)).transpose()?)
+            }
+            (_, Some(name)) => {
+                Columns::Poses(streams.bodies.get(name).map(|s| self.marker(s)).transpose()?.flatten())
+            }
+            (role, None) => {
+                let stream = match role {
+                    "tip" => &streams.tip,
+                    "base" => &streams.base,
+                    _ => &streams.table,
+                };
+                Columns::Poses(stream.as_ref().map(|s| self.poses(s)).transpose()?)
+            }
+        })
     }
 
     fn joints(&mut self, stream: &JointStream) -> Result<JointSamples, RecordingError> {
-        let (role, table, first) = (self.role, &self.gathered.joints, self.warnings.len());
+        let role = self.role;
         self.refuse_undecoded(role)?;
-        if self.gathered.messages > 0 && table.position.is_empty() {
+        let table = std::mem::take(&mut self.gathered.joints);
+        if self.gathered.messages > 0 && table.position.iter().all(Vec::is_empty) {
             return Err(table.none_selected(stream, self.gathered.messages));
         }
-        let n = stream.names.len();
-        let finite = |i: usize| table.position[i * n..(i + 1) * n].iter().all(|x| x.is_finite());
+        let finite = |i: usize| table.position.iter().all(|column| column[i].is_finite());
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, finite);
         drop_duplicates(&mut rows, &mut counts);
-        let readings = |rows: &[(i64, usize)]| {
-            joints::to_rad(table, &rows.iter().map(|(_, i)| *i).collect::<Vec<_>>(), stream)
-        };
-        let joint_rad = readings(&rows);
+        let mut joint_rad = rows.of_columns(table.position);
+        joints::to_rad(&mut joint_rad, stream);
         joints::check_unit(&joint_rad, stream)?;
-        self.drop_impossible(&mut rows, |i| joints::is_possible(&joint_rad, i, stream));
-        let joint_rad = if self.report.impossible > 0 { readings(&rows) } else { joint_rad };
-        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        if let Some(possible) = joints::possible(&joint_rad, stream) {
+            for column in &mut joint_rad {
+                let mut place = 0..;
+                column.retain(|_| place.next().is_some_and(|place: usize| possible[place]));
+            }
+            let mut place = 0..;
+            self.drop_impossible(&mut rows, |_| place.next().is_some_and(|place: usize| possible[place]));
+        }
+        let effort_nm = joints::effort(rows.of_columns(table.effort));
+        let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
-        let effort_nm = joints::effort(table, &rows, n);
-        for (said, arm) in
-            self.warnings[first..].iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?)))
-        {
+        for (said, arm) in self.warnings.iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?))) {
             said.subject = format!("{arm}: {}", said.subject);
         }
         Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm })
@@ -170,23 +204,23 @@ impl<'a> Reading<'a> {
 
     fn poses(&mut self, stream: &PoseStream) -> Result<PoseSamples, RecordingError> {
         let role = self.role;
-        let table = &self.gathered.poses;
         self.refuse_undecoded(role)?;
+        let table = std::mem::take(&mut self.gathered.poses);
         if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
             return Err(poses::body_missing(role, stream, &self.gathered.other_bodies));
         }
-        poses::check_body(role, stream, table)?;
+        poses::check_body(role, stream, &table)?;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
-        let position_m = poses::positions(table, &rows.iter().map(|(_, i)| *i).collect::<Vec<_>>());
-        poses::check_unit(role, stream, &position_m)?;
-        self.drop_impossible(&mut rows, |i| poses::is_possible(&position_m[i]));
+        poses::check_unit(role, stream, &table, &rows)?;
+        self.drop_impossible(&mut rows, |i| poses::is_possible(&table.seen[i]));
         let Verdict { mut occluded, oriented } = reject_unseen(&mut rows, &table.seen);
         drop_duplicates(&mut rows, &mut counts);
         occluded.frozen = reject_frozen(&mut rows, &table.seen);
         self.report.occluded = occluded;
-        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
+        let position_m = poses::positions(&table, &rows);
+        let orientation = oriented.then(|| poses::orientations(&table, &rows)).flatten();
+        let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
-        let position_m = poses::positions(table, &rows);
         self.inadequate("unit-doubtful", poses::looks_like_metres(stream, &position_m));
         let several = (table.frames.len() > 1).then(|| {
             format!("poses come in several frames ({:?}) and are read as if they were one", table.frames)
@@ -202,7 +236,7 @@ impl<'a> Reading<'a> {
             body: stream.body.clone().or_else(|| table.bodies.first().cloned()).unwrap_or_default(),
             time_ns,
             position_m,
-            orientation: oriented.then(|| poses::orientations(table, &rows)).flatten(),
+            orientation,
         })
     }
 
@@ -222,27 +256,26 @@ impl<'a> Reading<'a> {
     fn gauge(&mut self, stream: &GaugeStream) -> Result<ScalarSamples, RecordingError> {
         let role = self.role;
         self.refuse_undecoded(role)?;
-        let value = &self.gathered.scalars;
+        let value = std::mem::take(&mut self.gathered.scalars);
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
         drop_duplicates(&mut rows, &mut counts);
-        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
-        self.finish(role, &time_ns, counts)?;
+        self.finish(role, &rows.time_ns, counts)?;
         let to_m = f64::from(stream.direction) * stream.unit.to_m();
-        Ok(ScalarSamples { time_ns, value: rows.iter().map(|i| value[*i] * to_m).collect() })
+        let value = rows.file_rows().map(|i| value[i] * to_m).collect();
+        Ok(ScalarSamples { time_ns: rows.time_ns, value })
     }
 
     /// None where no reading can be a temperature: a thermometer that is broken costs its effects, not the recording.
     fn temperature(&mut self, stream: &ScalarStream) -> Result<Option<ScalarSamples>, RecordingError> {
         let role = "temperature";
         self.refuse_undecoded(role)?;
-        let value = &self.gathered.scalars;
+        let value = std::mem::take(&mut self.gathered.scalars);
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| value[i].is_finite());
-        let scale = Scale::of(&rows.iter().map(|(_, i)| value[*i]).collect::<Vec<_>>());
-        let possible: Vec<bool> = rows.iter().map(|(_, i)| scale.celsius(value[*i]).is_some()).collect();
-        self.drop_impossible(&mut rows, |place| possible[place]);
+        let scale = Scale::of(&rows.file_rows().map(|i| value[i]).collect::<Vec<_>>());
+        self.drop_impossible(&mut rows, |i| scale.celsius(value[i]).is_some());
         drop_duplicates(&mut rows, &mut counts);
-        let (time_ns, rows): (Vec<i64>, Vec<usize>) = rows.into_iter().unzip();
-        let celsius: Vec<f64> = rows.iter().filter_map(|i| scale.celsius(value[*i])).collect();
+        let celsius: Vec<f64> = rows.file_rows().filter_map(|i| scale.celsius(value[i])).collect();
+        let time_ns = rows.time_ns;
         if let Err(why) = self.finish(role, &time_ns, counts) {
             let mixed = match scale {
                 Scale::Mixed => {
@@ -265,7 +298,7 @@ impl<'a> Reading<'a> {
 
     /// A stream of which nothing decodes is an error with the first reason.
     fn refuse_undecoded(&self, role: &'static str) -> Result<(), RecordingError> {
-        let g = self.gathered;
+        let g = &self.gathered;
         if g.messages > 0 && g.undecodable == g.messages {
             let why = format!(
                 "none of its {} messages decodes: {}",
@@ -279,17 +312,18 @@ impl<'a> Reading<'a> {
 
     /// The time of each row on the clock asked for, or on the best one.
     fn time(&mut self, role: &'static str, asked: Option<Clock>) -> Result<Vec<Option<i64>>, RecordingError> {
-        let stamps = &self.gathered.stamps;
+        let mut stamps = std::mem::take(&mut self.gathered.stamps);
         let (clock, why) = match asked {
-            None => choose(stamps),
+            None => choose(&stamps),
             Some(clock) => (clock, "set in the pipeline".to_owned()),
         };
-        let mut time = stamps.on(clock);
-        if !time.is_empty() && time.iter().all(Option::is_none) {
-            let (topic, why) = (self.report.topic.clone(), judge_header(stamps).err().unwrap_or_default());
+        let unset = clock == Clock::Header && !stamps.header_ns.iter().flatten().any(|ns| *ns > 0);
+        if unset && !stamps.log_ns.is_empty() {
+            let (topic, why) = (self.report.topic.clone(), judge_header(&stamps).err().unwrap_or_default());
             let why = format!("{why}; set \"publish\" or \"log\", or remove the key");
             return Err(RecordingError::NoClock { role, topic, clock: "header", why });
         }
+        let mut time = stamps.on(clock);
         if clock == Clock::Header {
             self.report.stray_stamps = drop_stray(&mut time, &stamps.log_ns);
         }
@@ -297,12 +331,9 @@ impl<'a> Reading<'a> {
         Ok(time)
     }
 
-    /// Removes the rows at whose place in `rows` the numbers are none a sensor can mean.
-    fn drop_impossible(&mut self, rows: &mut Vec<(i64, usize)>, possible: impl Fn(usize) -> bool) {
-        let mut place = 0..;
-        let before = rows.len();
-        rows.retain(|_| place.next().is_some_and(&possible));
-        self.report.impossible = (before - rows.len()) as u64;
+    /// Removes the rows of the file whose numbers are none a sensor can mean.
+    fn drop_impossible(&mut self, rows: &mut Kept, mut possible: impl FnMut(usize) -> bool) {
+        self.report.impossible = rows.drop_where(|_, i| !possible(i));
     }
 
     /// Completes the report, says what was lost, and refuses an empty stream.

@@ -4,13 +4,14 @@
 //! are that may hold a wanted channel: some at a time, the next ones on their way while these are worked on.
 
 use crate::RecordingError;
+use crate::budget::BUDGET_BYTES;
 use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
 use crate::index::{body_of_chunk, holding};
 use crate::layout::{Content, Damage};
 use crate::open::RecordingFile;
-use crate::records::{Message, RawRecord, Records};
+use crate::records::{ChunkHeader, Message, RawRecord, Records};
 use bytes::Bytes;
 use mcap::records::op;
 use rayon::prelude::*;
@@ -19,6 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Blocks of a file read by ranges are fetched up to this at a time.
 const BATCH_BYTES: usize = 16 << 20;
+/// Stretches that several threads get each, so that none waits long for the last of another.
+const STRETCHES: usize = 16;
 
 /// Names a block: file, then block in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,41 +93,51 @@ impl FileSurvey {
 /// What a block showed besides what was collected.
 pub(crate) type BlockSurvey = (At, FileSurvey);
 
-/// Passes over blocks. `start` makes the collector of a block, `each` sees every sound message of it in order, `finish`
-/// keeps what is worth keeping. Returns a survey of each block, and what was kept, both in file order.
+/// Passes over blocks. `start` makes the collector of a stretch of consecutive blocks, given which share of all blocks that
+/// is; `each` sees every sound message of them in order. Returns a survey of each block, and the collectors, both in file
+/// order. How long stretches are depends on the threads: what is collected must be the same once it is put together.
 ///
 /// # Errors
 /// Bytes that cannot be fetched; of mapped files there are none.
-pub(crate) fn sweep<C, D: Send>(
+pub(crate) fn sweep<C: Send>(
     files: &[RecordingFile],
     blocks: &[At],
-    start: impl Fn(usize) -> C + Sync,
-    each: impl Fn(&mut C, &Message<'_>) + Sync,
-    finish: impl Fn(C) -> D + Sync,
-) -> Result<(Vec<BlockSurvey>, Vec<D>), RecordingError> {
-    let one = |inflater: &mut Inflater, at: At, fetched: Option<&Bytes>| {
+    start: impl Fn(f64) -> C + Sync,
+    each: impl Fn(&mut C, At, &Message<'_>) + Sync,
+) -> Result<(Vec<BlockSurvey>, Vec<C>), RecordingError> {
+    let one = |inflater: &mut Inflater, collector: &mut C, at: At, fetched: Option<&Bytes>| {
         let file = &files[at.file];
-        let mut collector = start(at.file);
-        let (bytes, damage) = judge(file, at, fetched, inflater);
-        let survey = survey(file, at, bytes, damage, |message| each(&mut collector, message));
-        inflater.done();
         let range = file.layout.blocks[at.block].range();
+        // Hashing streams through the bytes, and leaves them in the cache for inflating, which does not.
         file.bytes.hash(&range);
+        let (bytes, damage) = judge(file, at, fetched, inflater);
+        let survey = survey(file, at, bytes, damage, |message| each(collector, at, message));
+        inflater.done();
         file.bytes.passed(range);
-        ((at, survey), finish(collector))
+        (at, survey)
     };
-    let (mut surveys, mut kept) = (Vec::with_capacity(blocks.len()), Vec::with_capacity(blocks.len()));
+    let stretch = |inflater: &mut Inflater, (stretch, fetched): (&[At], &[Option<Bytes>])| {
+        let mut collector = start(stretch.len() as f64 / blocks.len() as f64);
+        let work = stretch.iter().zip(fetched);
+        let surveys: Vec<BlockSurvey> =
+            work.map(|(at, fetched)| one(inflater, &mut collector, *at, fetched.as_ref())).collect();
+        (surveys, collector)
+    };
+    let (mut surveys, mut collected) = (Vec::with_capacity(blocks.len()), Vec::new());
     for_each_batch(files, blocks, |batch| {
-        let work = batch.blocks.par_iter().zip(&batch.fetched);
-        let results: Vec<(BlockSurvey, D)> = work
-            .map_init(Inflater::default, |inflater, (at, fetched)| one(inflater, *at, fetched.as_ref()))
-            .collect();
-        let (found, collected): (Vec<_>, Vec<_>) = results.into_iter().unzip();
-        surveys.extend(found);
-        kept.extend(collected);
+        let stretches = match rayon::current_num_threads() {
+            1 => 1,
+            threads => threads * STRETCHES,
+        };
+        let length = batch.blocks.len().div_ceil(stretches).max(1);
+        let work = batch.blocks.par_chunks(length).zip(batch.fetched.par_chunks(length));
+        for (found, collector) in work.map_init(Inflater::default, stretch).collect::<Vec<_>>() {
+            surveys.extend(found);
+            collected.push(collector);
+        }
         Ok(())
     })?;
-    Ok((surveys, kept))
+    Ok((surveys, collected))
 }
 
 /// Blocks that are worked on together, and what was fetched of them.
@@ -182,6 +195,27 @@ fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, Rec
         _ => vec![None; blocks.len()],
     };
     Ok(Batch { blocks, fetched })
+}
+
+/// How many blocks from the first on are inflated together: at most `most`, and within the budget by what they claim.
+pub(crate) fn together(
+    files: &[RecordingFile],
+    blocks: &[At],
+    fetched: &[Option<Bytes>],
+    most: usize,
+) -> usize {
+    let claim = |(at, fetched): (&At, &Option<Bytes>)| {
+        let (file, fetched) = (&files[at.file], fetched.as_ref());
+        let body = stored(file, *at, fetched).unwrap_or_default();
+        let loose = matches!(file.layout.blocks[at.block].content, Content::Loose(_));
+        let header = if loose { None } else { ChunkHeader::parse(body) };
+        header.map_or(0, |(header, _)| header.uncompressed_size)
+    };
+    let sums = blocks.iter().zip(fetched).scan(0_u64, |sum, block| {
+        *sum = sum.saturating_add(claim(block));
+        Some(*sum)
+    });
+    sums.take(most).take_while(|sum| *sum <= BUDGET_BYTES as u64).count().max(1)
 }
 
 /// The records of a block, held for passes that hand messages out in order, and the survey of it. A bad one is empty.

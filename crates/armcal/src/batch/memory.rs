@@ -4,6 +4,25 @@
 /// giving back after each would have every page made anew.
 pub(super) const EVERY: usize = 16;
 
+/// Blocks from this size on are the system's own, and go back to it as soon as they are freed.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const OWN_BYTES: libc::c_int = 4 << 20;
+/// Free memory at the end of what a thread has goes back from this size on.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const FREE_BYTES: libc::c_int = 1 << 20;
+
+/// Has free memory given back while the work goes on. glibc raises both limits to the largest block it has ever freed, up to
+/// 32 MiB and twice that, so that every thread would keep what the largest recording of its own needed.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(super) fn keep_little() {
+    #[expect(unsafe_code, reason = "there is no other way to the allocator")]
+    // SAFETY: it takes numbers, and changes two limits under the allocator's own locks.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, OWN_BYTES);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, FREE_BYTES);
+    }
+}
+
 /// Gives free memory back to the system. glibc keeps what a thread has freed for that thread, so that what comes after
 /// the workers would have to be had in addition to all they ever needed.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -14,6 +33,10 @@ pub(super) fn give_back() {
         libc::malloc_trim(0);
     }
 }
+
+/// Other allocators do so by themselves.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(super) fn keep_little() {}
 
 /// Other allocators do so by themselves.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]

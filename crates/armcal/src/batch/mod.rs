@@ -73,6 +73,7 @@ pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
 
 fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<Receipt, Error> {
     let Request { manifest, pipeline, out, .. } = request;
+    memory::keep_little();
     let store = Store::open(out)?;
     let keys = Keys::new(pipeline, request.full, out)?;
     let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();

@@ -158,6 +158,8 @@ impl<'m> Cursor<'m> {
     pub(super) fn number(&mut self, number: Number) -> Option<f64> {
         match (number, self.little_endian) {
             (Number::Float(8), true) => Some(f64::from_le_bytes(self.primitive()?)),
+            (Number::Signed(4), true) => Some(f64::from(i32::from_le_bytes(self.primitive()?))),
+            (Number::Unsigned(4), true) => Some(f64::from(u32::from_le_bytes(self.primitive()?))),
             (_, little_endian) => Some(value(number, little_endian, self.skip_numbers(number.bytes(), 1)?)),
         }
     }

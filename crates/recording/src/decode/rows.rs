@@ -48,14 +48,14 @@ impl Rows {
         self.len() == 0
     }
 
-    /// Makes room for `more` rows like those that are there.
-    pub(crate) fn reserve(&mut self, more: usize) {
+    /// Takes all rows away. Room for as many stays, and texts that repeat are still known.
+    pub(crate) fn clear(&mut self) {
         match self {
-            Rows::Joints(rows) => rows.reserve(more),
-            Rows::Pose(rows) => rows.reserve(more),
+            Rows::Joints(rows) => rows.clear(),
+            Rows::Pose(rows) => rows.truncate(0),
             Rows::Scalar(rows) => {
-                rows.stamp_ns.reserve(more);
-                rows.value.reserve(more);
+                rows.stamp_ns.clear();
+                rows.value.clear();
             }
         }
     }
@@ -74,6 +74,8 @@ pub struct JointRows {
     pub(super) effort: Vec<f64>,
     effort_end: Vec<usize>,
     names_of_row: Vec<u32>,
+    /// The names of the last row that there was.
+    last_names: Option<u32>,
     name_lists: Vec<Arc<[String]>>,
     name_keys: Interner,
     /// Joint names of the message being decoded, each as its length (u32) and its bytes.
@@ -130,20 +132,18 @@ impl JointRows {
         &self.name_lists
     }
 
-    fn reserve(&mut self, more: usize) {
-        let a_row = |values: &[f64]| values.len().div_ceil(self.stamp_ns.len().max(1));
-        let (positions, efforts) = (a_row(&self.position), a_row(&self.effort));
-        self.stamp_ns.reserve(more);
-        self.position.reserve(more.saturating_mul(positions));
-        self.position_end.reserve(more);
-        self.effort.reserve(more.saturating_mul(efforts));
-        self.effort_end.reserve(more);
-        self.names_of_row.reserve(more);
+    fn clear(&mut self) {
+        self.stamp_ns.clear();
+        self.position.clear();
+        self.position_end.clear();
+        self.effort.clear();
+        self.effort_end.clear();
+        self.names_of_row.clear();
     }
 
     /// The bytes of the list of names of the last row, and how many names it has.
     pub(super) fn last_names(&self) -> Option<(&[u8], usize)> {
-        let names = &self.name_lists[*self.names_of_row.last()? as usize];
+        let names = &self.name_lists[self.last_names? as usize];
         (!self.last_names_list.is_empty()).then_some((&self.last_names_list, names.len()))
     }
 
@@ -161,7 +161,7 @@ impl JointRows {
 
     /// Makes a row with the names of the last row.
     pub(super) fn push_same_names(&mut self, stamp_ns: Option<i64>) {
-        if let Some(&id) = self.names_of_row.last() {
+        if let Some(id) = self.last_names {
             self.push(stamp_ns, id);
         }
     }
@@ -171,6 +171,7 @@ impl JointRows {
         self.position_end.push(self.position.len());
         self.effort_end.push(self.effort.len());
         self.names_of_row.push(names);
+        self.last_names = Some(names);
     }
 }
 
@@ -258,15 +259,6 @@ impl PoseRows {
     /// The different frames of the rows, in order of appearance.
     pub fn frames(&self) -> Vec<&str> {
         self.frames.used(&self.frame_of_row)
-    }
-
-    fn reserve(&mut self, more: usize) {
-        self.stamp_ns.reserve(more);
-        self.position.reserve(more);
-        self.quaternion_xyzw.reserve(more);
-        self.occluded.reserve(more);
-        self.frame_of_row.reserve(more);
-        self.body_of_row.reserve(more);
     }
 
     pub(super) fn truncate(&mut self, len: usize) {

@@ -1,6 +1,7 @@
 //! From messages to columns: selection, clocks, cleaning, units, occlusion.
 
 use super::{OnDisk, Style, Track, mcap_bytes, open};
+use crate::records::{ENVELOPE, Records};
 use crate::ros2::{self, Header};
 use crate::{
     Clock, Encoder, JointStream, JointUnit, LengthUnit, PoseStream, Recording, RecordingError, ScalarStream,
@@ -406,6 +407,25 @@ fn what_no_laboratory_has_is_no_temperature() {
     let (samples, _, warnings) = with_thermometer(|i| 68.0 + i as f64);
     assert_eq!(samples.temperature.expect("a column").value[0], 68.0);
     assert!(code(&warnings, "temperature-fahrenheit").is_some());
+}
+
+#[test]
+fn rows_are_those_that_are_there_whatever_the_statistics_declare() {
+    let mut file = mcap_bytes(&[joint_track(moving())], &Style::default());
+    let sound = open(&file).read(&two_joints()).expect("a sound file");
+    // Without a CRC nothing contradicts the summary.
+    let crc = file.len() - mcap::MAGIC.len() - 4;
+    file[crc..][..4].fill(0);
+    let mut records = Records::new(&file, mcap::MAGIC.len(), file.len()).flatten();
+    let statistics = records.find(|r| r.op == mcap::records::op::STATISTICS).expect("there are some");
+    // What they say of the only channel comes last.
+    let count = statistics.offset + ENVELOPE + statistics.body.len() - 8;
+    assert_eq!(file[count..][..8], 500_u64.to_le_bytes());
+    for declared in [0, 7, 501, u64::MAX] {
+        file[count..][..8].copy_from_slice(&declared.to_le_bytes());
+        let read = open(&file).read(&two_joints()).expect("the same rows");
+        assert_eq!((read.0, read.1), (sound.0.clone(), sound.1.clone()), "{declared}");
+    }
 }
 
 #[test]
