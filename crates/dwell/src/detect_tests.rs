@@ -1,6 +1,5 @@
 use super::*;
-use crate::NominalArm;
-use crate::testkit::{Random, Session, ns, tip_m};
+use crate::testkit::{Formula, Random, Session, ns, tip_m};
 use armcal_core::{Arrival, JointSamples, PoseSamples, ScalarSamples};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -467,7 +466,8 @@ proptest! {
         let _ = detect_dwells(0, &samples, None, &DwellConfig::default());
         if let Some(tip) = &samples.tip {
             let _ = crate::mean_pose(tip);
-            let _ = crate::align_clocks(&samples.joints, tip, NominalArm { tip_m: &|q, _| Vector3::new(q[0], q[1], 0.0), uncertain: 0 }, &crate::ClockConfig::default());
+            let arm = Formula { tip_m: |q: &[f64], _: &[f64]| Vector3::new(q[0], q[1], 0.0), uncertain: 0 };
+            let _ = crate::align_clocks(&samples.joints, tip, &arm, &crate::ClockConfig::default());
         }
     }
 }

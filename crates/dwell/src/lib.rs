@@ -7,7 +7,7 @@
 //! table, base --mean_pose-----> MeanPose (with a warning when the body moved)
 //! ```
 //!
-//! Nothing here knows a file, a board or a robot model; the caller passes the nominal model as a closure.
+//! Nothing here knows a file, a board or a robot model; the caller passes the nominal model as a trait object.
 
 mod align;
 mod arrival;
@@ -29,7 +29,7 @@ mod summary;
 mod testkit;
 mod track;
 
-pub use align::{NominalArm, TipOf, align_clocks};
+pub use align::{NominalArm, PlacedArm, align_clocks};
 pub use clock::ClockAlignment;
 pub use config::{ClockConfig, DwellConfig, KnownClock};
 pub use detect::detect_dwells;

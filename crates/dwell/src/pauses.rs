@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::creep;
-use crate::series::{breaking_gap_s, median_period_s, seconds_between, unbroken};
+use crate::series::{breaking_gap_s, median_period_s, seconds_between, typical_period_s, unbroken};
 use crate::stats::quantisation_step;
 use crate::stillness::{Channel, channels, hysteresis};
 use crate::{ClockAlignment, DwellConfig};
@@ -54,7 +54,8 @@ impl<'a> Encoders<'a> {
     pub(crate) fn of(joints: &'a JointSamples, config: &DwellConfig) -> Encoders<'a> {
         let time_ns = &joints.time_ns;
         let finite = |i: usize| joints.joint_rad.iter().all(|column| column[i].is_finite());
-        let stretches = unbroken(time_ns, breaking_gap_s(config.max_gap_s, time_ns), finite);
+        let stretches =
+            unbroken(time_ns, breaking_gap_s(config.max_gap_s, typical_period_s(time_ns)), finite);
         let step_rad: Vec<f64> =
             joints.joint_rad.iter().map(|c| quantisation_step(c).unwrap_or(0.0)).collect();
         let floor_rad = config.joint_floor_deg.to_radians();
@@ -86,7 +87,7 @@ impl<'a> Tip<'a> {
     ) -> Tip<'a> {
         let robot_ns: Vec<i64> =
             samples.time_ns.iter().map(|&t| clock.map_or(t, |c| c.to_robot_ns(t))).collect();
-        let gap_s = breaking_gap_s(config.max_gap_s, &robot_ns);
+        let gap_s = breaking_gap_s(config.max_gap_s, typical_period_s(&robot_ns));
         let stretches = unbroken(&robot_ns, gap_s, |i| samples.position_m[i].iter().all(|v| v.is_finite()));
         let columns: Vec<Vec<f64>> =
             (0..3).map(|axis| samples.position_m.iter().map(|p| p[axis]).collect()).collect();

@@ -18,17 +18,17 @@ pub(crate) fn median_period_s(time_ns: &[i64]) -> f64 {
     median(&periods)
 }
 
-/// Time between rows that nine in ten do not exceed, at least the median [s]: of a stream of which rows were lost at
-/// random, the median tells nothing.
+/// Time between rows that nine in ten do not exceed [s]: of a stream of which rows were lost at random, the median tells
+/// nothing.
 pub(crate) fn typical_period_s(time_ns: &[i64]) -> f64 {
     let periods: Vec<f64> = time_ns.windows(2).map(|w| seconds_between(w[0], w[1])).collect();
-    percentile(&periods, 0.9).max(median(&periods))
+    percentile(&periods, 0.9)
 }
 
-/// The gap that breaks a stream: as configured, but at least 3.5 periods, so that jitter of a slow stream
+/// The gap that breaks a stream of a typical period: as configured, but at least 3.5 periods, so that jitter of a slow stream
 /// and lost rows do not.
-pub(crate) fn breaking_gap_s(configured_s: f64, time_ns: &[i64]) -> f64 {
-    configured_s.max(3.5 * typical_period_s(time_ns))
+pub(crate) fn breaking_gap_s(configured_s: f64, period_s: f64) -> f64 {
+    configured_s.max(3.5 * period_s)
 }
 
 /// Maximal runs of usable rows without a gap longer than `max_gap_s`.

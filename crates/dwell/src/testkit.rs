@@ -1,5 +1,6 @@
 //! What the tests of this crate share: seeded noise, an arm, recordings with planted dwells.
 
+use crate::{NominalArm, PlacedArm};
 use armcal_core::{JointSamples, PoseSamples};
 use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -69,6 +70,46 @@ pub(crate) fn tip_m(q: &[f64], wrong: f64) -> Vector3<f64> {
 /// The nominal arm, with its errors in their standard deviations.
 pub(crate) fn nominal(q: &[f64], off: &[f64]) -> Vector3<f64> {
     tip_of(q, &std::array::from_fn(|k| WRONG_SIGMA[k] * off.get(k).copied().unwrap_or(0.0)))
+}
+
+/// An arm given by its tip over readings and errors in standard deviations; motions are central differences.
+pub(crate) struct Formula<F> {
+    pub tip_m: F,
+    pub uncertain: usize,
+}
+
+impl<F: Fn(&[f64], &[f64]) -> Vector3<f64> + Sync> NominalArm for Formula<F> {
+    fn uncertain(&self) -> usize {
+        self.uncertain
+    }
+
+    fn with(&self, off: &[f64]) -> Box<dyn PlacedArm + '_> {
+        Box::new(Placed { arm: self, off: off.to_vec() })
+    }
+}
+
+struct Placed<'a, F> {
+    arm: &'a Formula<F>,
+    off: Vec<f64>,
+}
+
+impl<F: Fn(&[f64], &[f64]) -> Vector3<f64> + Sync> PlacedArm for Placed<'_, F> {
+    fn tip_m(&self, joint_rad: &[f64]) -> Vector3<f64> {
+        (self.arm.tip_m)(joint_rad, &self.off)
+    }
+
+    fn motions_m(&self, joint_rad: &[f64], moved_m: &mut [Vector3<f64>]) -> Vector3<f64> {
+        let step = 1e-4;
+        for (k, moved_m) in moved_m.iter_mut().enumerate() {
+            let at = |by: f64| {
+                let mut off = self.off.clone();
+                off[k] += by;
+                (self.arm.tip_m)(joint_rad, &off)
+            };
+            *moved_m = (at(step) - at(-step)) / (2.0 * step);
+        }
+        self.tip_m(joint_rad)
+    }
 }
 
 /// A session: dwells joined by smooth moves, as functions of robot time [s].

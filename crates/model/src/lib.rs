@@ -50,7 +50,7 @@ pub use error::ModelError;
 pub use fixed::{FixedPlace, Length};
 pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
-pub use model::{LinkFrame, Model, RecordingStart};
+pub use model::{CarriedMotions, CarriedPoint, LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;
 pub use segment::Motion;
 pub use skeleton::{Bone, Moving, Place, Skeleton};

@@ -1,5 +1,6 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+mod carried;
 mod features;
 mod linearisation;
 mod measurement;
@@ -15,6 +16,7 @@ use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frame, Frames, Marker, Masses, ModelError};
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Unit};
+pub use carried::{CarriedMotions, CarriedPoint};
 use features::Feature;
 pub use features::LinkFrame;
 pub use scopes::RecordingStart;

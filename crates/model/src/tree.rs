@@ -8,6 +8,7 @@
 use crate::rigid::Rigid;
 use crate::segment::{LinearisedSegment, Segment};
 use crate::twist::{Twist, Twists};
+use nalgebra::Vector3;
 use std::borrow::Cow;
 
 /// A segment by its place in the tree.
@@ -109,6 +110,15 @@ impl<'a> TreeAt<'a> {
         };
         let segments = tree.0.iter().map(still).collect();
         TreeAt { tree, p, segments }
+    }
+
+    /// A point of the frame at the end of a route, in the one before it.
+    pub fn point(&self, route: &[SegmentId], joints: &[f64], point_m: Vector3<f64>) -> Vector3<f64> {
+        let before = |point_m: Vector3<f64>, id: &SegmentId| match &self.segments[*id] {
+            Still::Linearised(still) => still.transform.point(&point_m),
+            _ => self.tree.0[*id].transform(&self.p, joints).point(&point_m),
+        };
+        route.iter().rev().fold(point_m, before)
     }
 
     /// The end of a route and its derivatives with respect to every parameter and joint on it.

@@ -78,13 +78,13 @@ pub fn place(folder: &Path, poses: usize, diagnosed: bool, models: &Path) -> Res
 }
 
 /// The arm as it was built, and the target on its flange.
-struct Arm {
+pub struct Arm {
     rows: [[f64; 4]; 6],
     target_m: Vector3<f64>,
 }
 
 impl Arm {
-    fn built(random: &mut ChaCha8Rng) -> Arm {
+    pub fn built(random: &mut ChaCha8Rng) -> Arm {
         let mut rows = ROWS;
         for row in &mut rows {
             for (k, value) in row.iter_mut().enumerate() {
@@ -95,7 +95,7 @@ impl Arm {
     }
 
     /// The target in the base's frame [m] where encoders count `joint_rad`.
-    fn target_m(&self, joint_rad: &[f64; 6]) -> Vector3<f64> {
+    pub fn target_m(&self, joint_rad: &[f64; 6]) -> Vector3<f64> {
         let mut turned = *joint_rad;
         for (joint, amplitude_rad, periods, phase_rad) in RIPPLES {
             turned[joint] += amplitude_rad * (periods * joint_rad[joint] + phase_rad).sin();
@@ -127,9 +127,7 @@ impl Arm {
             let to = drawn(random);
             for step in 0..REST_ROWS + MOVE_ROWS {
                 let u = step.saturating_sub(REST_ROWS) as f64 / MOVE_ROWS as f64;
-                // Without jerk at both ends (Flash and Hogan 1985).
-                let share = if pose + 1 < poses { u * u * u * (10.0 - 15.0 * u + 6.0 * u * u) } else { 0.0 };
-                let at: [f64; 6] = std::array::from_fn(|k| from[k] + share * (to[k] - from[k]));
+                let at = if pose + 1 < poses { between(&from, &to, u) } else { from };
                 let stamp_ns =
                     START_NS + series as i64 * 100_000_000_000_000 + (f64::from(row) / RATE_HZ * 1e9) as i64;
                 let seen_m = tracker_from_base * nalgebra::Point3::from(self.target_m(&at));
@@ -154,12 +152,18 @@ impl Arm {
     }
 }
 
+/// On the way from one pose to the next, without jerk at both ends (Flash and Hogan 1985).
+pub fn between(from: &[f64; 6], to: &[f64; 6], u: f64) -> [f64; 6] {
+    let share = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    std::array::from_fn(|k| from[k] + share * (to[k] - from[k]))
+}
+
 /// A pose before the arm [rad].
-fn drawn(random: &mut ChaCha8Rng) -> [f64; 6] {
+pub fn drawn(random: &mut ChaCha8Rng) -> [f64; 6] {
     let ranges = [(-2.5, 2.5), (-2.2, -0.6), (0.4, 2.2), (-2.5, 2.5), (-2.5, 2.5), (-2.5, 2.5)];
     ranges.map(|(low, high)| random.random_range(low..high))
 }
 
-fn normal(random: &mut ChaCha8Rng) -> f64 {
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }

@@ -6,12 +6,14 @@
 //! `--poses N` the most poses of a campaign.
 //! Data go to `target/bench-data`.
 //!
-//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes), `memory`, `batch` are the parts; `peers` finds or makes
+//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes),
+//! `memory`, `alignment` (of clocks), `batch` are the parts; `peers` finds or makes
 //! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `child`
 //! measures processes, `page` lays out, `machine` says on what.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its numbers")]
 
+mod alignment;
 mod batch;
 mod campaign;
 mod child;
@@ -37,12 +39,13 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 type Part = fn(&Options) -> Result<Section>;
 
 /// Each by its name, in the order of the page.
-const PARTS: [(&str, Part); 6] = [
+const PARTS: [(&str, Part); 7] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
     ("growth", growth::section),
     ("memory", memory::section),
+    ("alignment", alignment::section),
     ("batch", batch::section),
 ];
 

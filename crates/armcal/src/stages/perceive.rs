@@ -4,20 +4,19 @@ use crate::error::Error;
 use crate::pipeline::{BoardPose, FramePose, Pipeline, RecordingEntry};
 use crate::progress::Progress;
 use crate::setup;
+use crate::stages::doubts::Doubts;
 use crate::stages::effort;
 use crate::stages::frames;
 use crate::stages::readings::{self, Readings};
 use crate::stages::rigid;
 use armcal_core::robust::{median, percentile};
-use armcal_core::{
-    Dwell, FeatureId, JointSamples, Load, Parameter, PoseSamples, Rejection, Samples, Warning,
-};
-use armcal_dwell::{ClockAlignment, MeanPose, NominalArm, align_clocks, detect_dwells, mean_pose};
+use armcal_core::{Dwell, FeatureId, JointSamples, Load, PoseSamples, Rejection, Samples, Warning};
+use armcal_dwell::{ClockAlignment, MeanPose, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, RecordingReport, SharedTime};
 use armcal_report::RecordingRun;
 use armcal_table::Association;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -149,56 +148,6 @@ pub fn recording_runs(
         .collect()
 }
 
-/// Share of the half width of its bounds that a parameter without a prior may be off, 1 sigma.
-const BOUNDS_TO_SIGMA: f64 = 0.8;
-
-/// How far the nominal arm may be off: what the clocks have to be found in spite of.
-struct Doubts {
-    nominal: Vec<f64>,
-    /// What the sensor saw that the clocks are aligned by.
-    leading: FeatureId,
-    /// Index and standard deviation of every parameter in doubt.
-    parameters: Vec<(usize, f64)>,
-    /// How far the tracked point may be from the tip of the chain, per axis [m]; 0 where that is given.
-    marker_m: f64,
-}
-
-impl Doubts {
-    fn of(pipeline: &Pipeline, model: &Model, leading: FeatureId) -> Doubts {
-        let sigma =
-            |p: &Parameter| p.prior_sigma.unwrap_or(BOUNDS_TO_SIGMA * 0.5 * (p.upper - p.lower)).max(0.0);
-        let parameters = model.parameters().iter().enumerate().filter(|(_, p)| p.free);
-        let parameters =
-            parameters.map(|(k, p)| (k, sigma(p))).filter(|(_, sigma)| sigma.is_finite()).collect();
-        let name = model.features().find(|(feature, _)| *feature == leading).map_or("", |(_, name)| name);
-        let tip = match pipeline.markers.get(name) {
-            Some(marker) if !leading.is_tip() => marker.frame(),
-            _ => pipeline.frames.tip.clone(),
-        };
-        let association = pipeline.table.as_ref().map(|t| t.association.clone()).unwrap_or_default();
-        let away_m = Vector3::from(tip.at.xyz_m).norm();
-        let given = tip.pose == FramePose::Given && away_m == 0.0;
-        let marker_m = if given { 0.0 } else { away_m + 1e-3 * association.marker_offset_sigma_mm };
-        Doubts { nominal: model.nominal(), leading, parameters, marker_m }
-    }
-
-    fn count(&self) -> usize {
-        self.parameters.len() + if self.marker_m > 0.0 { 3 } else { 0 }
-    }
-
-    /// The tip in the base's frame, with everything in doubt off by so many standard deviations.
-    fn tip_m(&self, model: &Model, joint_rad: &[f64], off: &[f64]) -> Vector3<f64> {
-        let mut p = self.nominal.clone();
-        for ((k, sigma), off) in self.parameters.iter().zip(off) {
-            p[*k] += sigma * off;
-        }
-        let marker = off.get(self.parameters.len()..).filter(|axes| axes.len() == 3);
-        let marker_m =
-            marker.map_or_else(Vector3::zeros, |axes| self.marker_m * Vector3::from_column_slice(axes));
-        (model.feature_in_base(&p, self.leading, joint_rad) * Point3::from(marker_m)).coords
-    }
-}
-
 fn dwells_of_one(
     pipeline: &Pipeline,
     speed_model: &Model,
@@ -231,14 +180,11 @@ fn dwells_of_one(
     let clock = match leading(&samples, speed_model) {
         Some((feature, tip)) => {
             let doubts = Doubts::of(pipeline, speed_model, feature);
-            let tip_of = |q: &[f64], off: &[f64]| doubts.tip_m(speed_model, q, off);
-            let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
-            let aligned = align_clocks(&samples.joints, tip, arm, &pipeline.clock);
+            let aligned = align_clocks(&samples.joints, tip, &doubts, &pipeline.clock);
             let (clock, said) = aligned.map_err(|source| {
                 let with = |reading: &setup::Reading| {
-                    let tip_of = |q: &[f64], off: &[f64]| reading.lengths * doubts.tip_m(speed_model, q, off);
-                    let arm = NominalArm { tip_m: &tip_of, uncertain: doubts.count() };
-                    let aligned = align_clocks(&reading.joints, &reading.tip, arm, &pipeline.clock);
+                    let arm = doubts.scaled(reading.lengths);
+                    let aligned = align_clocks(&reading.joints, &reading.tip, &arm, &pipeline.clock);
                     aligned.ok().map(|(clock, _)| clock.correlation)
                 };
                 misread(in_dwell(source), name, &samples, &with)

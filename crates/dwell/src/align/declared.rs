@@ -17,7 +17,7 @@ const CONTRADICTION_S: f64 = 2e-3;
 pub(super) fn align(
     joints: &JointSamples,
     tip: &PoseSamples,
-    arm: NominalArm<'_>,
+    arm: &dyn NominalArm,
     config: &ClockConfig,
     declared: Declared,
 ) -> Result<(ClockAlignment, Vec<Warning>), DwellError> {

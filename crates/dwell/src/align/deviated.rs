@@ -1,14 +1,12 @@
-//! Speeds that the nominal model predicts, with its uncertain parameters where they are taken to be.
+//! Speeds that the nominal model predicts with its uncertain parameters where they are taken to be, and what these do to them.
 
 use armcal_core::JointSamples;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::profile::SpeedProfile;
-use super::scale::{Scale, Track};
-use super::spread::{Deviations, FURTHER};
-use super::{NominalArm, Streams};
-use crate::ClockConfig;
+use super::scale::Scale;
+use super::{PlacedArm, Streams};
 
 /// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
 const TRIED_ROWS: f64 = 5.0;
@@ -16,72 +14,140 @@ const TRIED_ROWS: f64 = 5.0;
 /// Motion of a joint [rad] (prismatic: [m]) up to which the tip is where it was, whatever the uncertain parameters.
 const RESTING_RAD: f64 = 1e-4;
 
+/// The path of the tip under a model, and how each uncertain parameter moves it.
+pub(crate) struct Deviations {
+    /// The parameters, in standard deviations of their priors.
+    pub so_far: Vec<f64>,
+    h_s: f64,
+    /// Where speeds are logarithms: the speed that counts as standing still [m/s].
+    still_m_s: Option<f64>,
+    /// Rows of the path: time [s], and the place among `moved` where the arm then is.
+    rows: Vec<(f64, usize)>,
+    moved: Vec<Moved>,
+}
+
+/// The tip in one pose of the arm.
+struct Moved {
+    tip_m: Vector3<f64>,
+    /// Its motion per standard deviation of each parameter [m].
+    by_m: Vec<Vector3<f64>>,
+}
+
 impl Streams<'_> {
     /// The speeds that the model with these parameters predicts.
     pub(super) fn robot_speeds(&self, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
         if parameters.iter().all(|p| *p == 0.0) {
             return scale.robot.clone();
         }
-        scale.like_robot(
-            predicted(self.joints, self.robot_origin_ns, self.arm, parameters, self.config).speeds(scale.h_s),
-        )
+        let path_m = predicted(self.joints, &self.joint_rows, &*self.arm.with(parameters));
+        scale.like_robot(self.robot.speeds_of(&path_m, scale.h_s))
     }
 
-    /// Speeds with each uncertain parameter further off in turn; none where there are no such parameters.
-    pub(super) fn deviations(&self, scale: &Scale, so_far: &[f64]) -> Option<Deviations> {
+    /// What each uncertain parameter does to the speeds at some times on the robot's clock [s]; none where there are no such
+    /// parameters.
+    pub(super) fn deviations(
+        &self,
+        scale: &Scale,
+        so_far: &[f64],
+        at_s: impl Iterator<Item = f64>,
+    ) -> Option<Deviations> {
         if so_far.is_empty() {
             return None;
         }
-        let rows = self.robot.thinned(scale.h_s / TRIED_ROWS);
-        let thin = JointSamples {
-            time_ns: rows.iter().map(|row| self.joints.time_ns[*row]).collect(),
-            joint_rad: self
-                .joints
-                .joint_rad
-                .iter()
-                .map(|c| rows.iter().map(|row| c[*row]).collect())
-                .collect(),
-            ..JointSamples::default()
+        let rows = around(&self.robot.time_s, &self.robot.thinned(scale.h_s / TRIED_ROWS), scale.h_s, at_s);
+        let joint_rows: Vec<usize> = rows.iter().map(|row| self.joint_rows[*row]).collect();
+        let (moved, of_row) = where_moved(self.joints, &joint_rows);
+        let arm = self.arm.with(so_far);
+        let at = |row: &usize| {
+            let mut by_m = vec![Vector3::zeros(); so_far.len()];
+            let tip_m = arm.motions_m(&self.joints.row_rad(*row), &mut by_m);
+            Moved { tip_m, by_m }
         };
-        let (moved, of_row) = where_moved(&thin);
-        let speeds = |parameters: &[f64]| {
-            let tip_m = |row: &usize| (self.arm.tip_m)(&thin.row_rad(*row), parameters);
-            let at_m: Vec<Vector3<f64>> = moved.par_iter().map(tip_m).collect();
-            let path_m = of_row.iter().map(|k| at_m[*k]).collect();
-            scale.like_robot(
-                Track::of(&thin.time_ns, self.robot_origin_ns, path_m, self.config).speeds(scale.h_s),
-            )
-        };
-        let further = |k: usize| {
-            let mut parameters = so_far.to_vec();
-            parameters[k] += FURTHER;
-            speeds(&parameters)
-        };
-        let deviated = (0..so_far.len()).into_par_iter().map(further).collect();
-        Some(Deviations { so_far: so_far.to_vec(), now: speeds(so_far), deviated })
+        let time_s = rows.iter().map(|row| self.robot.time_s[*row]);
+        Some(Deviations {
+            so_far: so_far.to_vec(),
+            h_s: scale.h_s,
+            still_m_s: scale.robot_still_m_s,
+            rows: time_s.zip(of_row).collect(),
+            moved: moved.par_iter().map(at).collect(),
+        })
     }
 }
 
-/// The path that a model predicts of the joints' readings.
-pub(super) fn predicted(
-    joints: &JointSamples,
-    origin_ns: i64,
-    arm: NominalArm<'_>,
-    parameters: &[f64],
-    config: &ClockConfig,
-) -> Track {
-    let tip_m = |row| (arm.tip_m)(&joints.row_rad(row), parameters);
-    let path_m = (0..joints.len()).into_par_iter().map(tip_m).collect();
-    Track::of(&joints.time_ns, origin_ns, path_m, config)
+impl Deviations {
+    /// Change of the speed at a time per standard deviation of each parameter, as [`SpeedProfile`] smooths it.
+    ///
+    /// Between two rows the tip goes straight, and its velocity under the kernel `k` is
+    /// `v = sum_j (p_j+1 - p_j) / (t_j+1 - t_j) * (K(t_j+1) - K(t_j))` with `K` the integral of `k`. The speed changes as
+    /// the velocity does along its own direction.
+    pub(super) fn rates(&self, t_s: f64, rates: &mut [f64]) {
+        rates.fill(0.0);
+        let first = self.rows.partition_point(|row| row.0 <= t_s - self.h_s).saturating_sub(1);
+        let behind = self.rows[first..].iter().take_while(|row| row.0 < t_s + self.h_s).count();
+        let rows = &self.rows[first..(first + behind + 1).min(self.rows.len())];
+        let mut shares: Vec<(usize, f64)> = Vec::with_capacity(rows.len());
+        for step in rows.windows(2) {
+            let ((from_s, from), (to_s, to)) = (step[0], step[1]);
+            // Where the arm rests it goes nowhere.
+            if from != to {
+                let share = (self.passed(to_s - t_s) - self.passed(from_s - t_s)) / (to_s - from_s);
+                match shares.last_mut() {
+                    Some(last) if last.0 == from => last.1 -= share,
+                    _ => shares.push((from, -share)),
+                }
+                shares.push((to, share));
+            }
+        }
+        let velocity: Vector3<f64> = shares.iter().map(|(at, share)| self.moved[*at].tip_m * *share).sum();
+        let speed_m_s = velocity.norm();
+        if speed_m_s == 0.0 {
+            return;
+        }
+        let gain = self.still_m_s.map_or(1.0, |still| speed_m_s / (speed_m_s.powi(2) + still.powi(2)));
+        let along = velocity * (gain / speed_m_s);
+        for (at, share) in shares {
+            let along = along * share;
+            for (rate, by_m) in rates.iter_mut().zip(&self.moved[at].by_m) {
+                *rate += along.dot(by_m);
+            }
+        }
+    }
+
+    /// The part of the kernel that lies before a time from its middle [s].
+    fn passed(&self, from_middle_s: f64) -> f64 {
+        let u = (from_middle_s / self.h_s).clamp(-1.0, 1.0);
+        if u < 0.0 { 0.5 * (1.0 + u).powi(2) } else { 1.0 - 0.5 * (1.0 - u).powi(2) }
+    }
 }
 
-/// Rows at which the arm is not where it was at the one before them, and which of these every row is as.
-fn where_moved(joints: &JointSamples) -> (Vec<usize>, Vec<usize>) {
-    let (mut moved, mut of_row) = (Vec::new(), Vec::with_capacity(joints.len()));
+/// The path that a model predicts of some rows of the joints' readings [m].
+pub(super) fn predicted(joints: &JointSamples, rows: &[usize], arm: &dyn PlacedArm) -> Vec<Vector3<f64>> {
+    let tip_m = |joint_rad: &mut Vec<f64>, row: &usize| {
+        joint_rad.clear();
+        joint_rad.extend(joints.joint_rad.iter().map(|column| column[*row]));
+        arm.tip_m(joint_rad)
+    };
+    rows.par_iter().map_init(Vec::new, tip_m).collect()
+}
+
+/// The rows that a kernel of half-width `h_s` at any of the times reaches.
+fn around(time_s: &[f64], rows: &[usize], h_s: f64, at_s: impl Iterator<Item = f64>) -> Vec<usize> {
+    let mut reached = vec![false; rows.len()];
+    for t_s in at_s {
+        let first = rows.partition_point(|row| time_s[*row] <= t_s - h_s).saturating_sub(1);
+        let after = rows[first..].iter().take_while(|row| time_s[**row] < t_s + h_s).count();
+        reached.iter_mut().skip(first).take(after + 1).for_each(|reached| *reached = true);
+    }
+    rows.iter().zip(reached).filter(|(_, reached)| *reached).map(|(row, _)| *row).collect()
+}
+
+/// Of some rows those at which the arm is not where it was at the one before them, and which of these every row is as.
+fn where_moved(joints: &JointSamples, rows: &[usize]) -> (Vec<usize>, Vec<usize>) {
+    let (mut moved, mut of_row) = (Vec::new(), Vec::with_capacity(rows.len()));
     let rests = |last: usize, row: usize| {
         joints.joint_rad.iter().all(|column| (column[row] - column[last]).abs() <= RESTING_RAD)
     };
-    for row in 0..joints.len() {
+    for &row in rows {
         if moved.last().is_none_or(|last| !rests(*last, row)) {
             moved.push(row);
         }

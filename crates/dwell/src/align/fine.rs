@@ -17,7 +17,8 @@ const MAX_ITERATIONS: usize = 60;
 
 /// Times the scale of the residuals is taken anew.
 const SCALE_ROUNDS: usize = 3;
-const CONVERGED_S: f64 = 1e-9;
+/// A tenth of what stamps are believed to.
+const CONVERGED_S: f64 = 1e-7;
 
 /// Largest step of an iteration [s]: beyond a peak of the speed the linearisation means nothing.
 const LONGEST_STEP_S: f64 = 0.1;
@@ -81,31 +82,32 @@ impl<'a> Problem<'a> {
         let mut state = Vector4::new(start.offset_s, drift_s, 1.0, 0.0);
         (state.z, state.w) = self.first_gain(&state)?;
         for _ in 0..SCALE_ROUNDS {
-            let limit = self.huber_limit(&self.rows(&state, f64::INFINITY));
-            state = self.descend(state, limit)?;
+            state = self.descend(state, self.huber_limit(&state))?;
         }
         Some(state)
     }
 
     /// The rows at a state, weighted by Huber.
     pub(crate) fn weighted_rows(&self, state: &Vector4<f64>) -> Vec<Row> {
-        self.rows(state, self.huber_limit(&self.rows(state, f64::INFINITY)))
+        self.rows(state, self.huber_limit(state)).collect()
+    }
+
+    /// Times of the points on the robot's clock at a state [s].
+    pub(crate) fn robot_times_s(&self, state: &Vector4<f64>) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|point| self.robot_s(state, point))
     }
 
     /// Gauss-Newton on Huber's cost with a fixed limit, steps halved until the cost falls.
     fn descend(&self, mut state: Vector4<f64>, limit: f64) -> Option<Vector4<f64>> {
-        let mut rows = self.rows(&state, limit);
-        let mut cost = huber_cost(&rows, limit);
+        let mut sums = self.sums(&state, limit);
         for _ in 0..MAX_ITERATIONS {
-            let (normal, gradient) = self.normal(&rows);
-            let mut step = normal.lu().solve(&gradient)?;
+            let mut step = sums.normal.lu().solve(&sums.gradient)?;
             step *= (LONGEST_STEP_S / step.x.abs().max(step.y.abs()).max(LONGEST_STEP_S)).min(1.0);
             loop {
                 let (next, longest_s) = (state + step, step.x.abs().max(step.y.abs()));
-                let next_rows = self.rows(&next, limit);
-                let next_cost = huber_cost(&next_rows, limit);
-                if next_cost < cost {
-                    (state, rows, cost) = (next, next_rows, next_cost);
+                let next_sums = self.sums(&next, limit);
+                if next_sums.cost < sums.cost {
+                    (state, sums) = (next, next_sums);
                 } else if longest_s > CONVERGED_S {
                     step *= 0.5;
                     continue;
@@ -140,9 +142,10 @@ impl<'a> Problem<'a> {
         t_s - state.x - state.y * (t_s - self.reference_s) / self.half_s
     }
 
-    fn rows(&self, state: &Vector4<f64>, limit: f64) -> Vec<Row> {
-        let row = |point: &Point| {
-            let robot_s = self.robot_s(state, point);
+    fn rows(&self, state: &Vector4<f64>, limit: f64) -> impl Iterator<Item = Row> {
+        let state = *state;
+        self.points.iter().filter_map(move |point| {
+            let robot_s = self.robot_s(&state, point);
             let (p, rate) = self.robot.at(robot_s)?;
             let by_offset = -state.z * rate;
             let far = match self.fixed_drift {
@@ -153,25 +156,41 @@ impl<'a> Problem<'a> {
             let residual = point.measured - state.z * p - state.w;
             let weight = (limit / residual.abs()).min(1.0);
             Some(Row { point: *point, residual, jacobian, weight, robot_s })
-        };
-        self.points.iter().filter_map(row).collect()
+        })
     }
 
     /// Huber's limit in the scale of the moving rows: the many at rest agree far better and tell nothing of
     /// time.
-    fn huber_limit(&self, rows: &[Row]) -> f64 {
-        let moving: Vec<f64> = rows.iter().filter(|r| r.point.moving).map(|r| r.residual).collect();
-        let limit = HUBER_K * mad_sigma(&moving);
+    fn huber_limit(&self, state: &Vector4<f64>) -> f64 {
+        let moving = self.rows(state, f64::INFINITY).filter(|r| r.point.moving).map(|r| r.residual);
+        let limit = HUBER_K * mad_sigma(&moving.collect::<Vec<f64>>());
         if limit > 0.0 { limit } else { f64::INFINITY }
     }
 
-    fn normal(&self, rows: &[Row]) -> (Matrix4<f64>, Vector4<f64>) {
-        let (mut normal, gradient) = sums(rows);
+    fn sums(&self, state: &Vector4<f64>, limit: f64) -> Sums {
+        let (mut normal, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
+        let (mut loss, mut rows) = (0.0, 0.0);
+        for r in self.rows(state, limit) {
+            let weighted = r.weight * r.jacobian;
+            normal += weighted * r.jacobian.transpose();
+            gradient += r.residual * weighted;
+            let size = r.residual.abs();
+            loss += if size <= limit { 0.5 * size * size } else { limit * (size - 0.5 * limit) };
+            rows += 1.0;
+        }
         if self.fixed_drift.is_some() {
             normal[(1, 1)] = 1.0;
         }
-        (normal, gradient)
+        Sums { normal, gradient, cost: loss / f64::max(rows, 1.0) }
     }
+}
+
+/// Normal equations of all rows, and the mean of Huber's loss: the number of rows that find a counterpart changes with the
+/// state.
+struct Sums {
+    normal: Matrix4<f64>,
+    gradient: Vector4<f64>,
+    cost: f64,
 }
 
 /// Groups points into movements: cut at rest once `shortest_s` long, and anywhere at three times that.
@@ -188,20 +207,4 @@ pub(crate) fn movements(points: &[(f64, f64)], moving_above: f64, shortest_s: f6
         grouped.push(Point { t_s, measured, moving, movement, late_s: 0.0 });
     }
     grouped
-}
-
-/// Mean of Huber's loss: the number of rows that find a counterpart changes with the state.
-fn huber_cost(rows: &[Row], limit: f64) -> f64 {
-    let loss = |r: f64| if r <= limit { 0.5 * r * r } else { limit * (r - 0.5 * limit) };
-    rows.iter().map(|r| loss(r.residual.abs())).sum::<f64>() / rows.len().max(1) as f64
-}
-
-fn sums(rows: &[Row]) -> (Matrix4<f64>, Vector4<f64>) {
-    let mut normal = Matrix4::zeros();
-    let mut gradient = Vector4::zeros();
-    for r in rows {
-        normal += r.weight * r.jacobian * r.jacobian.transpose();
-        gradient += r.weight * r.residual * r.jacobian;
-    }
-    (normal, gradient)
 }

@@ -1,9 +1,7 @@
 //! A stretch of the recording whose stamps differ from the rest: where, by how much, and what the stamps show there.
 
-use rayon::prelude::*;
-
-use super::coarse;
 use super::fine::{Point, Start};
+use super::lags::{self, Lags, Sums};
 use super::scale::Scale;
 use super::spread::MovementOffset;
 use super::stamps::Stamps;
@@ -20,8 +18,6 @@ const ROUNDS: usize = 3;
 /// best one.
 const APART_SHARE: f64 = 0.6;
 const ALIKE: f64 = 0.8;
-/// Most points that far offsets are tried on.
-const MOST_POINTS: usize = 8_000;
 
 /// A stretch of movements that is stamped later or earlier than the rest.
 pub(super) struct Jump {
@@ -108,23 +104,27 @@ impl Streams<'_> {
     /// slope cannot lead there: first and last sensor time, and how much later it is stamped [s].
     fn far_stretch(&self, scale: &Scale, points: &[Point], start: Start) -> Option<(f64, f64, f64)> {
         let movements: Vec<&[Point]> = points.chunk_by(|a, b| a.movement == b.movement).collect();
-        let lags = (2.0 * self.config.max_offset_s / scale.h_s).ceil() as i64;
-        let lag_s = |k: i64| k as f64 * 0.5 * scale.h_s;
-        let every = points.len().div_ceil(MOST_POINTS).max(1);
-        let apart = |window: &[&[Point]]| -> Option<f64> {
-            let inside = window.iter().flat_map(|m| m.iter().map(|p| (p.t_s, p.measured)));
-            let points: Vec<(f64, f64)> = inside.step_by(every).collect();
-            let at = |late_s: f64| {
-                let offset_s = start.offset_s + late_s;
-                coarse::correlation(&points, &scale.robot, self.reference_s, offset_s, start.drift)
-            };
-            let (best, late_s) = (-lags..=lags)
-                .map(|k| (at(lag_s(k)), lag_s(k)))
-                .filter(|b| b.0.is_finite())
-                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))?;
-            (best >= ALIKE && at(0.0) < APART_SHARE * best).then_some(late_s)
+        let lags = Lags::within(&scale.sensor, self.config.max_offset_s);
+        let robot_s = |t_s: f64| t_s - start.offset_s - start.drift * (t_s - self.reference_s);
+        let of = |movement: &&[Point]| {
+            let points: Vec<(f64, f64)> = movement.iter().step_by(2).map(|p| (p.t_s, p.measured)).collect();
+            (points.len(), lags::sums(&points, &scale.robot, robot_s, lags))
         };
-        let late: Vec<Option<f64>> = movements.par_windows(LEAST_MOVEMENTS).map(apart).collect();
+        let sums: Vec<(usize, Vec<Sums>)> = movements.iter().map(of).collect();
+        let apart = |window: &[(usize, Vec<Sums>)]| -> Option<f64> {
+            let points = window.iter().map(|w| w.0).sum();
+            let at = |lag: i64| {
+                let mut all = Sums::default();
+                window.iter().for_each(|(_, sums)| all.add(&sums[(lag + lags.most) as usize]));
+                all.correlation(points)
+            };
+            let (best, lag) = (-lags.most..=lags.most)
+                .map(|lag| (at(lag), lag))
+                .filter(|b| b.0.is_finite())
+                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().cmp(&a.1.abs())))?;
+            (best >= ALIKE && at(0) < APART_SHARE * best).then_some(lag as f64 * lags.step_s)
+        };
+        let late: Vec<Option<f64>> = sums.windows(LEAST_MOVEMENTS).map(apart).collect();
         let mut best: Option<(usize, usize, f64)> = None;
         let mut first = 0;
         while first < late.len() {

@@ -3,8 +3,10 @@
 mod coarse;
 mod declared;
 mod deviated;
+mod excerpt;
 mod fine;
 mod jump;
+mod lags;
 mod profile;
 mod scale;
 mod spread;
@@ -20,9 +22,10 @@ use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
 use coarse::Coarse;
 use deviated::predicted;
+use excerpt::Excerpt;
 use fine::{Point, Problem, Start};
 use scale::{Scale, Track};
-use spread::Fine;
+use spread::{Fine, Step};
 use stamps::Stamps;
 
 const DOING: &str = "aligning the clocks";
@@ -43,17 +46,22 @@ const KERNELS: [f64; 3] = [1.0, 3.0, 10.0];
 const MODEL_ROUNDS: usize = 3;
 const MODEL_SETTLED: f64 = 0.05;
 
-/// A tip of the readings of all joints [rad] and of the deviations of all uncertain parameters.
-pub type TipOf<'a> = dyn Fn(&[f64], &[f64]) -> Vector3<f64> + Sync + 'a;
-
 /// The arm as it is known before it is calibrated.
-#[derive(Clone, Copy)]
-pub struct NominalArm<'a> {
-    /// Position of the tip in any fixed frame [m], of the joints' readings [rad] and of how far each uncertain parameter
-    /// is off, in standard deviations of its prior.
-    pub tip_m: &'a TipOf<'a>,
+pub trait NominalArm: Sync {
     /// Number of uncertain parameters.
-    pub uncertain: usize,
+    fn uncertain(&self) -> usize;
+
+    /// The arm with each uncertain parameter off by so many standard deviations of its prior.
+    fn with(&self, off: &[f64]) -> Box<dyn PlacedArm + '_>;
+}
+
+/// A nominal arm with its uncertain parameters where they are taken to be.
+pub trait PlacedArm: Sync {
+    /// Position of the tip in any fixed frame [m] at the joints' readings [rad].
+    fn tip_m(&self, joint_rad: &[f64]) -> Vector3<f64>;
+
+    /// The same, with its motion per standard deviation of each uncertain parameter [m].
+    fn motions_m(&self, joint_rad: &[f64], moved_m: &mut [Vector3<f64>]) -> Vector3<f64>;
 }
 
 /// Estimates offset and drift of the sensor's clock against the robot's, or takes them as the configuration declares them
@@ -77,7 +85,7 @@ pub struct NominalArm<'a> {
 pub fn align_clocks(
     joints: &JointSamples,
     tip: &PoseSamples,
-    arm: NominalArm<'_>,
+    arm: &dyn NominalArm,
     config: &ClockConfig,
 ) -> Result<(ClockAlignment, Vec<Warning>), DwellError> {
     config.check()?;
@@ -95,7 +103,7 @@ pub fn align_clocks(
 fn estimate(
     joints: &JointSamples,
     tip: &PoseSamples,
-    arm: NominalArm<'_>,
+    arm: &dyn NominalArm,
     config: &ClockConfig,
 ) -> Result<(ClockAlignment, Vec<Warning>), DwellError> {
     let streams = Streams::of(joints, tip, arm, config)?;
@@ -122,18 +130,19 @@ fn estimate(
 struct Streams<'a> {
     joints: &'a JointSamples,
     tip: &'a PoseSamples,
-    arm: NominalArm<'a>,
+    arm: &'a dyn NominalArm,
     config: &'a ClockConfig,
     sensor: Track,
     robot: Track,
+    /// By row of the robot's track its row in the joint stream.
+    joint_rows: Vec<usize>,
     /// From the shortest kernel to the longest.
     scales: Vec<Scale>,
     reference_s: f64,
-    /// Where robot times count from.
-    robot_origin_ns: i64,
 }
 
 /// A fine estimate before its last step, and the correlation of the profiles under it.
+#[derive(Clone, Copy)]
 struct Found {
     start: Start,
     correlation: f64,
@@ -160,13 +169,20 @@ impl<'a> Streams<'a> {
     fn of(
         joints: &'a JointSamples,
         tip: &'a PoseSamples,
-        arm: NominalArm<'a>,
+        arm: &'a dyn NominalArm,
         config: &'a ClockConfig,
     ) -> Result<Streams<'a>, DwellError> {
         let origin_ns = tip.time_ns[0];
         let robot_origin_ns = shifted(origin_ns, -config.initial_offset_s);
-        let sensor = Track::of(&tip.time_ns, origin_ns, tip.position_m.clone(), config);
-        let robot = predicted(joints, robot_origin_ns, arm, &vec![0.0; arm.uncertain], config);
+        let excerpt = Excerpt::of(joints, tip, config);
+        let seen = || excerpt.tip.iter().cloned().flatten();
+        let (time_ns, path_m): (Vec<i64>, Vec<_>) =
+            seen().map(|i| (tip.time_ns[i], tip.position_m[i])).unzip();
+        let sensor = Track::of(&time_ns, origin_ns, path_m, config);
+        let joint_rows = excerpt.joints;
+        let path_m = predicted(joints, &joint_rows, &*arm.with(&vec![0.0; arm.uncertain()]));
+        let time_ns: Vec<i64> = joint_rows.iter().map(|row| joints.time_ns[*row]).collect();
+        let robot = Track::of(&time_ns, robot_origin_ns, path_m, config);
         // Two samples in each half of the kernel, or a slow stream would be smoothed differently.
         let h_s = (0.5 * config.smoothing_s).max(2.0 * sensor.period_s).max(2.0 * robot.period_s);
         let tried = KERNELS.map(|times| Scale::of(&sensor, &robot, times * h_s, config));
@@ -179,8 +195,7 @@ impl<'a> Streams<'a> {
                 Err(reason) => first_reason = first_reason.or(Some(reason)),
             }
         }
-        let streams =
-            Streams { joints, tip, arm, config, sensor, robot, scales, reference_s, robot_origin_ns };
+        let streams = Streams { joints, joint_rows, tip, arm, config, sensor, robot, scales, reference_s };
         match first_reason {
             Some(DwellError::Broken { stream, needed_s, .. }) if streams.scales.is_empty() => {
                 Err(DwellError::Broken { stream, needed_s, rows: streams.rows_in_words() })
@@ -241,11 +256,13 @@ impl<'a> Streams<'a> {
     /// logarithms; else from the scale of the coarse estimate itself.
     fn fine(&self, from: &Scale, coarse: &Coarse, ratio: f64) -> Result<(Scale, Found), DwellError> {
         let own = self.found(from, Start { offset_s: coarse.offset_s, drift: coarse.drift })?;
+        let found =
+            |scale: &Scale| if std::ptr::eq(scale, from) { Ok(own) } else { self.found(scale, own.start) };
         let near = |found: &Found| (found.start.offset_s - own.start.offset_s).abs() < from.h_s;
         let sharp = &self.scales[..self.scales.len().min(KERNELS.len() - 1)];
         let best = sharp
             .iter()
-            .filter_map(|scale| Some((scale, self.found(scale, own.start).ok()?)))
+            .filter_map(|scale| Some((scale, found(scale).ok()?)))
             .filter(|(_, found)| near(found) && found.correlation >= PATH_PREDICTED)
             .max_by(|a, b| a.1.correlation.total_cmp(&b.1.correlation));
         if let Some((scale, found)) = best {
@@ -274,7 +291,7 @@ impl<'a> Streams<'a> {
         let movements = scale.movements()?;
         let most = self.max_drift();
         let solve = |fixed: Option<f64>| {
-            self.finish_with(scale, &movements, found.start, vec![0.0; self.arm.uncertain], fixed)
+            self.finish_with(scale, &movements, found.start, vec![0.0; self.arm.uncertain()], fixed)
                 .ok_or_else(undetermined)
         };
         if most == 0.0 {
@@ -301,23 +318,23 @@ impl<'a> Streams<'a> {
         mut parameters: Vec<f64>,
         fixed: Option<f64>,
     ) -> Option<Fine> {
-        let mut best = None;
+        let mut last = None;
         for _ in 0..MODEL_ROUNDS {
             let robot = self.robot_speeds(scale, &parameters);
             let problem = Problem::new(&robot, movements, self.reference_s, fixed);
             let Some(state) = problem.solve(start) else { break };
-            let deviations = self.deviations(scale, &parameters);
-            let Some(fine) = spread::finish(&problem, &state, deviations.as_ref()) else { break };
-            let by = parameters.iter().zip(&fine.parameters).map(|(was, is)| (is - was).abs());
+            let deviations = self.deviations(scale, &parameters, problem.robot_times_s(&state));
+            let Some(step) = Step::of(&problem, &state, deviations.as_ref()) else { break };
+            let by = parameters.iter().zip(&step.parameters).map(|(was, is)| (is - was).abs());
             let settled = by.fold(0.0, f64::max) < MODEL_SETTLED;
-            parameters.clone_from(&fine.parameters);
-            start = Start { offset_s: fine.offset_s, drift: fine.drift };
-            best = Some(fine);
+            parameters.clone_from(&step.parameters);
+            start = step.to;
+            last = Some(step);
             if settled {
                 break;
             }
         }
-        best
+        last?.fine()
     }
 
     /// Median ratio of measured to predicted distances of the tip between distant moments. Positions do not

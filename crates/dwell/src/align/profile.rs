@@ -46,7 +46,7 @@ impl SpeedProfile {
     pub(crate) fn at(&self, t_s: f64) -> Option<(f64, f64)> {
         let stretch = &self.stretches[self.stretches.partition_point(|s| s.start_s <= t_s).checked_sub(1)?];
         let u = (t_s - stretch.start_s) / self.step_s;
-        let i = u.floor() as usize;
+        let i = u as usize;
         let v = &stretch.speed_m_s;
         if i == 0 || i + 2 >= v.len() {
             return None;
@@ -57,6 +57,11 @@ impl SpeedProfile {
         let x = u - i as f64;
         let value = b + x * (k1 + x * (k2 + x * k3));
         Some((value, (k1 + x * (2.0 * k2 + x * 3.0 * k3)) / self.step_s))
+    }
+
+    /// Time from one grid point to the next [s].
+    pub(crate) fn step_s(&self) -> f64 {
+        self.step_s
     }
 
     /// Every `every`-th grid point: time [s] and speed [m/s].
@@ -83,11 +88,6 @@ impl SpeedProfile {
     pub(crate) fn quantile_m_s(&self, p: f64) -> f64 {
         let all: Vec<f64> = self.stretches.iter().flat_map(|s| s.speed_m_s.iter().copied()).collect();
         percentile(&all, p)
-    }
-
-    /// Grid points.
-    pub(crate) fn len(&self) -> usize {
-        self.stretches.iter().map(|s| s.speed_m_s.len()).sum()
     }
 }
 

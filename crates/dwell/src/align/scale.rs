@@ -36,13 +36,19 @@ impl Track {
         position_m: Vec<Vector3<f64>>,
         config: &ClockConfig,
     ) -> Track {
-        let gap_s = breaking_gap_s(config.max_gap_s, time_ns);
+        let period_s = typical_period_s(time_ns);
+        let gap_s = breaking_gap_s(config.max_gap_s, period_s);
         Track {
             time_s: time_ns.iter().map(|&t| seconds_between(origin_ns, t)).collect(),
             unbroken: unbroken(time_ns, gap_s, |i| position_m[i].iter().all(|v| v.is_finite())),
             position_m,
-            period_s: typical_period_s(time_ns),
+            period_s,
         }
+    }
+
+    /// The same stamps on another path without more breaks, as speeds.
+    pub(crate) fn speeds_of(&self, position_m: &[Vector3<f64>], h_s: f64) -> SpeedProfile {
+        SpeedProfile::new(&self.time_s, position_m, &self.unbroken, h_s, 0.1 * h_s)
     }
 
     /// Position of the row nearest to a time, where one lies within two periods.
@@ -55,12 +61,13 @@ impl Track {
         (distance(&row) <= 2.0 * self.period_s).then(|| self.position_m[row])
     }
 
-    /// Rows no closer to each other than `apart_s`.
+    /// Rows no closer to each other than `apart_s`, and where the path is broken the last one before.
     pub(crate) fn thinned(&self, apart_s: f64) -> Vec<usize> {
         let mut kept: Vec<usize> = Vec::new();
         for rows in &self.unbroken {
             for row in rows.clone() {
-                if kept.last().is_none_or(|last| self.time_s[row] - self.time_s[*last] >= apart_s) {
+                let apart = kept.last().is_none_or(|last| self.time_s[row] - self.time_s[*last] >= apart_s);
+                if apart || row + 1 == rows.end {
                     kept.push(row);
                 }
             }
@@ -69,7 +76,7 @@ impl Track {
     }
 
     pub(crate) fn speeds(&self, h_s: f64) -> SpeedProfile {
-        SpeedProfile::new(&self.time_s, &self.position_m, &self.unbroken, h_s, 0.1 * h_s)
+        self.speeds_of(&self.position_m, h_s)
     }
 }
 

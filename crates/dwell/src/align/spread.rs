@@ -16,8 +16,8 @@
 use armcal_core::robust::mad_sigma;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector4};
 
-use super::fine::{Problem, Row};
-use super::profile::SpeedProfile;
+use super::deviated::Deviations;
+use super::fine::{Problem, Row, Start};
 
 /// Fewest movements from which errors can be told.
 pub(crate) const MIN_MOVEMENTS: usize = 6;
@@ -30,19 +30,6 @@ const NOISE_FACTORS: [f64; 8] = [3.0, 1e1, 3e1, 1e2, 3e2, 1e3, 3e3, 1e4];
 
 /// Neighbouring movements that are left out together.
 const TOGETHER: [usize; 3] = [1, 2, 4];
-
-/// Speeds predicted by the model with its uncertain parameters as they are taken to be so far.
-pub(crate) struct Deviations {
-    /// The parameters, in standard deviations of their priors.
-    pub so_far: Vec<f64>,
-    /// The speeds of that model.
-    pub now: SpeedProfile,
-    /// The same with each parameter further off by [`FURTHER`] standard deviations.
-    pub deviated: Vec<SpeedProfile>,
-}
-
-/// How much further a parameter is taken to see what it does, in standard deviations.
-pub(crate) const FURTHER: f64 = 0.3;
 
 /// The fine estimate. Offset at the reference time, drift about it.
 #[derive(Debug, Clone)]
@@ -76,23 +63,17 @@ struct Part {
     squares: f64,
 }
 
-/// One more step from `state`, with the uncertain parameters, and the errors after it. `None` for too few movements, or
-/// where the equations are singular.
-pub(crate) fn finish(
-    problem: &Problem<'_>,
-    state: &Vector4<f64>,
-    deviations: Option<&Deviations>,
-) -> Option<Fine> {
-    let rows = problem.weighted_rows(state);
-    let by_movement: Vec<&[Row]> = rows.chunk_by(|a, b| a.point.movement == b.point.movement).collect();
-    if by_movement.len() < MIN_MOVEMENTS {
-        return None;
-    }
-    Wide::new(problem, state, &by_movement, deviations)?.fine(problem, state, deviations)
-}
-
-/// The linear problem: offset, scaled drift, gain and level, then one column an uncertain parameter.
-struct Wide {
+/// One more step from a state, with the uncertain parameters: offset, scaled drift, gain and level, then one column an
+/// uncertain parameter.
+pub(crate) struct Step {
+    /// Where it leads, at the reference time.
+    pub to: Start,
+    /// The uncertain parameters after it, in standard deviations.
+    pub parameters: Vec<f64>,
+    step: DVector<f64>,
+    inverse: DMatrix<f64>,
+    /// Time from the reference to the far end of the recording [s].
+    half_s: f64,
     parts: Vec<Part>,
     times_s: Vec<(f64, f64)>,
     whole: DMatrix<f64>,
@@ -102,13 +83,18 @@ struct Wide {
     noise: f64,
 }
 
-impl Wide {
-    fn new(
+impl Step {
+    /// The step from `state`. `None` for too few movements, or where the equations are singular.
+    pub(crate) fn of(
         problem: &Problem<'_>,
         state: &Vector4<f64>,
-        by_movement: &[&[Row]],
         deviations: Option<&Deviations>,
-    ) -> Option<Wide> {
+    ) -> Option<Step> {
+        let rows = problem.weighted_rows(state);
+        let by_movement: Vec<&[Row]> = rows.chunk_by(|a, b| a.point.movement == b.point.movement).collect();
+        if by_movement.len() < MIN_MOVEMENTS {
+            return None;
+        }
         let parts: Vec<Part> = by_movement.iter().map(|rows| part(state, rows, deviations)).collect();
         let size = parts[0].gradient.len();
         let (mut whole, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
@@ -122,17 +108,56 @@ impl Wide {
         let so_far = DVector::from_vec(deviations.map_or_else(Vec::new, |d| d.so_far.clone()));
         let ends = |rows: &[Row]| (rows[0].point.t_s, rows[rows.len() - 1].point.t_s);
         let times_s = by_movement.iter().map(|rows| ends(rows)).collect();
-        let moving = by_movement.iter().flat_map(|rows| rows.iter()).filter(|r| r.point.moving);
+        let moving = rows.iter().filter(|r| r.point.moving);
         let variance = mad_sigma(&moving.map(|r| r.residual).collect::<Vec<_>>()).powi(2);
-        let mut wide = Wide { parts, times_s, whole, gradient, so_far, noise: variance };
+        let mut all = Step {
+            to: Start { offset_s: state.x, drift: state.y / problem.half_s },
+            parameters: Vec::new(),
+            step: DVector::zeros(size),
+            inverse: DMatrix::zeros(size, size),
+            half_s: problem.half_s,
+            parts,
+            times_s,
+            whole,
+            gradient,
+            so_far,
+            noise: variance,
+        };
         if size > 4 {
             let tried = NOISE_FACTORS.map(|factor| {
-                wide.noise = factor * variance;
-                (wide.noise, wide.left_out(1).map_or(f64::INFINITY, |all| wide.squares_left_out(&all)))
+                all.noise = factor * variance;
+                (all.noise, all.left_out(1).map_or(f64::INFINITY, |each| all.squares_left_out(&each)))
             });
-            wide.noise = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
+            all.noise = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0;
         }
-        Some(wide)
+        all.taken(problem, state)
+    }
+
+    fn taken(mut self, problem: &Problem<'_>, state: &Vector4<f64>) -> Option<Step> {
+        self.inverse = self.held().try_inverse()?;
+        self.step = &self.inverse * self.pull();
+        if self.step[0].hypot(self.step[1]) > LONGEST_STEP_S || !self.step.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        self.to = Start {
+            offset_s: state.x + self.step[0],
+            drift: problem.fixed_drift.unwrap_or((state.y + self.step[1]) / self.half_s),
+        };
+        self.parameters =
+            self.so_far.iter().zip(self.step.iter().skip(4)).map(|(was, by)| was + by).collect();
+        Some(self)
+    }
+
+    /// The estimate after the step, with its errors.
+    pub(crate) fn fine(self) -> Option<Fine> {
+        let scale = Matrix2::new(1.0, 0.0, 0.0, 1.0 / self.half_s);
+        Some(Fine {
+            offset_s: self.to.offset_s,
+            drift: self.to.drift,
+            covariance: scale * self.covariance()? * scale,
+            movements: self.movements()?,
+            parameters: self.parameters,
+        })
     }
 
     /// `N` with the precision of the priors.
@@ -162,7 +187,7 @@ impl Wide {
                 held -= &part.normal;
                 pull -= &part.gradient;
             }
-            held.lu().solve(&pull)
+            Some(held.cholesky()?.solve(&pull))
         };
         self.parts.chunks(together).map(without).collect()
     }
@@ -174,29 +199,8 @@ impl Wide {
         self.parts.iter().zip(solutions).map(one).sum()
     }
 
-    fn fine(
-        &self,
-        problem: &Problem<'_>,
-        state: &Vector4<f64>,
-        deviations: Option<&Deviations>,
-    ) -> Option<Fine> {
-        let inverse = self.held().try_inverse()?;
-        let step = &inverse * self.pull();
-        if step[0].hypot(step[1]) > LONGEST_STEP_S || !step.iter().all(|v| v.is_finite()) {
-            return None;
-        }
-        let scale = Matrix2::new(1.0, 0.0, 0.0, 1.0 / problem.half_s);
-        let so_far = deviations.map_or(&[][..], |d| &d.so_far);
-        Some(Fine {
-            offset_s: state.x + step[0],
-            drift: problem.fixed_drift.unwrap_or((state.y + step[1]) / problem.half_s),
-            covariance: scale * self.covariance(&inverse, &step)? * scale,
-            movements: self.movements(&step)?,
-            parameters: so_far.iter().zip(step.iter().skip(4)).map(|(so_far, by)| so_far + by).collect(),
-        })
-    }
-
-    fn covariance(&self, inverse: &DMatrix<f64>, step: &DVector<f64>) -> Option<Matrix2<f64>> {
+    fn covariance(&self) -> Option<Matrix2<f64>> {
+        let Step { inverse, step, .. } = self;
         let unknown = inverse.rows(0, 2).columns(4, inverse.ncols() - 4) * self.noise;
         let unknown = &unknown * unknown.transpose();
         let mut data = Matrix2::zeros();
@@ -231,8 +235,8 @@ impl Wide {
         Some(widened * seen * widened)
     }
 
-    /// What each movement alone would add to the offset after `step`, all but the clocks being as it says.
-    fn movements(&self, step: &DVector<f64>) -> Option<Vec<MovementOffset>> {
+    /// What each movement alone would add to the offset after the step, all but the clocks being as it says.
+    fn movements(&self) -> Option<Vec<MovementOffset>> {
         // How gain, level and model follow a change of the offset of one unit.
         let mut others = self.held();
         for k in 0..others.nrows() {
@@ -248,7 +252,7 @@ impl Wide {
         along[0] = 1.0;
         let one = |(part, &(from_s, to_s)): (&Part, &(f64, f64))| {
             let weight = (&part.normal * &along).dot(&along);
-            let left = &part.gradient - &part.normal * step;
+            let left = &part.gradient - &part.normal * &self.step;
             MovementOffset { from_s, to_s, offset_s: left.dot(&along) / weight, weight }
         };
         Some(self.parts.iter().zip(&self.times_s).map(one).filter(|m| m.offset_s.is_finite()).collect())
@@ -256,24 +260,23 @@ impl Wide {
 }
 
 fn part(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> Part {
-    let size = 4 + deviations.map_or(0, |d| d.deviated.len());
-    let mut part = Part { normal: DMatrix::zeros(size, size), gradient: DVector::zeros(size), squares: 0.0 };
-    let mut jacobian = DVector::zeros(size);
-    for r in rows {
-        jacobian.fixed_rows_mut::<4>(0).copy_from(&r.jacobian);
+    let uncertain = deviations.map_or(0, |d| d.so_far.len());
+    let (mut jacobian, mut weighted) = (DMatrix::zeros(rows.len(), 4 + uncertain), Vec::new());
+    let (mut rates, mut squares) = (vec![0.0; uncertain], 0.0);
+    for (k, r) in rows.iter().enumerate() {
+        jacobian.fixed_view_mut::<1, 4>(k, 0).tr_copy_from(&r.jacobian);
         if let Some(d) = deviations {
-            let at = |profile: &SpeedProfile| profile.at(r.robot_s).map(|(speed, _)| speed);
-            let now = at(&d.now);
-            for (k, deviated) in d.deviated.iter().enumerate() {
-                let by = at(deviated).zip(now).map_or(0.0, |(then, now)| then - now);
-                jacobian[4 + k] = state.z * by / FURTHER;
-            }
+            d.rates(r.robot_s, &mut rates);
+            rates.iter().enumerate().for_each(|(column, rate)| jacobian[(k, 4 + column)] = state.z * rate);
         }
-        part.normal.ger(r.weight, &jacobian, &jacobian, 1.0);
-        part.gradient.axpy(r.weight * r.residual, &jacobian, 1.0);
-        part.squares += r.weight * r.residual * r.residual;
+        squares += r.weight * r.residual * r.residual;
+        weighted.push(r.weight * r.residual);
     }
-    part
+    let gradient = jacobian.tr_mul(&DVector::from_vec(weighted));
+    for (k, r) in rows.iter().enumerate() {
+        jacobian.row_mut(k).scale_mut(r.weight.sqrt());
+    }
+    Part { normal: jacobian.tr_mul(&jacobian), gradient, squares }
 }
 
 /// Ratio of the 97.5 % points of Student's t and of the normal distribution (Cornish and Fisher's

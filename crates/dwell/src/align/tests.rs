@@ -1,6 +1,6 @@
 use super::*;
 use crate::KnownClock;
-use crate::testkit::{Random, Session, WRONG_SIGMA, Wrong, nominal, ns, tip_m};
+use crate::testkit::{Formula, Random, Session, WRONG_SIGMA, Wrong, nominal, ns, tip_m};
 use armcal_core::Severity;
 use nalgebra::Rotation3;
 
@@ -11,7 +11,9 @@ fn session(seed: u64) -> (Random, Session) {
     (r, session)
 }
 
-const ARM: NominalArm<'static> = NominalArm { tip_m: &nominal, uncertain: WRONG_SIGMA.len() };
+type Nominal = fn(&[f64], &[f64]) -> Vector3<f64>;
+
+const ARM: &Formula<Nominal> = &Formula { tip_m: nominal, uncertain: WRONG_SIGMA.len() };
 
 fn align(joints: &JointSamples, tip: &PoseSamples) -> (ClockAlignment, Vec<Warning>) {
     align_clocks(joints, tip, ARM, &ClockConfig::default()).expect("aligns")
@@ -63,6 +65,76 @@ fn intervals_of_offset_and_drift_hold_the_truth_as_often_as_they_say() {
     // Nor are they wider than they need to be.
     assert!(typical < 1.5 * error, "typical sigma {typical}, error {error}");
     assert!(typical < 2e-4 && error < 2e-4, "typical sigma {typical}, error {error}");
+}
+
+#[test]
+fn of_a_long_recording_pieces_tell_the_clocks() {
+    // Half an hour, of which a part is looked at; an arm drawn from its prior each time.
+    let (mut middle, mut end, mut rate, mut errors_s) = (0, 0, 0, Vec::new());
+    let seeds = 50;
+    for seed in 0..seeds {
+        let mut r = Random::new(1000 + seed);
+        let s = Session::random(&mut r, 650, (0.8, 1.6), (0.8, 2.2));
+        let (offset_s, drift, wrong) = (r.between(-1.5, 1.5), r.between(-3e-4, 3e-4), arm(&mut r));
+        let joints = s.encoders(&mut r, 50.0, 2e-5, 0.0);
+        let tip = s.tip_of(&mut r, &wrong, 60.0, 1.4e-4, offset_s, drift);
+        let (found, warnings) = align(&joints, &tip);
+        assert!(warnings.is_empty(), "seed {seed}: {warnings:?}");
+        let at = |share| pull(&found, &tip, offset_s, drift, share, s.end_s());
+        middle += u32::from(at(0.5).abs() < 1.96);
+        end += u32::from(at(1.0).abs() < 1.96);
+        // Drift counts from the sensor's time, the planted one from the robot's: a square apart.
+        rate += u32::from((found.drift - drift / (1.0 + drift)).abs() < 1.96 * found.drift_sigma);
+        errors_s.push(at(0.5) * found.sigma_s(tip.time_ns[tip.len() / 2]));
+        println!(
+            "{seed} {:.2} {:.2} {:.4}",
+            errors_s[errors_s.len() - 1] * 1e6,
+            found.sigma_s(tip.time_ns[tip.len() / 2]) * 1e6,
+            (found.drift - drift) * 1e6
+        );
+    }
+    for (what, inside) in [("middle", middle), ("end", end), ("drift", rate)] {
+        assert!(inside >= 44, "{what}: {inside} of {seeds}");
+    }
+    let error_s = (errors_s.iter().map(|e| e * e).sum::<f64>() / errors_s.len() as f64).sqrt();
+    assert!(error_s < 1.5e-5, "{error_s}");
+}
+
+#[test]
+fn a_clock_set_in_a_long_recording_is_noticed_where_it_was() {
+    for (seed, by_s) in [(70, 0.03_f64), (72, 0.2)] {
+        let mut r = Random::new(seed);
+        let s = Session::random(&mut r, 650, (0.8, 1.6), (0.8, 2.2));
+        let (joints, mut tip) = (s.encoders(&mut r, 50.0, 2e-5, 0.0), s.tip(&mut r, 60.0, 1e-4, 0.1, 0.0));
+        let from = tip.len() * 2 / 3;
+        let set_s = (tip.time_ns[from] - tip.time_ns[0]) as f64 * 1e-9;
+        tip.time_ns[from..].iter_mut().for_each(|t| *t += (by_s * 1e9) as i64);
+        let (_, warnings) = align(&joints, &tip);
+        let said = warnings.iter().find(|w| w.code == "clock-not-linear").expect("noticed");
+        let number = |before: &str| -> f64 {
+            let after = said.message.split(before).nth(1).and_then(|rest| rest.split(' ').next());
+            after.and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("{}", said.message))
+        };
+        // A fiftieth of the recording is told as one movement.
+        assert!((number("from ") - set_s).abs() < s.end_s() / 20.0, "{set_s}: {}", said.message);
+        assert!((number("stamps are ") - by_s * 1e3).abs() < 5.0, "{}", said.message);
+    }
+}
+
+#[test]
+fn rows_denser_than_the_kernel_tell_nothing_more() {
+    let (mut r, s) = session(20);
+    let (joints, tip) = (s.encoders(&mut r, 1000.0, 2e-5, 0.0), s.tip(&mut r, 100.0, 1e-4, 0.1, 5e-5));
+    let every: Vec<usize> = (0..joints.len()).step_by(10).collect();
+    let thin = JointSamples {
+        time_ns: every.iter().map(|row| joints.time_ns[*row]).collect(),
+        joint_rad: joints.joint_rad.iter().map(|c| every.iter().map(|row| c[*row]).collect()).collect(),
+        ..joints.clone()
+    };
+    let ([dense, thin], tip_ns) =
+        ([&joints, &thin].map(|joints| align(joints, &tip).0), tip.time_ns[tip.len() / 2]);
+    let apart_s = (dense.to_robot_ns(tip_ns) - thin.to_robot_ns(tip_ns)) as f64 * 1e-9;
+    assert!(apart_s.abs() < 0.2 * dense.sigma_s(tip_ns), "{apart_s} {dense:?} {thin:?}");
 }
 
 #[test]
@@ -396,7 +468,7 @@ fn strange_numbers_do_not_panic() {
         let position_m = (0..n).map(|i| Vector3::new(huge, f64::from(i), -huge)).collect();
         let tip = PoseSamples { time_ns, position_m, ..PoseSamples::default() };
         let at = |q: &[f64], _: &[f64]| Vector3::new(q[0], q[1] * 1e10, 0.0);
-        let arm = NominalArm { tip_m: &at, uncertain: 2 };
+        let arm = &Formula { tip_m: at, uncertain: 2 };
         assert!(align_clocks(&joints, &tip, arm, &ClockConfig::default()).is_err());
     }
 }

@@ -135,6 +135,34 @@ proptest! {
     }
 
     #[test]
+    fn a_carried_point_agrees_with_the_tip_and_with_central_differences(
+        (model, p, joints) in random_case(),
+        point_m in prop::array::uniform3(-0.3..0.3f64),
+    ) {
+        let expected = |p: &[f64], point_m: Vector3<f64>| {
+            model.tip_in_base(p, &joints).transform_point(&point_m.into()).coords
+        };
+        let point_m = Vector3::from(point_m);
+        let carried = model.carried_point(&p, FeatureId::TIP, point_m, &|_| true);
+        let found = carried.motions(&joints);
+        prop_assert!((carried.at_m(&joints) - expected(&p, point_m)).norm() < 1e-12);
+        prop_assert!((found.at_m - expected(&p, point_m)).norm() < 1e-12);
+        let step = 1e-5;
+        for (index, by_m) in found.parameters {
+            let at = |by: f64| {
+                let mut moved = p.clone();
+                moved[index] += by;
+                expected(&moved, point_m)
+            };
+            prop_assert!((by_m - (at(step) - at(-step)) / (2.0 * step)).norm() < 1e-7);
+        }
+        for (k, axis) in found.axes.column_iter().enumerate() {
+            let along = Vector3::ith(k, 1.0);
+            prop_assert!((axis - (expected(&p, point_m + along) - expected(&p, point_m))).norm() < 1e-12);
+        }
+    }
+
+    #[test]
     fn seated_tips_agree_with_central_differences((model, p, joints) in random_case()) {
         let o = seated(&joints, Vector3::new(0.08, -0.03, 0.01));
         prop_assert!(worst_difference(&model, &p, &o) < 1e-7);
