@@ -3,7 +3,7 @@
 #
 #   pipelines/cluster/slurm-pool.sh RESULTS PIPELINE OUT SHARDS [sbatch options for the tasks, such as --mem=4G]
 #
-# Paths must mean the same on every node. A pool takes some 50 to 100 rounds (ARMCAL_ROUNDS at most, 400 when not set), and
+# Paths must mean the same on every node. A pool takes some 40 to 100 rounds, 400 at most (or ARMCAL_ROUNDS), and
 # a round takes Slurm some seconds. Submitting the same again goes on where a cancelled or failed one stopped.
 set -euo pipefail
 if [ $# -lt 4 ]; then

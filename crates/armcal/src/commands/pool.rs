@@ -67,7 +67,11 @@ pub(super) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
     progress.step("writing results");
     let written = write_pool_brief(&run, out)?;
     progress.finish();
-    show(&run, out, &written, Detail::Story, json)
+    let outcome = show(&run, out, &written, Detail::Story, json)?;
+    if !json {
+        print("Page, tables and run.mcap need the observations themselves: `armcal pool` writes them.\n")?;
+    }
+    Ok(outcome)
 }
 
 fn show(run: &Run, out: &Path, written: &[PathBuf], detail: Detail, json: bool) -> Result<Outcome, Error> {

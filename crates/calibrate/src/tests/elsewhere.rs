@@ -4,7 +4,7 @@ use super::rig;
 use crate::elsewhere::{Answer, Elsewhere, Request, answer};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, Scale, calibrate, calibrate_elsewhere};
 use armcal_core::{Observation, Pose, Reference};
-use armcal_model::{EffectSpec, Frame, Knowledge, Model, RecordingStart, Session};
+use armcal_model::{EffectSpec, Frame, Model, RecordingStart, Session};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
