@@ -64,10 +64,10 @@ impl Weighting {
 
 /// What one recording answers.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Answer(Result<Told, String>);
+pub struct Answer(Result<Numbers, String>);
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
-enum Told {
+enum Numbers {
     Sums(Sums),
     Errors(Vec<Predicted>),
 }
@@ -136,7 +136,7 @@ impl<'a> Away<'a> {
         let request = Request { of: self.of.clone(), question: Question::Sums(evaluation) };
         let (mut norms, mut parts) = (Vec::with_capacity(white.blocks()), Vec::new());
         for answer in self.who.ask(&request)? {
-            let Told::Sums(sums) = answer.0.map_err(CalibrateError::Elsewhere)? else {
+            let Numbers::Sums(sums) = answer.0.map_err(CalibrateError::Elsewhere)? else {
                 return Err(strange());
             };
             norms.extend(sums.norms);
@@ -180,7 +180,7 @@ pub(crate) fn errors(
     let question = Question::Errors { values: values.to_vec(), nominal_values: nominal_values.to_vec() };
     let mut all = Vec::with_capacity(places.len());
     for answer in who.ask(&Request { of: runs(places), question })? {
-        let Told::Errors(errors) = answer.0.map_err(CalibrateError::Elsewhere)? else {
+        let Numbers::Errors(errors) = answer.0.map_err(CalibrateError::Elsewhere)? else {
             return Err(strange());
         };
         all.extend(errors);
@@ -204,12 +204,12 @@ pub fn answer(
         return None;
     }
     let told = match &request.question {
-        Question::Sums(evaluation) => evaluation.sums(model, &own, config).map(Told::Sums),
+        Question::Sums(evaluation) => evaluation.sums(model, &own, config).map(Numbers::Sums),
         Question::Errors { values, nominal_values } => own
             .into_iter()
             .map(|o| Predicted::of(model, o, values, nominal_values))
             .collect::<Result<_, _>>()
-            .map(Told::Errors),
+            .map(Numbers::Errors),
     };
     Some(Answer(told.map_err(|e| e.to_string())))
 }

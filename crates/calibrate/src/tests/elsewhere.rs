@@ -174,8 +174,9 @@ fn one_recording_and_a_tracked_arm_with_its_own_bases_too() {
 #[test]
 fn effects_that_remember_where_the_joints_came_from_too() {
     let (model, _, mut observations) = days(&[30, 30], 11, &[]);
-    let flip =
-        |k: usize| if k % 3 == 0 { armcal_core::Arrival::Negative } else { armcal_core::Arrival::Positive };
+    let flip = |k: usize| {
+        if k.is_multiple_of(3) { armcal_core::Arrival::Negative } else { armcal_core::Arrival::Positive }
+    };
     observations.iter_mut().enumerate().for_each(|(k, o)| o.arrival = vec![flip(k); 3]);
     let effects: Vec<EffectSpec> = vec![EffectSpec::new("backlash").at(1)];
     let pool = model.with_effects(&effects, &Session::of(&observations)).unwrap();
