@@ -1,7 +1,9 @@
-use crate::support::{armcal, number, read_json, root, run_pipeline, shipped};
+use crate::support::slurm::slurm;
+use crate::support::{armcal, number, python_with, read_json, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
 /// Name, declared roll and pitch [deg] of the table on six days.
 const DAYS: [(&str, f64, f64); 6] = [
@@ -298,4 +300,178 @@ fn every_day_may_have_a_base_of_its_own() {
     let frame = ["--frame", "base", "--out"].map(Into::into);
     let output = armcal(args.into_iter().chain(frame).chain([path.join("set-points.csv").into_os_string()]));
     assert!(matches!(output.status.code(), Some(0 | 3)), "{}", said(&output));
+}
+
+/// A pool, whole in one process, and the same in shares.
+struct Shared {
+    folder: tempfile::TempDir,
+}
+
+/// What both ways write.
+const SAME: [&str; 5] = ["pool.json", "summary.json", "parameters.toml", "model.json", "calibrated.toml"];
+
+impl Shared {
+    /// Days of a shipped pipeline, each run alone, and pooled in one process.
+    fn new(shipped: &str, days: usize, more: &str) -> Shared {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path();
+        simulate(path, &DAYS[..days]);
+        run_alone(shipped, path, &DAYS[..days]);
+        write(&path.join("settings.toml"), &pipeline(shipped, path, &[], more));
+        let output = pool(&path.join("settings.toml"), &[path.join("results")], &path.join("whole"));
+        assert!(matches!(output.status.code(), Some(0 | 3)), "{}", said(&output));
+        Shared { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn map_command(&self, out: &str, shard: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_armcal"));
+        command.arg("map").arg("--pool").arg(self.path("results")).arg("--pipeline");
+        command.arg(self.path("settings.toml")).arg("--out").arg(self.path(out)).args(["--shard", shard]);
+        command
+    }
+
+    fn map(&self, out: &str, shard: &str) -> Output {
+        self.map_command(out, shard).output().expect("starting armcal")
+    }
+
+    fn reduce(&self, out: &str) -> Output {
+        armcal([Path::new("reduce"), &self.path(out)])
+    }
+
+    /// One round of all shares, the last first, some killed on their way; the exit code of its reduction.
+    fn round(&self, out: &str, of: usize, number: usize) -> Option<i32> {
+        for shard in (1..=of).rev().map(|number| format!("{number}/{of}")) {
+            if (number + 4).is_multiple_of(7) {
+                let mut map =
+                    self.map_command(out, &shard).stdout(Stdio::null()).spawn().expect("starting armcal");
+                std::thread::sleep(Duration::from_millis(5 * number as u64));
+                map.kill().expect("SIGKILL");
+                map.wait().expect("its end");
+            }
+            let output = self.map(out, &shard);
+            assert!(output.status.success(), "{}", said(&output));
+        }
+        let output = self.reduce(out);
+        assert!(matches!(output.status.code(), Some(0 | 3 | 4)), "{}", said(&output));
+        output.status.code()
+    }
+
+    fn assert_same(&self, out: &str) {
+        for name in SAME {
+            let read = |folder: &str| std::fs::read(self.path(folder).join(name)).expect("result");
+            assert!(read("whole") == read(out), "{name} differs");
+        }
+        // What needs the observations themselves is not there.
+        for name in ["report.html", "run.mcap", "observations.parquet", "observations.json", "view.toml"] {
+            assert!(!self.path(out).join(name).exists(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn shares_of_any_number_give_the_bytes_of_one_process() {
+    let shared = Shared::new("paper-camera-free.toml", 4, "[pool]\nturns = 2\n");
+    // Uneven ones, one, and more than there are results.
+    for of in [3, 1, 6] {
+        let out = format!("in-{of}");
+        let rounds = (0..).find(|number| shared.round(&out, of, *number) != Some(4)).expect("an end");
+        println!("{of} shares: {} rounds", rounds + 1);
+        shared.assert_same(&out);
+    }
+    // Done again, nothing changes.
+    assert_ne!(shared.reduce("in-3").status.code(), Some(4));
+    assert!(String::from_utf8_lossy(&shared.map("in-3", "2/3").stdout).contains("was answered already"));
+    shared.assert_same("in-3");
+
+    let refused = |output: Output, words: &[&str]| {
+        assert_eq!(output.status.code(), Some(1));
+        words.iter().for_each(|word| assert!(said(&output).contains(word), "{word}: {}", said(&output)));
+    };
+    std::fs::remove_file(shared.path("in-3/rounds/2/2-of-3")).expect("answers");
+    refused(shared.reduce("in-3"), &["rounds/2/2-of-3", "map share 2/3"]);
+    std::fs::write(shared.path("in-6/rounds/0/2-of-6"), "no answers").expect("written");
+    refused(shared.reduce("in-6"), &["rounds/0/2-of-6", "is not what armcal wrote"]);
+    std::fs::write(shared.path("in-1/rounds/0/1-of-2"), "no answers").expect("written");
+    refused(shared.reduce("in-1"), &["two partitions, 1/1 and 1/2"]);
+    refused(shared.reduce("nowhere"), &["nowhere"]);
+
+    // A result that changes on the way, one more of them, another pipeline.
+    assert!(shared.map("changed", "1/1").status.success());
+    assert_eq!(shared.reduce("changed").status.code(), Some(4));
+    let result = shared.path("results/tuesday/observations.json");
+    let text = std::fs::read_to_string(&result).expect("result");
+    write(&result, &format!("{text} "));
+    refused(shared.map("changed", "1/1"), &["tuesday/observations.json", "changed since the first round"]);
+    write(&result, &text);
+    assert!(shared.map("changed", "1/1").status.success());
+    let copy = shared.path("results/again");
+    std::fs::create_dir(&copy).expect("folder");
+    write(&copy.join("observations.json"), &text);
+    refused(shared.map("changed", "1/1"), &["of another pool"]);
+    std::fs::remove_dir_all(&copy).expect("removed");
+    let settings = std::fs::read_to_string(shared.path("settings.toml")).expect("pipeline");
+    write(&shared.path("settings.toml"), &settings.replace("turns = 2", "turns = 3"));
+    refused(shared.map("changed", "1/1"), &["of another pool"]);
+    refused(shared.reduce("changed"), &["of another pool"]);
+    write(&shared.path("settings.toml"), &settings.replace("[pool]", "[fit]\nobjective = \"paper\"\n[pool]"));
+    refused(shared.map("paper", "1/1"), &["fit.objective"]);
+}
+
+#[test]
+fn shares_with_bases_of_their_own_and_a_result_twice_give_the_bytes_of_one_process() {
+    let shared = Shared::new("paper.toml", 3, "[pool]\nper_recording = [\"base.*\"]\nturns = 3\n");
+    let copy = shared.path("results/copy");
+    std::fs::create_dir(&copy).expect("folder");
+    std::fs::copy(shared.path("results/monday/observations.json"), copy.join("observations.json"))
+        .expect("copy");
+    let output = pool(&shared.path("settings.toml"), &[shared.path("results")], &shared.path("whole"));
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", said(&output));
+    let rounds = (0..).find(|number| shared.round("in-2", 2, *number) != Some(4)).expect("an end");
+    println!("2 shares: {} rounds", rounds + 1);
+    shared.assert_same("in-2");
+    let pooled = read_json(&shared.path("in-2/pool.json"));
+    let warnings = pooled["warnings"].as_array().expect("warnings");
+    assert!(warnings.iter().any(|w| w["code"] == "counted-once"), "{warnings:?}");
+}
+
+#[test]
+fn a_slurm_job_array_a_round_gives_the_bytes_of_one_process() {
+    let Some(slurm) = slurm() else { return };
+    let shared = Shared::new("paper-camera-free.toml", 3, "");
+    let output = slurm
+        .command(&root().join("pipelines/cluster/slurm-pool.sh").display().to_string())
+        .args([shared.path("results"), shared.path("settings.toml"), shared.path("slurm")])
+        .arg("2")
+        .env("ARMCAL", env!("CARGO_BIN_EXE_armcal"))
+        .output()
+        .expect("submitting");
+    assert!(output.status.success(), "{}", said(&output));
+    slurm.wait_for_jobs();
+    let log = std::fs::read_to_string(shared.path("slurm/log/reduce.log")).unwrap_or_default();
+    println!("{log}");
+    shared.assert_same("slurm");
+}
+
+#[test]
+fn a_snakemake_workflow_of_rounds_gives_the_bytes_of_one_process() {
+    let Some(python) = python_with("snakemake") else { return };
+    let shared = Shared::new("paper-camera-free.toml", 3, "");
+    let setting = |name: &str, file: &str| format!("{name}={}", shared.path(file).display());
+    let output = Command::new(&python)
+        .args(["-m", "snakemake", "--cores", "2", "--directory"])
+        .arg(shared.path("work"))
+        .arg("-s")
+        .arg(root().join("pipelines/cluster/pool.smk"))
+        .arg("--config")
+        .args([setting("results", "results"), setting("pipeline", "settings.toml"), setting("out", "snake")])
+        .arg("shards=2")
+        .env("ARMCAL", env!("CARGO_BIN_EXE_armcal"))
+        .output()
+        .expect("starting Snakemake");
+    assert!(output.status.success(), "{}", said(&output));
+    shared.assert_same("snake");
 }

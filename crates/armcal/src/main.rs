@@ -1,4 +1,5 @@
-//! Outcome to exit code: 0 done, 1 failed or a limit is broken, 2 usage, 3 finished but data were lost or the model is inadequate.
+//! Outcome to exit code: 0 done, 1 failed or a limit is broken, 2 usage, 3 finished but data were lost or the model is
+//! inadequate, 4 a pool in shards needs another round.
 
 use armcal::cli::Cli;
 use armcal::commands::{self, Outcome};
@@ -25,6 +26,7 @@ fn ended(result: Result<Outcome, Error>) -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Doubtful) => ExitCode::from(3),
         Ok(Outcome::Broken) => ExitCode::FAILURE,
+        Ok(Outcome::Again) => ExitCode::from(4),
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
             let _ = writeln!(

@@ -329,9 +329,17 @@ pub(crate) fn with_effects(
     effects: &[EffectSpec],
     observations: &[Observation],
 ) -> Result<Model, Error> {
-    let session = frames::session(pipeline, observations);
-    geometry.check_declared(&session)?;
-    Ok(geometry.with_effects(effects, &session)?)
+    with_session(geometry, effects, &frames::session(pipeline, observations))
+}
+
+/// The same of observations of which this is known.
+pub(crate) fn with_session(
+    geometry: &Model,
+    effects: &[EffectSpec],
+    session: &Session,
+) -> Result<Model, Error> {
+    geometry.check_declared(session)?;
+    Ok(geometry.with_effects(effects, session)?)
 }
 
 fn closing_warnings(rounds: usize, at_table: bool, calibration: &Calibration) -> Vec<Warning> {

@@ -11,11 +11,14 @@
 //! **Nominal errors** are those of nominal robot parameters after fitting only the frames that nobody could know
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
+use crate::elsewhere::{Elsewhere, errors as errors_elsewhere};
 use crate::fit::{Near, fit_near};
 use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
-use crate::model_problem::{ModelProblem, describe, position_covariance_m2, whitened};
+use crate::model_problem::{
+    ModelProblem, describe, not_recording_by_recording, position_covariance_m2, whitened,
+};
 use crate::noise::expected_norm_m;
 use crate::nominal::{self, Nominal};
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
@@ -25,6 +28,7 @@ use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, War
 use armcal_model::Model;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Calibrates `model` on `observations` and judges it on those held out.
@@ -46,13 +50,36 @@ pub fn calibrate_beside(
     config: &FitConfig,
     holdout: &HoldoutConfig,
 ) -> Result<Calibration, CalibrateError> {
-    config.check()?;
-    if observations.is_empty() {
+    let nominal = other.and_then(|other| nominal::of_turns(other, model)).unwrap_or_default();
+    calibrated(&Judge { model, observations, config, nominal, elsewhere: None }, holdout)
+}
+
+/// [`calibrate`] on observations that somebody else holds: of each is known here who it is, where the arm stood and what was
+/// measured, but neither its noise nor how the joints came there. The result is the same, to the last bit.
+///
+/// # Errors
+/// [`CalibrateError::Unanswered`] as long as questions about them are open, each put to [`Elsewhere::ask`]; or those of a
+/// calibration.
+pub fn calibrate_elsewhere(
+    model: &Model,
+    observations: &[Observation],
+    config: &FitConfig,
+    holdout: &HoldoutConfig,
+    elsewhere: &dyn Elsewhere,
+) -> Result<Calibration, CalibrateError> {
+    if config.objective == Objective::Paper {
+        return Err(not_recording_by_recording());
+    }
+    let nominal = Nominal::default();
+    calibrated(&Judge { model, observations, config, nominal, elsewhere: Some(elsewhere) }, holdout)
+}
+
+fn calibrated(judge: &Judge<'_>, holdout: &HoldoutConfig) -> Result<Calibration, CalibrateError> {
+    judge.config.check()?;
+    if judge.observations.is_empty() {
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
-    let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
-    let nominal = other.and_then(|other| nominal::of_turns(other, model)).unwrap_or_default();
-    judged(&Judge { model, observations, config, nominal }, &holdout)
+    judged(judge, &holdout::resolve(holdout, judge.observations, &frames::board_names(judge.model))?)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -127,20 +154,19 @@ fn gathered(
     turns: &[Turn],
     last: Turn,
 ) -> Result<Calibration, CalibrateError> {
-    let mut turn_of = vec![None; judge.observations.len()];
-    for (t, held) in holdout.turns.iter().enumerate() {
-        held.iter().for_each(|&i| turn_of[i] = Some(t));
-    }
-    let mut residuals = Vec::with_capacity(judge.observations.len());
-    let mut train = Vec::new();
-    for (i, held_in) in turn_of.iter().enumerate() {
-        let judged_by = held_in.map_or(&last, |t| &turns[t]);
-        residuals.push(judge.residual(i, judged_by, held_in.is_some())?);
-        // In turns, everything is training for the last fit.
-        if holdout.in_turn {
-            train.push(judge.residual(i, &last, false)?);
-        }
-    }
+    let all: Vec<usize> = (0..judge.observations.len()).collect();
+    let held: BTreeSet<usize> = holdout.turns.iter().flatten().copied().collect();
+    let seen: Vec<usize> = all.iter().copied().filter(|i| !held.contains(i)).collect();
+    let by_turns = holdout.turns.iter().zip(turns).map(|(held, turn)| judge.residuals(held, turn, true));
+    let mut parts: Vec<_> = by_turns.chain([judge.residuals(&seen, &last, false)]).collect();
+    // In turns, everything is training for the last fit.
+    parts.push(if holdout.in_turn { judge.residuals(&all, &last, false) } else { Ok(Vec::new()) });
+    let mut parts = parts.into_iter().collect::<Result<Vec<Vec<Residual>>, _>>()?;
+    let train = parts.pop().unwrap_or_default();
+    let places = holdout.turns.iter().chain([&seen]).flatten();
+    let mut placed: Vec<(&usize, Residual)> = places.zip(parts.into_iter().flatten()).collect();
+    placed.sort_by_key(|(place, _)| **place);
+    let residuals: Vec<Residual> = placed.into_iter().map(|(_, residual)| residual).collect();
     let held: Vec<&Residual> = residuals.iter().filter(|r| r.held_out).collect();
     let seen: Vec<&Residual> =
         train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
@@ -190,6 +216,8 @@ struct Judge<'a> {
     observations: &'a [Observation],
     config: &'a FitConfig,
     nominal: Nominal,
+    /// Who holds the observations, where what is here of them is not all.
+    elsewhere: Option<&'a dyn Elsewhere>,
 }
 
 impl Judge<'_> {
@@ -200,10 +228,16 @@ impl Judge<'_> {
         (held, nominal): (&[usize], Option<&Vec<f64>>),
         near: Option<&Turn>,
     ) -> Result<Turn, CalibrateError> {
-        let is_held = |i: usize| held.binary_search(&i).is_ok();
-        let side = |held: bool| {
-            let chosen = self.observations.iter().enumerate().filter(move |(i, _)| is_held(*i) == held);
-            ModelProblem::new(self.model, chosen.map(|(_, o)| o), self.config)
+        let side = |is_held: bool| {
+            let all = 0..self.observations.len();
+            let places: Vec<usize> = all.filter(|i| held.binary_search(i).is_ok() == is_held).collect();
+            let chosen = places.iter().map(|&i| &self.observations[i]);
+            match self.elsewhere {
+                None => ModelProblem::new(self.model, chosen, self.config),
+                Some(who) => {
+                    Ok(ModelProblem::elsewhere(self.model, chosen.collect(), &places, who, self.config))
+                }
+            }
         };
         let (train, test) = (side(false)?, side(true)?);
         let unseen = self.frames_only_in(&test, &train);
@@ -232,20 +266,48 @@ impl Judge<'_> {
         Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations) })
     }
 
-    /// One observation as a turn predicts it.
-    fn residual(&self, i: usize, turn: &Turn, held_out: bool) -> Result<Residual, CalibrateError> {
-        let o = &self.observations[i];
-        let covariance = position_covariance_m2(self.model, &turn.values, o);
-        let fitted = self.model.residual(&turn.values, o);
+    /// These observations as a turn predicts them.
+    fn residuals(&self, of: &[usize], turn: &Turn, held_out: bool) -> Result<Vec<Residual>, CalibrateError> {
+        let (values, nominal_values) = (&turn.values, &turn.nominal_values);
+        let here = |&i: &usize| Predicted::of(self.model, &self.observations[i], values, nominal_values);
+        let predicted = match self.elsewhere {
+            None => of.iter().map(here).collect::<Result<Vec<_>, _>>()?,
+            Some(who) => errors_elsewhere(who, of, values, nominal_values)?,
+        };
+        let residual =
+            |(&i, Predicted { nominal_m, fitted_m, whitened, expected_norm_m }): (&usize, Predicted)| {
+                let weight = if held_out { 1.0 } else { turn.weight(i) };
+                let dwell = self.observations[i].dwell;
+                Residual { dwell, held_out, nominal_m, fitted_m, whitened, weight, expected_norm_m }
+            };
+        Ok(of.iter().zip(predicted).map(residual).collect())
+    }
+}
+
+/// One observation as parameters predict it: what a [`Residual`] says of it alone.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Predicted {
+    nominal_m: Vector3<f64>,
+    fitted_m: Vector3<f64>,
+    whitened: Vector3<f64>,
+    expected_norm_m: f64,
+}
+
+impl Predicted {
+    pub fn of(
+        model: &Model,
+        o: &Observation,
+        values: &[f64],
+        nominal_values: &[f64],
+    ) -> Result<Predicted, CalibrateError> {
+        let covariance = position_covariance_m2(model, values, o);
+        let fitted = model.residual(values, o);
         let whitened = whitened(&fitted, &covariance)
             .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
-        Ok(Residual {
-            dwell: o.dwell,
-            held_out,
-            nominal_m: self.model.residual(&turn.nominal_values, o).position_m,
+        Ok(Predicted {
+            nominal_m: model.residual(nominal_values, o).position_m,
             fitted_m: fitted.position_m,
             whitened,
-            weight: if held_out { 1.0 } else { turn.weight(i) },
             expected_norm_m: expected_norm_m(&covariance),
         })
     }

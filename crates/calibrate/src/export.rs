@@ -86,19 +86,19 @@ impl WhitenedProblem<'_> {
 
     /// f(x): whitened rows of the observations, then one row for each prior.
     pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
-        Ok(self.evaluate(&self.white.at(x.clone())?).0)
+        Ok(self.evaluate(&self.white.at(x.clone(), None)?).0)
     }
 
     /// df/dx.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, CalibrateError> {
-        Ok(self.evaluate(&self.white.at(x.clone())?).1)
+        Ok(self.evaluate(&self.white.at(x.clone(), None)?).1)
     }
 
-    fn evaluate(&self, at: &Point) -> (DVector<f64>, DMatrix<f64>) {
-        let (mut residual, mut jacobian) = (at.residual.clone(), self.white.jacobian(at));
-        let (rows, n) = (residual.len(), at.x.len());
+    fn evaluate(&self, point: &Point) -> (DVector<f64>, DMatrix<f64>) {
+        let (mut residual, mut jacobian) = (point.residual.clone(), self.white.jacobian(point));
+        let (rows, n) = (residual.len(), point.x.len());
         let cost = RobustCost::new(&self.white, &self.config, self.sigma_scale);
-        for (j, u) in cost.norms(&residual).into_iter().enumerate() {
+        for (j, u) in cost.norms(point).into_iter().enumerate() {
             let (at, count, loss) = (self.white.offsets[j], self.white.dimension(j), cost.loss(j));
             let root = (2.0 * loss.rho(u)).sqrt();
             // Across the residual it stretches by `stretch`, along it by the derivative of sqrt(2 rho).
@@ -116,7 +116,7 @@ impl WhitenedProblem<'_> {
         let mut derivative = DMatrix::zeros(rows + n, n);
         derivative.rows_mut(0, rows).copy_from(&jacobian);
         for (k, a) in self.white.axes.iter().enumerate() {
-            all[rows + k] = a.precision.sqrt() * at.x[k];
+            all[rows + k] = a.precision.sqrt() * point.x[k];
             derivative[(rows + k, k)] = a.precision.sqrt();
         }
         (all, derivative)

@@ -16,11 +16,13 @@
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
 //! * many recordings of one arm, each with parameters of its own ([`armcal_model::Model::with_own`]): their columns are eliminated
 //!   recording by recording ([`problem::Problem::known`]), so that work and memory grow with the number of recordings;
+//! * observations that shards hold, each asked for the sums of its recordings: `elsewhere`, [`calibrate_elsewhere`];
 //! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
 mod calibration;
 mod config;
 mod covariance;
+mod elsewhere;
 mod error;
 mod export;
 mod fit;
@@ -54,9 +56,10 @@ mod words;
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
 mod tests;
 
-pub use calibration::{calibrate, calibrate_beside, holdout_turns};
+pub use calibration::{calibrate, calibrate_beside, calibrate_elsewhere, holdout_turns};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use covariance::Covariance;
+pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};

@@ -63,7 +63,7 @@ pub fn linearise(
     let to_metres = (0..observations.len()).map(|i| problem.to_metres(i, values)).collect();
     let runs = problem.runs().to_vec();
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
-    let at = white.at(white.start())?;
+    let at = white.at(white.start(), None)?;
     let axis = |(a, x): (&crate::whitened::Axis, &f64)| LinearAxis {
         index: a.index,
         scale: a.scale,

@@ -11,6 +11,7 @@
 //! one step of expectation-maximisation, `s_new^2 = s^2 sum (x_k^2 + v_k) / n`, which never overshoots. The default prior
 //! is the widest it becomes. Bounds that the arm goes beyond are [`crate::wider`]'s matter.
 
+use crate::elsewhere::Away;
 use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
 use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
@@ -80,6 +81,10 @@ impl Problem for WithPriors<'_> {
 
     fn known(&self) -> Vec<Known> {
         self.problem.known()
+    }
+
+    fn elsewhere(&self) -> Option<&Away<'_>> {
+        self.problem.elsewhere()
     }
 
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
@@ -161,7 +166,7 @@ fn rescaled(
     let parameters = white.problem.parameters();
     let name = |index: usize| parameters[index].name.clone();
     let data = solved.sigma_scale.powi(-2);
-    let variances = posterior(&white.squares(&solved.at), &white.axes, data, &name)?.variances();
+    let variances = posterior(&white.squares(&solved.at)?, &white.axes, data, &name)?.variances();
     // Of each kind: how many, those known, and squares of offsets and of standard deviations.
     let mut sums: BTreeMap<ParameterKind, [f64; 4]> = BTreeMap::new();
     for ((axis, x), variance) in white.axes.iter().zip(solved.at.x.iter()).zip(variances.iter()) {

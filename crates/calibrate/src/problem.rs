@@ -1,6 +1,7 @@
 //! What a solver needs to know about a calibration, and nothing about robots: blocks of residual rows (one block an
 //! observation), their exact derivatives, their covariance, and the parameters.
 
+use crate::elsewhere::Away;
 use armcal_core::Parameter;
 use armcal_model::Asked;
 use nalgebra::{DMatrix, DVector};
@@ -73,6 +74,10 @@ pub trait Problem: Sync {
     fn known(&self) -> Vec<Known> {
         Vec::new()
     }
+    /// Who holds the observations, where they are not at hand: then neither residuals nor covariances are known here.
+    fn elsewhere(&self) -> Option<&Away<'_>> {
+        None
+    }
     /// What the problem is known to leave open at parameters `p`. One that the data do see after all (because a parameter
     /// in it is fixed) is dropped when what is undetermined is put into words.
     fn symmetries(&self, _p: &[f64]) -> Vec<Symmetry> {
@@ -123,6 +128,10 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn known(&self) -> Vec<Known> {
         (**self).known()
+    }
+
+    fn elsewhere(&self) -> Option<&Away<'_>> {
+        (**self).elsewhere()
     }
 
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {

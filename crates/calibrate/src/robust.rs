@@ -3,15 +3,18 @@
 //! `F(x) = sum_j rho(|e_j| / s) + 1/2 sum_k w_k x_k^2` with e_j the whitened residual of observation j, s the scale of
 //! the residuals in units of the declared noise, and w the prior precision (1 in units of its own standard deviation).
 
+use crate::elsewhere::{Part, Weighting};
 use crate::loss::{Loss, chi_median};
 use crate::problem::Linearised;
 use crate::products::gram;
 use crate::solver::{Arrow, Cost, Curvature, Quadratic, triangle};
+use crate::structure::Structure;
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::robust::median;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The cost at a fixed scale.
 pub(crate) struct RobustCost<'a, 'p> {
@@ -30,30 +33,40 @@ impl<'a, 'p> RobustCost<'a, 'p> {
         RobustCost { white, huber_c, sigma_scale, exact_curvature: true }
     }
 
+    pub fn weighted(white: &'a Whitened<'p>, by: Weighting) -> RobustCost<'a, 'p> {
+        let Weighting { huber_c, sigma_scale, exact_curvature } = by;
+        RobustCost { white, huber_c, sigma_scale, exact_curvature }
+    }
+
+    /// How residuals weigh in it.
+    pub fn weighting(&self) -> Weighting {
+        let RobustCost { huber_c, sigma_scale, exact_curvature, .. } = *self;
+        Weighting { huber_c, sigma_scale, exact_curvature }
+    }
+
     pub fn loss(&self, block: usize) -> Loss {
         self.huber_c.map_or(Loss::Square, |c| Loss::huber(c, self.white.dimension(block)))
     }
 
     /// `|e_j| / s` of every observation.
-    pub fn norms(&self, residual: &DVector<f64>) -> Vec<f64> {
-        let norm = |j| residual.rows(self.white.offsets[j], self.white.dimension(j)).norm();
-        (0..self.white.blocks()).map(|j| norm(j) / self.sigma_scale).collect()
+    pub fn norms(&self, at: &Point) -> Vec<f64> {
+        at.norms.iter().map(|norm| norm / self.sigma_scale).collect()
     }
 
     /// Weight of every observation, 1 = fully trusted.
-    pub fn weights(&self, residual: &DVector<f64>) -> Vec<f64> {
-        let norms = self.norms(residual);
+    pub fn weights(&self, at: &Point) -> Vec<f64> {
+        let norms = self.norms(at);
         norms.iter().enumerate().map(|(j, &u)| self.loss(j).weight(u)).collect()
     }
 }
 
 impl Cost for RobustCost<'_, '_> {
     fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
-        self.white.at(x)
+        self.white.at(x, Some(self.weighting()))
     }
 
     fn value(&self, at: &Point) -> f64 {
-        let norms = self.norms(&at.residual);
+        let norms = self.norms(at);
         let data: f64 = norms.iter().enumerate().map(|(j, &u)| self.loss(j).rho(u)).sum();
         let prior: f64 = self.white.axes.iter().zip(at.x.iter()).map(|(a, x)| a.precision * x * x).sum();
         data + 0.5 * prior
@@ -61,11 +74,11 @@ impl Cost for RobustCost<'_, '_> {
 
     /// Gauss-Newton in the model, exact in the loss: for an outlier `w (I - u u')` instead of `w I`, because Huber's
     /// loss has no curvature along the residual (Triggs et al. 2000, section 4.3, with rho'' from the table).
-    fn model(&self, at: &Point) -> Quadratic {
+    fn model(&self, at: &Point) -> Result<Quadratic, CalibrateError> {
         let (x, structure) = (&at.x, &self.white.structure);
         let precision =
             DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.precision));
-        let parts = self.white.each_group(|group| self.part(group, &at.groups[group]));
+        let parts = self.parts(at)?;
         let (mut gradient, mut damping) = (DVector::zeros(x.len()), DVector::zeros(x.len()));
         for (group, part) in parts.iter().enumerate() {
             for (k, axis) in structure.axes(group).enumerate() {
@@ -75,18 +88,8 @@ impl Cost for RobustCost<'_, '_> {
         }
         gradient += precision.component_mul(x);
         damping += &precision;
-        let mut of_data: Vec<DMatrix<f64>> = parts.into_iter().map(|part| part.curvature).collect();
-        let hessian = match of_data.pop() {
-            Some(mut hessian) if structure.is_dense() => {
-                (0..x.len()).for_each(|k| hessian[(k, k)] += precision[k]);
-                Curvature::Dense(hessian)
-            }
-            last => {
-                of_data.extend(last);
-                Curvature::Arrow(Arrow::new(structure.clone(), of_data, precision))
-            }
-        };
-        Quadratic { value: self.value(at), gradient, hessian, damping }
+        let hessian = curvature(structure, parts, precision);
+        Ok(Quadratic { value: self.value(at), gradient, hessian, damping })
     }
 
     fn lower(&self) -> DVector<f64> {
@@ -98,17 +101,44 @@ impl Cost for RobustCost<'_, '_> {
     }
 }
 
-/// What the blocks of one group add to the model, over the group's columns.
-struct Part {
-    gradient: DVector<f64>,
-    /// Diagonal of the curvature, without what outliers take from it.
-    squares: DVector<f64>,
-    /// The matrix itself where the structure is dense, otherwise the triangle that has it as its square.
-    curvature: DMatrix<f64>,
+/// The sum of the squares of all groups, with `diagonal` on its diagonal.
+pub(crate) fn curvature(structure: &Arc<Structure>, parts: Vec<Part>, diagonal: DVector<f64>) -> Curvature {
+    let mut of_data: Vec<DMatrix<f64>> = parts.into_iter().map(|part| part.curvature).collect();
+    match of_data.pop() {
+        Some(mut hessian) if structure.is_dense() => {
+            (0..diagonal.len()).for_each(|k| hessian[(k, k)] += diagonal[k]);
+            Curvature::Dense(hessian)
+        }
+        last => {
+            of_data.extend(last);
+            Curvature::Arrow(Arrow::new(structure.clone(), of_data, diagonal))
+        }
+    }
+}
+
+impl Part {
+    /// What a group without blocks adds.
+    pub fn nothing(columns: usize) -> Part {
+        let zeros = DVector::zeros(columns);
+        Part { gradient: zeros.clone(), squares: zeros, curvature: DMatrix::zeros(0, columns) }
+    }
 }
 
 impl RobustCost<'_, '_> {
-    fn part(&self, group: usize, (residual, jacobian): &Linearised) -> Part {
+    /// What every group adds to the model: the one thing that is asked of observations, wherever they are.
+    pub fn parts(&self, at: &Point) -> Result<Vec<Part>, CalibrateError> {
+        if self.white.problem.elsewhere().is_none() {
+            return Ok(self.white.each_group(|group| self.part(group, &at.groups[group])));
+        }
+        let by = self.weighting();
+        match &at.parts {
+            Some((as_asked, parts)) if *as_asked == by => Ok(parts.clone()),
+            _ => Ok(self.white.at(at.x.clone(), Some(by))?.parts.map_or_else(Vec::new, |(_, parts)| parts)),
+        }
+    }
+
+    /// What the blocks of one group add to the model, over the group's columns.
+    pub fn part(&self, group: usize, (residual, jacobian): &Linearised) -> Part {
         let blocks = self.white.structure.groups[group].blocks.clone();
         let first = self.white.offsets[blocks.start];
         let mut scale = DVector::zeros(residual.len());
@@ -162,20 +192,19 @@ fn expected_psi_square(cost: &RobustCost<'_, '_>) -> f64 {
 }
 
 /// Scale of the residuals by the median norm: survives half of the observations being wrong.
-pub(crate) fn median_scale(white: &Whitened<'_>, residual: &DVector<f64>) -> f64 {
-    let norms: Vec<f64> = (0..white.blocks())
-        .map(|j| residual.rows(white.offsets[j], white.dimension(j)).norm() / chi_median(white.dimension(j)))
-        .collect();
+pub(crate) fn median_scale(white: &Whitened<'_>, at: &Point) -> f64 {
+    let norm = |(j, norm): (usize, &f64)| norm / chi_median(white.dimension(j));
+    let norms: Vec<f64> = at.norms.iter().enumerate().map(norm).collect();
     median(&norms)
 }
 
 /// Scale of the residuals by Huber's proposal 2 (Huber and Ronchetti 2009, section 6.4), `p` fitted directions
 /// allowed for: `sum |psi(e/s)|^2 = (1 - p/N) sum_j E|psi|^2`. As efficient as the fit itself, kept within a factor of
 /// two of the median's answer, which is the more robust one.
-pub(crate) fn proposal2_scale(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, fitted: f64) -> f64 {
+pub(crate) fn proposal2_scale(cost: &RobustCost<'_, '_>, point: &Point, fitted: f64) -> f64 {
     let white = cost.white;
     let left = ((white.rows() as f64 - fitted) / white.rows() as f64).max(1.0 / white.rows() as f64);
-    let start = median_scale(white, residual) / left.sqrt();
+    let start = median_scale(white, point) / left.sqrt();
     let expected = expected_psi_square(cost);
     if start <= 0.0 {
         // Most observations are met exactly: there is no scale to refine.
@@ -184,7 +213,7 @@ pub(crate) fn proposal2_scale(cost: &RobustCost<'_, '_>, residual: &DVector<f64>
     let mut scale = start;
     for _ in 0..100 {
         let at = RobustCost { sigma_scale: scale, ..*cost };
-        let norms = at.norms(residual);
+        let norms = at.norms(point);
         let psi: f64 = norms.iter().enumerate().map(|(j, &u)| (at.loss(j).weight(u) * u).powi(2)).sum();
         let next = (scale * (psi / (left * expected)).sqrt()).clamp(0.5 * start, 2.0 * start);
         let change = (next - scale).abs();
@@ -195,7 +224,8 @@ pub(crate) fn proposal2_scale(cost: &RobustCost<'_, '_>, residual: &DVector<f64>
     }
     if cost.huber_c.is_none() {
         // Least squares: the root of the reduced chi-square itself.
-        return (residual.norm_squared() / (left * white.rows() as f64)).sqrt();
+        let squares: f64 = point.norms.iter().map(|norm| norm * norm).sum();
+        return (squares / (left * white.rows() as f64)).sqrt();
     }
     scale
 }

@@ -22,7 +22,7 @@ use crate::CalibrateError;
 use crate::covariance::Covariance;
 use crate::robust::RobustCost;
 use crate::solver::{Arrow, Curvature};
-use crate::whitened::Axis;
+use crate::whitened::{Axis, Point};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -60,10 +60,10 @@ pub(crate) struct Weak {
     pub followed: bool,
 }
 
-/// Uncertainty at a solution with this whitened residual; `squares` is J'J of the whitened Jacobian.
+/// Uncertainty at a solution; `squares` is J'J of the whitened Jacobian.
 pub(crate) fn uncertainty(
     cost: &RobustCost<'_, '_>,
-    residual: &DVector<f64>,
+    at: &Point,
     squares: &Curvature,
     name: &dyn Fn(usize) -> String,
 ) -> Result<Uncertainty, CalibrateError> {
@@ -71,7 +71,7 @@ pub(crate) fn uncertainty(
     let declared = posterior(squares, axes, cost.sigma_scale.powi(2).recip(), name)?;
     let fitted = fitted_directions(&declared.variances(), axes);
     let freedom = (cost.white.rows() as f64 - fitted).max(1.0);
-    let variance = residual_variance(cost, residual, freedom);
+    let variance = residual_variance(cost, at, freedom);
     let covariance = posterior(squares, axes, variance.recip(), name)?;
     let variances = covariance.variances();
     let determined = variances.iter().map(|variance| variance.sqrt() < PRIOR_DECIDES).collect();
@@ -91,10 +91,10 @@ pub(crate) fn t95(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
 }
 
-fn residual_variance(cost: &RobustCost<'_, '_>, residual: &DVector<f64>, freedom: f64) -> f64 {
+fn residual_variance(cost: &RobustCost<'_, '_>, at: &Point, freedom: f64) -> f64 {
     let white = cost.white;
     let (mut psi_square, mut curvature) = (0.0, 0.0);
-    for (j, u) in cost.norms(residual).into_iter().enumerate() {
+    for (j, u) in cost.norms(at).into_iter().enumerate() {
         psi_square += (cost.loss(j).weight(u) * u).powi(2);
         curvature += cost.loss(j).mean_curvature(u, white.dimension(j)) * white.dimension(j) as f64;
     }
@@ -200,7 +200,8 @@ mod tests {
             // Four shared axes, then three groups of two, of which some directions are barely seen.
             let own = |k: usize| vec![4 + 2 * k, 5 + 2 * k];
             let group = |k: usize| Group { blocks: k..k + 1, own: own(k), columns: vec![None; 6] };
-            let structure = Structure { groups: (0..3).map(group).collect(), shared: (0..4).collect() };
+            let structure =
+                Structure { groups: (0..3).map(group).collect(), shared: (0..4).collect(), dense: false };
             let triangles = (0..3).map(|_| {
                 let sizes = DVector::from_fn(6, |_, _| 10_f64.powf(rng.random_range(-2.0..2.0)));
                 let rows = DMatrix::from_fn(rng.random_range(1..9), 6, |_, _| rng.random_range(-1.0..1.0));

@@ -14,6 +14,8 @@ use std::ops::Range;
 pub(crate) struct Structure {
     pub groups: Vec<Group>,
     pub shared: Vec<usize>,
+    /// Whether all parameters are shared by one group.
+    pub dense: bool,
 }
 
 /// Observations that know the same parameters.
@@ -31,53 +33,47 @@ impl Structure {
     pub fn of(problem: &dyn Problem, axes: &[Axis]) -> Structure {
         let known = problem.known();
         if known.len() <= 1 {
-            return Structure::dense(problem, axes, known);
+            let all = || Known {
+                blocks: 0..problem.blocks(),
+                parameters: (0..problem.parameters().len()).collect(),
+            };
+            let known = if known.is_empty() { vec![all()] } else { known };
+            return Structure::over(known, axes, (0..axes.len()).collect(), true);
         }
         let mut knowers = vec![Knowers::None; problem.parameters().len()];
         for (group, known) in known.iter().enumerate() {
             known.parameters.iter().for_each(|&index| knowers[index] = knowers[index].and(group));
         }
-        let mut own = vec![Vec::new(); known.len()];
-        let (mut shared, mut nobodys) = (Vec::new(), Vec::new());
-        for (axis, a) in axes.iter().enumerate() {
-            match knowers[a.index] {
-                Knowers::None => nobodys.push(axis),
-                Knowers::One(group) => own[group].push(axis),
-                Knowers::Several => shared.push(axis),
-            }
-        }
-        let mut groups: Vec<Group> = known
-            .into_iter()
-            .zip(own)
-            .map(|(known, own)| {
-                let at: BTreeMap<usize, usize> =
-                    known.parameters.iter().enumerate().map(|(column, &index)| (index, column)).collect();
-                let columns = own.iter().chain(&shared).map(|&axis| at.get(&axes[axis].index).copied());
-                Group { blocks: known.blocks, columns: columns.collect(), own }
-            })
-            .collect();
+        let is = |wanted| {
+            (0..axes.len()).filter(|&axis| knowers[axes[axis].index] == wanted).collect::<Vec<usize>>()
+        };
+        let (shared, nobodys) = (is(Knowers::Several), is(Knowers::None));
+        let mut structure = Structure::over(known, axes, shared, false);
         // Only its prior says anything about a parameter that no observation knows.
-        groups.extend(nobodys.into_iter().map(|axis| Group {
-            blocks: 0..0,
-            own: vec![axis],
-            columns: vec![None; 1 + shared.len()],
-        }));
-        Structure { groups, shared }
+        let columns = vec![None; 1 + structure.shared.len()];
+        let alone = |axis| Group { blocks: 0..0, own: vec![axis], columns: columns.clone() };
+        structure.groups.extend(nobodys.into_iter().map(alone));
+        structure
     }
 
-    fn dense(problem: &dyn Problem, axes: &[Axis], known: Vec<Known>) -> Structure {
-        let of_index = |index: usize| match known.first() {
-            None => Some(index),
-            Some(known) => known.parameters.iter().position(|&k| k == index),
+    /// Of groups, all there are or some of them, that share these axes; what else one of them knows is its own.
+    pub fn over(known: Vec<Known>, axes: &[Axis], shared: Vec<usize>, dense: bool) -> Structure {
+        let axis_of: BTreeMap<usize, usize> =
+            axes.iter().enumerate().map(|(axis, a)| (a.index, axis)).collect();
+        let group = |known: Known| {
+            let at: BTreeMap<usize, usize> =
+                known.parameters.iter().enumerate().map(|(column, &index)| (index, column)).collect();
+            let of_group = at.keys().filter_map(|index| axis_of.get(index)).copied();
+            let own: Vec<usize> = of_group.filter(|axis| shared.binary_search(axis).is_err()).collect();
+            let columns = own.iter().chain(&shared).map(|&axis| at.get(&axes[axis].index).copied());
+            Group { blocks: known.blocks, columns: columns.collect(), own }
         };
-        let columns = axes.iter().map(|a| of_index(a.index)).collect();
-        let group = Group { blocks: 0..problem.blocks(), own: Vec::new(), columns };
-        Structure { groups: vec![group], shared: (0..axes.len()).collect() }
+        Structure { groups: known.into_iter().map(group).collect(), shared, dense }
     }
 
     /// Whether all parameters are shared by one group.
     pub fn is_dense(&self) -> bool {
-        self.groups.len() == 1 && self.groups[0].own.is_empty()
+        self.dense
     }
 
     /// Number of axes.
@@ -92,7 +88,7 @@ impl Structure {
 }
 
 /// Who knows a parameter.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Knowers {
     None,
     One(usize),

@@ -6,9 +6,10 @@
 //! (or a ridge of 1 m, 1 rad), wide enough not to be felt by anything the data see at all, and keeps directions that
 //! nothing determines where they started.
 
+use crate::elsewhere::{Part, Weighting};
 use crate::problem::{Linearised, Problem};
-use crate::products::gram;
-use crate::solver::{Arrow, Curvature, triangle};
+use crate::robust::{RobustCost, curvature};
+use crate::solver::Curvature;
 use crate::structure::Structure;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::{Parameter, Role, Unit};
@@ -40,13 +41,20 @@ pub(crate) struct Axis {
     pub upper: f64,
 }
 
+impl Axis {
+    /// One of which nothing but its unit counts.
+    pub fn scaled(index: usize, scale: f64) -> Axis {
+        Axis { index, centre: 0.0, scale, precision: 0.0, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
+    }
+}
+
 /// A [`Problem`] whitened at its start values, over its free parameters.
 pub(crate) struct Whitened<'a> {
     pub problem: Box<dyn Problem + 'a>,
     pub axes: Vec<Axis>,
     /// Full parameter vector at the start; fixed parameters stay there.
-    start: Vec<f64>,
-    /// Inverse Cholesky factor of each block's covariance.
+    pub start: Vec<f64>,
+    /// Inverse Cholesky factor of each block's covariance; none of observations that are elsewhere.
     whitener: Vec<DMatrix<f64>>,
     /// First row of each block in the stacked residual, and one past the last.
     pub offsets: Vec<usize>,
@@ -58,10 +66,14 @@ pub(crate) struct Whitened<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     pub x: DVector<f64>,
-    /// Whitened residuals of all blocks, stacked.
+    /// Norm of the whitened residual of each block.
+    pub norms: Vec<f64>,
+    /// Whitened residuals of all blocks, stacked; none of observations that are elsewhere.
     pub residual: DVector<f64>,
-    /// Rows and derivative of each group, over its columns.
+    /// Rows and derivative of each group, over its columns; none of observations that are elsewhere.
     pub groups: Vec<Linearised>,
+    /// Of observations that are elsewhere: what they add to a cost with this weighting, where that was asked for.
+    pub parts: Option<(Weighting, Vec<Part>)>,
 }
 
 impl<'a> Whitened<'a> {
@@ -86,15 +98,31 @@ impl<'a> Whitened<'a> {
         for a in &axes {
             start[a.index] = a.centre + a.scale * clamp((start[a.index] - a.centre) / a.scale, a);
         }
-        let (mut whitener, mut offsets) = (Vec::with_capacity(problem.blocks()), vec![0]);
-        for block in 0..problem.blocks() {
+        let structure = Structure::of(problem.as_ref(), &axes);
+        Whitened::over(problem, axes, start, structure)
+    }
+
+    /// The same over these axes, whose start is within their bounds.
+    pub fn over(
+        problem: Box<dyn Problem + 'a>,
+        axes: Vec<Axis>,
+        start: Vec<f64>,
+        structure: Structure,
+    ) -> Result<Whitened<'a>, CalibrateError> {
+        let mut whitener = Vec::with_capacity(problem.blocks());
+        let blocks = if problem.elsewhere().is_some() { 0 } else { problem.blocks() };
+        for block in 0..blocks {
             let inverse = inverse_cholesky(problem.covariance(block, &start))
                 .ok_or_else(|| CalibrateError::BadCovariance { observation: problem.name(block) })?;
-            offsets.push(offsets[block] + inverse.nrows());
             whitener.push(inverse);
         }
-        let structure = Structure::of(problem.as_ref(), &axes).into();
-        Ok(Whitened { problem, axes, start, whitener, offsets, structure })
+        let rows = match problem.elsewhere() {
+            Some(away) => away.rows.clone(),
+            None => whitener.iter().map(DMatrix::nrows).collect(),
+        };
+        let mut offsets = vec![0];
+        rows.iter().for_each(|rows| offsets.push(offsets[offsets.len() - 1] + rows));
+        Ok(Whitened { problem, axes, start, whitener, offsets, structure: structure.into() })
     }
 
     /// Inverse Cholesky factor of each block's covariance.
@@ -107,7 +135,7 @@ impl<'a> Whitened<'a> {
     }
 
     pub fn blocks(&self) -> usize {
-        self.whitener.len()
+        self.offsets.len() - 1
     }
 
     /// Rows of one block.
@@ -140,13 +168,26 @@ impl<'a> Whitened<'a> {
         p
     }
 
-    /// Linearises at x.
-    pub fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
+    /// Linearises at x. Observations that are elsewhere are asked for what a cost with this weighting will need.
+    pub fn at(&self, x: DVector<f64>, by: Option<Weighting>) -> Result<Point, CalibrateError> {
         let p = self.parameters_at(&x);
-        let groups = self.each_group(|group| self.linearised_group(&p, group));
+        let Some(away) = self.problem.elsewhere() else { return self.at_parameters(x, &p) };
+        let (norms, mut parts) = away.sums(self, p, by)?;
+        let without = self.structure.groups[parts.len()..].iter();
+        parts.extend(without.map(|group| Part::nothing(group.columns.len())));
+        let parts = by.map(|by| (by, parts));
+        Ok(Point { x, norms, residual: DVector::zeros(0), groups: Vec::new(), parts })
+    }
+
+    /// Linearises at all parameters `p`.
+    pub fn at_parameters(&self, x: DVector<f64>, p: &[f64]) -> Result<Point, CalibrateError> {
+        let groups = self.each_group(|group| self.linearised_group(p, group));
         let groups = groups.into_iter().collect::<Result<Vec<_>, _>>()?;
         let rows = groups.iter().flat_map(|(residual, _)| residual.iter().copied());
-        Ok(Point { x, residual: DVector::from_iterator(self.rows(), rows), groups })
+        let residual = DVector::from_iterator(self.rows(), rows);
+        let norm = |block| residual.rows(self.offsets[block], self.dimension(block)).norm();
+        let norms = (0..self.blocks()).map(norm).collect();
+        Ok(Point { x, norms, residual, groups, parts: None })
     }
 
     /// Something of every group of blocks, in their order.
@@ -196,14 +237,9 @@ impl<'a> Whitened<'a> {
     }
 
     /// `J'J` of that derivative.
-    pub fn squares(&self, at: &Point) -> Curvature {
-        if self.structure.is_dense() {
-            let jacobian = &at.groups[0].1;
-            return Curvature::Dense(gram(jacobian));
-        }
-        let triangles = self.each_group(|group| triangle(at.groups[group].1.clone()));
-        let nothing = DVector::zeros(self.axes.len());
-        Curvature::Arrow(Arrow::new(self.structure.clone(), triangles, nothing))
+    pub fn squares(&self, at: &Point) -> Result<Curvature, CalibrateError> {
+        let parts = RobustCost::weighted(self, Weighting::PLAIN).parts(at)?;
+        Ok(curvature(&self.structure, parts, DVector::zeros(self.axes.len())))
     }
 
     /// The rows of one group at parameters `p`, with the columns of its own axes, then those of the shared ones.

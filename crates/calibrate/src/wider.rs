@@ -43,7 +43,7 @@ pub(crate) fn wider<'a>(
     let mut better = solve(&again, Some(solved.sigma_scale), config)?;
     better.iterations += solved.iterations;
     let scatter = |white: &Whitened<'_>, solved: &Solved| {
-        proposal2_scale(&solved.cost(white, config), &solved.at.residual, white.axes.len() as f64)
+        proposal2_scale(&solved.cost(white, config), &solved.at, white.axes.len() as f64)
     };
     let found = again.parameters_at(&better.at.x);
     let within = tight.iter().all(|k| !ended_on(&again.problem.parameters()[*k], found[*k]));

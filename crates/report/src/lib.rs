@@ -83,4 +83,6 @@ pub use verification::{
     IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
     verification_files, verification_json, verification_paths, verification_text,
 };
-pub use write::{InputMessages, OutputConfig, pool_files, run_files, write_all, write_brief};
+pub use write::{
+    InputMessages, OutputConfig, pool_files, run_files, write_all, write_brief, write_pool_brief,
+};

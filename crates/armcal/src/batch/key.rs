@@ -18,7 +18,7 @@ const SCHEMA: &str = "armcal.seen/2";
 const SEEN: &str = ".inputs";
 
 /// Makes the keys of a campaign's recordings.
-pub(super) struct Keys {
+pub(crate) struct Keys {
     /// Hash of everything that is the same for all recordings.
     common: String,
     seen: PathBuf,
@@ -52,11 +52,16 @@ impl Keys {
         Ok(Keys { common: hash(parts), seen: out.join(SEEN) })
     }
 
+    /// The key of something else made from the same settings and these parts.
+    pub fn of(&self, what: &str, parts: impl IntoIterator<Item = String>) -> String {
+        hash([self.common.clone(), what.to_owned()].into_iter().chain(parts))
+    }
+
     /// The key of one recording.
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn of(&self, entry: &RecordingEntry) -> Result<String, Error> {
+    pub fn of_recording(&self, entry: &RecordingEntry) -> Result<String, Error> {
         let in_recording = |source| Error::Recording { recording: entry.name(), source };
         let mut parts = vec![self.common.clone(), declared(entry)];
         for path in &entry.paths {

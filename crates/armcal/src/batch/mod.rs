@@ -15,14 +15,15 @@ mod store;
 mod work;
 mod workers;
 
+pub(crate) use key::Keys;
 pub use manifest::Manifest;
 pub use shard::Shard;
+pub(crate) use store::write_one;
 
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use armcal_report::{Campaign, FailedRecording, write_campaign};
-use key::Keys;
 use shard::{Done, Receipt};
 use std::path::{Path, PathBuf};
 use store::Store;

@@ -20,7 +20,7 @@ pub(super) fn one(
     store: &Store,
     full: bool,
 ) -> Result<(String, bool), Error> {
-    let folder = Store::name(&entry.name(), &keys.of(entry)?);
+    let folder = Store::name(&entry.name(), &keys.of_recording(entry)?);
     if store.has(&folder) {
         return Ok((folder, true));
     }

@@ -51,13 +51,7 @@ pub(super) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
 
 /// One share.
 pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> {
-    let shard = match (shard, Shard::of_slurm()) {
-        (Some(text), _) => text.parse().map_err(Error::Shard)?,
-        (None, Some(of_slurm)) => of_slurm.map_err(Error::Shard)?,
-        (None, None) => {
-            return Err(Error::Shard("is missing; write 1/3, 2/3 and 3/3 for three shares".into()));
-        }
-    };
+    let shard = shard_of(shard)?;
     let pipeline = job.pipeline()?;
     job.note_inputs();
     may_write([receipt_file(shard, job.out)])?;
@@ -67,6 +61,15 @@ pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
     let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
     print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"))?;
     Ok(if failed > 0 { Outcome::Doubtful } else { Outcome::Done })
+}
+
+/// The share that was asked for, or that of this task of a Slurm job array.
+pub(super) fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
+    match (shard, Shard::of_slurm()) {
+        (Some(text), _) => text.parse().map_err(Error::Shard),
+        (None, Some(of_slurm)) => of_slurm.map_err(Error::Shard),
+        (None, None) => Err(Error::Shard("is missing; write 1/3, 2/3 and 3/3 for three shares".into())),
+    }
 }
 
 /// The shares together.

@@ -39,6 +39,8 @@ pub enum Outcome {
     Doubtful,
     /// Done, and the result breaks a limit.
     Broken,
+    /// This much is done, and the same is to be done again.
+    Again,
 }
 
 /// Runs the command a user typed.
@@ -52,11 +54,15 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
                 *json,
             )
         }
-        Command::Map { manifest, shard, pipeline, out, full, jobs } => {
-            let manifest = Manifest::read(manifest)?;
+        Command::Map { pool: results, shard, pipeline, out, .. } if !results.is_empty() => {
+            pool::map(pipeline.as_deref(), results, out, shard.as_deref())
+        }
+        Command::Map { manifest, shard, pipeline, out, full, jobs, .. } => {
+            let manifest = Manifest::read(manifest.as_deref().unwrap_or(Path::new("")))?;
             let job = batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs };
             batch::map(&job, shard.as_deref())
         }
+        Command::Reduce { out, json } if crate::pool::is_in_shards(out) => pool::reduce(out, *json),
         Command::Reduce { out, json } => batch::reduce(out, *json),
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Compensate(asked) => compensate::run(asked),

@@ -1,8 +1,8 @@
 //! Levenberg-Marquardt with bounds: every step is the exact minimiser of the damped quadratic model within the box.
 
 use super::{Cost, Curvature, Quadratic, bounded_qp};
-use crate::Status;
 use crate::whitened::Point;
+use crate::{CalibrateError, Status};
 use nalgebra::DVector;
 
 /// When to stop.
@@ -29,11 +29,16 @@ pub(crate) struct Solution {
 /// Marquardt's scaling by the largest curvature seen; damping by the ratio of actual to predicted decrease (Madsen,
 /// Nielsen and Tingleff 2004, with a factor of ten instead of three on the way down). The test of convergence has no
 /// unit: the step in the metric of the Hessian, that is, in standard deviations of the estimate. A trial point at
-/// which the cost is not finite counts as a failed step; the start is evaluated by the caller.
-pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Solution {
+/// which the cost is not finite counts as a failed step; the start is evaluated by the caller. An error is one of
+/// observations that are elsewhere.
+pub(crate) fn minimise(
+    cost: &dyn Cost,
+    start: Point,
+    settings: Settings,
+) -> Result<Solution, CalibrateError> {
     let (lower, upper) = (cost.lower(), cost.upper());
     let mut at = start;
-    let mut model = cost.model(&at);
+    let mut model = cost.model(&at)?;
     let mut damping = model.damping.clone();
     let (mut mu, mut growth) = (1e-8, 10.0);
     for iterations in 0..settings.max_iterations {
@@ -44,7 +49,7 @@ pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Sol
             let Some(step) = step.filter(|d| d.iter().all(|v| v.is_finite())) else {
                 mu *= growth;
                 if mu > 1e20 {
-                    return stopped(at, model, Status::IterationLimit, iterations);
+                    return Ok(stopped(at, model, Status::IterationLimit, iterations));
                 }
                 continue;
             };
@@ -52,7 +57,10 @@ pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Sol
             let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
             let rounding = 16.0 * f64::EPSILON * model.value.abs();
             let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;
-            let trial = cost.at(snapped(&at.x + step, &lower, &upper)).ok();
+            let trial = match cost.at(snapped(&at.x + step, &lower, &upper)) {
+                Err(e @ (CalibrateError::Unanswered | CalibrateError::Unreachable(_))) => return Err(e),
+                trial => trial.ok(),
+            };
             let value = trial.as_ref().map_or(f64::INFINITY, |trial| cost.value(trial));
             let gain = (model.value - value) / predicted;
             if done {
@@ -60,7 +68,7 @@ pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Sol
                 // step is worth says that the last step was wrong.
                 let tolerated = rounding.max(0.5 * settings.step_tolerance.powi(2));
                 let end = trial.filter(|_| value - model.value <= tolerated).unwrap_or(at);
-                return stopped(end, model, Status::Converged, iterations + 1);
+                return Ok(stopped(end, model, Status::Converged, iterations + 1));
             }
             if let Some(trial) = trial.filter(|_| gain > 1e-4) {
                 mu = if gain > 0.5 { (0.1 * mu).max(1e-15) } else { mu };
@@ -71,12 +79,12 @@ pub(crate) fn minimise(cost: &dyn Cost, start: Point, settings: Settings) -> Sol
             mu *= growth;
             growth *= 2.0;
             if !mu.is_finite() {
-                return stopped(at, model, Status::IterationLimit, iterations);
+                return Ok(stopped(at, model, Status::IterationLimit, iterations));
             }
         }
-        model = cost.model(&at);
+        model = cost.model(&at)?;
     }
-    stopped(at, model, Status::IterationLimit, settings.max_iterations)
+    Ok(stopped(at, model, Status::IterationLimit, settings.max_iterations))
 }
 
 fn stopped(at: Point, model: Quadratic, status: Status, iterations: usize) -> Solution {

@@ -46,7 +46,8 @@ impl Excerpt {
         let h_s = (0.5 * config.smoothing_s).max(2.0 * period_s).max(2.0 * joint_period_s);
         let piece = ((PIECE_WIDTHS * h_s / period_s).ceil() as usize).max(1);
         let whole = tip.len() <= PIECES.saturating_mul(piece);
-        let pieces = if whole { vec![0..tip.len()] } else { pieces(tip, piece, h_s / period_s) };
+        let pieces =
+            if whole { std::iter::once(0..tip.len()).collect() } else { pieces(tip, piece, h_s / period_s) };
         let time_s = |row: usize| seconds_between(tip.time_ns[0], tip.time_ns[row]);
         let span_s = time_s(tip.len() - 1);
         let within = |rows: &Range<usize>| {

@@ -86,12 +86,6 @@ fn of_a_long_recording_pieces_tell_the_clocks() {
         // Drift counts from the sensor's time, the planted one from the robot's: a square apart.
         rate += u32::from((found.drift - drift / (1.0 + drift)).abs() < 1.96 * found.drift_sigma);
         errors_s.push(at(0.5) * found.sigma_s(tip.time_ns[tip.len() / 2]));
-        println!(
-            "{seed} {:.2} {:.2} {:.4}",
-            errors_s[errors_s.len() - 1] * 1e6,
-            found.sigma_s(tip.time_ns[tip.len() / 2]) * 1e6,
-            (found.drift - drift) * 1e6
-        );
     }
     for (what, inside) in [("middle", middle), ("end", end), ("drift", rate)] {
         assert!(inside >= 44, "{what}: {inside} of {seeds}");
