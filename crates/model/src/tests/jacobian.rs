@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{FixedPlace, Frame, Knowledge, Length};
-use armcal_core::Against;
+use armcal_core::{Against, FeatureId};
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 
