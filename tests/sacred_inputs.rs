@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 /// Paths that a command only reads, by command and argument.
-const READ: [(&str, &str); 21] = [
+const READ: [(&str, &str); 22] = [
     ("run", "pipeline"),
     ("inspect", "inputs"),
     ("diagnose", "input"),
@@ -18,6 +18,7 @@ const READ: [(&str, &str); 21] = [
     ("check", "pipeline"),
     ("batch", "pipeline"),
     ("map", "manifest"),
+    ("map", "pool"),
     ("map", "pipeline"),
     ("compare", "before"),
     ("compare", "after"),

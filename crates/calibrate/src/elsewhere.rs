@@ -91,6 +91,13 @@ pub(crate) struct Part {
     pub curvature: DMatrix<f64>,
 }
 
+impl Part {
+    /// Whether it is over so many columns.
+    fn is_over(&self, columns: usize) -> bool {
+        [self.gradient.len(), self.squares.len(), self.curvature.ncols()] == [columns; 3]
+    }
+}
+
 /// Whoever asks the shards.
 pub trait Elsewhere: Sync {
     /// The answers of the recordings that have any of the observations, in their order.
@@ -142,9 +149,10 @@ impl<'a> Away<'a> {
             norms.extend(sums.norms);
             parts.extend(sums.part);
         }
-        let asked =
-            weighting.map_or(0, |_| white.structure.groups.iter().filter(|g| !g.blocks.is_empty()).count());
-        if norms.len() != white.blocks() || parts.len() != asked {
+        let groups = white.structure.groups.iter().filter(|g| weighting.is_some() && !g.blocks.is_empty());
+        let widths: Vec<usize> = groups.map(|g| g.columns.len()).collect();
+        let as_asked = parts.len() == widths.len() && parts.iter().zip(widths).all(|(p, n)| p.is_over(n));
+        if norms.len() != white.blocks() || !as_asked {
             return Err(strange());
         }
         Ok((norms, parts))
@@ -261,6 +269,12 @@ mod upper {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DMatrix<f64>, D::Error> {
         let (rows, columns, symmetric, values) = <(usize, usize, bool, Vec<f64>)>::deserialize(deserializer)?;
+        // A damaged file may say any size.
+        let bounded = rows <= columns && (columns <= values.len() || rows == 0);
+        let expected = || (0..columns).map(|c| rows.min(c + 1)).sum::<usize>();
+        if !bounded || (symmetric && rows != columns) || (rows > 0 && expected() != values.len()) {
+            return Err(D::Error::custom("a matrix whose size its values contradict"));
+        }
         let mut left = values.into_iter();
         let mut m = DMatrix::zeros(rows, columns);
         for c in 0..columns {

@@ -10,6 +10,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Functions at the dwells: dwells x m.
+pub(crate) type Functions<'c> = Cow<'c, DMatrix<f64>>;
+
 /// Whitened columns.
 #[derive(Debug, Clone)]
 pub enum Columns {
@@ -83,7 +86,7 @@ impl Columns {
     }
 
     /// Of a product its base, and the functions at the dwells (dwells x m).
-    pub(crate) fn factors(&self) -> Option<(&Arc<DMatrix<f64>>, Cow<'_, DMatrix<f64>>)> {
+    pub(crate) fn factors(&self) -> Option<(&Arc<DMatrix<f64>>, Functions<'_>)> {
         match self {
             Columns::Dense(_) => None,
             Columns::Product { base, basis, size } if *size == 1.0 => Some((base, Cow::Borrowed(basis))),
@@ -100,7 +103,7 @@ impl Columns {
 
     /// The functions of many terms, those that have any. Of waves over one angle at even steps each is the one before it
     /// turned by the step, which costs no sine.
-    pub(crate) fn functions<'c>(terms: impl Iterator<Item = &'c Columns>) -> Vec<Cow<'c, DMatrix<f64>>> {
+    pub(crate) fn functions<'c>(terms: impl Iterator<Item = &'c Columns>) -> Vec<Functions<'c>> {
         let mut all = Vec::new();
         let mut turning: Option<Turning<'c>> = None;
         for term in terms {

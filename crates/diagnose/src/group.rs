@@ -1,9 +1,9 @@
 //! One family at all joints together: a cause that is likely to be in every joint, such as a make of gear.
 
+use crate::columns::Functions;
 use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
 use nalgebra::{DMatrix, DVector, DVectorView};
-use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
@@ -83,7 +83,7 @@ impl<'s> Point<'s> {
         let with: Vec<[Vec<f64>; 2]> =
             base.column_iter().map(|x| [of_dwell(x, residual.as_view()), of_dwell(x, x)]).collect();
         let functions = Columns::functions(scan.points.iter().map(|p| &p.columns));
-        let of = |(candidate, basis): (&'s Candidate, Cow<'_, DMatrix<f64>>)| {
+        let of = |(candidate, basis): (&'s Candidate, Functions<'_>)| {
             let sums = with.iter().flat_map(|[with_residual, square]| {
                 basis.column_iter().map(move |f| {
                     let weighted = f.iter().zip(with_residual.iter().zip(square));

@@ -128,7 +128,7 @@ fn rows(base: &Linearisation) -> Vec<Range<usize>> {
 /// How the members of a family with a shape become columns.
 enum Scanned<'c> {
     /// Of the effect that acts from the first dwell on.
-    Steps(EffectSpec),
+    Steps(Box<EffectSpec>),
     /// Of a joint that is turned over its own angle.
     Waves(&'c Channel),
     /// Each by itself.
@@ -144,7 +144,7 @@ impl<'c> Scanned<'c> {
     ) -> Scanned<'c> {
         let steps = members.iter().all(|m| matches!(m.since, Some(Since::Dwell(_))));
         if let Some(first) = times.order.first().filter(|_| steps) {
-            return Scanned::Steps(family.clone().since(Since::Dwell(*first)));
+            return Scanned::Steps(family.clone().since(Since::Dwell(*first)).into());
         }
         let joint = family.target.map(|j| format!("joint{}", j + 1));
         let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
@@ -154,7 +154,7 @@ impl<'c> Scanned<'c> {
     /// The effects whose columns say what those of all members are.
     fn like<'m>(&'m self, members: &'m [EffectSpec]) -> impl Iterator<Item = EffectSpec> + use<'m> {
         let own = match self {
-            Scanned::Steps(always) => std::slice::from_ref(always),
+            Scanned::Steps(always) => std::slice::from_ref(always.as_ref()),
             Scanned::Waves(_) => &members[..members.len().min(1)],
             Scanned::Alone => &[],
         };

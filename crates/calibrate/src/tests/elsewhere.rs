@@ -27,7 +27,8 @@ impl Elsewhere for Shards<'_> {
             self.open.lock().unwrap().insert(key, request.clone());
             return Err(CalibrateError::Unanswered);
         };
-        Ok(answers.iter().map(|bytes| rmp_serde::from_slice(bytes).unwrap()).collect())
+        let told = answers.iter().map(|bytes| rmp_serde::from_slice(bytes));
+        told.collect::<Result<_, _>>().map_err(|e| CalibrateError::Elsewhere(e.to_string()))
     }
 
     fn found(&self, key: &[u8]) -> Option<Vec<f64>> {
@@ -181,6 +182,42 @@ fn effects_that_remember_where_the_joints_came_from_too() {
     let effects: Vec<EffectSpec> = vec![EffectSpec::new("backlash").at(1)];
     let pool = model.with_effects(&effects, &Session::of(&observations)).unwrap();
     compare(&pool, &observations, &FitConfig::default(), &HoldoutConfig::RecordingFolds { k: 2 }, 2);
+}
+
+#[test]
+fn damaged_answers_end_in_an_error_or_in_numbers() {
+    let (model, _, observations) = days(&[22, 9, 12], 3, &["joint2.theta"]);
+    let (config, holdout) = (FitConfig::default(), HoldoutConfig::None);
+    let seen: Vec<Observation> = observations.iter().map(light).collect();
+    let (open, settled) = Default::default();
+    let (answered, of) = (BTreeMap::new(), 2);
+    let mut shards =
+        Shards { model: &model, observations: &observations, config: &config, of, answered, open, settled };
+    let fit = |shards: &Shards<'_>| calibrate_elsewhere(&model, &seen, &config, &holdout, shards);
+    while let Err(CalibrateError::Unanswered) = fit(&shards) {
+        assert!(shards.answer(), "nothing is asked");
+    }
+    let keys: Vec<Vec<u8>> = shards.answered.keys().cloned().collect();
+    let (mut refused, mut other) = (0, 0);
+    for k in 0..400 {
+        let key = &keys[k % keys.len()];
+        let sound = shards.answered[key].clone();
+        let mut damaged = sound.clone();
+        let bytes = &mut damaged[k % sound.len()];
+        // Most of what is not a number stands in front.
+        let at = if k % 2 == 0 { k % bytes.len().min(160) } else { (k * 7919) % bytes.len() };
+        bytes[at] ^= 1 << (k % 8);
+        shards.answered.insert(key.clone(), damaged);
+        shards.settled.lock().unwrap().clear();
+        match fit(&shards) {
+            Err(CalibrateError::Elsewhere(_) | CalibrateError::Unreachable(_)) => refused += 1,
+            _ => other += 1,
+        }
+        shards.open.lock().unwrap().clear();
+        shards.answered.insert(key.clone(), sound);
+    }
+    assert!(refused > 50 && other > 50, "{refused} refused, {other} read");
+    assert!(fit(&shards).is_ok(), "what is sound again");
 }
 
 #[test]

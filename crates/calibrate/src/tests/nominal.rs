@@ -1,3 +1,7 @@
+//! Is the nominal arm carried from one calibration to another the one that would have been found?
+
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use super::of_turns;
 use crate::tests::rig;
 use crate::{FitConfig, HoldoutConfig, calibrate, calibrate_beside};
