@@ -59,6 +59,9 @@ mod missing_effect;
 /// Does a change of the code move a number that it is not meant to move?
 mod goldens;
 
+/// Does `summary.json` keep every field that programs read?
+mod summary_contract;
+
 /// Is nobody told that nothing is missing where a number of the pipeline, model or board is wrong?
 mod verdict_law;
 
