@@ -22,7 +22,9 @@ use crate::model_problem::{
 use crate::noise::expected_norm_m;
 use crate::nominal::{self, Nominal};
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
+use crate::poses::measured_together;
 use crate::priors::scales_of;
+use crate::remembered::{Looked, look};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
@@ -30,6 +32,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Calibrates `model` on `observations` and judges it on those held out.
 pub fn calibrate(
@@ -102,7 +106,11 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     }
     let last = judge.turn((&[], judge.nominal.of_all.as_ref()), None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
-    let near = (judge.config.objective != Objective::Paper).then_some(&last);
+    let near = match judge.config.objective {
+        Objective::Paper => None,
+        _ => Some((&last, judge.look(&last, holdout.turns.len())?)),
+    };
+    let near = near.as_ref().map(|(last, looked)| (*last, looked.as_deref()));
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
     let turns: Vec<Result<Turn, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
@@ -226,11 +234,14 @@ impl Judge<'_> {
     fn turn(
         &self,
         (held, nominal): (&[usize], Option<&Vec<f64>>),
-        near: Option<&Turn>,
+        near: Option<(&Turn, Option<&Looked>)>,
     ) -> Result<Turn, CalibrateError> {
-        let side = |is_held: bool| {
+        let places = |is_held: bool| -> Vec<usize> {
             let all = 0..self.observations.len();
-            let places: Vec<usize> = all.filter(|i| held.binary_search(i).is_ok() == is_held).collect();
+            all.filter(|i| held.binary_search(i).is_ok() == is_held).collect()
+        };
+        let side = |is_held: bool| {
+            let places = places(is_held);
             let chosen = places.iter().map(|&i| &self.observations[i]);
             match self.elsewhere {
                 None => ModelProblem::new(self.model, chosen, self.config),
@@ -245,12 +256,16 @@ impl Judge<'_> {
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
         let mut nominal_values = match (nominal, near) {
             (Some(known), _) => known.clone(),
-            (None, Some(near)) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
+            (None, Some((near, _))) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
             (None, None) => frames::fit_on(&train, self.config)?,
         };
         let free = |p: &Parameter| p.free && !of_unseen(p);
-        let mut fit = match near.map(|near| self.near(&near.fit, &nominal_values, &of_unseen)) {
-            Some(near) => fit_near(&train, &near, &free, self.config)?,
+        let mut fit = match near {
+            Some((near, looked)) => {
+                let looked = looked.and_then(|looked| self.looked_at(looked, &places(false), &train));
+                let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
+                fit_near(&train, near, &free, self.config)?
+            }
             None => fit_problem(&train, &nominal_values, &free, self.config)?,
         };
         let mut warnings = Vec::new();
@@ -319,7 +334,27 @@ impl Judge<'_> {
         let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
         let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
         let prior_scales = scales_of(fit, self.model.parameters());
-        Near { values, sigma_scale: fit.sigma_scale, prior_scales }
+        Near { values, sigma_scale: fit.sigma_scale, prior_scales, looked: None }
+    }
+
+    /// All observations where the fit to them ended, for several turns that begin there.
+    fn look(&self, last: &Turn, turns: usize) -> Result<Option<Arc<Looked>>, CalibrateError> {
+        if turns < 2 || self.elsewhere.is_some() {
+            return Ok(None);
+        }
+        let problem = ModelProblem::new(self.model, self.observations, self.config)?;
+        look(&problem, &last.values, &|p| p.free, self.config).map(Some)
+    }
+
+    /// What is known of all observations, of a problem with those at these places; none where its blocks are others.
+    fn looked_at(&self, all: &Looked, places: &[usize], train: &ModelProblem<'_>) -> Option<Looked> {
+        let blocks = measured_together(self.observations);
+        let of = |run: &Range<usize>| {
+            let block = blocks.binary_search_by_key(&places[run.start], |block| block.start).ok()?;
+            (blocks[block].len() == run.len()).then_some(block)
+        };
+        let same: Option<Vec<usize>> = train.runs().iter().map(of).collect();
+        same.map(|same| all.of(&same))
     }
 
     /// Estimated frames (and what else a recording of a pool has for itself, unless it was measured) that `test` says

@@ -55,6 +55,10 @@ pub struct FitConfig {
     /// Mean error [m] of the nominal arm, its frames placed, above which a fit is given up; not set by files, default: none.
     #[serde(skip)]
     pub give_up_above_m: Option<f64>,
+    /// Whether the last step of a fit is evaluated however small it is, as it is where observations are elsewhere: then both
+    /// ways end at the same bits. Not set by files, default: false.
+    #[serde(skip)]
+    pub every_step: bool,
 }
 
 impl Default for FitConfig {
@@ -69,6 +73,7 @@ impl Default for FitConfig {
             average_accuracy_mm: None,
             max_iterations: 200,
             give_up_above_m: None,
+            every_step: false,
         }
     }
 }

@@ -6,6 +6,7 @@ use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
 use crate::priors::PriorScales;
 use crate::problem::Problem;
+use crate::remembered::{Looked, Remembered};
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Cost as _, Settings};
 use crate::statistics::{self, Uncertainty};
@@ -50,7 +51,7 @@ pub fn fit_problem(
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
-    fit_from(problem, start, None, free, config)
+    fit_from(&Remembered::new(problem, None), start, None, free, config)
 }
 
 /// [`fit_problem`] from where another fit ended, at the scales it found: the same minimum in a few steps when most of the
@@ -58,11 +59,28 @@ pub fn fit_problem(
 /// eq. 4, which ends anywhere within its limit, so that the start is part of the answer.
 pub(crate) fn fit_near(
     problem: &dyn Problem,
-    near: &Near,
+    mut near: Near,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
-    fit_from(problem, &near.values, Some(near), free, config)
+    let problem = Remembered::new(problem, near.looked.take());
+    fit_from(&problem, &near.values, Some(&near), free, config)
+}
+
+/// The parameters where a fit from these ends: what is asked of [`fit_problem`] where nobody asks how sure they are. Priors are
+/// those of the problem.
+pub fn fitted_values(
+    problem: &dyn Problem,
+    start: &[f64],
+    config: &FitConfig,
+) -> Result<Vec<f64>, CalibrateError> {
+    config.check()?;
+    let free = &|p: &Parameter| p.free;
+    let white = Whitened::new(Box::new(problem), start, free, config)?;
+    enough_equations(&white)?;
+    let solved = solve(&white, None, config)?;
+    let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
+    Ok(white.parameters_at(&solved.at.x))
 }
 
 /// Where another fit ended.
@@ -73,6 +91,8 @@ pub(crate) struct Near {
     pub sigma_scale: f64,
     /// Scales of the priors that it learnt.
     pub prior_scales: PriorScales,
+    /// The problem there, where it is known.
+    pub looked: Option<Looked>,
 }
 
 fn fit_from(

@@ -1,11 +1,12 @@
 //! The fit as linear algebra: whitened residuals and derivatives at given parameters, for whoever judges a fit.
 
 use crate::model_problem::ModelProblem;
-use crate::whitened::Whitened;
+use crate::whitened::{Axis, Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
-use armcal_core::Observation;
+use armcal_core::{Observation, Parameter};
 use armcal_model::Model;
 use nalgebra::{DMatrix, DVector, Matrix3xX};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// A model linearised at given parameters, in units of noise and prior.
@@ -64,22 +65,49 @@ pub fn linearise(
     let runs = problem.runs().to_vec();
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
     let at = white.at(white.start(), None)?;
-    let axis = |(a, x): (&crate::whitened::Axis, &f64)| LinearAxis {
-        index: a.index,
-        scale: a.scale,
-        precision: a.precision,
-        offset: *x,
-    };
     let pose = |(observations, whitener): (Range<usize>, DMatrix<f64>)| {
         let rows = rows[observations.start].start..rows[observations.end - 1].end;
         LinearPose { observations, rows, whitener }
     };
     Ok(Linearisation {
-        axes: white.axes.iter().zip(at.x.iter()).map(axis).collect(),
+        axes: axes(&white, &at),
         to_metres,
         jacobian: white.jacobian(&at),
         residual: at.residual,
         poses: runs.into_iter().zip(white.into_whitener()).map(pose).collect(),
         rows,
     })
+}
+
+fn axes(white: &Whitened<'_>, at: &Point) -> Vec<LinearAxis> {
+    let axis = |(a, x): (&Axis, &f64)| LinearAxis {
+        index: a.index,
+        scale: a.scale,
+        precision: a.precision,
+        offset: *x,
+    };
+    white.axes.iter().zip(at.x.iter()).map(axis).collect()
+}
+
+/// Of a model that is longer than one that was linearised on the same observations, at the same values and in the same noise:
+/// the free parameters behind the first `known`, and the derivatives by them.
+pub fn linearise_more(
+    shorter: &Linearisation,
+    model: &Model,
+    observations: &[Observation],
+    (values, known): (&[f64], usize),
+    config: &FitConfig,
+) -> Result<(Vec<LinearAxis>, DMatrix<f64>), CalibrateError> {
+    let config = &FitConfig { objective: Objective::Robust, ..config.clone() };
+    let more: BTreeSet<&str> =
+        model.parameters()[known..].iter().filter(|p| p.free).map(|p| p.name.as_str()).collect();
+    if more.is_empty() {
+        return Ok((Vec::new(), DMatrix::zeros(shorter.residual.len(), 0)));
+    }
+    let problem = ModelProblem::new(model, observations, config)?;
+    let whitener = shorter.poses.iter().map(|pose| pose.whitener.clone()).collect();
+    let free = |p: &Parameter| more.contains(p.name.as_str());
+    let white = Whitened::in_noise(Box::new(problem), values, &free, whitener, config)?;
+    let at = white.at(white.start(), None)?;
+    Ok((axes(&white, &at), white.jacobian(&at)))
 }

@@ -13,6 +13,7 @@ use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Observation, Parameter};
 use armcal_model::{Asked, Model, ModelResidual};
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Step of the central difference that turns joint noise into orientation noise [rad]. It feeds a covariance, not
@@ -316,7 +317,7 @@ impl Problem for ModelProblem<'_> {
         let mut of = |o: &Observation, residual: ModelResidual, jacobian: DMatrix<f64>| {
             parts.push(self.used(o, (residual, jacobian)));
             if parts.len() == self.blocks[block].len() {
-                each(block, stacked(std::mem::take(&mut parts)));
+                each(block, Cow::Owned(stacked(std::mem::take(&mut parts))));
                 block += 1;
             }
         };

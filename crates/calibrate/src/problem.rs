@@ -5,13 +5,14 @@ use crate::elsewhere::Away;
 use armcal_core::Parameter;
 use armcal_model::Asked;
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Residual rows and their derivative, one column a parameter.
 pub type Linearised = (DVector<f64>, DMatrix<f64>);
 
 /// What is told of one block after the other: its number, and its rows.
-pub type Told<'a> = dyn FnMut(usize, Linearised) + 'a;
+pub type Told<'a> = dyn FnMut(usize, Cow<'_, Linearised>) + 'a;
 
 /// A motion of the parameters that no observation of a problem can ever see.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +62,7 @@ pub trait Problem: Sync {
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised;
     /// Calls `each` with [`Problem::linearised`] of these blocks, in order; columns that are not `asked` for may be zero.
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], _asked: &Asked<'_>, each: &mut Told<'_>) {
-        blocks.for_each(|block| each(block, self.linearised(block, p)));
+        blocks.for_each(|block| each(block, Cow::Owned(self.linearised(block, p))));
     }
     /// Covariance of the rows of a block at parameters `p`: measurement and propagated encoder noise.
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64>;

@@ -25,17 +25,20 @@ pub(crate) struct RobustCost<'a, 'p> {
     /// Whether the curvature of the loss is exact (fast near the minimum) or that of iteratively reweighted least
     /// squares (never too small, hence no overshooting far away).
     pub exact_curvature: bool,
+    /// As [`Cost::ends_straight`].
+    pub ends_straight: bool,
 }
 
 impl<'a, 'p> RobustCost<'a, 'p> {
     pub fn new(white: &'a Whitened<'p>, config: &FitConfig, sigma_scale: f64) -> RobustCost<'a, 'p> {
         let huber_c = (config.objective == Objective::Robust).then_some(config.huber_c);
-        RobustCost { white, huber_c, sigma_scale, exact_curvature: true }
+        let ends_straight = !config.every_step && white.problem.elsewhere().is_none();
+        RobustCost { white, huber_c, sigma_scale, exact_curvature: true, ends_straight }
     }
 
     pub fn weighted(white: &'a Whitened<'p>, by: Weighting) -> RobustCost<'a, 'p> {
         let Weighting { huber_c, sigma_scale, exact_curvature } = by;
-        RobustCost { white, huber_c, sigma_scale, exact_curvature }
+        RobustCost { white, huber_c, sigma_scale, exact_curvature, ends_straight: false }
     }
 
     /// How residuals weigh in it.
@@ -63,6 +66,14 @@ impl<'a, 'p> RobustCost<'a, 'p> {
 impl Cost for RobustCost<'_, '_> {
     fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
         self.white.at(x, Some(self.weighting()))
+    }
+
+    fn ends_straight(&self) -> bool {
+        self.ends_straight
+    }
+
+    fn moved(&self, at: Point, x: DVector<f64>) -> Point {
+        self.white.moved(at, x)
     }
 
     fn value(&self, at: &Point) -> f64 {

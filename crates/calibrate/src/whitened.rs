@@ -46,6 +46,11 @@ impl Axis {
     pub fn scaled(index: usize, scale: f64) -> Axis {
         Axis { index, centre: 0.0, scale, precision: 0.0, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
     }
+
+    /// A value in its units, within the bounds.
+    fn at(&self, value: f64) -> f64 {
+        ((value - self.centre) / self.scale).max(self.lower).min(self.upper)
+    }
 }
 
 /// A [`Problem`] whitened at its start values, over its free parameters.
@@ -84,22 +89,23 @@ impl<'a> Whitened<'a> {
         free: &dyn Fn(&Parameter) -> bool,
         config: &FitConfig,
     ) -> Result<Whitened<'a>, CalibrateError> {
-        if problem.blocks() == 0 {
-            return Err(CalibrateError::NoObservations { context: String::new() });
-        }
-        let mut axes = Vec::new();
-        for (index, parameter) in problem.parameters().iter().enumerate().filter(|(_, p)| free(p)) {
-            axes.push(axis(index, parameter, start[index], config)?);
-        }
-        if axes.is_empty() {
-            return Err(CalibrateError::NothingFree);
-        }
-        let mut start = start.to_vec();
-        for a in &axes {
-            start[a.index] = a.centre + a.scale * clamp((start[a.index] - a.centre) / a.scale, a);
-        }
+        let (axes, start) = axes_and_start(problem.as_ref(), start, free, config)?;
         let structure = Structure::of(problem.as_ref(), &axes);
         Whitened::over(problem, axes, start, structure)
+    }
+
+    /// The same where the inverse Cholesky factor of each block's covariance is known.
+    pub fn in_noise(
+        problem: Box<dyn Problem + 'a>,
+        start: &[f64],
+        free: &dyn Fn(&Parameter) -> bool,
+        whitener: Vec<DMatrix<f64>>,
+        config: &FitConfig,
+    ) -> Result<Whitened<'a>, CalibrateError> {
+        let (axes, start) = axes_and_start(problem.as_ref(), start, free, config)?;
+        let structure = Structure::of(problem.as_ref(), &axes);
+        let rows: Vec<usize> = whitener.iter().map(DMatrix::nrows).collect();
+        Ok(Whitened { offsets: offsets(&rows), problem, axes, start, whitener, structure: structure.into() })
     }
 
     /// The same over these axes, whose start is within their bounds.
@@ -120,9 +126,7 @@ impl<'a> Whitened<'a> {
             Some(away) => away.rows.clone(),
             None => whitener.iter().map(DMatrix::nrows).collect(),
         };
-        let mut offsets = vec![0];
-        rows.iter().for_each(|rows| offsets.push(offsets[offsets.len() - 1] + rows));
-        Ok(Whitened { problem, axes, start, whitener, offsets, structure: structure.into() })
+        Ok(Whitened { offsets: offsets(&rows), problem, axes, start, whitener, structure: structure.into() })
     }
 
     /// Inverse Cholesky factor of each block's covariance.
@@ -145,19 +149,18 @@ impl<'a> Whitened<'a> {
 
     /// Start in units of x, within the bounds.
     pub fn start(&self) -> DVector<f64> {
-        DVector::from_iterator(
-            self.axes.len(),
-            self.axes.iter().map(|a| clamp((self.start[a.index] - a.centre) / a.scale, a)),
-        )
+        DVector::from_iterator(self.axes.len(), self.axes.iter().map(|a| a.at(self.start[a.index])))
     }
 
     /// Full parameter vector at x.
     pub fn parameters_at(&self, x: &DVector<f64>) -> Vec<f64> {
         let mut p = self.start.clone();
         for (a, x) in self.axes.iter().zip(x.iter()) {
-            // A bound is met exactly, not to rounding.
+            // The start and a bound are met exactly, not to rounding.
             let parameter = &self.problem.parameters()[a.index];
-            p[a.index] = if *x <= a.lower {
+            p[a.index] = if *x == a.at(self.start[a.index]) {
+                self.start[a.index]
+            } else if *x <= a.lower {
                 parameter.lower
             } else if *x >= a.upper {
                 parameter.upper
@@ -183,11 +186,27 @@ impl<'a> Whitened<'a> {
     pub fn at_parameters(&self, x: DVector<f64>, p: &[f64]) -> Result<Point, CalibrateError> {
         let groups = self.each_group(|group| self.linearised_group(p, group));
         let groups = groups.into_iter().collect::<Result<Vec<_>, _>>()?;
+        Ok(self.point(x, groups))
+    }
+
+    /// A point with these rows.
+    fn point(&self, x: DVector<f64>, groups: Vec<Linearised>) -> Point {
         let rows = groups.iter().flat_map(|(residual, _)| residual.iter().copied());
         let residual = DVector::from_iterator(self.rows(), rows);
         let norm = |block| residual.rows(self.offsets[block], self.dimension(block)).norm();
         let norms = (0..self.blocks()).map(norm).collect();
-        Ok(Point { x, norms, residual, groups, parts: None })
+        Point { x, norms, residual, groups, parts: None }
+    }
+
+    /// A point moved to x along its linearisation.
+    pub fn moved(&self, at: Point, x: DVector<f64>) -> Point {
+        let step = &x - &at.x;
+        let mut groups = at.groups;
+        for (group, (residual, jacobian)) in groups.iter_mut().enumerate() {
+            let own = self.structure.axes(group).map(|axis| step[axis]);
+            *residual += &*jacobian * DVector::from_iterator(jacobian.ncols(), own);
+        }
+        self.point(x, groups)
     }
 
     /// Something of every group of blocks, in their order.
@@ -252,7 +271,7 @@ impl<'a> Whitened<'a> {
         // Of a pool a group knows few of all parameters.
         let asked = |column: usize| at_group.columns.contains(&Some(column));
         let mut done = Ok(());
-        let mut put = |block: usize, (raw, full): Linearised| {
+        let mut put = |block: usize, (raw, full): &Linearised| {
             self.finite(block, raw.as_slice(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
@@ -271,7 +290,7 @@ impl<'a> Whitened<'a> {
         };
         self.problem.linearised_each(at_group.blocks.clone(), p, &asked, &mut |block, linearised| {
             if done.is_ok() {
-                done = put(block, linearised);
+                done = put(block, &linearised);
             }
         });
         done?;
@@ -291,6 +310,41 @@ impl<'a> Whitened<'a> {
             joint_rad: self.problem.joint_rad(block).to_vec(),
         }
     }
+}
+
+/// The free axes of a problem, and all its parameters at the start, those within their bounds.
+fn axes_and_start(
+    problem: &dyn Problem,
+    start: &[f64],
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<(Vec<Axis>, Vec<f64>), CalibrateError> {
+    if problem.blocks() == 0 {
+        return Err(CalibrateError::NoObservations { context: String::new() });
+    }
+    let mut axes = Vec::new();
+    for (index, parameter) in problem.parameters().iter().enumerate().filter(|(_, p)| free(p)) {
+        axes.push(axis(index, parameter, start[index], config)?);
+    }
+    if axes.is_empty() {
+        return Err(CalibrateError::NothingFree);
+    }
+    let mut start = start.to_vec();
+    for a in &axes {
+        // Unless it is beyond a bound, exactly as it is.
+        let x = a.at(start[a.index]);
+        if x <= a.lower || x >= a.upper {
+            start[a.index] = a.centre + a.scale * x;
+        }
+    }
+    Ok((axes, start))
+}
+
+/// First row of each block, and one past the last.
+fn offsets(rows: &[usize]) -> Vec<usize> {
+    let mut offsets = vec![0];
+    rows.iter().for_each(|rows| offsets.push(offsets[offsets.len() - 1] + rows));
+    offsets
 }
 
 /// Without a branch for each value: nearly always the answer is yes.
@@ -364,10 +418,6 @@ fn axis(index: usize, parameter: &Parameter, start: f64, config: &FitConfig) -> 
     };
     let to_x = |value: f64| (value - centre) / scale;
     Ok(Axis { index, centre, scale, precision, lower: to_x(lower), upper: to_x(upper) })
-}
-
-fn clamp(x: f64, axis: &Axis) -> f64 {
-    x.max(axis.lower).min(axis.upper)
 }
 
 fn inverse_cholesky(covariance: DMatrix<f64>) -> Option<DMatrix<f64>> {

@@ -7,7 +7,7 @@
 //! geometry (Brynjarsdottir and O'Hagan 2014 on why it must be).
 
 use crate::config::DiagnosisConfig;
-use crate::drivers::{Driver, DriverKind, moments, standardised_joints, varies};
+use crate::drivers::{Driver, DriverKind, drivers, moments, standardised_joints, varies};
 use crate::problem::{Columns, Problem};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -69,33 +69,55 @@ pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisCon
     all
 }
 
-/// Smooth discrepancies over poses, directions, time, recordings and load.
-pub(crate) fn discrepancies(problem: &Problem, config: &DiagnosisConfig) -> Vec<Unlisted> {
-    let n = problem.dwells.len();
+/// What the unlisted may depend on: the same in all problems that differ in what is fitted alone.
+#[derive(Debug)]
+pub(crate) struct Dependences {
+    /// Drivers of the cells.
+    pub drivers: Vec<Driver>,
+    /// Of each kind of smooth discrepancy its functions at the dwells.
+    smooth: Vec<(&'static str, Arc<DMatrix<f64>>)>,
+}
+
+impl Dependences {
+    /// Of the dwells of a problem.
+    pub fn of(problem: &Problem) -> Dependences {
+        Dependences { drivers: drivers(problem), smooth: smooth(problem) }
+    }
+}
+
+/// Smooth discrepancies over poses, directions, time, recordings and load: displacements that depend on them alone.
+pub(crate) fn discrepancies(
+    problem: &Problem,
+    dependences: &Dependences,
+    config: &DiagnosisConfig,
+) -> Vec<Unlisted> {
     let base = world_axes(problem);
+    let size = config.unlisted_effect_mm * 1e-3 / 3f64.sqrt();
+    let of = |(name, functions): &(&str, Arc<DMatrix<f64>>)| Unlisted {
+        channel: None,
+        driver: None,
+        name: format!("displacement <- {name}"),
+        driver_name: (*name).to_owned(),
+        columns: Columns::Product { base: base.clone(), basis: functions.clone(), size },
+        unit_si: size,
+    };
+    dependences.smooth.iter().map(of).collect()
+}
+
+/// The functions of each kind at the dwells.
+fn smooth(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
+    let n = problem.dwells.len();
     let pose = pose_kernel(problem);
     let time: Vec<f64> = problem.dwells.iter().map(|d| d.time_s).collect();
     let load: Vec<f64> = problem.dwells.iter().map(|d| d.load_kg).collect();
     let span = time.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - time.iter().copied().fold(f64::INFINITY, f64::min);
     let mut all = Vec::new();
-    let mut add = |name: &str, kernel: &dyn Fn(usize, usize) -> f64| {
+    let mut add = |name: &'static str, kernel: &dyn Fn(usize, usize) -> f64| {
         let functions = low_rank(n, kernel);
-        if functions.ncols() == 0 {
-            return;
+        if functions.ncols() > 0 {
+            all.push((name, Arc::new(functions)));
         }
-        all.push(Unlisted {
-            channel: None,
-            driver: None,
-            name: format!("displacement <- {name}"),
-            driver_name: name.to_string(),
-            columns: Columns::Product {
-                base: base.clone(),
-                basis: Arc::new(functions),
-                size: config.unlisted_effect_mm * 1e-3 / 3f64.sqrt(),
-            },
-            unit_si: config.unlisted_effect_mm * 1e-3 / 3f64.sqrt(),
-        });
     };
     add("pose", &|i, j| pose(i, j));
     let moving: Vec<usize> = (0..problem.joints())

@@ -10,6 +10,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Columns are a product where no more than this share of their length is not.
+const PROPORTIONAL: f64 = 1e-9;
+
 /// Functions at the dwells: dwells x m.
 pub(crate) type Functions<'c> = Cow<'c, DMatrix<f64>>;
 
@@ -99,6 +102,28 @@ impl Columns {
                 Some((base, Cow::Owned(DMatrix::from_iterator(places.len(), 1, on))))
             }
         }
+    }
+
+    /// The same as a product with `base`, one column, where each of these is that times something in every dwell (`rows`).
+    pub(crate) fn factored(&self, base: &Arc<DMatrix<f64>>, rows: &[Range<usize>]) -> Option<Columns> {
+        let (Columns::Dense(own), 1) = (self, base.ncols()) else { return None };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let base_rows = base.as_slice();
+        let mut basis = DMatrix::zeros(rows.len(), own.ncols());
+        for (k, column) in own.as_slice().chunks_exact(own.nrows().max(1)).enumerate() {
+            let mut left = 0.0;
+            for (i, rows) in rows.iter().enumerate() {
+                let (x, b) = (&column[rows.clone()], &base_rows[rows.clone()]);
+                let square = dot(b, b);
+                let times = if square > 0.0 { dot(x, b) / square } else { 0.0 };
+                left += x.iter().zip(b).map(|(x, b)| (x - times * b).powi(2)).sum::<f64>();
+                basis[(i, k)] = times;
+            }
+            if left > (PROPORTIONAL * PROPORTIONAL) * dot(column, column) {
+                return None;
+            }
+        }
+        Some(Columns::Product { base: base.clone(), basis: basis.into(), size: 1.0 })
     }
 
     /// The functions of many terms, those that have any. Of waves over one angle at even steps each is the one before it

@@ -1,9 +1,11 @@
 //! What cannot be told apart (notes 3 and 4.12, formula 10), and what the data could not have shown (4.1).
 
-use crate::projection::{Gram, Projection, eigen};
+use crate::evidence::Metric;
+use crate::projection::{Gram, eigen};
 use crate::special::{Z_80, Z_975};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal};
+use std::ops::Range;
 
 /// What one candidate looks like in the projected space, before it is added.
 #[derive(Debug, Clone)]
@@ -51,23 +53,80 @@ pub(crate) struct Likeness {
     pub delta: f64,
 }
 
-/// Compares `k` at coefficients `theta` with everything `l` can do, both projected.
-pub(crate) fn likeness(
-    projection: &Projection,
-    k: &DMatrix<f64>,
-    theta: &DVector<f64>,
-    l: &DMatrix<f64>,
-    variance: f64,
-) -> Likeness {
-    let signature = DMatrix::from_column_slice(k.nrows(), 1, (k * theta).as_slice());
-    let power = projection.cross(&signature, &signature)[(0, 0)].max(0.0);
-    let cross = projection.cross(l, &signature);
-    let gram = projection.gram(l);
-    let (w, v) = eigen(&gram.a, gram.raw.max());
-    let t = v.tr_mul(&cross);
-    let shared: f64 = w.iter().zip(t.iter()).filter(|(w, _)| **w > 0.0).map(|(w, t)| t * t / w).sum();
-    if power <= 0.0 {
-        return Likeness { cosine: 1.0, delta: 0.0 };
+/// What columns can make in the projected space: the eigenvalues and eigenvectors of their products.
+#[derive(Debug, Clone)]
+pub(crate) struct Reach(DVector<f64>, DMatrix<f64>);
+
+impl Reach {
+    /// Of columns, by their products.
+    pub fn of(gram: &Gram) -> Reach {
+        let (w, v) = eigen(&gram.a, gram.raw.max());
+        Reach(w, v)
     }
-    Likeness { cosine: (shared / power).clamp(0.0, 1.0).sqrt(), delta: (power - shared).max(0.0) / variance }
+
+    /// How near these columns come to a signature of this squared length, given their products with it, both projected.
+    pub fn likeness(&self, power: f64, cross: &DVector<f64>, variance: f64) -> Likeness {
+        if power <= 0.0 {
+            return Likeness { cosine: 1.0, delta: 0.0 };
+        }
+        let Reach(w, v) = self;
+        let t = v.tr_mul(cross);
+        let shared: f64 = w.iter().zip(t.iter()).filter(|(w, _)| **w > 0.0).map(|(w, t)| t * t / w).sum();
+        Likeness {
+            cosine: (shared / power).clamp(0.0, 1.0).sqrt(),
+            delta: (power - shared).max(0.0) / variance,
+        }
+    }
+}
+
+/// Several sets of columns under one noise, and their products with each other.
+#[derive(Debug, Clone)]
+pub(crate) struct Crossed {
+    /// The columns of each set among all.
+    sets: Vec<Range<usize>>,
+    /// Products of all columns.
+    all: Gram,
+    reach: Vec<Reach>,
+}
+
+impl Crossed {
+    /// Of columns in the units of the weighing.
+    pub fn of(columns: &[DMatrix<f64>], metric: &Metric) -> Crossed {
+        let rows = columns.first().map_or(0, DMatrix::nrows);
+        let mut stacked = DMatrix::zeros(rows, columns.iter().map(DMatrix::ncols).sum());
+        let mut sets = Vec::with_capacity(columns.len());
+        let mut at = 0;
+        for own in columns {
+            stacked.columns_mut(at, own.ncols()).copy_from(own);
+            sets.push(at..at + own.ncols());
+            at += own.ncols();
+        }
+        let all = metric.projection.gram(&metric.whitened(stacked));
+        let mut crossed = Crossed { sets, all, reach: Vec::new() };
+        crossed.reach = (0..columns.len()).map(|k| Reach::of(&crossed.gram(k))).collect();
+        crossed
+    }
+
+    /// Products of one of them.
+    pub fn gram(&self, k: usize) -> Gram {
+        let Range { start, .. } = self.sets[k];
+        let m = self.sets[k].len();
+        Gram {
+            a: self.all.a.view((start, start), (m, m)).into_owned(),
+            g: self.all.g.rows(start, m).into_owned(),
+            raw: self.all.raw.rows(start, m).into_owned(),
+            spent: self.all.spent.columns(start, m).into_owned(),
+        }
+    }
+
+    /// Compares `k` at coefficients `theta` with everything `l` can do.
+    pub fn likeness(&self, k: usize, theta: &DVector<f64>, l: usize, variance: f64) -> Likeness {
+        let block = |l: usize| {
+            self.all
+                .a
+                .view((self.sets[l].start, self.sets[k].start), (self.sets[l].len(), self.sets[k].len()))
+        };
+        let power = theta.dot(&(block(k) * theta)).max(0.0);
+        self.reach[l].likeness(power, &(block(l) * theta), variance)
+    }
 }

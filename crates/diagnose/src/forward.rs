@@ -315,11 +315,8 @@ fn drop_superseded(
     while steps.len() > 1 && k + 1 < steps.len() {
         let mut others: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         let own = others.remove(k);
-        let problem = rooms.bare(&others)?;
-        let white = &crate::evidence::metrics(&problem, 1.0, config)[0];
-        let Some(own) = listed(&problem, &own) else { break };
-        let gram = white.gram(&own.columns.dense(&problem.dwells, 1.0));
-        if white.ln_bayes(&gram, config) < config.margin_nats {
+        let Some(ln_bayes) = rooms.ln_bayes(&others, &own)? else { break };
+        if ln_bayes < config.margin_nats {
             steps.remove(k);
         } else {
             k += 1;
@@ -335,11 +332,6 @@ fn beats_a_cell(steps: &[Step], config: &DiagnosisConfig) -> bool {
     let together: f64 = steps[from..].iter().map(|s| s.ln_evidence).sum();
     let cost: f64 = steps[from + 1..].iter().map(|s| s.ln_prior.min(0.0)).sum();
     together + cost - steps[from].ln_cell >= config.margin_nats
-}
-
-/// A candidate as this problem has it.
-fn listed<'p>(problem: &'p Problem, candidate: &Candidate) -> Option<&'p Candidate> {
-    all_of(problem).find(|c| c.spec == candidate.spec)
 }
 
 fn all_of(problem: &Problem) -> impl Iterator<Item = &Candidate> {

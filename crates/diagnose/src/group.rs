@@ -25,14 +25,13 @@ const WEIGHED: usize = 12;
 const ONE_FREQUENCY: f64 = 0.5;
 
 /// The candidates, and for gears of one make all joints together: each joint alone may be hidden by the others.
-pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
+pub(crate) fn with_groups(mut all: Vec<Candidate>, dwells: &[DwellRow]) -> Vec<Candidate> {
     for family in OF_A_MAKE {
-        let members: Vec<&Candidate> =
-            all.iter().filter(|c| c.family == family && matches!(c.columns, Columns::Dense(_))).collect();
+        let members: Vec<&Candidate> = all.iter().filter(|c| c.family == family).collect();
         if members.len() < 2 {
             continue;
         }
-        let group = grouped(&members, &[]);
+        let group = grouped(&members, dwells);
         all.push(group);
     }
     all
@@ -108,7 +107,7 @@ fn frequency(point: &Candidate) -> Option<f64> {
     point.spec.split_once("frequency=")?.1.parse().ok()
 }
 
-/// All of them as one, each with amplitudes of its own; `dwells` serve those that are products.
+/// All of them as one, each with amplitudes of its own.
 fn grouped(members: &[&Candidate], dwells: &[DwellRow]) -> Candidate {
     let columns: Vec<DVector<f64>> = members
         .iter()

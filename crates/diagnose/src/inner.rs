@@ -1,7 +1,6 @@
 //! The inner room as one call: from a problem (and a way to refit it) to the whole diagnosis.
 
 use crate::config::DiagnosisConfig;
-use crate::confusion::likeness;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
     BeforeAfter, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
@@ -21,7 +20,7 @@ use crate::weigh::Weighed;
 use crate::{DiagnoseError, next, rivals};
 use armcal_core::{Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
-use nalgebra::DMatrix;
+use nalgebra::DVector;
 
 /// Noise this far above the declaration is worth a word.
 const SIGMA_RATIO: f64 = 1.4;
@@ -147,21 +146,16 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
 
 /// Pairs of testable entries whose signatures, at typical size, are the same.
 fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<[String; 2]> {
-    let projection = &weighed.metrics[0].projection;
-    let columns: Vec<DMatrix<f64>> =
-        weighed.entries.iter().map(|e| weighed.dense(&e.candidate.columns, problem)).collect();
+    let white = weighed.white(problem);
+    let width = |k: usize| weighed.entries[k].candidate.columns.len();
     let mut pairs = Vec::new();
-    for k in 0..columns.len() {
-        if weighed.entries[k].candidate.is_group()
-            || projection.gram(&columns[k]).a.trace() < config.min_delta
-        {
+    for k in 0..weighed.entries.len() {
+        if weighed.entries[k].candidate.is_group() || white.gram(k).a.trace() < config.min_delta {
             continue;
         }
-        let theta = nalgebra::DVector::from_element(columns[k].ncols(), 1.0);
-        for l in k + 1..columns.len() {
-            if columns[k].ncols() == columns[l].ncols()
-                && likeness(projection, &columns[k], &theta, &columns[l], 1.0).cosine > config.merge_cosine
-            {
+        let theta = DVector::from_element(width(k), 1.0);
+        for l in k + 1..weighed.entries.len() {
+            if width(k) == width(l) && white.likeness(k, &theta, l, 1.0).cosine > config.merge_cosine {
                 let name = |i: usize| weighed.entries[i].candidate.spec.clone();
                 pairs.push([name(k), name(l)]);
             }

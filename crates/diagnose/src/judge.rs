@@ -2,7 +2,7 @@
 
 use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
-use crate::confusion::{OneStep, half_width, likeness, one_step};
+use crate::confusion::{Crossed, OneStep, Reach, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
 use crate::crossval::{Group, by_place, by_recording, by_stretch, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
@@ -14,6 +14,7 @@ use crate::problem::{Amplitude, Columns, Problem, Scan};
 use crate::projection::Gram;
 use crate::weigh::Weighed;
 use nalgebra::DVector;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Dwells of a block when the noise has memory.
@@ -124,7 +125,7 @@ pub(crate) fn judge(
     config: &DiagnosisConfig,
 ) -> Judged {
     let projection = &weighed.metrics[0].projection;
-    let gram = projection.gram(&weighed.dense(&weighed.entries[entry].candidate.columns, problem));
+    let gram = weighed.white(problem).gram(entry);
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
@@ -233,12 +234,14 @@ fn answer(
     (entry, within_nats): (usize, f64),
     config: &DiagnosisConfig,
 ) -> Vec<usize> {
-    let projection = &metric.projection;
-    let white = |k: usize| metric.whitened(weighed.dense(&weighed.entries[k].candidate.columns, problem));
-    let own = white(entry);
-    let fitted = one_step(&projection.gram(&own), 1.0);
-    let score = fitted.estimate.dot(&projection.gram(&own).g);
-    let variance = projection.variance_without(score).max(1e-12);
+    let crossed: Cow<'_, Crossed> = match metric.noise {
+        Noise::White => Cow::Borrowed(weighed.white(problem)),
+        _ => Cow::Owned(weighed.crossed(metric, problem)),
+    };
+    let own = crossed.gram(entry);
+    let fitted = one_step(&own, 1.0);
+    let score = fitted.estimate.dot(&own.g);
+    let variance = metric.projection.variance_without(score).max(1e-12);
 
     let total = 1.0 - weighed.p_nothing;
     let mut order: Vec<(f64, Option<usize>)> =
@@ -254,7 +257,7 @@ fn answer(
         set.extend(who.filter(|k| *k != entry));
     }
     for k in (0..weighed.entries.len()).filter(|k| *k != entry) {
-        let like = likeness(projection, &own, &fitted.estimate, &white(k), variance);
+        let like = crossed.likeness(entry, &fitted.estimate, k, variance);
         // Alike to the eye is one answer only while the evidence is: where the noise is small, the data tell apart what
         // differs by little, down to the detail of a shape that no formula of the catalogue has exactly.
         let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
@@ -300,6 +303,8 @@ fn against_unlisted(
     let projection = &metric.projection;
     let own_ln = weighed.entries[entry].ln_evidence;
     let own = metric.whitened(weighed.dense(&weighed.entries[entry].candidate.columns, problem));
+    let of_own = projection.gram(&own);
+    let reach = Reach::of(&of_own);
     let mut told = Unlisted { margin: f64::INFINITY, p_other: 0.0, p_same: 0.0, best_other: 0.0 };
     for u in &weighed.unlisted {
         let close = u.ln_evidence > own_ln - config.margin_nats;
@@ -312,7 +317,11 @@ fn against_unlisted(
         let gram = projection.gram(&columns);
         let a = best_amplitude(&gram, projection.rss, projection.dof(), config);
         let (theta, _) = coefficients(&gram, a);
-        let cosine = likeness(projection, &columns, &theta, &own, 1.0).cosine;
+        let signature = columns * &theta;
+        let spent = &gram.spent * &theta;
+        let cross = own.tr_mul(&signature) - of_own.spent.tr_mul(&spent);
+        let power = (signature.norm_squared() - spent.norm_squared()).max(0.0);
+        let cosine = reach.likeness(power, &cross, 1.0).cosine;
         let same = cosine > config.merge_cosine;
         let asked = if same { 0.0 } else { config.margin_nats };
         let detail = 1.0 - cosine * cosine <= config.leftover_share;

@@ -9,10 +9,11 @@ use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{
-    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fit_problem, gram, linearise,
+    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram, linearise,
 };
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 /// A calibrated model, and what it was calibrated with.
@@ -37,7 +38,8 @@ impl Calibrated<'_> {
     pub(crate) fn with(&self, effects: Vec<EffectSpec>) -> Option<Refitted> {
         let model = self.model.with_effects(&effects, self.session).ok()?;
         let beside = Some(self.calibration);
-        let calibration = calibrate_beside(beside, &model, self.observations, self.fit, self.holdout).ok()?;
+        let calibration =
+            { calibrate_beside(beside, &model, self.observations, self.fit, self.holdout) }.ok()?;
         Some(Refitted { effects, model, calibration, warnings: Vec::new() })
     }
 }
@@ -60,6 +62,7 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         last: None,
         sizes: BTreeMap::new(),
         knowledge: Knowledge::of(config, joint_names)?,
+        products: RefCell::default(),
     };
     let mut diagnosis = diagnose_problem(&mut refit, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
@@ -106,6 +109,7 @@ struct ModelRefit<'a> {
     /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
     sizes: BTreeMap<String, Option<f64>>,
     knowledge: Knowledge,
+    products: RefCell<BTreeMap<String, Candidate>>,
 }
 
 impl ModelRefit<'_> {
@@ -120,7 +124,7 @@ impl ModelRefit<'_> {
         values.extend(&model.nominal()[values.len()..]);
         if !specs.is_empty() {
             let problem = ModelProblem::new(&model, self.observations, self.fit)?;
-            values = fit_problem(&problem, &values, &|p| p.free, self.fit)?.values();
+            values = fitted_values(&problem, &values, self.fit)?;
         }
         self.fits.insert(names.to_vec(), (model.clone(), values.clone()));
         Ok((model, values))
@@ -135,6 +139,7 @@ impl ModelRefit<'_> {
             fit: self.fit,
             sizes: &self.sizes,
             knowledge: &self.knowledge,
+            products: &self.products,
         }
     }
 }
@@ -149,6 +154,11 @@ impl Refit for ModelRefit<'_> {
         let problem = self.view(&model, &values).problem()?;
         self.last = Some((names, problem.clone()));
         Ok(problem)
+    }
+
+    fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
+        let (model, values) = self.fitted(&names(accepted))?;
+        self.view(&model, &values).problem_of(&self.model.effect(&own.spec)?)
     }
 
     fn refitted(

@@ -284,6 +284,15 @@ impl Problem {
         self
     }
 
+    /// The same with nothing to weigh but the candidate of this name.
+    pub(crate) fn with_only(mut self, spec: &str) -> Problem {
+        let points = std::mem::take(&mut self.scans).into_iter().flat_map(|scan| scan.points);
+        self.candidates.extend(points);
+        self.candidates.retain(|c| c.spec == spec);
+        self.channels.clear();
+        self
+    }
+
     /// The rows under another noise, without anything to weigh.
     pub(crate) fn whitened(&self, by: &Whitener) -> Problem {
         let mut residual = DMatrix::from_column_slice(self.rows(), 1, self.residual.as_slice());

@@ -116,11 +116,6 @@ impl Projection {
             spent: c,
         }
     }
-
-    /// `A~' B~` of two sets of columns.
-    pub fn cross(&self, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-        inner(a, b) - inner(&self.q, a).tr_mul(&inner(&self.q, b))
-    }
 }
 
 /// Upper Cholesky factor of a positive semi-definite matrix, with a ridge that grows until it exists.

@@ -9,6 +9,11 @@ pub trait Refit {
     /// The problem whose geometry includes the accepted effects, linearised at the fit with them.
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError>;
 
+    /// The same with nothing to weigh but one candidate, where this problem has it.
+    fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
+        Ok(self.problem(accepted)?.with_only(&own.spec))
+    }
+
     /// Refits with a candidate beside the accepted effects. Where it does not act in proportion to its size, every later
     /// problem has its columns as they are at the size found, instead of their derivative at zero; says whether any
     /// changed, which can happen once for each candidate.

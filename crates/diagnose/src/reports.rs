@@ -3,7 +3,7 @@
 use crate::bootstrap::Significance;
 use crate::combination::{Combination, combination};
 use crate::config::DiagnosisConfig;
-use crate::confusion::{half_width, likeness, one_step, smallest_seen};
+use crate::confusion::{half_width, one_step, smallest_seen};
 use crate::crossval::{Group, compare, left_out};
 use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport, Rival};
 use crate::forward::Accepted;
@@ -64,7 +64,7 @@ pub(crate) fn candidate_reports(
     groups: &[Group],
     config: &DiagnosisConfig,
 ) -> Vec<CandidateReport> {
-    let projection = &weighed.metrics[0].projection;
+    let (white, projection) = (weighed.white(problem), &weighed.metrics[0].projection);
     let variance = projection.rss / projection.dof();
     let order = weighed.ranking();
     let before = left_out(problem, None, groups, weighed.scale);
@@ -73,8 +73,7 @@ pub(crate) fn candidate_reports(
     for (rank, k) in order.iter().copied().enumerate() {
         let entry = &weighed.entries[k];
         let c = &entry.candidate;
-        let columns = weighed.dense(&c.columns, problem);
-        let gram = projection.gram(&columns);
+        let gram = white.gram(k);
         let fitted = one_step(&gram, 1.0);
         let significance = top.map_or(none, |t| t.significance[k]);
         let own_variance = projection.variance_without(significance.score);
@@ -88,9 +87,7 @@ pub(crate) fn candidate_reports(
         // What these motions do not show at any size looks like everything and like nothing.
         if rank < SHOWN && smallest_seen.is_finite() {
             let others = order.iter().filter(|l| **l != k).filter(|l| {
-                let other = weighed.dense(&weighed.entries[**l].candidate.columns, problem);
-                likeness(projection, &columns, &fitted.estimate, &other, own_variance).cosine
-                    > config.merge_cosine
+                white.likeness(k, &fitted.estimate, **l, own_variance).cosine > config.merge_cosine
             });
             same.extend(others.map(|l| weighed.entries[*l].candidate.spec.clone()));
         }
@@ -138,17 +135,17 @@ pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival>
 
 /// Entries whose smallest visible size exceeds the typical one.
 pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTestable> {
-    let projection = &weighed.metrics[0].projection;
+    let (white, projection) = (weighed.white(problem), &weighed.metrics[0].projection);
     // What the best explanation leaves is the noise against which sizes are seen.
     let best = weighed.ranking().first().map_or(0.0, |k| {
-        let gram = weighed.white_gram(&weighed.entries[*k].candidate.columns, problem);
+        let gram = white.gram(*k);
         one_step(&gram, 1.0).estimate.dot(&gram.g).max(0.0)
     });
     let variance = projection.variance_without(best);
     let mut all = Vec::new();
-    for entry in weighed.entries.iter().filter(|e| !e.candidate.is_group()) {
+    for (k, entry) in weighed.entries.iter().enumerate().filter(|(_, e)| !e.candidate.is_group()) {
         let c = &entry.candidate;
-        let gram = weighed.white_gram(&c.columns, problem);
+        let gram = white.gram(k);
         let smallest = smallest_seen(&gram, variance, weighed.entries.len());
         if smallest <= 1.0 {
             continue;

@@ -2,13 +2,15 @@
 
 use crate::DiagnoseError;
 use crate::bootstrap::Significance;
-use crate::cells::Unlisted;
+use crate::cells::{Dependences, Unlisted};
 use crate::config::DiagnosisConfig;
+use crate::evidence::Metric;
 use crate::judge::{Judged, independent_groups, judge, significance};
+use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
 use crate::rivals::AfterRefit;
-use crate::weigh::{Weighed, weigh};
+use crate::weigh::{Weighed, weigh_among};
 use armcal_model::Toggle;
 use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
@@ -63,6 +65,8 @@ pub(crate) struct Rooms<'a> {
     refit: &'a mut dyn Refit,
     keep: Vec<bool>,
     config: &'a DiagnosisConfig,
+    /// The dwells are the same in all.
+    dependences: Arc<Dependences>,
     /// Those that may be asked for again. A room of thousands of poses is tens of megabytes: but for the last ones they live
     /// as long as somebody else needs them, and are made again otherwise.
     known: Vec<(Vec<String>, Weak<Room>)>,
@@ -78,7 +82,8 @@ impl<'a> Rooms<'a> {
         config: &'a DiagnosisConfig,
     ) -> Rooms<'a> {
         let room = Rc::new(Room::new(first.0, first.1));
-        let mut rooms = Rooms { refit, keep, config, known: Vec::new(), last: VecDeque::new() };
+        let dependences = room.weighed.dependences.clone();
+        let mut rooms = Rooms { refit, keep, config, dependences, known: Vec::new(), last: VecDeque::new() };
         rooms.remember(Vec::new(), &room);
         rooms
     }
@@ -91,7 +96,7 @@ impl<'a> Rooms<'a> {
             return Ok(room);
         }
         let problem = self.bare(accepted)?;
-        let weighed = weigh(&problem, self.config);
+        let weighed = weigh_among(&problem, self.dependences.clone(), self.config);
         let room = Rc::new(Room::new(problem, weighed));
         self.known.retain(|(_, room)| room.strong_count() > 0);
         self.remember(names, &room);
@@ -124,15 +129,29 @@ impl<'a> Rooms<'a> {
         self.refit.refitted(accepted, &self.keep)
     }
 
+    /// What speaks for a candidate beside others, under white noise alone: its ln Bayes factor; none where the problem without
+    /// it does not have it.
+    pub fn ln_bayes(&mut self, others: &[Candidate], own: &Candidate) -> Result<Option<f64>, DiagnoseError> {
+        let problem = self.refit.problem_of(others, own)?;
+        let problem = self.kept(problem)?;
+        let Some(own) = problem.candidates.first() else { return Ok(None) };
+        let white = Metric::new(Noise::White, 0.0, &problem, 1.0);
+        let gram = white.gram(&own.columns.dense(&problem.dwells, 1.0));
+        Ok(Some(white.ln_bayes(&gram, self.config)))
+    }
+
+    /// A problem without the dwells that do not count.
+    fn kept(&self, problem: Problem) -> Result<Problem, DiagnoseError> {
+        problem.check()?;
+        Ok(if self.keep.iter().all(|k| *k) { problem } else { problem.without(&self.keep) })
+    }
+
     /// The problem alone.
-    pub fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+    fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
             accepted.iter().cloned().partition(|c| c.family == UNLISTED);
         let mut problem = self.refit.problem(&named)?;
-        problem.check()?;
-        if !self.keep.iter().all(|k| *k) {
-            problem = problem.without(&self.keep);
-        }
+        problem = self.kept(problem)?;
         for shape in &shapes {
             // The dwells are the same in all rooms, so a shape's columns fit as they are.
             let columns = shape.columns.dense(&problem.dwells, 1.0);

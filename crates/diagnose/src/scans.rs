@@ -7,11 +7,14 @@ use crate::view::View;
 use armcal_calibrate::Linearisation;
 use armcal_core::DwellId;
 use armcal_model::{EffectSpec, Since};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Steps of an effect that are weighed in full.
 const MOST_STEPS: usize = 400;
+/// Numbers in the columns that are linearised together.
+const LINEARISED: usize = 4_000_000;
 
 impl View<'_> {
     /// The catalogue, and every family with a shape: products where the shape switches or modulates, columns of their own
@@ -31,10 +34,11 @@ impl View<'_> {
             }
         }
         let like = families.iter().flat_map(|(scanned, _, members)| scanned.like(members));
-        let all: Vec<EffectSpec> = specs.iter().cloned().chain(like).collect();
-        let mut all = self.candidates(&all)?.into_iter();
-        let candidates = all.by_ref().take(specs.len()).collect();
+        let like: Vec<EffectSpec> = like.collect();
+        let mut all = self.candidates(&like, base)?.into_iter();
+        let candidates = self.listed(specs, channels, base)?;
         let mut scans = Vec::new();
+        let mut alone = Vec::new();
         for (scanned, family, members) in families {
             let like: Vec<Candidate> = all.by_ref().take(scanned.like(&members).count()).collect();
             let points = match (scanned, like.first()) {
@@ -50,10 +54,56 @@ impl View<'_> {
                 _ => None,
             };
             // No product, or one of two amplitudes is held: what is left is none.
-            let points = points.map_or_else(|| self.candidates(&members), Ok)?;
-            scans.push(Scan::of(family.to_string(), points));
+            if points.is_none() {
+                alone.push((scans.len(), members));
+            }
+            scans.push(Scan::of(family.to_string(), points.unwrap_or_default()));
+        }
+        let members: Vec<EffectSpec> =
+            alone.iter().flat_map(|(_, members)| members.iter().cloned()).collect();
+        let mut points = self.listed(&members, channels, base)?.into_iter();
+        for (scan, members) in alone {
+            let points = points.by_ref().take(members.len()).collect();
+            scans[scan] = Scan::of(std::mem::take(&mut scans[scan].name), points);
         }
         Ok((candidates, scans))
+    }
+
+    /// Candidates, those that turn one joint as products with its channel: by how much is a matter of the nominal arm alone, and
+    /// known from one fit to the next. The others are linearised, so many at a time as some memory holds.
+    fn listed(
+        &self,
+        specs: &[EffectSpec],
+        channels: &[Channel],
+        base: &Linearisation,
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
+        let channel = |spec: &EffectSpec| {
+            let name = format!("joint{}", spec.target? + 1);
+            channels.iter().find(|c| c.name == name).map(|c| &c.columns)
+        };
+        let mut products = self.products.borrow_mut();
+        let refined = |spec: &EffectSpec| self.sizes.get(&spec.to_string()).is_some_and(Option::is_some);
+        let is_known = |spec: &&EffectSpec| products.contains_key(&spec.to_string()) && !refined(spec);
+        let new: Vec<EffectSpec> = specs.iter().filter(|spec| !is_known(spec)).cloned().collect();
+        let at_once = (LINEARISED / base.residual.len().max(1)).max(1);
+        let (rows, mut others) = (rows(base), BTreeMap::new());
+        for some in new.chunks(at_once) {
+            for (spec, mut candidate) in some.iter().zip(self.candidates(some, base)?) {
+                let product = channel(spec).and_then(|base| candidate.columns.factored(base, &rows));
+                let known = if product.is_some() { &mut *products } else { &mut others };
+                candidate.columns = product.unwrap_or(candidate.columns);
+                known.insert(spec.to_string(), candidate);
+            }
+        }
+        let of = |spec: &EffectSpec| {
+            let name = spec.to_string();
+            let mut candidate = others.get(&name).or_else(|| products.get(&name))?.clone();
+            if let (Columns::Product { base, .. }, Some(channel)) = (&mut candidate.columns, channel(spec)) {
+                *base = channel.clone();
+            }
+            Some(candidate)
+        };
+        Ok(specs.iter().filter_map(of).collect())
     }
 
     /// An event that ends again, in the stretches of dwells where it promises most.

@@ -50,7 +50,7 @@ pub(crate) fn described(
     let groups = independent_groups(problem, weighed);
     let places = weighed.gain(problem, (&best.columns, &effect), &groups, config);
     let channel = best.channel.and_then(|c| problem.channels.get(c));
-    let driver = best.driver.and_then(|d| weighed.drivers.get(d));
+    let driver = best.driver.and_then(|d| weighed.dependences.drivers.get(d));
     let (mut shape, mut strongest, mut series) = (Vec::new(), None, None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
@@ -74,7 +74,8 @@ pub(crate) fn described(
     };
     let pasted = Some(outside).filter(formulable).or_else(best_formulable);
     let formula = pasted.and_then(|u| {
-        let (channel, driver) = (&problem.channels[u.what.channel?], &weighed.drivers[u.what.driver?]);
+        let (channel, driver) =
+            (&problem.channels[u.what.channel?], &weighed.dependences.drivers[u.what.driver?]);
         let gram = metric.gram(&weighed.dense(&u.what.columns, problem));
         let (theta, _) = coefficients(&gram, a);
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());

@@ -9,10 +9,11 @@ use crate::group::{one_frequency, with_groups};
 use crate::knowledge::Knowledge;
 use crate::places::places;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem};
-use armcal_calibrate::{FitConfig, LinearPose, Linearisation, linearise};
+use armcal_calibrate::{FitConfig, LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
 use nalgebra::{DMatrix, Matrix3};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,27 +29,43 @@ pub(crate) struct View<'a> {
     pub fit: &'a FitConfig,
     pub sizes: &'a BTreeMap<String, Option<f64>>,
     pub knowledge: &'a Knowledge,
+    /// What turns one joint, as seen around another fit of the same arm and observations.
+    pub products: &'a RefCell<BTreeMap<String, Candidate>>,
 }
 
 impl View<'_> {
     pub fn problem(&self) -> Result<Problem, DiagnoseError> {
         let mut specs = self.model.candidates(self.session);
         specs.retain(|spec| self.tried(spec));
-        let base = self.linearised(&[])?.1;
+        let base = self.base()?;
         let channels = self.channels(&base);
-        let dwells = self.dwells(&base);
         let (candidates, mut scans) = self.candidates_and_scans(&specs, &channels, &base)?;
-        scans.extend(one_frequency(&scans, &dwells, &base.residual));
-        Ok(Problem {
-            dwells,
+        let mut problem = self.of(&base, candidates);
+        problem.candidates = with_groups(problem.candidates, &problem.dwells);
+        scans.extend(one_frequency(&scans, &problem.dwells, &base.residual));
+        Ok(Problem { scans, channels, ..problem })
+    }
+
+    /// [`View::problem`] with one candidate alone.
+    pub fn problem_of(&self, spec: &EffectSpec) -> Result<Problem, DiagnoseError> {
+        let base = self.base()?;
+        let tried = std::slice::from_ref(spec).iter().filter(|spec| self.tried(spec)).cloned();
+        let candidates = self.candidates(&tried.collect::<Vec<_>>(), &base)?;
+        Ok(self.of(&base, candidates))
+    }
+
+    /// The rows of a linearised fit, with candidates.
+    fn of(&self, base: &Linearisation, candidates: Vec<Candidate>) -> Problem {
+        Problem {
+            dwells: self.dwells(base),
             residual: base.residual.clone(),
             geometry: -&base.jacobian,
             geometry_offset: base.axes.iter().map(|a| a.offset).collect::<Vec<_>>().into(),
             geometry_precision: base.axes.iter().map(|a| a.precision).collect::<Vec<_>>().into(),
-            candidates: with_groups(candidates),
-            scans,
-            channels,
-        })
+            candidates,
+            scans: Vec::new(),
+            channels: Vec::new(),
+        }
     }
 
     /// Whether an effect may explain something: the model has it not yet, whatever a pipeline says of its parameters, and
@@ -59,23 +76,28 @@ impl View<'_> {
         !taken && self.knowledge.tries(spec)
     }
 
-    /// The model with more effects at zero, linearised at the fit.
-    fn linearised(&self, specs: &[EffectSpec]) -> Result<(Model, Linearisation), DiagnoseError> {
-        let model = self.model.with_effects(specs, self.session)?;
-        let mut values = self.values.to_vec();
-        values.extend(&model.nominal()[values.len()..]);
-        let linear = linearise(&model, self.observations, &values, self.fit)?;
-        Ok((model, linear))
+    /// The model linearised at the fit.
+    fn base(&self) -> Result<Linearisation, DiagnoseError> {
+        Ok(linearise(self.model, self.observations, self.values, self.fit)?)
     }
 
-    pub(crate) fn candidates(&self, specs: &[EffectSpec]) -> Result<Vec<Candidate>, DiagnoseError> {
+    /// What effects do, each added to the model at zero.
+    pub(crate) fn candidates(
+        &self,
+        specs: &[EffectSpec],
+        base: &Linearisation,
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
         if specs.is_empty() {
             return Ok(Vec::new());
         }
-        let (model, linear) = self.linearised(specs)?;
+        let model = self.model.with_effects(specs, self.session)?;
+        let mut values = self.values.to_vec();
+        let known = values.len();
+        values.extend(&model.nominal()[known..]);
+        let more = linearise_more(base, &model, self.observations, (&values, known), self.fit)?;
         let new = &model.effects()[self.model.effects().len()..];
         let mut all: Vec<Candidate> =
-            new.iter().map(|effect| self.candidate(&model, effect, &linear)).collect();
+            new.iter().map(|effect| self.candidate(&model, effect, &more)).collect();
         for (candidate, effect) in all.iter_mut().zip(new) {
             if let Some(Some(size)) = self.sizes.get(&candidate.spec) {
                 candidate.columns = Columns::Dense(Arc::new(self.secant(&effect.spec, *size)?));
@@ -86,7 +108,7 @@ impl View<'_> {
 
     /// Whether what an effect of one amplitude does at a size is more than its derivative at zero times that size.
     pub fn bends(&self, spec: &EffectSpec, size: f64) -> Result<bool, DiagnoseError> {
-        let tangent = self.candidates(std::slice::from_ref(spec))?;
+        let tangent = self.candidates(std::slice::from_ref(spec), &self.base()?)?;
         let Some(Candidate { columns: Columns::Dense(tangent), .. }) = tangent.first() else {
             return Ok(false);
         };
@@ -108,13 +130,17 @@ impl View<'_> {
         Ok(DMatrix::from_column_slice(change.len(), 1, change.as_slice()))
     }
 
-    fn candidate(&self, model: &Model, effect: &PlacedEffect, linear: &Linearisation) -> Candidate {
+    fn candidate(
+        &self,
+        model: &Model,
+        effect: &PlacedEffect,
+        (axes, jacobian): &(Vec<LinearAxis>, DMatrix<f64>),
+    ) -> Candidate {
         let amplitudes = effect.parameters.start..effect.parameters.start + effect.amplitudes;
-        let own: Vec<usize> =
-            (0..linear.axes.len()).filter(|c| amplitudes.contains(&linear.axes[*c].index)).collect();
+        let own: Vec<usize> = (0..axes.len()).filter(|c| amplitudes.contains(&axes[*c].index)).collect();
         let prefix = format!("{}.", effect.spec);
         let amplitude = |column: &usize| {
-            let axis = &linear.axes[*column];
+            let axis = &axes[*column];
             let parameter = &model.parameters()[axis.index];
             let name = parameter.name.strip_prefix(&prefix).unwrap_or(&parameter.name).to_owned();
             let never_negative = effect.never_negative(&name);
@@ -128,7 +154,7 @@ impl View<'_> {
             known: self.knowledge.acts(&effect.spec).map(str::to_owned),
             amplitudes: own.iter().map(amplitude).collect(),
             toggle: toggle(effect),
-            columns: Columns::Dense(Arc::new(-linear.jacobian.select_columns(&own))),
+            columns: Columns::Dense(Arc::new(-jacobian.select_columns(&own))),
         }
     }
 

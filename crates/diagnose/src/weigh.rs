@@ -1,28 +1,30 @@
 //! One round of weighing: the evidence of nothing, of every candidate, of everything unlisted (notes 4.6 to 4.8).
 
-use crate::cells::{Unlisted, cells, discrepancies};
+use crate::cells::{Dependences, Unlisted, cells, discrepancies};
 use crate::config::DiagnosisConfig;
+use crate::confusion::Crossed;
 use crate::crossval::{EFFECT_PRECISION, Group, gain};
-use crate::drivers::{Driver, drivers};
 use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
-use crate::problem::{Candidate, Columns, Problem, Scan};
-use crate::projection::Gram;
+use crate::problem::{Candidate, Columns, Problem};
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
 use nalgebra::DMatrix;
+use std::cell::OnceCell;
+use std::sync::Arc;
 
 /// Residual variance of the best explanation above which the declared noise is taken to be wrong and everything is
 /// weighed again in units of what was found.
 const RESCALE_ABOVE: f64 = 4.0;
-/// Points of a scan weighed under every kind of noise.
+/// Points of a scan weighed under every kind of noise; and of many dwells.
 const SCAN_POINTS: usize = 32;
+const FEW_SCAN_POINTS: usize = 8;
 /// Entries of the catalogue, the best under white noise, by which the size of every other kind of noise is chosen.
 const SCOUTS: usize = 32;
 /// Up to so many dwells everything unlisted is weighed under every kind of noise; of more, so many shapes of a family.
-const ALL_SHAPES_DWELLS: usize = 400;
-const SHAPES: usize = 64;
+const MANY_DWELLS: usize = 400;
+const SHAPES: usize = 32;
 
 /// One entry of the catalogue: a candidate, or a scan at its best point.
 #[derive(Debug, Clone)]
@@ -53,8 +55,8 @@ pub(crate) struct Weighed {
     pub scale: f64,
     /// The alternatives of the noise.
     pub metrics: Vec<Metric>,
-    /// Drivers of the cells.
-    pub drivers: Vec<Driver>,
+    /// What the unlisted may depend on.
+    pub dependences: Arc<Dependences>,
     /// The catalogue in the order given, scans last.
     pub entries: Vec<Entry>,
     /// How many of them were given without a search; the rest are scans.
@@ -67,29 +69,55 @@ pub(crate) struct Weighed {
     pub p_unlisted: f64,
     /// Posterior probability of correlated noise of each kind, over everything.
     pub p_noise: Vec<(Noise, f64)>,
+    /// Products of all entries under white noise, once somebody asked.
+    white: OnceCell<Crossed>,
 }
 
 /// Weighs a problem, with the noise rescaled where the declaration is far off.
 pub(crate) fn weigh(problem: &Problem, config: &DiagnosisConfig) -> Weighed {
-    let first = weigh_at(problem, 1.0, config);
+    weigh_among(problem, Dependences::of(problem).into(), config)
+}
+
+/// The same where it is known what the unlisted may depend on.
+pub(crate) fn weigh_among(
+    problem: &Problem,
+    dependences: Arc<Dependences>,
+    config: &DiagnosisConfig,
+) -> Weighed {
+    let first = weigh_at(problem, dependences, 1.0, config);
     let variance = first.best_variance(problem, config);
-    if variance > RESCALE_ABOVE { weigh_at(problem, variance.sqrt(), config) } else { first }
+    if variance <= RESCALE_ABOVE {
+        return first;
+    }
+    let Weighed { dependences, .. } = first;
+    weigh_at(problem, dependences, variance.sqrt(), config)
 }
 
 /// Weighs with the noise `scale` times the declared one.
-pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Weighed {
-    let all = metrics(problem, scale, config);
-    let listed: Vec<&Columns> = problem.candidates.iter().map(|c| &c.columns).collect();
-    let white = over_noise(&listed, problem, scale, &all[..1], config);
-    let best: Vec<&Columns> = promising(&white, SCOUTS).into_iter().map(|k| listed[k]).collect();
-    let mut scout = over_noise(&best, problem, scale, &all, config);
-    scout.push(all.iter().map(|m| m.ln_weight).collect());
-    let kept = leading(&all, &scout);
-    let mut all: Vec<Option<Metric>> = all.into_iter().map(Some).collect();
-    let metrics: Vec<Metric> = kept.iter().filter_map(|m| all[*m].take()).collect();
-    drop(all);
-    let weighed = beside_white(&listed, white, problem, scale, &metrics, config);
-    let drivers = drivers(problem);
+fn weigh_at(
+    problem: &Problem,
+    dependences: Arc<Dependences>,
+    scale: f64,
+    config: &DiagnosisConfig,
+) -> Weighed {
+    let outside =
+        [cells(problem, &dependences.drivers, config), discrepancies(problem, &dependences, config)];
+    let many = problem.dwells.len() > MANY_DWELLS;
+    let catalogue = Terms::all(problem.candidates.iter().map(|c| &c.columns));
+    let scans = problem.scans.iter().map(|scan| Terms {
+        most: if many { FEW_SCAN_POINTS } else { SCAN_POINTS },
+        silent: |_| 0.0,
+        ..Terms::all(scan.points.iter().map(|c| &c.columns))
+    });
+    let shapes = outside.iter().map(|family| Terms {
+        most: if many { SHAPES } else { usize::MAX },
+        silent: |ln_bayes| ln_bayes.min(0.0),
+        ..Terms::all(family.iter().map(|u| &u.columns))
+    });
+    let terms: Vec<Terms<'_>> = std::iter::once(catalogue).chain(scans).chain(shapes).collect();
+    let (metrics, weighed) = over_metrics(&terms, problem, scale, config);
+    let mut weighed = weighed.into_iter();
+
     let null: Vec<f64> = metrics.iter().map(|m| m.ln_weight).collect();
     let ln_null = ln_sum_exp(null.iter().copied());
     // ln of (prior x evidence) by metric, for the noise's own posterior.
@@ -99,13 +127,12 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     let count = (problem.candidates.len() + problem.scans.len()).max(1) as f64;
     let share = (config.prior_catalogue / count).ln();
     let mut entries = Vec::new();
-    for (candidate, ln) in problem.candidates.iter().zip(weighed) {
+    for (candidate, ln) in problem.candidates.iter().zip(weighed.next().unwrap_or_default()) {
         let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
         by_metric.push(plus(&ln, share));
         entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0 });
     }
-    for scan in &problem.scans {
-        let all = scanned(problem, scan, scale, &metrics, config);
+    for (scan, all) in problem.scans.iter().zip(weighed.by_ref().take(problem.scans.len())) {
         let totals: Vec<f64> = all.iter().map(|ln| ln_sum_exp(ln.iter().copied())).collect();
         let Some(best) = (0..totals.len()).max_by(|a, b| totals[*a].total_cmp(&totals[*b])) else { continue };
         let ln_points = (scan.tried.max(totals.len()) as f64).ln();
@@ -116,13 +143,10 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
         entries.push(Entry { candidate: scan.points[best].clone(), ln_evidence, probability: 0.0 });
     }
 
-    let (cells, smooth) = (cells(problem, &drivers, config), discrepancies(problem, config));
     let mut unlisted = Vec::new();
-    let families = if cells.is_empty() || smooth.is_empty() { 1.0 } else { 2.0 };
-    for family in [cells, smooth] {
+    let families = outside.iter().filter(|family| !family.is_empty()).count() as f64;
+    for (family, parts) in outside.into_iter().zip(weighed) {
         let share = (config.prior_unknown / families / family.len().max(1) as f64).ln();
-        let columns: Vec<&Columns> = family.iter().map(|u| &u.columns).collect();
-        let parts = unlisted_over_noise(&columns, problem, scale, &metrics, config);
         for (what, ln) in family.into_iter().zip(parts) {
             let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
             by_metric.push(plus(&ln, share));
@@ -143,78 +167,84 @@ pub(crate) fn weigh_at(problem: &Problem, scale: f64, config: &DiagnosisConfig) 
     let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
     let given = problem.candidates.len();
-    Weighed { scale, metrics, drivers, entries, given, unlisted, p_nothing, p_unlisted, p_noise }
+    let white = OnceCell::new();
+    Weighed { scale, metrics, dependences, entries, given, unlisted, p_nothing, p_unlisted, p_noise, white }
 }
 
-/// The terms with the largest evidence under white noise, `white[term][0]`, at most so many.
-fn promising(white: &[Vec<f64>], most: usize) -> Vec<usize> {
+/// Terms of one kind.
+struct Terms<'p> {
+    columns: Vec<&'p Columns>,
+    /// So many are weighed under every noise, those that white noise likes best.
+    most: usize,
+    /// What the others are taken to say there, from what they say under white noise (ln Bayes factors).
+    silent: fn(f64) -> f64,
+}
+
+impl<'p> Terms<'p> {
+    /// Weighed in full.
+    fn all(columns: impl Iterator<Item = &'p Columns>) -> Terms<'p> {
+        Terms { columns: columns.collect(), most: usize::MAX, silent: |ln_bayes| ln_bayes }
+    }
+}
+
+/// The alternatives of the noise, and ln (weight x Bayes factor) of all terms in them: `[kind][term][metric]`.
+fn over_metrics(
+    terms: &[Terms<'_>],
+    problem: &Problem,
+    scale: f64,
+    config: &DiagnosisConfig,
+) -> (Vec<Metric>, Vec<Vec<Vec<f64>>>) {
+    let all = metrics(problem, scale, config);
+    let columns: Vec<&Columns> = terms.iter().flat_map(|t| t.columns.iter().copied()).collect();
+    let mut white = over_noise(&columns, problem, scale, &all[..1], config).into_iter().map(|ln| ln[0]);
+    let white: Vec<Vec<f64>> = terms.iter().map(|t| white.by_ref().take(t.columns.len()).collect()).collect();
+    let metrics = kept(all, (&terms[0].columns, &white[0]), problem, scale, config);
+    let best: Vec<Vec<usize>> = terms.iter().zip(&white).map(|(t, white)| promising(white, t.most)).collect();
+    let of_best = terms.iter().zip(&best).flat_map(|(t, best)| best.iter().map(|k| t.columns[*k]));
+    let others = over_noise(&of_best.collect::<Vec<_>>(), problem, scale, &metrics[1..], config);
+    let mut others = others.into_iter();
+    let ln_white = metrics[0].ln_weight;
+    let told = |((t, white), best): ((&Terms<'_>, Vec<f64>), Vec<usize>)| {
+        let silent = |ln: &f64| {
+            let others = metrics[1..].iter().map(|m| m.ln_weight + (t.silent)(ln - ln_white));
+            std::iter::once(*ln).chain(others).collect::<Vec<f64>>()
+        };
+        let mut all: Vec<Vec<f64>> = white.iter().map(silent).collect();
+        for (k, ln) in best.into_iter().zip(others.by_ref()) {
+            all[k].truncate(1);
+            all[k].extend(ln);
+        }
+        all
+    };
+    let told = terms.iter().zip(white).zip(best).map(told).collect();
+    (metrics, told)
+}
+
+/// Of every kind of noise the size that explains nothing, or one of the scouts among these terms, best.
+fn kept(
+    all: Vec<Metric>,
+    (columns, white): (&[&Columns], &[f64]),
+    problem: &Problem,
+    scale: f64,
+    config: &DiagnosisConfig,
+) -> Vec<Metric> {
+    let best = promising(white, SCOUTS);
+    let scouts: Vec<&Columns> = best.iter().map(|k| columns[*k]).collect();
+    let others = over_noise(&scouts, problem, scale, &all[1..], config);
+    let mut parts: Vec<Vec<f64>> =
+        best.iter().zip(others).map(|(k, others)| [&[white[*k]], others.as_slice()].concat()).collect();
+    parts.push(all.iter().map(|m| m.ln_weight).collect());
+    let kept = leading(&all, &parts);
+    let mut all: Vec<Option<Metric>> = all.into_iter().map(Some).collect();
+    kept.iter().filter_map(|m| all[*m].take()).collect()
+}
+
+/// The terms with the largest evidence under white noise, at most so many.
+fn promising(white: &[f64], most: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..white.len()).collect();
-    order.sort_by(|a, b| white[*b][0].total_cmp(&white[*a][0]));
+    order.sort_by(|a, b| white[*b].total_cmp(&white[*a]));
     order.truncate(most);
     order
-}
-
-/// ln (weight x Bayes factor) of terms in every metric, given that under white noise.
-fn beside_white(
-    terms: &[&Columns],
-    mut white: Vec<Vec<f64>>,
-    problem: &Problem,
-    scale: f64,
-    metrics: &[Metric],
-    config: &DiagnosisConfig,
-) -> Vec<Vec<f64>> {
-    let others = over_noise(terms, problem, scale, &metrics[1..], config);
-    white.iter_mut().zip(others).for_each(|(all, others)| all.extend(others));
-    white
-}
-
-/// The same of what is not listed: of many dwells only the most promising shapes are weighed under every noise. The others
-/// are taken to say there what they say under white noise, or nothing if that is more.
-fn unlisted_over_noise(
-    terms: &[&Columns],
-    problem: &Problem,
-    scale: f64,
-    metrics: &[Metric],
-    config: &DiagnosisConfig,
-) -> Vec<Vec<f64>> {
-    let white = over_noise(terms, problem, scale, &metrics[..1], config);
-    if problem.dwells.len() <= ALL_SHAPES_DWELLS {
-        return beside_white(terms, white, problem, scale, metrics, config);
-    }
-    let order = promising(&white, SHAPES);
-    let ln_white = metrics[0].ln_weight;
-    let as_white =
-        |ln: &Vec<f64>| metrics.iter().map(|m| m.ln_weight + (ln[0] - ln_white).min(0.0)).collect();
-    let mut all: Vec<Vec<f64>> = white.iter().map(as_white).collect();
-    let best: Vec<&Columns> = order.iter().map(|k| terms[*k]).collect();
-    let own = order.iter().map(|k| white[*k].clone()).collect();
-    let exact = beside_white(&best, own, problem, scale, metrics, config);
-    all.iter_mut().zip(white).for_each(|(all, white)| all[0] = white[0]);
-    order.into_iter().zip(exact).for_each(|(k, ln)| all[k] = ln);
-    all
-}
-
-/// ln (weight x Bayes factor) of every point of a scan in every metric. Under white noise all points are weighed, under
-/// the others the points that white noise likes best; the rest are taken to say nothing there.
-fn scanned(
-    problem: &Problem,
-    scan: &Scan,
-    scale: f64,
-    metrics: &[Metric],
-    config: &DiagnosisConfig,
-) -> Vec<Vec<f64>> {
-    let points: Vec<&Columns> = scan.points.iter().map(|c| &c.columns).collect();
-    let white = over_noise(&points, problem, scale, &metrics[..1], config);
-    let order = promising(&white, SCAN_POINTS);
-    let leading: Vec<&Columns> = order.iter().map(|k| points[*k]).collect();
-    let others = over_noise(&leading, problem, scale, &metrics[1..], config);
-    let silent = |w: &Vec<f64>| w.iter().copied().chain(metrics[1..].iter().map(|m| m.ln_weight)).collect();
-    let mut all: Vec<Vec<f64>> = white.iter().map(silent).collect();
-    for (k, ln) in order.into_iter().zip(others) {
-        all[k].truncate(1);
-        all[k].extend(ln);
-    }
-    all
 }
 
 impl Weighed {
@@ -328,8 +358,14 @@ impl Weighed {
         gain(problem, effect, groups, (self.memory_of(columns, problem, config), self.scale), config)
     }
 
-    /// Products under white noise.
-    pub fn white_gram(&self, columns: &Columns, problem: &Problem) -> Gram {
-        self.metrics[0].gram(&self.dense(columns, problem))
+    /// Products of all entries with each other under white noise.
+    pub fn white(&self, problem: &Problem) -> &Crossed {
+        self.white.get_or_init(|| self.crossed(&self.metrics[0], problem))
+    }
+
+    /// The same under another noise.
+    pub fn crossed(&self, metric: &Metric, problem: &Problem) -> Crossed {
+        let columns = self.entries.iter().map(|e| self.dense(&e.candidate.columns, problem));
+        Crossed::of(&columns.collect::<Vec<_>>(), metric)
     }
 }

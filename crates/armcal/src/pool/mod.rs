@@ -23,7 +23,7 @@ use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story;
 use crate::two_arms::check::place_bases;
-use armcal_calibrate::{CalibrateError, Calibration, HoldoutConfig, align_frames, calibrate};
+use armcal_calibrate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_report::{Run, Undiagnosed};
@@ -51,7 +51,9 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
     let board = frames::board(pipeline)?;
     let collected = collect(pipeline, &model_texts.concat(), board.as_ref(), folders)?;
     let fit = |model: &Model, observations: &[Observation], holdout: &HoldoutConfig| {
-        calibrate(model, observations, &pipeline.fit, holdout)
+        // Shards end at the same bits.
+        let config = FitConfig { every_step: true, ..pipeline.fit.clone() };
+        calibrate(model, observations, &config, holdout)
     };
     let (mut run, geometry) = joint_run(pipeline, collected, &fit, progress)?;
     let free = run.model.parameters().iter().filter(|p| p.free).count();

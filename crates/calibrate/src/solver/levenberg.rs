@@ -14,6 +14,10 @@ pub(crate) struct Settings {
     pub step_tolerance: f64,
 }
 
+/// A last step of no more standard deviations of the estimate may end where the linearised problem has it: what that leaves out
+/// is of the square of it.
+const NEGLIGIBLE: f64 = 1e-5;
+
 /// Where the iteration ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
@@ -57,7 +61,11 @@ pub(crate) fn minimise(
             let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
             let rounding = 16.0 * f64::EPSILON * model.value.abs();
             let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;
-            let trial = match cost.at(snapped(&at.x + step, &lower, &upper)) {
+            let x = snapped(&at.x + step, &lower, &upper);
+            if done && curvature.sqrt() <= NEGLIGIBLE && cost.ends_straight() {
+                return Ok(stopped(cost.moved(at, x), model, Status::Converged, iterations + 1));
+            }
+            let trial = match cost.at(x) {
                 Err(e @ (CalibrateError::Unanswered | CalibrateError::Unreachable(_))) => return Err(e),
                 trial => trial.ok(),
             };

@@ -27,6 +27,10 @@ use nalgebra::DVector;
 pub(crate) trait Cost {
     /// What is known at x: evaluated once, whatever is asked of it.
     fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError>;
+    /// Whether a last, negligible step may be taken as [`Cost::moved`] has it.
+    fn ends_straight(&self) -> bool;
+    /// A point moved to x along its linearisation.
+    fn moved(&self, at: Point, x: DVector<f64>) -> Point;
     /// Value there.
     fn value(&self, at: &Point) -> f64;
     /// Value, gradient and a positive semidefinite approximation of the Hessian there.

@@ -78,6 +78,7 @@ fn compare(
     holdout: &HoldoutConfig,
     of: usize,
 ) -> usize {
+    let config = &FitConfig { every_step: true, ..config.clone() };
     let whole = calibrate(model, observations, config, holdout).unwrap();
     let seen: Vec<Observation> = observations.iter().map(light).collect();
     let (open, settled) = Default::default();

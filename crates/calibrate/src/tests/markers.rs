@@ -133,7 +133,9 @@ fn a_block_is_a_pose_and_its_covariance_is_that_of_all_its_rows() {
         assert_eq!(jacobian.rows(3 * k, 3), by);
     }
     let mut each = Vec::new();
-    problem.linearised_each(0..5, &truth, &|_| true, &mut |block, linearised| each.push((block, linearised)));
+    problem.linearised_each(0..5, &truth, &|_| true, &mut |block, linearised| {
+        each.push((block, linearised.into_owned()))
+    });
     assert_eq!(each[2], (2, (residual, jacobian)));
 }
 

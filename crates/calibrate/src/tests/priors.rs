@@ -122,8 +122,9 @@ fn from_the_scales_of_other_data_a_fit_comes_to_its_own() {
         values: fit.values(),
         sigma_scale: fit.sigma_scale,
         prior_scales: scales_of(&fit, &all.parameters),
+        looked: None,
     };
-    let turn = fit_near(&own, &near, &|p| p.free, &config()).unwrap();
+    let turn = fit_near(&own, near, &|p| p.free, &config()).unwrap();
     let (found, alone) = (turn.estimates[0].parameter.prior_sigma.unwrap(), learnt(&own, &config())[0]);
     assert!((found / alone - 1.0).abs() < 0.02, "{found} and {alone}");
     assert!(found > 1.5 * fit.estimates[0].parameter.prior_sigma.unwrap());

@@ -80,12 +80,21 @@ fn rig(seed: u64, n: usize, loose: Option<usize>) -> Rig {
 impl Rig {
     /// As the diagnosis sees it at the truth.
     fn problem(&self) -> Problem {
-        let (values, sizes) = (self.model.nominal(), Default::default());
+        let (values, sizes, products) = (self.model.nominal(), Default::default(), Default::default());
         let knowledge = Knowledge::of(&quick(), self.model.chain().joint_names()).unwrap();
         let Rig { model, observations, session, fit } = self;
-        View { model, values: &values, observations, session, fit, sizes: &sizes, knowledge: &knowledge }
-            .problem()
-            .unwrap()
+        View {
+            model,
+            values: &values,
+            observations,
+            session,
+            fit,
+            sizes: &sizes,
+            knowledge: &knowledge,
+            products: &products,
+        }
+        .problem()
+        .unwrap()
     }
 
     fn diagnosed(&self) -> Diagnosis {

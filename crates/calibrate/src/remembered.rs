@@ -1,0 +1,163 @@
+//! A problem that remembers where it was looked at last: a fit with other priors begins where the one before it ended, and a
+//! fit without some observations where that of all did.
+
+use crate::elsewhere::Away;
+use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
+use crate::whitened::Whitened;
+use crate::{CalibrateError, FitConfig};
+use armcal_core::Parameter;
+use armcal_model::Asked;
+use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// What a problem is at some parameters, block by block as far as anybody asked.
+#[derive(Debug)]
+pub(crate) struct Looked {
+    p: Vec<f64>,
+    blocks: Vec<OnceLock<Arc<Block>>>,
+    covariances: Vec<OnceLock<Arc<DMatrix<f64>>>>,
+}
+
+/// Rows of a block, and which columns of their derivative were asked for.
+#[derive(Debug)]
+struct Block {
+    linearised: Linearised,
+    asked: Arc<Vec<bool>>,
+}
+
+impl Looked {
+    fn nothing_yet(p: &[f64], blocks: usize) -> Looked {
+        let unknown = |_| OnceLock::new();
+        Looked {
+            p: p.to_vec(),
+            blocks: (0..blocks).map(unknown).collect(),
+            covariances: (0..blocks).map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// The same of some of the blocks.
+    pub fn of(&self, blocks: &[usize]) -> Looked {
+        Looked {
+            p: self.p.clone(),
+            blocks: blocks.iter().map(|block| self.blocks[*block].clone()).collect(),
+            covariances: blocks.iter().map(|block| self.covariances[*block].clone()).collect(),
+        }
+    }
+}
+
+/// A problem with what it was at the parameters that were asked for last.
+pub(crate) struct Remembered<'a> {
+    problem: &'a dyn Problem,
+    last: Mutex<Arc<Looked>>,
+}
+
+/// A problem at these parameters, as fits of the parameters `free` will ask of it.
+pub(crate) fn look(
+    problem: &dyn Problem,
+    p: &[f64],
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Arc<Looked>, CalibrateError> {
+    let remembered = Remembered::new(problem, None);
+    let white = Whitened::new(Box::new(&remembered), p, free, config)?;
+    white.at(white.start(), None)?;
+    Ok(remembered.at(&white.start))
+}
+
+impl<'a> Remembered<'a> {
+    pub fn new(problem: &'a dyn Problem, looked: Option<Looked>) -> Remembered<'a> {
+        let looked = looked.filter(|looked| looked.blocks.len() == problem.blocks());
+        let looked = looked.unwrap_or_else(|| Looked::nothing_yet(&[], problem.blocks()));
+        Remembered { problem, last: Mutex::new(Arc::new(looked)) }
+    }
+
+    /// What is known of the problem at these parameters.
+    fn at(&self, p: &[f64]) -> Arc<Looked> {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.p != p {
+            *last = Arc::new(Looked::nothing_yet(p, self.problem.blocks()));
+        }
+        last.clone()
+    }
+}
+
+impl Problem for Remembered<'_> {
+    fn parameters(&self) -> &[Parameter] {
+        self.problem.parameters()
+    }
+
+    fn blocks(&self) -> usize {
+        self.problem.blocks()
+    }
+
+    fn observations_of(&self, block: usize) -> usize {
+        self.problem.observations_of(block)
+    }
+
+    fn name(&self, block: usize) -> String {
+        self.problem.name(block)
+    }
+
+    fn joint_rad(&self, block: usize) -> &[f64] {
+        self.problem.joint_rad(block)
+    }
+
+    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
+        self.problem.residual(block, p)
+    }
+
+    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
+        self.problem.linearised(block, p)
+    }
+
+    fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
+        let looked = self.at(p);
+        let known = &looked.blocks[blocks.clone()];
+        let columns = known.iter().find_map(|known| Some(known.get()?.asked.len()));
+        let wanted: Vec<bool> = (0..columns.unwrap_or(0)).map(asked).collect();
+        let serves = |had: &Block| {
+            had.asked.len() == wanted.len()
+                && had.asked.iter().zip(&wanted).all(|(had, wanted)| *had || !wanted)
+        };
+        if known.iter().all(|known| known.get().is_some_and(|had| serves(had))) {
+            for (block, known) in blocks.zip(known) {
+                known.get().into_iter().for_each(|had| each(block, Cow::Borrowed(&had.linearised)));
+            }
+            return;
+        }
+        let mut shared: Option<Arc<Vec<bool>>> = None;
+        self.problem.linearised_each(blocks, p, asked, &mut |block, linearised| {
+            let linearised = linearised.into_owned();
+            let columns = linearised.1.ncols();
+            let of_columns = || Arc::new((0..columns).map(asked).collect());
+            let asked = shared.get_or_insert_with(of_columns).clone();
+            each(block, Cow::Borrowed(&linearised));
+            // Where less was asked for before, that stays.
+            let _ = looked.blocks[block].set(Arc::new(Block { linearised, asked }));
+        });
+    }
+
+    fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
+        let looked = self.at(p);
+        let own = looked.covariances[block].get_or_init(|| Arc::new(self.problem.covariance(block, p)));
+        own.as_ref().clone()
+    }
+
+    fn noise_depends(&self) -> bool {
+        self.problem.noise_depends()
+    }
+
+    fn known(&self) -> Vec<Known> {
+        self.problem.known()
+    }
+
+    fn elsewhere(&self) -> Option<&Away<'_>> {
+        self.problem.elsewhere()
+    }
+
+    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
+        self.problem.symmetries(p)
+    }
+}
