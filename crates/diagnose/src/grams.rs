@@ -6,10 +6,10 @@
 
 use crate::columns::Columns;
 use crate::evidence::Metric;
-use crate::problem::Problem;
+use crate::problem::{DwellRow, Problem};
 use crate::projection::{Gram, Projection};
 use armcal_calibrate::inner;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::sync::Arc;
 
 /// Columns put together into one matrix product.
@@ -118,23 +118,16 @@ impl<'p> ByDwell<'p> {
             with_residual: DMatrix::zeros(n, c),
             with_geometry: vec![DMatrix::zeros(n, p); c],
         };
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (residual, q) = (projection.residual.as_slice(), projection.q.as_slice());
-        let rows = base.nrows();
+        let dwells = &problem.dwells;
         for i in 0..c {
-            let own = &base.as_slice()[i * rows..(i + 1) * rows];
-            for (d, dwell) in problem.dwells.iter().enumerate() {
-                by_dwell.with_residual[(d, i)] = sum(&own[dwell.range()], &residual[dwell.range()]);
-                for j in 0..c {
-                    let other = &base.as_slice()[j * rows..(j + 1) * rows];
-                    by_dwell.square[(d, i * c + j)] = sum(&own[dwell.range()], &other[dwell.range()]);
-                }
+            let own = base.column(i);
+            dot_by_dwell(own, projection.residual.column(0), dwells, by_dwell.with_residual.column_mut(i));
+            for j in 0..c {
+                dot_by_dwell(own, base.column(j), dwells, by_dwell.square.column_mut(i * c + j));
             }
-            for (k, mut column) in by_dwell.with_geometry[i].column_iter_mut().enumerate() {
-                let q = &q[k * rows..(k + 1) * rows];
-                for (value, dwell) in column.iter_mut().zip(&problem.dwells) {
-                    *value = sum(&own[dwell.range()], &q[dwell.range()]);
-                }
+            let of_base = &mut by_dwell.with_geometry[i];
+            for (q, products) in projection.q.column_iter().zip(of_base.column_iter_mut()) {
+                dot_by_dwell(own, q, dwells, products);
             }
         }
         by_dwell
@@ -193,7 +186,7 @@ impl<'p> ByDwell<'p> {
         bounds.sort_unstable();
         bounds.dedup();
         let sums = self.until(places, &bounds);
-        let at = |place: usize| &sums[bounds.partition_point(|bound| *bound < place)];
+        let at = |place: usize| sums.column(bounds.partition_point(|bound| *bound < place));
         for k in events {
             let Columns::Within { on, .. } = terms[*k] else { continue };
             let (c, p) = (self.c, self.projection.q.ncols());
@@ -210,23 +203,48 @@ impl<'p> ByDwell<'p> {
         }
     }
 
-    /// Sums over the dwells before each of these places: `square`, `with_residual`, then `with_geometry`.
-    fn until(&self, places: &[usize], bounds: &[usize]) -> Vec<DVector<f64>> {
-        let p = self.projection.q.ncols();
+    /// Sums over the dwells before each of these places: `square`, `with_residual`, then `with_geometry`, a column a place.
+    fn until(&self, places: &[usize], bounds: &[usize]) -> DMatrix<f64> {
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by_key(|d| places[*d]);
-        let mut sum = DVector::zeros(self.c * (self.c + 1 + p));
-        let mut next = order.into_iter().peekable();
-        let mut sums = Vec::with_capacity(bounds.len());
-        for bound in bounds {
-            while let Some(d) = next.next_if(|d| places[*d] < *bound) {
-                let own = self.square.row(d).into_iter().chain(self.with_residual.row(d));
-                let spent = self.with_geometry.iter().flat_map(|q| q.row(d).into_iter());
-                sum.iter_mut().zip(own.chain(spent)).for_each(|(sum, own)| *sum += own);
+        let spent = self.with_geometry.iter().flat_map(DMatrix::column_iter);
+        let all = self.square.column_iter().chain(self.with_residual.column_iter()).chain(spent);
+        let mut sums = DMatrix::zeros(self.c * (self.c + 1 + self.projection.q.ncols()), bounds.len());
+        for (k, column) in all.enumerate() {
+            let (mut sum, mut next) = (0.0, order.iter().peekable());
+            for (b, bound) in bounds.iter().enumerate() {
+                while let Some(d) = next.next_if(|d| places[**d] < *bound) {
+                    sum += column[*d];
+                }
+                sums[(k, b)] = sum;
             }
-            sums.push(sum.clone());
         }
         sums
+    }
+}
+
+/// Products of two columns dwell by dwell.
+fn dot_by_dwell(
+    a: DVectorView<'_, f64>,
+    b: DVectorView<'_, f64>,
+    dwells: &[DwellRow],
+    mut products: DVectorViewMut<'_, f64>,
+) {
+    let (a, b, products) = (a.as_slice(), b.as_slice(), products.as_mut_slice());
+    // Most dwells have as many rows as the first: a product whose length is known takes a fraction of the time.
+    match dwells.first().map(|first| first.rows).filter(|rows| dwells.iter().all(|d| d.rows == *rows)) {
+        Some(3) => dot_by::<3>(a, b, products),
+        Some(6) => dot_by::<6>(a, b, products),
+        _ => products.iter_mut().zip(dwells).for_each(|(product, d)| {
+            *product = a[d.range()].iter().zip(&b[d.range()]).map(|(a, b)| a * b).sum();
+        }),
+    }
+}
+
+fn dot_by<const ROWS: usize>(a: &[f64], b: &[f64], products: &mut [f64]) {
+    let pairs = a.as_chunks::<ROWS>().0.iter().zip(b.as_chunks::<ROWS>().0);
+    for (product, (a, b)) in products.iter_mut().zip(pairs) {
+        *product = (0..ROWS).map(|k| a[k] * b[k]).sum();
     }
 }
 

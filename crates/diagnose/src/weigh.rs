@@ -22,6 +22,9 @@ const SCAN_POINTS: usize = 32;
 const FEW_SCAN_POINTS: usize = 8;
 /// Entries of the catalogue, the best under white noise, by which the size of every other kind of noise is chosen.
 const SCOUTS: usize = 32;
+/// Of many dwells, a kind of noise that puts nothing, and no scout, less than this behind another kind is not asked further
+/// [nats]: of all probability it has less than one part in a thousand million.
+const OUT_OF_THE_QUESTION: f64 = 21.0;
 /// Up to so many dwells everything unlisted is weighed under every kind of noise; of more, so many shapes of a family.
 const MANY_DWELLS: usize = 400;
 const SHAPES: usize = 32;
@@ -234,7 +237,11 @@ fn kept(
     let mut parts: Vec<Vec<f64>> =
         best.iter().zip(others).map(|(k, others)| [&[white[*k]], others.as_slice()].concat()).collect();
     parts.push(all.iter().map(|m| m.ln_weight).collect());
-    let kept = leading(&all, &parts);
+    let mut kept = leading(&all, &parts);
+    if problem.dwells.len() > MANY_DWELLS {
+        let most = |ln: &[f64]| ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        kept.retain(|m| *m == 0 || parts.iter().any(|ln| ln[*m] > most(ln) - OUT_OF_THE_QUESTION));
+    }
     let mut all: Vec<Option<Metric>> = all.into_iter().map(Some).collect();
     kept.iter().filter_map(|m| all[*m].take()).collect()
 }
