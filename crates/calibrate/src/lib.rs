@@ -10,6 +10,8 @@
 //!   encoder noise, evaluated at the start (`whitened`);
 //! * `rho`: Huber on the norm of an observation (`loss`), `s`: its robust scale (`robust`);
 //! * the minimum: `solver`; eq. 4 of the paper instead: `paper`;
+//! * a fit with other priors begins where the one before it ended, a turn of the hold-out where the fit to all did: what the
+//!   problem is there is `remembered`;
 //! * covariance, intervals, rank, what the data cannot determine: `statistics`, `undetermined`, `words`;
 //! * priors that nobody declared: `priors` learns how far lengths, angles and joint zeros of this arm are from nominal;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];

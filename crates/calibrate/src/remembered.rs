@@ -161,3 +161,7 @@ impl Problem for Remembered<'_> {
         self.problem.symmetries(p)
     }
 }
+
+#[cfg(test)]
+#[path = "tests/remembered.rs"]
+mod tests;

@@ -16,7 +16,7 @@ pub fn section(_: &Options) -> Result<Section> {
     );
     let mut table =
         Table::new(&["hidden", "design", "dwells", "diagnosis [s]", "calibration [s]", "verdict"]);
-    for design in [Design::ThreeTiltsBothWays, Design::FreePoses] {
+    for (design, most_s) in [(Design::ThreeTiltsBothWays, 0.25), (Design::FreePoses, 0.8)] {
         let mut slowest: (f64, usize) = (0.0, 0);
         for family in HIDDEN {
             let scenario = Scenario::new(family, design, 1);
@@ -35,9 +35,9 @@ pub fn section(_: &Options) -> Result<Section> {
         }
         section.bar(Bar {
             what: format!("full diagnosis of {} dwells, one core, slowest of {}", slowest.1, HIDDEN.len()),
-            limit: "< 1 s".into(),
+            limit: format!("<= {most_s} s"),
             measured: format!("{:.2} s", slowest.0),
-            met: slowest.0 < 1.0,
+            met: slowest.0 <= most_s,
         });
     }
     section.table(table);

@@ -57,6 +57,27 @@ fn what_is_held_out_does_not_touch_the_fit() {
     assert_eq!(alone.values(), before.fit.values());
 }
 
+/// A turn that begins with what the fit to all saw, and ends a negligible step along its linearisation, ends where a fit that
+/// evaluates everything does.
+#[test]
+fn shorter_ways_end_at_the_same_place() {
+    for (model, observations) in [tracked(), boards()] {
+        let holdout: HoldoutConfig = toml::from_str("kind = \"cavity-folds\"\nk = 4").unwrap();
+        let of = |every_step| {
+            let config = FitConfig { every_step, ..FitConfig::default() };
+            calibrate(&model, &observations, &config, &holdout).unwrap()
+        };
+        let (short, long) = (of(false), of(true));
+        for (a, b) in short.fit.estimates.iter().zip(&long.fit.estimates) {
+            assert!((a.value - b.value).abs() <= 1e-5 * a.sigma, "{}", a.parameter.name);
+            assert!((a.sigma - b.sigma).abs() <= 1e-5 * a.sigma, "{}", a.parameter.name);
+        }
+        for (a, b) in short.residuals.iter().zip(&long.residuals) {
+            assert!((a.whitened - b.whitened).amax() < 1e-4, "{}", a.dwell);
+        }
+    }
+}
+
 #[test]
 fn held_out_error_is_near_the_noise_floor_and_far_below_nominal() {
     let (model, observations) = tracked();

@@ -4,7 +4,7 @@ use super::{assert_whitens, quick};
 use crate::knowledge::Knowledge;
 use crate::noise::Noise;
 use crate::view::View;
-use crate::{Calibrated, Diagnosis, Problem, Verdict, diagnose};
+use crate::{Calibrated, Candidate, Diagnosis, Problem, Verdict, diagnose};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Marker, Model, Session};
@@ -12,6 +12,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 const ARM: &str = include_str!("../../../../pipelines/models/right_arm.toml");
@@ -80,7 +82,12 @@ fn rig(seed: u64, n: usize, loose: Option<usize>) -> Rig {
 impl Rig {
     /// As the diagnosis sees it at the truth.
     fn problem(&self) -> Problem {
-        let (values, sizes, products) = (self.model.nominal(), Default::default(), Default::default());
+        self.problem_at(self.model.nominal(), &RefCell::default())
+    }
+
+    /// At other parameters, with what is known from other fits.
+    fn problem_at(&self, values: Vec<f64>, products: &RefCell<BTreeMap<String, Candidate>>) -> Problem {
+        let sizes = BTreeMap::new();
         let knowledge = Knowledge::of(&quick(), self.model.chain().joint_names()).unwrap();
         let Rig { model, observations, session, fit } = self;
         View {
@@ -91,7 +98,7 @@ impl Rig {
             fit,
             sizes: &sizes,
             knowledge: &knowledge,
-            products: &products,
+            products,
         }
         .problem()
         .unwrap()
@@ -125,6 +132,29 @@ fn what_was_seen_of_a_pose_is_independent_once_it_is_whitened() {
     let o = &rig.observations[0];
     let lever = rig.model.joint_jacobian(&rig.model.nominal(), o).norm() * ENCODER_RAD;
     assert!(lever > SIGMA_M, "{lever}");
+}
+
+/// What turns one joint is known from one fit to the next: its columns around another fit are those of a problem that knows
+/// nothing.
+#[test]
+fn products_with_a_joint_hold_around_another_fit() {
+    let rig = rig(4, 30, None);
+    let known = RefCell::default();
+    rig.problem_at(rig.model.nominal(), &known);
+    assert!(known.borrow().len() > 20, "{}", known.borrow().len());
+    let mut values = rig.model.nominal();
+    values.iter_mut().zip(rig.model.parameters()).filter(|(_, p)| p.free).for_each(|(v, _)| *v += 3e-3);
+    let found = rig.problem_at(values.clone(), &known);
+    let anew = rig.problem_at(values, &RefCell::default());
+    let all = |p: &Problem| -> Vec<Candidate> {
+        p.candidates.iter().chain(p.scans.iter().flat_map(|s| &s.points)).cloned().collect()
+    };
+    assert_eq!(all(&found).len(), all(&anew).len());
+    for (a, b) in all(&found).iter().zip(&all(&anew)) {
+        let [own, other] = [a, b].map(|c| c.columns.dense(&anew.dwells, 1.0));
+        assert_eq!((&a.spec, &a.amplitudes, a.toggle), (&b.spec, &b.amplitudes, b.toggle));
+        assert!((&own - &other).amax() <= 1e-9 * (1.0 + other.amax()), "{}", a.spec);
+    }
 }
 
 #[test]
