@@ -67,20 +67,30 @@ pub(crate) fn fit_near(
     fit_from(&problem, &near.values, Some(&near), free, config)
 }
 
-/// The parameters where a fit from these ends: what is asked of [`fit_problem`] where nobody asks how sure they are. Priors are
-/// those of the problem.
+/// All parameters where a fit ended, and the scale of its residuals in units of the declared noise.
+pub struct Ended {
+    /// The parameters.
+    pub values: Vec<f64>,
+    /// The scale.
+    pub sigma_scale: f64,
+}
+
+/// Where a fit from these parameters ends: what is asked of [`fit_problem`] where nobody asks how sure they are. Priors are
+/// those of the problem. Near where a fit of part of the observations `ended` the scale is known, and the way is short.
 pub fn fitted_values(
     problem: &dyn Problem,
     start: &[f64],
+    ended: Option<&Ended>,
     config: &FitConfig,
-) -> Result<Vec<f64>, CalibrateError> {
+) -> Result<Ended, CalibrateError> {
     config.check()?;
     let free = &|p: &Parameter| p.free;
+    let start = ended.map_or(start, |ended| &ended.values);
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
-    let solved = solve(&white, None, config)?;
+    let solved = solve(&white, ended.map(|ended| ended.sigma_scale), config)?;
     let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
-    Ok(white.parameters_at(&solved.at.x))
+    Ok(Ended { values: white.parameters_at(&solved.at.x), sigma_scale: solved.sigma_scale })
 }
 
 /// Where another fit ended.

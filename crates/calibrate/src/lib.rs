@@ -65,7 +65,7 @@ pub use covariance::Covariance;
 pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
-pub use fit::{fit, fit_problem, fitted_values};
+pub use fit::{Ended, fit, fit_problem, fitted_values};
 pub use fit_warnings::{ABOVE_FLOOR, INADEQUATE};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
 pub use linearise::{LinearAxis, LinearPose, Linearisation, linearise, linearise_more};

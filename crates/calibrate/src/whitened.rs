@@ -270,21 +270,24 @@ impl<'a> Whitened<'a> {
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
         // Of a pool a group knows few of all parameters.
         let asked = |column: usize| at_group.columns.contains(&Some(column));
+        // Where a column is among those that are told, where it goes, and its axis.
+        let told = self.structure.axes(group).zip(&at_group.columns).enumerate();
+        let told: Vec<(usize, usize, &Axis)> =
+            told.filter_map(|(to, (axis, known))| Some(((*known)?, to * height, &self.axes[axis]))).collect();
         let mut done = Ok(());
         let mut put = |block: usize, (raw, full): &Linearised| {
             self.finite(block, raw.as_slice(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
             whiten(white, raw.as_slice(), 1.0, &mut stacked.as_mut_slice()[at..at + rows]);
-            let suspect = !all_finite(full.as_slice());
-            let columns = jacobian.as_mut_slice().chunks_exact_mut(height);
-            for ((axis, known), column) in self.structure.axes(group).zip(&at_group.columns).zip(columns) {
-                let (Some(known), a) = (known, &self.axes[axis]) else { continue };
-                let raw = &full.as_slice()[known * rows..(known + 1) * rows];
+            let (full, out) = (full.as_slice(), jacobian.as_mut_slice());
+            let suspect = !all_finite(full);
+            for (known, to, axis) in &told {
+                let raw = &full[known * rows..(known + 1) * rows];
                 if suspect && !all_finite(raw) {
-                    return Err(self.not_finite(block, "the derivative", Some(a.index)));
+                    return Err(self.not_finite(block, "the derivative", Some(axis.index)));
                 }
-                whiten(white, raw, a.scale, &mut column[at..at + rows]);
+                whiten(white, raw, axis.scale, &mut out[to + at..to + at + rows]);
             }
             Ok(())
         };

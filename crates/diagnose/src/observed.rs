@@ -3,18 +3,25 @@
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;
 use crate::knowledge::Knowledge;
-use crate::places::thinned;
+use crate::places::{places_of_poses, thinned};
 use crate::problem::{Candidate, Problem};
 use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{
-    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram, linearise,
+    Calibration, Ended, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram,
+    linearise,
 };
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A fit to so many observations begins with one to a few poses.
+const MANY: usize = 1600;
+const FEW: usize = 400;
+/// Fewest of these to each recording.
+const OF_EACH: usize = 20;
 
 /// A calibrated model, and what it was calibrated with.
 #[derive(Debug, Clone, Copy)]
@@ -51,11 +58,15 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     let joint_names = model.chain().joint_names();
     let values = calibration.fit.values();
     let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
+    let few = few(observations, config);
+    let places = places_of_poses(&weighed);
     let mut refit = ModelRefit {
         model,
         values,
         observations,
         weighed: &weighed,
+        few: &few,
+        places: &places,
         session,
         fit,
         fits: BTreeMap::new(),
@@ -71,6 +82,16 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         .map(|found| diagnosis.with_rests(calibrated, found));
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
+}
+
+/// Of very many observations a few that tell nearly where a fit to all of them ends; none where recordings, which may have
+/// parameters of their own, would have few of these each.
+fn few<'o>(observations: &'o [Observation], config: &DiagnosisConfig) -> Vec<&'o Observation> {
+    let recordings: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();
+    if observations.len() < MANY || recordings.len() * OF_EACH > FEW {
+        return Vec::new();
+    }
+    thinned(observations, &DiagnosisConfig { max_weighed: FEW, ..config.clone() })
 }
 
 /// The model with the priors that its fit learnt and the bounds that it took, which hold for all that is tried beside it.
@@ -100,6 +121,10 @@ struct ModelRefit<'a> {
     observations: &'a [Observation],
     /// Those of them that weigh explanations.
     weighed: &'a [Observation],
+    /// Of very many those with which a fit to all of them begins.
+    few: &'a [&'a Observation],
+    /// The place of each pose of those that weigh.
+    places: &'a [Option<String>],
     session: &'a Session,
     fit: &'a FitConfig,
     /// Every set of effects fitted so far.
@@ -123,8 +148,13 @@ impl ModelRefit<'_> {
         let mut values = self.values.clone();
         values.extend(&model.nominal()[values.len()..]);
         if !specs.is_empty() {
-            let problem = ModelProblem::new(&model, self.observations, self.fit)?;
-            values = fitted_values(&problem, &values, self.fit)?;
+            let fitted = |some: &[&Observation], start: &[f64], ended: Option<&Ended>| {
+                let problem = ModelProblem::new(&model, some.iter().copied(), self.fit)?;
+                fitted_values(&problem, start, ended, self.fit)
+            };
+            let ended = (!self.few.is_empty()).then(|| fitted(self.few, &values, None)).transpose()?;
+            let all: Vec<&Observation> = self.observations.iter().collect();
+            values = fitted(&all, &values, ended.as_ref())?.values;
         }
         self.fits.insert(names.to_vec(), (model.clone(), values.clone()));
         Ok((model, values))
@@ -139,6 +169,7 @@ impl ModelRefit<'_> {
             fit: self.fit,
             sizes: &self.sizes,
             knowledge: &self.knowledge,
+            places: self.places,
             products: &self.products,
         }
     }

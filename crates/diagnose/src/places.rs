@@ -61,6 +61,12 @@ pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisCon
     drawn.into_iter().flat_map(|i| &observations[poses[i].clone()]).collect()
 }
 
+/// [`places`] of each pose of these observations.
+pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String>> {
+    let poses = measured_together(observations);
+    places(&poses.iter().map(|pose| &observations[pose.start]).collect::<Vec<_>>())
+}
+
 /// The cavity; for a tracked pose the pose itself, where it was visited more than once. One observation of each pose is asked.
 pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
     let same = |a: &Observation, b: &Observation| {

@@ -7,7 +7,6 @@
 use crate::DiagnoseError;
 use crate::group::{one_frequency, with_groups};
 use crate::knowledge::Knowledge;
-use crate::places::places;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem};
 use armcal_calibrate::{FitConfig, LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 use armcal_core::Observation;
@@ -29,6 +28,8 @@ pub(crate) struct View<'a> {
     pub fit: &'a FitConfig,
     pub sizes: &'a BTreeMap<String, Option<f64>>,
     pub knowledge: &'a Knowledge,
+    /// The place of each pose, where it has one.
+    pub places: &'a [Option<String>],
     /// What turns one joint, as seen around another fit of the same arm and observations.
     pub products: &'a RefCell<BTreeMap<String, Candidate>>,
 }
@@ -183,9 +184,7 @@ impl View<'_> {
     }
 
     fn dwells(&self, linear: &Linearisation) -> Vec<DwellRow> {
-        let firsts: Vec<&Observation> = self.poses(linear).collect();
-        let places = places(&firsts);
-        let of = |(pose, place): (&LinearPose, Option<String>)| {
+        let of = |(pose, place): (&LinearPose, &Option<String>)| {
             let all = &self.observations[pose.observations.clone()];
             let o = &all[0];
             let drivers = self.model.drivers(self.session, o);
@@ -200,12 +199,12 @@ impl View<'_> {
                 torque_nm: drivers.torque().iter().map(|t| t.total_nm()).collect(),
                 load_kg: o.all_loads_kg(),
                 temperature_c: o.temperature_c,
-                place,
+                place: place.clone(),
                 displaced: moved(linear, pose, &Matrix3::identity(), |_| true),
                 seat: self.seat(linear, pose),
             }
         };
-        linear.poses.iter().zip(places).map(of).collect()
+        linear.poses.iter().zip(self.places).map(of).collect()
     }
 
     /// Whitened rows of a displacement by one declared standard deviation along each axis of the board, or of the world where

@@ -98,6 +98,7 @@ impl Rig {
             fit,
             sizes: &sizes,
             knowledge: &knowledge,
+            places: &crate::places::places_of_poses(observations),
             products,
         }
         .problem()
