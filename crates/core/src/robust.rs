@@ -18,7 +18,9 @@ pub fn mad_sigma(values: &[f64]) -> f64 {
 /// The `p`-quantile (0 to 1) of the finite values, linearly interpolated between order statistics
 /// (Hyndman and Fan 1996, type 7). NaN when there are none.
 pub fn percentile(values: &[f64], p: f64) -> f64 {
-    percentile_in(&mut values.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>(), p)
+    let mut finite = Vec::with_capacity(values.len());
+    finite.extend(values.iter().copied().filter(|v| v.is_finite()));
+    percentile_in(&mut finite, p)
 }
 
 /// The same of values that are all finite, without a copy of them: they change places.

@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 /// Candidates whose scores are drawn in one product.
-const BLOCK: usize = 128;
+const BLOCK: usize = 32;
 
 /// One candidate in the projected space.
 #[derive(Debug, Clone)]
@@ -173,11 +173,11 @@ pub(crate) fn wild_cluster(
         for &k in block {
             let best = top.entry(ranks[k]).or_insert_with(|| vec![0.0; config.resamplings]);
             let share = scores[k] / rss;
-            for b in 0..config.resamplings {
-                let square: f64 = (at..at + ranks[k]).map(|r| drawn[(r, b)] * drawn[(r, b)]).sum();
-                let drawn_share = square / left[b];
+            let each = drawn.as_slice().chunks_exact(width).zip(&left).zip(best);
+            for ((drawn, left), best) in each {
+                let drawn_share = drawn[at..at + ranks[k]].iter().map(|v| v * v).sum::<f64>() / left;
                 exceed[k] += usize::from(drawn_share >= share);
-                best[b] = best[b].max(drawn_share);
+                *best = best.max(drawn_share);
             }
             at += ranks[k];
         }

@@ -1,6 +1,7 @@
 //! What an effect may depend on, as numbers at the dwells, and smooth functions of it.
 
 use crate::problem::Problem;
+use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -198,14 +199,15 @@ impl Kernel {
             share[(bin.max(0.0) as usize).min(bins - 1)] += 0.98 / value.len() as f64;
         }
         let root = DVector::from_iterator(bins, share.iter().map(|w| w.sqrt()));
-        let k = DMatrix::from_fn(bins, bins, |i, j| root[i] * root[j] * kernel(grid[i] - grid[j], lengths));
-        let eigen = k.symmetric_eigen();
-        let mut order: Vec<usize> = (0..bins).collect();
-        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-        let keep: Vec<usize> =
-            order.into_iter().take(functions).filter(|k| eigen.eigenvalues[*k] > 1e-6).collect();
+        // What it is worth depends on the distance alone.
+        let apart: Vec<f64> = grid.iter().map(|g| kernel(g - grid[0], lengths)).collect();
+        let k = DMatrix::from_fn(bins, bins, |i, j| root[i] * root[j] * apart[i.abs_diff(j)]);
+        let (worth, vectors) = eigen(k);
+        let mut order: Vec<usize> = (0..worth.len()).collect();
+        order.sort_by(|a, b| worth[*b].total_cmp(&worth[*a]));
+        let keep: Vec<usize> = order.into_iter().take(functions).filter(|k| worth[*k] > 1e-6).collect();
         let weights = DMatrix::from_fn(bins, keep.len(), |i, c| {
-            root[i] * eigen.eigenvectors[(i, keep[c])] / eigen.eigenvalues[keep[c]].sqrt()
+            root[i] * vectors[(i, keep[c])] / worth[keep[c]].sqrt()
         });
         Kernel { centre, half, lengths, grid, weights }
     }
@@ -222,6 +224,40 @@ impl Kernel {
             DVector::from_iterator(self.grid.len(), self.grid.iter().map(|g| kernel(x - g, self.lengths)));
         self.weights.tr_mul(&row)
     }
+}
+
+/// Eigenvalues and -vectors of a positive matrix, those of no worth left out where few have any: with `K = L L'` and
+/// `L'L v = w v` they are `w` and `L v / sqrt(w)`, which are those of a much smaller matrix.
+fn eigen(k: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let Some(factor) = factor(&k) else {
+        let whole = k.symmetric_eigen();
+        return (whole.eigenvalues, whole.eigenvectors);
+    };
+    let small = gram(&factor).symmetric_eigen();
+    let mut vectors = factor * small.eigenvectors;
+    for (mut vector, worth) in vectors.column_iter_mut().zip(small.eigenvalues.iter()) {
+        vector /= worth.max(f64::MIN_POSITIVE).sqrt();
+    }
+    (small.eigenvalues, vectors)
+}
+
+/// `L` of `K = L L'` to rounding, by Cholesky's method with the largest pivot first; none of more than half as many columns
+/// as rows, which would save nothing.
+fn factor(k: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let most = k.nrows() / 2;
+    let (mut left, mut factor) = (k.diagonal(), DMatrix::zeros(k.nrows(), most));
+    let rounding = f64::EPSILON * left.sum();
+    for c in 0..most {
+        let pivot = left.imax();
+        if left[pivot] <= rounding {
+            return Some(factor.columns(0, c).into_owned());
+        }
+        let (before, root) = (factor.columns(0, c), left[pivot].sqrt());
+        let column = (k.column(pivot) - before * before.row(pivot).transpose()) / root;
+        left -= column.component_mul(&column);
+        factor.set_column(c, &column);
+    }
+    None
 }
 
 fn kernel(distance: f64, lengths: [f64; 2]) -> f64 {

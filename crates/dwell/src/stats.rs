@@ -140,8 +140,9 @@ pub(crate) fn quantisation_step(values: &[f64]) -> Option<f64> {
             (counts - counts.round()).abs() > 0.05 + rounding / step
         };
         // The coarse grids must be told from chance: 99 % of all increments have to sit on it.
-        let misses = increments.iter().filter(|d| off_grid(**d)).count();
-        misses * 100 <= increments.len() && *step > 20.0 * rounding
+        let too_many_off =
+            || increments.iter().filter(|d| off_grid(**d)).nth(increments.len() / 100).is_some();
+        *step > 20.0 * rounding && !too_many_off()
     })
 }
 

@@ -3,7 +3,7 @@
 //! A window as long as a period of hand tremor sees slow motion, fast motion and tremor alike; a speed
 //! averaged over the same window would not see the tremor.
 
-use armcal_core::robust::{MAD_TO_SIGMA, median, percentile};
+use armcal_core::robust::{MAD_TO_SIGMA, median, percentile, percentile_in};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -97,9 +97,11 @@ fn high_frequency_noise(column: &[f64], stretches: &[Range<usize>]) -> f64 {
         .flat_map(|s| column[s.clone()].chunks(BLOCK))
         .filter(|block| block.len() >= 5)
         .map(|block| {
-            let second: Vec<f64> = block.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect();
+            let mut second = [f64::NAN; BLOCK];
+            let found = block.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs());
+            second.iter_mut().zip(found).for_each(|(second, found)| *second = found);
             // The variance of q[i+1] - 2 q[i] + q[i-1] is six times that of q.
-            MAD_TO_SIGMA * median(&second) / 6f64.sqrt()
+            MAD_TO_SIGMA * percentile_in(&mut second[..block.len() - 2], 0.5) / 6f64.sqrt()
         })
         .collect();
     low_mode(&blocks, 0.0)

@@ -6,7 +6,6 @@
 //! chosen wherever they occur, and memory does not grow with the recording.
 
 use armcal_core::{JointSamples, PoseSamples, Samples};
-use std::collections::BinaryHeap;
 use std::ops::RangeInclusive;
 
 /// Rows kept of a stream, at most: 64 KiB, and forty rows of an overlap of a hundredth.
@@ -100,20 +99,27 @@ impl Sketch {
         columns: usize,
         value: &impl Fn(usize, usize) -> f64,
     ) -> Sketch {
-        let mut smallest: BinaryHeap<(u64, i64)> = BinaryHeap::new();
+        let mut smallest: Vec<(u64, i64)> = Vec::with_capacity(2 * KEPT);
         let mut below = u64::MAX;
+        let cut = |smallest: &mut Vec<(u64, i64)>, below: &mut u64| {
+            if smallest.len() > KEPT {
+                *below = smallest.select_nth_unstable(KEPT).1.0;
+                smallest.truncate(KEPT);
+            }
+        };
         for i in rows {
             let hash = hash_of(time_ns[i], (0..columns).map(|k| value(i, k)));
-            if hash >= below {
-                continue;
+            if hash < below {
+                smallest.push((hash, time_ns[i]));
             }
-            smallest.push((hash, time_ns[i]));
-            if smallest.len() > KEPT {
-                below = smallest.pop().map_or(below, |(hash, _)| hash);
+            if smallest.len() == 2 * KEPT {
+                cut(&mut smallest, &mut below);
             }
         }
+        cut(&mut smallest, &mut below);
+        smallest.sort_unstable();
         let span_ns = time_ns.first().zip(time_ns.last()).map(|(first, last)| [*first, *last]);
-        Sketch { rows: smallest.into_sorted_vec(), below, span_ns }
+        Sketch { rows: smallest, below, span_ns }
     }
 
     /// Both over the time that both have; `None` where there is none.

@@ -79,13 +79,13 @@ impl Deviations {
     ///
     /// Between two rows the tip goes straight, and its velocity under the kernel `k` is
     /// `v = sum_j (p_j+1 - p_j) / (t_j+1 - t_j) * (K(t_j+1) - K(t_j))` with `K` the integral of `k`. The speed changes as
-    /// the velocity does along its own direction.
-    pub(super) fn rates(&self, t_s: f64, rates: &mut [f64]) {
+    /// the velocity does along its own direction. `shares` is room for the positions that count and their factors.
+    pub(super) fn rates(&self, t_s: f64, shares: &mut Vec<(usize, f64)>, rates: &mut [f64]) {
         rates.fill(0.0);
+        shares.clear();
         let first = self.rows.partition_point(|row| row.0 <= t_s - self.h_s).saturating_sub(1);
         let behind = self.rows[first..].iter().take_while(|row| row.0 < t_s + self.h_s).count();
         let rows = &self.rows[first..(first + behind + 1).min(self.rows.len())];
-        let mut shares: Vec<(usize, f64)> = Vec::with_capacity(rows.len());
         for step in rows.windows(2) {
             let ((from_s, from), (to_s, to)) = (step[0], step[1]);
             // Where the arm rests it goes nowhere.
@@ -105,9 +105,9 @@ impl Deviations {
         }
         let gain = self.still_m_s.map_or(1.0, |still| speed_m_s / (speed_m_s.powi(2) + still.powi(2)));
         let along = velocity * (gain / speed_m_s);
-        for (at, share) in shares {
-            let along = along * share;
-            for (rate, by_m) in rates.iter_mut().zip(&self.moved[at].by_m) {
+        for (at, share) in shares.iter() {
+            let along = along * *share;
+            for (rate, by_m) in rates.iter_mut().zip(&self.moved[*at].by_m) {
                 *rate += along.dot(by_m);
             }
         }

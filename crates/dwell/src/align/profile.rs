@@ -1,6 +1,6 @@
 //! Speed of a point over time, smoothed by one and the same kernel for every stream.
 
-use armcal_core::robust::percentile;
+use armcal_core::robust::percentile_in;
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -67,11 +67,13 @@ impl SpeedProfile {
     /// Every `every`-th grid point: time [s] and speed [m/s].
     pub(crate) fn points(&self, every: usize) -> Vec<(f64, f64)> {
         let every = every.max(1);
-        let of = |s: &Stretch| -> Vec<(f64, f64)> {
+        let mut points =
+            Vec::with_capacity(self.stretches.iter().map(|s| s.speed_m_s.len().div_ceil(every)).sum());
+        for s in &self.stretches {
             let grid = s.speed_m_s.iter().enumerate().step_by(every);
-            grid.map(|(i, v)| (s.start_s + i as f64 * self.step_s, *v)).collect()
-        };
-        self.stretches.iter().flat_map(of).collect()
+            points.extend(grid.map(|(i, v)| (s.start_s + i as f64 * self.step_s, *v)));
+        }
+        points
     }
 
     /// The logarithm of the speed over `still_m_s`, flat below: `ln(1 + (v / still)^2) / 2`.
@@ -86,8 +88,8 @@ impl SpeedProfile {
 
     /// The `p`-quantile of the speeds [m/s]; NaN when there are none.
     pub(crate) fn quantile_m_s(&self, p: f64) -> f64 {
-        let all: Vec<f64> = self.stretches.iter().flat_map(|s| s.speed_m_s.iter().copied()).collect();
-        percentile(&all, p)
+        let mut all: Vec<f64> = self.stretches.iter().map(|s| &s.speed_m_s[..]).collect::<Vec<_>>().concat();
+        percentile_in(&mut all, p)
     }
 }
 
@@ -103,7 +105,8 @@ impl<'a> Path<'a> {
         let origin = absolute_m.first().copied().unwrap_or_default();
         let position_m: Vec<Vector3<f64>> = absolute_m.iter().map(|p| p - origin).collect();
         let mut sum = Vector3::zeros();
-        let mut integral = vec![sum];
+        let mut integral = Vec::with_capacity(time_s.len());
+        integral.push(sum);
         for (t, p) in time_s.windows(2).zip(position_m.windows(2)) {
             sum += 0.5 * (p[0] + p[1]) * (t[1] - t[0]);
             integral.push(sum);

@@ -125,7 +125,8 @@ impl Scale {
             });
         }
         let moving_above = (MOVING_SHARE * measured).max(0.5 * least);
-        let moving_s = 0.1 * h_s * sensor.points(1).iter().filter(|p| p.1 > moving_above).count() as f64;
+        let points = sensor.points(1);
+        let moving_s = 0.1 * h_s * points.iter().filter(|p| p.1 > moving_above).count() as f64;
         if moving_s < config.min_motion_s {
             return Err(DwellError::NoMotion {
                 seen: format!(
@@ -135,7 +136,6 @@ impl Scale {
                 advice: "record more moves between poses",
             });
         }
-        let points = sensor.points(1);
         let seen_s = points.last().map_or(0.0, |p| p.0) - points.first().map_or(0.0, |p| p.0);
         let shortest_s =
             (moving_s / 12.0).min(SHORTEST_MOVEMENT_S).max(4.0 * h_s).max(seen_s / MOST_MOVEMENTS);

@@ -262,11 +262,11 @@ impl Step {
 fn part(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> Part {
     let uncertain = deviations.map_or(0, |d| d.so_far.len());
     let (mut jacobian, mut weighted) = (DMatrix::zeros(rows.len(), 4 + uncertain), Vec::new());
-    let (mut rates, mut squares) = (vec![0.0; uncertain], 0.0);
+    let (mut rates, mut shares, mut squares) = (vec![0.0; uncertain], Vec::new(), 0.0);
     for (k, r) in rows.iter().enumerate() {
         jacobian.fixed_view_mut::<1, 4>(k, 0).tr_copy_from(&r.jacobian);
         if let Some(d) = deviations {
-            d.rates(r.robot_s, &mut rates);
+            d.rates(r.robot_s, &mut shares, &mut rates);
             rates.iter().enumerate().for_each(|(column, rate)| jacobian[(k, 4 + column)] = state.z * rate);
         }
         squares += r.weight * r.residual * r.residual;
@@ -276,7 +276,8 @@ fn part(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> 
     for (k, r) in rows.iter().enumerate() {
         jacobian.row_mut(k).scale_mut(r.weight.sqrt());
     }
-    Part { normal: jacobian.tr_mul(&jacobian), gradient, squares }
+    // The blocked product: `tr_mul` takes a dot product for each entry.
+    Part { normal: jacobian.transpose() * jacobian, gradient, squares }
 }
 
 /// Ratio of the 97.5 % points of Student's t and of the normal distribution (Cornish and Fisher's

@@ -56,6 +56,8 @@ struct Step {
     repeat: Repeat,
     /// Where the value goes; `None` skips it.
     slot: Option<Slot>,
+    /// How many steps from this one on read one number of its kind each, one behind the other.
+    alike: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -131,7 +133,7 @@ impl Compiler<'_> {
                 (Some(Want::Inside(inside)), Kind::Message(inner)) => {
                     let last = last && index + 1 == end && field.repeat == Repeat::Once;
                     let program = self.read(inner, inside, last, depth + 1)?;
-                    Step { what: What::Read(program), repeat: field.repeat, slot: None }
+                    Step { what: What::Read(program), repeat: field.repeat, slot: None, alike: 0 }
                 }
                 (Some(Want::Value(slot)), kind) => {
                     self.step(kind, field.repeat, Some(*slot), &field.name, depth)?
@@ -183,7 +185,7 @@ impl Compiler<'_> {
                 ));
             }
         };
-        Ok(Step { what, repeat, slot })
+        Ok(Step { what, repeat, slot, alike: 0 })
     }
 
     /// Appends a step, in its place those of the message it stands for, if there is one of it and it is flattened;
@@ -225,7 +227,15 @@ impl Compiler<'_> {
     fn add(&mut self, mut steps: Vec<Step>) -> Result<usize, String> {
         if steps.is_empty() && self.encoding == Encoding::Cdr {
             // rosidl gives a message without fields `uint8 structure_needs_at_least_one_member`.
-            steps.push(Step { what: What::Number(Number::Unsigned(1)), repeat: Repeat::Once, slot: None });
+            let what = What::Number(Number::Unsigned(1));
+            steps.push(Step { what, repeat: Repeat::Once, slot: None, alike: 0 });
+        }
+        let mut behind = None;
+        for step in steps.iter_mut().rev() {
+            let number = number_read(step);
+            let more = behind.filter(|(after, _)| number == Some(*after)).map_or(0, |(_, alike)| alike);
+            step.alike = number.map_or(0, |_| more + 1);
+            behind = number.map(|number| (number, step.alike));
         }
         let min_bytes = steps.iter().fold(0, |sum: usize, step| sum.saturating_add(self.min_bytes(step)));
         let inner = |step: &Step| match step.what {
@@ -264,6 +274,14 @@ fn element_bytes(programs: &[Program], what: What) -> usize {
     }
 }
 
+/// The kind of the one number that a step reads, if that is what it does.
+fn number_read(step: &Step) -> Option<Number> {
+    match (step.what, step.slot, step.repeat) {
+        (What::Number(number), Some(_), Repeat::Once) => Some(number),
+        _ => None,
+    }
+}
+
 /// Size and number of the numbers a step skips, if that is what it does and they are always as many.
 fn skipped_numbers(step: &Step) -> Option<(usize, usize)> {
     match (step.what, step.slot, step.repeat) {
@@ -286,13 +304,28 @@ impl<'m, S: Sink<'m>> Machine<'_, 'm, S> {
             Delimiters::None | Delimiters::Lists => None,
         };
         let programs = self.programs;
-        for step in &programs[program].steps {
+        let mut steps = &programs[program].steps[..];
+        while let Some((step, rest)) = steps.split_first() {
+            if step.alike > 1 && self.alike(&steps[..step.alike]) {
+                steps = &steps[step.alike..];
+                continue;
+            }
             self.step(step)?;
+            steps = rest;
         }
         match end {
             Some(end) => self.cursor.finish_at(end),
             None => Some(()),
         }
+    }
+
+    /// Reads numbers of one kind at once, if all of them are there; else none, so that the first one missing is named.
+    #[inline]
+    fn alike(&mut self, steps: &[Step]) -> bool {
+        let Some(number) = number_read(&steps[0]) else { return false };
+        let Machine { cursor, sink, .. } = self;
+        let take = |k: usize, value| steps[k].slot.into_iter().for_each(|slot| sink.number(slot, value));
+        cursor.each(number, steps.len(), take).is_some()
     }
 
     #[inline]

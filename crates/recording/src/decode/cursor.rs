@@ -186,6 +186,28 @@ impl<'m> Cursor<'m> {
         Some(())
     }
 
+    /// Hands the next `count` numbers to `each`, by their place.
+    #[inline]
+    pub(super) fn each(
+        &mut self,
+        number: Number,
+        count: usize,
+        mut each: impl FnMut(usize, f64),
+    ) -> Option<()> {
+        let bytes = self.skip_numbers(number.bytes(), count)?;
+        match (number, self.little_endian) {
+            (Number::Float(8), true) => {
+                let numbers = bytes.as_chunks().0.iter().enumerate();
+                numbers.for_each(|(k, &bytes)| each(k, f64::from_le_bytes(bytes)));
+            }
+            (_, little_endian) => {
+                let numbers = bytes.chunks_exact(number.bytes()).enumerate();
+                numbers.for_each(|(k, bytes)| each(k, value(number, little_endian, bytes)));
+            }
+        }
+        Some(())
+    }
+
     /// Goes past `count` numbers of `size` bytes, and returns their bytes.
     #[inline]
     pub(super) fn skip_numbers(&mut self, size: usize, count: usize) -> Option<&'m [u8]> {
