@@ -29,6 +29,7 @@ pub fn section(options: &Options) -> Result<Section> {
         "peak [MiB]",
     ]);
     let mut before: Option<(usize, [Cost; 2])> = None;
+    let mut curve: Vec<(usize, [f64; 2])> = Vec::new();
     for poses in POSES.into_iter().filter(|poses| *poses <= options.poses) {
         let costs = [cost(options, poses, false)?, cost(options, poses, true)?];
         let exponent = |k: usize| {
@@ -51,10 +52,26 @@ pub fn section(options: &Options) -> Result<Section> {
                 met: cost.spent.cpu_s <= *most_s && cost.peak_mib <= *most_mib,
             });
         }
+        curve.push((poses, [0, 1].map(|k| costs[k].spent.cpu_s)));
         before = Some((poses, costs));
     }
     section.table(table);
+    section.figure(diagram(&curve));
     Ok(section)
+}
+
+/// Processor time over poses, both by powers of ten: a straight line grows with a constant exponent.
+fn diagram(curve: &[(usize, [f64; 2])]) -> String {
+    let list =
+        |value: &dyn Fn(&(usize, [f64; 2])) -> String| curve.iter().map(value).collect::<Vec<_>>().join(", ");
+    let line = |k: usize| list(&|(_, cpu_s)| format!("{:.2}", cpu_s[k].log10()));
+    format!(
+        "xychart-beta\n    title \"CPU time: below without, above with diagnosis\"\n    x-axis \"poses (steps of a power of \
+         ten's root)\" [{}]\n    y-axis \"log10 of CPU seconds\" -1 --> 3\n    line [{}]\n    line [{}]\n",
+        list(&|(poses, _)| poses.to_string()),
+        line(0),
+        line(1)
+    )
 }
 
 fn cost(options: &Options, poses: usize, diagnosed: bool) -> Result<Cost> {

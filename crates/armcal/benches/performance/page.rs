@@ -59,6 +59,8 @@ pub struct Section {
     title: &'static str,
     said: Vec<String>,
     tables: Vec<Table>,
+    /// Diagrams of Mermaid, which the page's readers draw.
+    figures: Vec<String>,
     bars: Vec<Bar>,
     skipped: Vec<String>,
 }
@@ -66,7 +68,14 @@ pub struct Section {
 impl Section {
     /// An empty part.
     pub fn new(title: &'static str) -> Section {
-        Section { title, said: Vec::new(), tables: Vec::new(), bars: Vec::new(), skipped: Vec::new() }
+        Section {
+            title,
+            said: Vec::new(),
+            tables: Vec::new(),
+            figures: Vec::new(),
+            bars: Vec::new(),
+            skipped: Vec::new(),
+        }
     }
 
     /// A paragraph.
@@ -77,6 +86,11 @@ impl Section {
     /// A table.
     pub fn table(&mut self, table: Table) {
         self.tables.push(table);
+    }
+
+    /// A diagram of Mermaid.
+    pub fn figure(&mut self, figure: String) {
+        self.figures.push(figure);
     }
 
     /// A bar and its answer.
@@ -99,6 +113,9 @@ impl Section {
         for table in &self.tables {
             text += &table.markdown();
             text += "\n";
+        }
+        for figure in &self.figures {
+            text += &format!("```mermaid\n{figure}```\n\n");
         }
         if !self.bars.is_empty() {
             text += &bars(self.bars.iter());
