@@ -123,6 +123,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> 
             (only.topic.clone(), only.names.clone())
         }
     };
+    unsure.extend(others(told, channels, &topic, &names));
     let model = bare(&chain, Vec::new())?;
     Ok(Arm {
         file: path.to_owned(),
@@ -153,6 +154,14 @@ fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
 /// The topics that may be meant.
 fn chosen<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
     channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|topic| *topic == j.topic))
+}
+
+/// Other topics that have the same joints: of another arm, of set-points, or of a driver beside the first.
+fn others(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Vec<String> {
+    let has_all = |j: &&JointTopic| j.topic != topic && names.iter().all(|name| j.names.contains(name));
+    let others: Vec<&str> = chosen(told, channels).filter(has_all).map(|j| j.topic.as_str()).collect();
+    let told = format!("{topic} is read; {} has the same joints, and --joints chooses it", others.join(", "));
+    if others.is_empty() { Vec::new() } else { vec![told] }
 }
 
 /// The topic that has all these joints, and their names in it; of several the one with most messages. Messages without names
@@ -260,7 +269,7 @@ fn from_urdf(
     let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
     links.extend(joints.values().map(|l| l.parent.to_owned()));
     let carried = moving.iter().map(|link| (*link).to_owned()).collect();
-    let mut unsure = Vec::new();
+    let mut unsure = others(told, channels, &topic, &names);
     if unnamed {
         unsure
             .push(format!("the messages of {topic} name no joints: they are read in the order of the model"));
@@ -309,4 +318,71 @@ fn rigid_with(joints: &BTreeMap<&str, Link<'_>>, link: &str) -> Vec<String> {
     }
     all.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(b.1)));
     all.into_iter().map(|(_, link)| link.to_owned()).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
+mod tests {
+    use super::*;
+
+    fn urdf(links: &[(&str, &str, &str, &str)]) -> String {
+        let joint = |(name, form, parent, child): &(&str, &str, &str, &str)| {
+            format!(
+                "<joint name=\"{name}\" type=\"{form}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0 0 0.2\"/>\
+                 <axis xyz=\"0 1 0\"/></joint>"
+            )
+        };
+        let names: BTreeSet<&str> = links.iter().flat_map(|l| [l.2, l.3]).collect();
+        let names = names.iter().map(|name| format!("<link name=\"{name}\"/>"));
+        format!(
+            "<robot name=\"r\">{}{}</robot>",
+            names.collect::<String>(),
+            links.iter().map(joint).collect::<String>()
+        )
+    }
+
+    fn recorded(names: &[&str]) -> Channels {
+        let names = names.iter().map(|n| (*n).to_owned()).collect();
+        Channels {
+            joints: vec![JointTopic { topic: "/j".into(), names, messages: 1 }],
+            ..Channels::default()
+        }
+    }
+
+    const ARM: [(&str, &str, &str, &str); 7] = [
+        ("mount", "fixed", "world", "base"),
+        ("lift", "prismatic", "base", "column"),
+        ("a", "revolute", "column", "l1"),
+        ("b", "continuous", "l1", "l2"),
+        ("f1", "prismatic", "hand", "finger1"),
+        ("f2", "prismatic", "hand", "finger2"),
+        ("hold", "fixed", "l2", "hand"),
+    ];
+
+    #[test]
+    fn the_arm_is_what_moves_and_is_read_without_its_fingers() {
+        let found = |names: &[&str]| {
+            from_urdf(&Told::default(), &recorded(names), "r.urdf".into(), urdf(&ARM), false).unwrap()
+        };
+        let whole = found(&["f1", "b", "a", "f2", "lift"]);
+        assert_eq!(
+            (whole.names.join(" "), whole.base_link.as_deref()),
+            ("lift a b".to_owned(), Some("base"))
+        );
+        assert_eq!(whole.tips, ["hand", "l2"]);
+        assert_eq!(whole.carried, ["column", "l1", "l2"]);
+        // What is not read stands still: the arm begins above it.
+        let above = found(&["a", "b"]);
+        assert_eq!((above.names.join(" "), above.base_link.as_deref()), ("a b".to_owned(), Some("column")));
+    }
+
+    #[test]
+    fn two_arms_in_one_file_are_not_guessed_between() {
+        let two = [("a", "revolute", "body", "l1"), ("b", "revolute", "body", "r1")];
+        let find = |told: &Told| from_urdf(told, &recorded(&["a", "b"]), "r.urdf".into(), urdf(&two), false);
+        let refused = find(&Told::default()).err().unwrap().to_string();
+        assert!(refused.contains("l1, r1") && refused.contains("--tip-link"), "{refused}");
+        let told = Told { tip_link: Some("r1".into()), ..Told::default() };
+        assert_eq!(find(&told).unwrap().names, ["b"]);
+    }
 }

@@ -7,6 +7,7 @@
 
 mod arm;
 mod channels;
+mod draft;
 mod evidence;
 mod files;
 mod links;
@@ -75,13 +76,14 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let evidence = evidence::gather(&arm, &read);
-    let (cast, seats) = roles::cast(&arm, &read, &evidence, board.as_ref());
+    let (cast, seats) = roles::cast(&arm, &evidence, board.as_ref());
     let tracked =
         cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
-    let sockets = match (&board, tracked) {
-        (None, false) => Some(sockets::find(&arm, &read)?.ok_or_else(|| nothing_seen(&read, &cast))?),
-        _ => None,
-    };
+    // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
+    let sockets = if tracked { None } else { sockets::find(&arm, &read)? };
+    if board.is_none() && !tracked && sockets.is_none() {
+        return Err(nothing_seen(&read, &cast));
+    }
     let board = asked.board.as_deref().zip(board.as_ref());
     let mut known = Known {
         asked,
@@ -94,7 +96,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
         board,
         sockets,
     };
-    if known.sockets.is_some() {
+    if known.sockets.is_some() && known.board.is_none() {
         progress.step("measuring the sockets");
         size_sockets(&mut known)?;
     }

@@ -1,7 +1,6 @@
 //! Where cavities of the board are where the tip pauses: which body is the table, and how it was tilted.
 
-use super::evidence::Evidence;
-use super::read::AllRead;
+use super::evidence::{Evidence, Pause};
 use armcal_core::Pose;
 use armcal_core::robust::median;
 use armcal_table::{Board, Tilt};
@@ -27,16 +26,12 @@ pub struct Seats {
     pub why: String,
     /// Recordings in which it does not fit.
     pub unfit: Vec<usize>,
+    /// Recordings in which it fits only when it is tilted on that body, and how.
+    pub turned: Vec<(usize, Tilt)>,
 }
 
 /// The bodies on the last link and those that stand still whose poses put most pauses into cavities.
-pub fn seats(
-    board: &Board,
-    read: &AllRead,
-    evidence: &[Evidence],
-    tips: &[usize],
-    still: &[usize],
-) -> Option<Seats> {
+pub fn seats(board: &Board, evidence: &[Evidence], tips: &[usize], still: &[usize]) -> Option<Seats> {
     let counted = |tip: usize, table: usize| -> Vec<(usize, usize)> {
         let both = evidence[tip].recordings.iter().zip(&evidence[table].recordings);
         both.map(|pair| match pair {
@@ -61,8 +56,21 @@ pub fn seats(
         return None;
     }
     let second = all.get(1).map_or(0, |(_, _, counts)| total(counts));
-    let unfit: Vec<usize> = (0..counts.len()).filter(|r| counts[*r].1 > 0 && !fits(&counts[*r])).collect();
+    let mut unfit: Vec<usize> =
+        (0..counts.len()).filter(|r| counts[*r].1 > 0 && !fits(&counts[*r])).collect();
     let pauses: usize = counts.iter().map(|(_, of)| of).sum();
+    // Where the markers are on the frame below the mechanism, a tilt that they do not show puts the cavities where the tip was.
+    let mut turned: Vec<(usize, Tilt)> = Vec::new();
+    unfit.retain(|r| {
+        let found = evidence[*tip].recordings[*r]
+            .as_ref()
+            .zip(evidence[*table].recordings[*r].as_ref().and_then(|t| t.mean));
+        let tilt = found.and_then(|(tip, frame)| {
+            tilted_below(board, &frame, &tip.pauses).filter(|(_, seated)| fits(&(*seated, tip.pauses.len())))
+        });
+        turned.extend(tilt.map(|(tilt, _)| (*r, tilt)));
+        tilt.is_none()
+    });
     Some(Seats {
         tip: *tip,
         table: *table,
@@ -73,8 +81,33 @@ pub fn seats(
             SEATED_M * 1e3,
             board.name
         ),
-        unfit: unfit.into_iter().filter(|r| read.recordings.get(*r).is_some()).collect(),
+        unfit,
+        turned,
     })
+}
+
+/// The tilt of a mechanism on this frame that puts most pauses into cavities, and how many: by whole degrees, then by tenths.
+fn tilted_below(board: &Board, frame: &Pose, pauses: &[Pause]) -> Option<(Tilt, usize)> {
+    board.mechanism.as_ref()?;
+    let seated = |roll_deg: f64, pitch_deg: f64| {
+        let tilt = Tilt { roll_rad: roll_deg.to_radians(), pitch_rad: pitch_deg.to_radians() };
+        let from_world = (frame * board.tilted(tilt).ok()?).inverse();
+        let count = pauses.iter().filter(|p| is_seated(board, &from_world, &p.at_m)).count();
+        Some((tilt, count, [roll_deg, pitch_deg]))
+    };
+    let around = |[roll, pitch]: [f64; 2], steps: i32, step: f64| {
+        let offsets = move || (-steps..=steps).map(move |k| f64::from(k) * step);
+        let all = offsets().flat_map(move |a| offsets().map(move |b| (roll + a, pitch + b)));
+        let all: Vec<_> = all.filter_map(|(roll, pitch)| seated(roll, pitch)).collect();
+        let most = all.iter().map(|(_, count, _)| *count).max()?;
+        // Of a patch that seats as many, the middle.
+        let best: Vec<_> = all.into_iter().filter(|(_, count, _)| *count == most).collect();
+        let mean = |k: usize| best.iter().map(|(.., at)| at[k]).sum::<f64>() / best.len() as f64;
+        seated(mean(0), mean(1))
+    };
+    let (.., coarse) = around([0.0; 2], 20, 1.0)?;
+    let (tilt, count, _) = around(coarse, 15, 0.1)?;
+    Some((tilt, count))
 }
 
 fn is_seated(board: &Board, board_from_world: &Pose, at_m: &Vector3<f64>) -> bool {
