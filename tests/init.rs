@@ -118,7 +118,8 @@ fn split(recording: &Path, urdf: &str, parts: &[PathBuf]) {
             let schema = message.channel.schema.as_ref().expect("a schema");
             let schema = Some((schema.name.as_str(), schema.encoding.as_str(), &*schema.data));
             let id = out.add_channel(&message.channel.topic, schema, "cdr", &nothing).expect("a channel");
-            out.put(id, message.sequence, message.log_time, message.publish_time, &message.data).expect("written");
+            out.put(id, message.sequence, message.log_time, message.publish_time, &message.data)
+                .expect("written");
         }
         out.finish().expect("finished");
     }
@@ -145,7 +146,7 @@ fn a_split_bag_is_one_recording_and_describes_its_robot() {
     // Described in every recording but one: it is the robot of all.
     let pipeline = proposed(folder.path(), &[&bag, &first, &second, &other]);
     let text = std::fs::read_to_string(&pipeline).expect("proposal");
-    assert_eq!(text.matches("[[recordings]]").count(), 3, "{text}");
+    assert_eq!(text.matches("\n[[recordings]]\n").count(), 3, "{text}");
     assert!(text.contains("front_0.mcap\", \"front/front_1.mcap\", \"front/front_2.mcap\"]"), "{text}");
     assert!(text.contains("[\"right_0.mcap\", \"right_1.mcap\"]"), "{text}");
     assert!(text.contains("urdf = \"proposed.urdf\""), "{text}");

@@ -214,7 +214,7 @@ fn from_urdf(
     let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on(l.parent) > 1);
     let depth = |link: &&str| path(&joints, link).iter().filter(|child| counts(&joints[**child])).count();
     let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
-    let deepest = ends.iter().map(|end| depth(&end)).max().unwrap_or(0);
+    let deepest = ends.iter().map(&depth).max().unwrap_or(0);
     let end = match &told.tip_link {
         Some(tip) => {
             let known = joints.get_key_value(tip.as_str()).map(|(link, _)| *link);
@@ -223,7 +223,7 @@ fn from_urdf(
             path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
         }
         None => {
-            let all: Vec<&str> = ends.iter().copied().filter(|end| depth(&end) == deepest).collect();
+            let all: Vec<&str> = ends.iter().copied().filter(|end| depth(end) == deepest).collect();
             if all.len() > 1 {
                 let named = all.join(", ");
                 return Err(bad(format!(

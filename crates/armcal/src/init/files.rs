@@ -106,7 +106,7 @@ fn refuse(path: &Path) -> Result<(), Error> {
         b if b.starts_with(b"SQLite format 3") => {
             refused("is a rosbag2 database: convert it with `ros2 bag convert` to MCAP".into())
         }
-        b if b.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) => {
+        [0x28, 0xb5, 0x2f, 0xfd, ..] => {
             refused("is compressed as a whole: `zstd -d` makes it a recording".into())
         }
         _ => refused("is no MCAP recording".into()),

@@ -190,7 +190,8 @@ fn the_base(evidence: &[Evidence], tip: usize, still: &[usize], seats: Option<&S
     near.sort_by(|a, b| a.1.total_cmp(&b.1));
     let Some((base, far_m, turned)) = near.first().copied() else { return };
     // Positions alone cannot stand for a frame, and a frame that is turned is not the base's.
-    if far_m > BASE_M || !(turned < BASE_RAD) {
+    let is_there = far_m < BASE_M && turned < BASE_RAD;
+    if !is_there {
         return;
     }
     let rival = near.get(1).is_some_and(|(_, far_m, turned)| *far_m < BASE_M && *turned < BASE_RAD);

@@ -14,6 +14,9 @@ const SHARE: f64 = 0.3;
 /// So many times as many as the next best is clear.
 const CLEAR: f64 = 2.0;
 
+/// Pauses in cavities, of how many.
+type Count = (usize, usize);
+
 /// The tip and the table that fit each other.
 pub struct Seats {
     /// The body whose origin was in cavities.
@@ -32,7 +35,7 @@ pub struct Seats {
 
 /// The bodies on the last link and those that stand still whose poses put most pauses into cavities.
 pub fn seats(board: &Board, evidence: &[Evidence], tips: &[usize], still: &[usize]) -> Option<Seats> {
-    let counted = |tip: usize, table: usize| -> Vec<(usize, usize)> {
+    let counted = |tip: usize, table: usize| -> Vec<Count> {
         let both = evidence[tip].recordings.iter().zip(&evidence[table].recordings);
         both.map(|pair| match pair {
             (Some(tip), Some(table)) => {
@@ -46,12 +49,12 @@ pub fn seats(board: &Board, evidence: &[Evidence], tips: &[usize], still: &[usiz
         .collect()
     };
     let pairs = tips.iter().flat_map(|tip| still.iter().map(move |table| (*tip, *table)));
-    let mut all: Vec<(usize, usize, Vec<(usize, usize)>)> =
+    let mut all: Vec<(usize, usize, Vec<Count>)> =
         pairs.map(|(tip, table)| (tip, table, counted(tip, table))).collect();
-    let total = |counts: &[(usize, usize)]| counts.iter().map(|(seated, _)| *seated).sum::<usize>();
+    let total = |counts: &[Count]| counts.iter().map(|(seated, _)| *seated).sum::<usize>();
     all.sort_by_key(|(_, _, counts)| std::cmp::Reverse(total(counts)));
     let (tip, table, counts) = all.first()?;
-    let fits = |(seated, of): &(usize, usize)| *seated >= FEWEST && *seated as f64 >= SHARE * *of as f64;
+    let fits = |(seated, of): &Count| *seated >= FEWEST && *seated as f64 >= SHARE * *of as f64;
     if !counts.iter().any(fits) {
         return None;
     }

@@ -41,12 +41,23 @@ pub struct Sockets {
     pub next_scatter_m: Option<(String, f64)>,
 }
 
+/// Where the tip was in each pause of a recording [m].
+type Points = Vec<Vector3<f64>>;
+
 /// The heaps of one recording: of each its pauses, in the order of first visits.
 type Heaps = Vec<Vec<usize>>;
 
+/// The pauses as they lie when the tip is on a link.
+struct OnLink {
+    scatter_m: f64,
+    link: Option<String>,
+    tips_m: Vec<Points>,
+    heaps: Vec<Heaps>,
+}
+
 /// Finds the sockets of recordings in which nothing but the joints was seen.
 pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, Error> {
-    let mut found: Vec<(f64, Option<String>, Vec<Vec<Vector3<f64>>>, Vec<Heaps>)> = Vec::new();
+    let mut found: Vec<OnLink> = Vec::new();
     let links: Vec<Option<String>> = match arm.tips.is_empty() {
         true => vec![None],
         false => arm.tips.iter().cloned().map(Some).collect(),
@@ -55,7 +66,7 @@ pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, Error> {
         let own = link.as_ref().map(|tip| arm.model_to(tip)).transpose()?;
         let model = own.as_ref().unwrap_or(&arm.model);
         let p = model.nominal();
-        let tips_m: Vec<Vec<Vector3<f64>>> = read
+        let tips_m: Vec<Points> = read
             .recordings
             .iter()
             .map(|r| {
@@ -83,12 +94,14 @@ pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, Error> {
                     heaps.iter().flat_map(|heap| off_m(tips_m, heap)).collect::<Vec<_>>()
                 })
                 .collect();
-            found.push((median(&scatter), link, tips_m, heaps));
+            found.push(OnLink { scatter_m: median(&scatter), link, tips_m, heaps });
         }
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let next_scatter_m = found.get(1).and_then(|(scatter_m, link, ..)| Some((link.clone()?, *scatter_m)));
-    let Some((scatter_m, tip_link, tips_m, heaps)) = found.into_iter().next() else { return Ok(None) };
+    found.sort_by(|a, b| a.scatter_m.total_cmp(&b.scatter_m));
+    let next_scatter_m = found.get(1).and_then(|next| Some((next.link.clone()?, next.scatter_m)));
+    let Some(OnLink { scatter_m, link: tip_link, tips_m, heaps }) = found.into_iter().next() else {
+        return Ok(None);
+    };
     let visits = (0..heaps[0].len()).map(|s| heaps.iter().map(|heaps| heaps[s].len()).sum()).collect();
     Ok(layout(&tips_m, &heaps).map(|in_board_m| Sockets {
         tip_link,
@@ -155,7 +168,8 @@ fn parted(points: usize, edges: &[(usize, usize, f64)]) -> Heaps {
 
 /// Edges of the shortest tree that joins all points, longest first (Prim 1957).
 fn spanning_tree(points_m: &[Vector3<f64>]) -> Vec<(usize, usize, f64)> {
-    let mut nearest: Vec<(usize, f64)> = points_m.iter().map(|p| (0, (p - points_m[0]).norm())).collect();
+    let Some(first) = points_m.first() else { return Vec::new() };
+    let mut nearest: Vec<(usize, f64)> = points_m.iter().map(|p| (0, (p - first).norm())).collect();
     let mut inside = vec![false; points_m.len()];
     let mut edges = Vec::new();
     let mut at = 0;
