@@ -50,6 +50,7 @@ pub struct Request {
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     let given = [&request.urdf, &request.dh, &request.board];
     given.into_iter().flatten().for_each(|path| input::note(path));
+    request.inputs.iter().for_each(|path| input::note(Path::new(path)));
     free(&request.out, request.force)?;
     let told = Told {
         dh: request.dh.clone(),
