@@ -126,6 +126,9 @@ fn printed(command: &str, out: &Path) -> String {
     if command.starts_with("run ") {
         armcal.arg("--out").arg(out);
     }
+    if command.starts_with("init ") {
+        armcal.arg("--out").arg(out.with_extension("toml"));
+    }
     if command.starts_with("write out ") {
         run_pipeline(&root().join("pipelines/paper.toml"), &out.join("out"), &[0]);
         armcal.current_dir(out);

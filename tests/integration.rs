@@ -14,6 +14,12 @@ mod paper_rig;
 /// Does geometry alone bring real robots as far as independent solvers bring them?
 mod real_robots;
 
+/// Is a pipeline proposed from recordings alone as good as one written by hand, and honest about what it could not see?
+mod init;
+
+/// Does a proposed pipeline take every tracked body for what it is?
+mod init_roles;
+
 /// Does every shipped pipeline run, from a clone or with the data that it names?
 mod shipped_pipelines;
 

@@ -31,7 +31,10 @@ const READ: [(&str, &str); 22] = [
     ("view", "input"),
     ("simulate", "lab"),
 ];
-const READ_TOO: [(&str, &str); 5] = [
+const READ_TOO: [(&str, &str); 8] = [
+    ("init", "urdf"),
+    ("init", "dh"),
+    ("init", "board"),
     ("extract", "inputs"),
     ("extract", "pipeline"),
     ("export", "pipeline"),

@@ -197,6 +197,7 @@ pub fn cases() -> Vec<Case> {
     let hidden = ["pipeline.toml", "arm.toml", "board.toml"];
     let map = ["map", "--shard", "1/1", "--manifest", "manifest.txt", "--pipeline", "p.toml"];
     let compensate = ["compensate", "result", "targets.csv"];
+    let init = ["init", "normal.mcap", "--dh", "arm.toml", "--board", "board.toml", "--force"];
     let thin = ["extract", "normal.mcap", "--pipeline", "p.toml"];
     vec![
         of(["run", "out"], "--out", &["run", "p.toml"], with(&[]), folder(&RUN)),
@@ -253,6 +254,7 @@ pub fn cases() -> Vec<Case> {
             folder(&simulated),
         ),
         of(["simulate", "out"], "--out", &["simulate", "--hide", "backlash"], vec![], folder(&hidden)),
+        of(["init", "out"], "--out", &init, vec!["normal.mcap", "board.toml", "arm.toml"], Place::File),
         of(["extract", "out"], "--out", &thin, vec!["normal.mcap", "p.toml"], Place::File),
         of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec![], Place::File),
         of(["export", "out"], "--out", &["export", "p.toml"], with(&[]), Place::File),
@@ -266,6 +268,7 @@ pub fn printing() -> Vec<Vec<&'static str>> {
         vec!["--version"],
         vec!["run", "p.toml"],
         vec!["run", "p.toml", "--json"],
+        vec!["init", "normal.mcap", "--dh", "arm.toml", "--out", "proposed.toml"],
         vec!["inspect", "normal.mcap"],
         vec!["diagnose", "result"],
         vec!["add", "backlash:1", "p.toml", "--write", "more.toml"],

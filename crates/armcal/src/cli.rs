@@ -1,6 +1,6 @@
 //! Everything a user can type.
 
-use crate::commands::{add, check, compensate, extract, plan, score, write};
+use crate::commands::{add, check, compensate, extract, init, plan, score, write};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -19,6 +19,11 @@ pub struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Proposes a pipeline for recordings: what they show of joints, tracked bodies, clocks, arm and table, each line with its
+    /// reason.
+    ///
+    /// Exit code 3 when a first calibration with it fails, or contradicts itself.
+    Init(init::Request),
     /// The main job: recordings to dwells, cavities, a calibration and an output MCAP.
     Run {
         /// Pipeline file.

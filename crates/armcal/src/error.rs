@@ -28,6 +28,9 @@ pub enum Error {
         "recording `{recording}` holds no message: there is nothing to calibrate with; was anything recorded?"
     )]
     NoMessages { recording: String },
+    /// No pipeline can be proposed.
+    #[error("{problem}")]
+    Init { problem: String },
     /// A name on the command line that means nothing.
     #[error(transparent)]
     Usage(Box<Error>),

@@ -11,6 +11,7 @@ pub mod cli;
 pub mod commands;
 pub mod compensate;
 pub mod error;
+pub mod init;
 pub mod pipeline;
 pub mod plan;
 pub mod pool;

@@ -327,7 +327,8 @@ impl Pipeline {
     /// The same for recordings that are named elsewhere; the pipeline's own are left out.
     pub fn load_for_others(path: &Path) -> Result<Pipeline, Error> {
         let text = read_text("pipeline", path)?;
-        let mut pipeline = Pipeline::parse_unchecked(path, text, path.parent().unwrap_or(Path::new("")))?;
+        let mut pipeline = Pipeline::read(path, text, path.parent().unwrap_or(Path::new("")))?;
+        pipeline.note_inputs();
         pipeline.recordings.clear();
         pipeline.check_sections(path)?;
         Ok(pipeline)
@@ -340,13 +341,20 @@ impl Pipeline {
 
     /// Reads and checks the text of a pipeline whose relative paths start in `folder`.
     pub fn parse(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
-        let pipeline = Pipeline::parse_unchecked(path, text, folder)?;
+        let pipeline = Pipeline::proposed(path, text, folder)?;
+        pipeline.note_inputs();
+        Ok(pipeline)
+    }
+
+    /// The same of one whose files may not be written yet: they are no inputs.
+    pub(crate) fn proposed(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
+        let pipeline = Pipeline::read(path, text, folder)?;
         pipeline.check_recordings(path)?;
         pipeline.check_sections(path)?;
         Ok(pipeline)
     }
 
-    fn parse_unchecked(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
+    fn read(path: &Path, text: String, folder: &Path) -> Result<Pipeline, Error> {
         let mut pipeline = match is_of_two_arms(&text) {
             true => TwoArms::parse(path, &text)?,
             false => toml::from_str(&text).map_err(|source| Error::PipelineSyntax {
@@ -359,7 +367,6 @@ impl Pipeline {
             gauges.filter_map(|m| Some((m.name().to_owned(), m.reading.clone()?))).collect();
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
-        pipeline.note_inputs();
         Ok(pipeline)
     }
 

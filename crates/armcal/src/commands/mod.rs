@@ -9,6 +9,7 @@ mod diagnose;
 mod effects;
 mod export;
 pub mod extract;
+pub mod init;
 mod inspect;
 pub mod plan;
 mod pool;
@@ -75,6 +76,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             pool::run(pipeline, results, out, detail(*verbose), *json)
         }
         Command::Run { pipeline, out, verbose, json } => run::run(pipeline, out, detail(*verbose), *json),
+        Command::Init(asked) => init::run(asked),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
             simulate::hide(family, design, size, out, seed.unwrap_or(1))

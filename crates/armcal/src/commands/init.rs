@@ -1,0 +1,155 @@
+//! `armcal init`: a pipeline proposed from recordings.
+
+use super::{Outcome, json_text, may_write, print};
+use crate::error::Error;
+use crate::init::{Asked, Proposal, Told, propose};
+use crate::progress::Progress;
+use armcal_recording::{RecordingError, atomic, input, may_put};
+use armcal_report::printable;
+use clap::Args;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// What `armcal init` is asked to do.
+#[derive(Debug, Clone, Args)]
+pub struct Request {
+    /// MCAP files, folders of them, patterns such as 'lab/*.mcap'; the parts of a split bag are one recording.
+    #[arg(required = true)]
+    pub inputs: Vec<String>,
+    /// The pipeline to write; what it needs and no file holds is written beside it.
+    #[arg(long, default_value = "pipeline.toml", value_name = "FILE")]
+    pub out: PathBuf,
+    /// URDF of the arm, instead of the /robot_description in the recordings.
+    #[arg(long, value_name = "FILE", conflicts_with = "dh")]
+    pub urdf: Option<PathBuf>,
+    /// DH table of the arm.
+    #[arg(long, value_name = "FILE")]
+    pub dh: Option<PathBuf>,
+    /// Board whose cavities the tip sat in.
+    #[arg(long, value_name = "FILE")]
+    pub board: Option<PathBuf>,
+    /// Topic of the joint readings, where several could be it.
+    #[arg(long, value_name = "TOPIC")]
+    pub joints: Option<String>,
+    /// First link of the arm in the URDF.
+    #[arg(long, value_name = "LINK", conflicts_with = "dh")]
+    pub base_link: Option<String>,
+    /// Last link of the arm in the URDF.
+    #[arg(long, value_name = "LINK", conflicts_with = "dh")]
+    pub tip_link: Option<String>,
+    /// Replace an earlier proposal; nothing else is ever written over.
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Proposes, writes, and says what was seen and what was not.
+pub fn run(request: &Request) -> Result<Outcome, Error> {
+    let given = [&request.urdf, &request.dh, &request.board];
+    given.into_iter().flatten().for_each(|path| input::note(path));
+    request.inputs.iter().for_each(|path| input::note(Path::new(path)));
+    free(&request.out, request.force)?;
+    let told = Told {
+        dh: request.dh.clone(),
+        urdf: request.urdf.clone(),
+        base_link: request.base_link.clone(),
+        tip_link: request.tip_link.clone(),
+        joints: request.joints.clone(),
+    };
+    let asked = Asked {
+        inputs: request.inputs.clone(),
+        told,
+        board: request.board.clone(),
+        out: request.out.clone(),
+    };
+    let proposal = propose(&asked, &Progress::new())?;
+    for (path, text) in &proposal.beside {
+        free(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
+    }
+    for (path, text) in &proposal.beside {
+        atomic::write(path, text.as_bytes()).map_err(Error::Output)?;
+    }
+    atomic::write(&proposal.out, proposal.pipeline.text.as_bytes()).map_err(Error::Output)?;
+    print(&if request.json { json_text(&json_of(&proposal))? } else { text(&proposal) })?;
+    Ok(if proposal.runs() { Outcome::Done } else { Outcome::Doubtful })
+}
+
+/// Whether a file may be written: it is not there, or the user wants it replaced and it is one of armcal's.
+fn free(path: &Path, force: bool) -> Result<(), Error> {
+    may_write([path])?;
+    let is_there = path.symlink_metadata().is_ok_and(|about| about.len() > 0);
+    if is_there && !force {
+        let what = "was proposed earlier; --force replaces it".to_owned();
+        return Err(Error::Output(RecordingError::NotOurs { path: path.to_owned(), what }));
+    }
+    Ok(())
+}
+
+fn text(proposal: &Proposal) -> String {
+    let mut out = String::new();
+    for (body, cast) in &proposal.bodies {
+        let name =
+            body.body.as_ref().map_or_else(|| body.topic.clone(), |name| format!("{name} of {}", body.topic));
+        let sure = if cast.sure { "" } else { " (unsure)" };
+        let _ = writeln!(out, " {}: {}{sure}: {}", printable(&name), cast.role.word(), printable(&cast.why));
+    }
+    for (what, all) in [("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)] {
+        for said in all {
+            let _ = writeln!(out, " {what}: {}", printable(said));
+        }
+    }
+    for (topic, why) in &proposal.left {
+        let _ = writeln!(out, " Not used: {}: {}", printable(topic), printable(why));
+    }
+    match &proposal.tried {
+        Some(Ok(tried)) => {
+            let [before, after] = tried.mean_m.map(|m| m * 1e3);
+            let _ = writeln!(
+                out,
+                "\n Tried: on {} points the mean error falls from {before:.2} to {after:.2} mm.",
+                tried.points
+            );
+            for mistake in &tried.mistakes {
+                let _ = writeln!(out, " Setup first: {}.", printable(mistake));
+            }
+        }
+        Some(Err(why)) => {
+            let _ = writeln!(out, "\n Tried, and it does not run yet: {}", printable(why));
+        }
+        None => {}
+    }
+    let beside: Vec<String> = proposal.beside.iter().map(|(path, _)| path.display().to_string()).collect();
+    let _ = writeln!(
+        out,
+        "\nWritten: {}",
+        [vec![proposal.out.display().to_string()], beside].concat().join(", ")
+    );
+    let _ = writeln!(out, " next:  armcal run {}", proposal.out.display());
+    out
+}
+
+fn json_of(proposal: &Proposal) -> Value {
+    let bodies = proposal.bodies.iter().map(|(body, cast)| {
+        json!({"topic": body.topic, "body": body.body, "role": cast.role.word(), "sure": cast.sure, "why": cast.why})
+    });
+    let tried = match &proposal.tried {
+        Some(Ok(t)) => {
+            json!({"points": t.points, "nominal_mm": t.mean_m[0] * 1e3, "calibrated_mm": t.mean_m[1] * 1e3, "mistakes": t.mistakes})
+        }
+        Some(Err(why)) => json!({"why_not": why}),
+        None => Value::Null,
+    };
+    json!({
+        "schema": "armcal.init/1",
+        "pipeline": proposal.out.display().to_string(),
+        "beside": proposal.beside.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+        "bodies": bodies.collect::<Vec<_>>(),
+        "unsure": proposal.unsure,
+        "not_visible": proposal.unseen,
+        "not_used": proposal.left.iter().map(|(topic, why)| json!({"topic": topic, "why": why})).collect::<Vec<_>>(),
+        "tried": tried,
+    })
+}

@@ -1,0 +1,388 @@
+//! The nominal arm: which of its joints are recorded, from which link to which.
+
+use super::channels::{Channels, JointTopic};
+use crate::error::Error;
+use crate::stages::frames::bare;
+use armcal_core::Pose;
+use armcal_model::{Chain, Model};
+use roxmltree::{Document, Node};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Names that REP-105 keeps for what is no part of a robot.
+const NO_ROBOT: [&str; 4] = ["world", "map", "odom", "earth"];
+
+/// What the user says of the arm.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    /// DH file.
+    pub dh: Option<PathBuf>,
+    /// URDF file.
+    pub urdf: Option<PathBuf>,
+    /// First link.
+    pub base_link: Option<String>,
+    /// Last link.
+    pub tip_link: Option<String>,
+    /// Topic of the joint readings.
+    pub joints: Option<String>,
+}
+
+/// The arm as far as files and names say it.
+pub struct Arm {
+    /// Its file: that of the user, or where a description from the recording will be written.
+    pub file: PathBuf,
+    /// The text of that file.
+    pub text: String,
+    /// Whether the text was found in a recording and is still to be written.
+    pub recorded: bool,
+    /// First link, of a URDF.
+    pub base_link: Option<String>,
+    /// Links that the tip may be, all behind the last joint; the first is the likeliest. Of a DH table none.
+    pub tips: Vec<String>,
+    /// Topic of the joint readings, and the names in it in the order of the model.
+    pub topic: String,
+    /// Joint names as recorded, in the order of the model.
+    pub names: Vec<String>,
+    /// Every link of the URDF.
+    pub links: BTreeSet<String>,
+    /// The chain to the first of the tips.
+    pub model: Model,
+    /// Of each joint, the link or row that it moves.
+    pub carried: Vec<String>,
+    /// What was taken on trust.
+    pub unsure: Vec<String>,
+}
+
+impl Arm {
+    /// Whether it is a URDF.
+    pub fn is_urdf(&self) -> bool {
+        self.model.chain().is_urdf()
+    }
+
+    /// The same arm with the tip at another link.
+    pub fn model_to(&self, tip: &str) -> Result<Model, Error> {
+        let base = self.base_link.as_deref().unwrap_or_default();
+        bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())
+    }
+
+    /// The links that the joints carry, then the tip, in the base.
+    pub fn poses(&self, joint_rad: &[f64]) -> Vec<Pose> {
+        let p = self.model.nominal();
+        let frames = self.model.link_frames(&p, joint_rad);
+        let of =
+            |name: &String| frames.iter().find(|f| f.name == *name).map_or(Pose::identity(), |f| f.in_base);
+        self.carried.iter().map(of).chain([self.model.tip_in_base(&p, joint_rad)]).collect()
+    }
+}
+
+/// Finds the arm: a file that the user names, or the description in the recordings, which goes `beside`.
+pub fn find(told: &Told, channels: &Channels, beside: &Path) -> Result<Arm, Error> {
+    if let Some(path) = &told.dh {
+        return from_dh(told, channels, path);
+    }
+    let (file, text, recorded) = match (&told.urdf, channels.urdfs.len()) {
+        (Some(path), _) => (path.clone(), crate::pipeline::read_text("URDF", path)?, false),
+        (None, 1) => (beside.to_owned(), channels.urdfs.iter().next().cloned().unwrap_or_default(), true),
+        (None, 0) => return Err(no_arm(channels, "no /robot_description (std_msgs/String) is recorded")),
+        (None, n) => {
+            return Err(no_arm(
+                channels,
+                &format!("{n} different robot descriptions are recorded; write the right one to a file"),
+            ));
+        }
+    };
+    from_urdf(told, channels, file, text, recorded)
+}
+
+fn no_arm(channels: &Channels, why: &str) -> Error {
+    let names = channels.joints.iter().map(|j| format!("{} ({})", j.topic, j.names.join(", ")));
+    let problem = format!(
+        "nothing says what the arm is: {why}; give --urdf FILE or --dh FILE (docs/guide.md shows one). Recorded joints: {}",
+        names.collect::<Vec<_>>().join("; ")
+    );
+    Error::Init { problem }
+}
+
+fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> {
+    let text = crate::pipeline::read_text("DH model", path)?;
+    let chain = Chain::from_dh_toml(&text, path)?;
+    let rows = chain.joint_names().to_vec();
+    let mut unsure = Vec::new();
+    let (topic, names) = match topic_of(told, channels, &rows)? {
+        Some(found) => found,
+        None => {
+            // A table may name its rows as it likes: as many joints on one topic are taken in their order.
+            let mut alike = chosen(told, channels).filter(|j| j.names.len() == rows.len());
+            let Some(only) = alike.next() else { return Err(other_joints(channels, &rows, path)) };
+            unsure.push(format!(
+                "the rows of {} are called {}, the recorded joints {}: they are taken in this order",
+                path.display(),
+                rows.join(", "),
+                only.names.join(", ")
+            ));
+            (only.topic.clone(), only.names.clone())
+        }
+    };
+    unsure.extend(others(told, channels, &topic, &names));
+    let model = bare(&chain, Vec::new())?;
+    Ok(Arm {
+        file: path.to_owned(),
+        text,
+        recorded: false,
+        base_link: None,
+        tips: Vec::new(),
+        topic,
+        names,
+        links: BTreeSet::new(),
+        model,
+        carried: rows,
+        unsure,
+    })
+}
+
+fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
+    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.topic, j.names.join(", ")));
+    let problem = format!(
+        "no topic has the joints of {} ({}): {}",
+        path.display(),
+        model.join(", "),
+        topics.collect::<Vec<_>>().join("; ")
+    );
+    Error::Init { problem }
+}
+
+/// The topics that may be meant.
+fn chosen<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
+    channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|topic| *topic == j.topic))
+}
+
+/// Other topics that have the same joints: of another arm, of set-points, or of a driver beside the first.
+fn others(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Vec<String> {
+    let has_all = |j: &&JointTopic| j.topic != topic && names.iter().all(|name| j.names.contains(name));
+    let others: Vec<&str> = chosen(told, channels).filter(has_all).map(|j| j.topic.as_str()).collect();
+    let told = format!("{topic} is read; {} has the same joints, and --joints chooses it", others.join(", "));
+    if others.is_empty() { Vec::new() } else { vec![told] }
+}
+
+/// The topic that has all these joints, and their names in it; of several the one with most messages. Messages without names
+/// are read in the order of the model.
+fn topic_of(
+    told: &Told,
+    channels: &Channels,
+    joints: &[String],
+) -> Result<Option<(String, Vec<String>)>, Error> {
+    if let Some(topic) =
+        told.joints.as_ref().filter(|topic| !channels.joints.iter().any(|j| j.topic == **topic))
+    {
+        let present: Vec<&str> = channels.joints.iter().map(|j| j.topic.as_str()).collect();
+        let problem = format!(
+            "--joints {topic} is no topic of joint readings in all recordings; there are: {}",
+            present.join(", ")
+        );
+        return Err(Error::of_usage(Error::Init { problem }));
+    }
+    let has_all = |j: &&JointTopic| joints.iter().all(|name| j.names.contains(name));
+    let all: Vec<&JointTopic> = chosen(told, channels).filter(has_all).collect();
+    let unnamed = || chosen(told, channels).find(|j| j.names.is_empty());
+    let most = all.into_iter().max_by(|a, b| a.messages.cmp(&b.messages).then(b.topic.cmp(&a.topic)));
+    Ok(most.or_else(unnamed).map(|j| (j.topic.clone(), joints.to_vec())))
+}
+
+/// A joint of a URDF.
+struct Link<'a> {
+    joint: &'a str,
+    moves: bool,
+    slides: bool,
+    parent: &'a str,
+}
+
+fn from_urdf(
+    told: &Told,
+    channels: &Channels,
+    file: PathBuf,
+    text: String,
+    recorded: bool,
+) -> Result<Arm, Error> {
+    let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", file.display()) };
+    let document = Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}")))?;
+    let joints = joints_of(document.root_element());
+    let named: BTreeSet<&str> = chosen(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
+    let unnamed = named.is_empty() && chosen(told, channels).next().is_some();
+    let is_read = |l: &Link<'_>| l.moves && (unnamed || named.contains(l.joint));
+    // Fingers: joints that share a parent link and end there.
+    let read_on = |parent: &str| joints.values().filter(|l| is_read(l) && l.parent == parent).count();
+    let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on(l.parent) > 1);
+    let depth = |link: &&str| path(&joints, link).iter().filter(|child| counts(&joints[**child])).count();
+    let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
+    let deepest = ends.iter().map(&depth).max().unwrap_or(0);
+    let end = match &told.tip_link {
+        Some(tip) => {
+            let known = joints.get_key_value(tip.as_str()).map(|(link, _)| *link);
+            let known =
+                known.ok_or_else(|| Error::of_usage(bad(format!("--tip-link {tip} is no link of it"))))?;
+            path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
+        }
+        None => {
+            let all: Vec<&str> = ends.iter().copied().filter(|end| depth(end) == deepest).collect();
+            if all.len() > 1 {
+                let named = all.join(", ");
+                return Err(bad(format!(
+                    "{} arms of {deepest} recorded joints end at {named}: say which with --tip-link LINK",
+                    all.len()
+                )));
+            }
+            all.first().copied()
+        }
+    };
+    let Some(end) = end else {
+        let known: Vec<String> = joints.values().filter(|l| l.moves).map(|l| l.joint.to_owned()).collect();
+        return Err(other_joints(channels, &known, &file));
+    };
+    let way = path(&joints, end);
+    let behind =
+        way.iter().rposition(|link| joints[link].moves && !counts(&joints[link])).map_or(0, |at| at + 1);
+    let moving: Vec<&str> = way[behind..].iter().copied().filter(|link| joints[link].moves).collect();
+    if moving.is_empty() {
+        return Err(bad(format!("no recorded joint leads to {end}")));
+    }
+    let model_joints: Vec<String> = moving.iter().map(|link| joints[link].joint.to_owned()).collect();
+    let (topic, names) = topic_of(told, channels, &model_joints)?
+        .ok_or_else(|| other_joints(channels, &model_joints, &file))?;
+    let first = way[behind];
+    let above = joints[first].parent;
+    let is_frame_alone = behind == 0 && NO_ROBOT.contains(&above) && !joints[first].moves;
+    let base = if is_frame_alone { first } else { above };
+    let base_link = told.base_link.clone().unwrap_or_else(|| base.to_owned());
+    let tips = match &told.tip_link {
+        Some(tip) => vec![tip.clone()],
+        None => rigid_with(&joints, end),
+    };
+    let chain = Chain::from_urdf(&text, &base_link, tips.first().map_or(end, String::as_str), &file)?;
+    if chain.joint_names() != model_joints {
+        let own = chain.joint_names().join(", ");
+        return Err(bad(format!(
+            "from {base_link} on the way to {end} there are the joints {own}, recorded are {}",
+            model_joints.join(", ")
+        )));
+    }
+    let model = bare(&chain, Vec::new())?;
+    let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
+    links.extend(joints.values().map(|l| l.parent.to_owned()));
+    let carried = moving.iter().map(|link| (*link).to_owned()).collect();
+    let mut unsure = others(told, channels, &topic, &names);
+    if unnamed {
+        unsure
+            .push(format!("the messages of {topic} name no joints: they are read in the order of the model"));
+    }
+    let base_link = Some(base_link);
+    drop(document);
+    Ok(Arm { file, recorded, base_link, tips, topic, names, links, model, carried, unsure, text })
+}
+
+/// Every joint by the link that it carries.
+fn joints_of<'a>(robot: Node<'a, '_>) -> BTreeMap<&'a str, Link<'a>> {
+    let child = |joint: Node<'a, '_>, tag: &str| {
+        let found = joint.children().find(|c| c.has_tag_name(tag))?;
+        found.attribute("link")
+    };
+    let joint = |joint: Node<'a, '_>| {
+        let form = joint.attribute("type")?;
+        let mimics = joint.children().any(|c| c.has_tag_name("mimic"));
+        let moves = ["revolute", "continuous", "prismatic"].contains(&form) && !mimics;
+        let (parent, link) = (child(joint, "parent")?, child(joint, "child")?);
+        Some((link, Link { joint: joint.attribute("name")?, moves, slides: form == "prismatic", parent }))
+    };
+    robot.children().filter(|c| c.has_tag_name("joint")).filter_map(joint).collect()
+}
+
+/// The links from behind the root to this one.
+fn path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
+    let mut way: Vec<&str> = Vec::new();
+    let mut at = link;
+    while let Some((link, joint)) = joints.get_key_value(at).filter(|_| way.len() <= joints.len()) {
+        way.push(link);
+        at = joint.parent;
+    }
+    way.reverse();
+    way
+}
+
+/// The links that are fixed to this one, those furthest from it first, itself last.
+fn rigid_with(joints: &BTreeMap<&str, Link<'_>>, link: &str) -> Vec<String> {
+    let mut all = vec![(0, link)];
+    let mut at = 0;
+    while let Some((depth, own)) = all.get(at).copied().filter(|_| all.len() <= joints.len() + 1) {
+        let fixed = joints.iter().filter(|(_, l)| l.parent == own && !l.moves);
+        all.extend(fixed.map(|(child, _)| (depth + 1, *child)));
+        at += 1;
+    }
+    all.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(b.1)));
+    all.into_iter().map(|(_, link)| link.to_owned()).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
+mod tests {
+    use super::*;
+
+    fn urdf(links: &[(&str, &str, &str, &str)]) -> String {
+        let joint = |(name, form, parent, child): &(&str, &str, &str, &str)| {
+            format!(
+                "<joint name=\"{name}\" type=\"{form}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0 0 0.2\"/>\
+                 <axis xyz=\"0 1 0\"/></joint>"
+            )
+        };
+        let names: BTreeSet<&str> = links.iter().flat_map(|l| [l.2, l.3]).collect();
+        let names = names.iter().map(|name| format!("<link name=\"{name}\"/>"));
+        format!(
+            "<robot name=\"r\">{}{}</robot>",
+            names.collect::<String>(),
+            links.iter().map(joint).collect::<String>()
+        )
+    }
+
+    fn recorded(names: &[&str]) -> Channels {
+        let names = names.iter().map(|n| (*n).to_owned()).collect();
+        Channels {
+            joints: vec![JointTopic { topic: "/j".into(), names, messages: 1 }],
+            ..Channels::default()
+        }
+    }
+
+    const ARM: [(&str, &str, &str, &str); 7] = [
+        ("mount", "fixed", "world", "base"),
+        ("lift", "prismatic", "base", "column"),
+        ("a", "revolute", "column", "l1"),
+        ("b", "continuous", "l1", "l2"),
+        ("f1", "prismatic", "hand", "finger1"),
+        ("f2", "prismatic", "hand", "finger2"),
+        ("hold", "fixed", "l2", "hand"),
+    ];
+
+    #[test]
+    fn the_arm_is_what_moves_and_is_read_without_its_fingers() {
+        let found = |names: &[&str]| {
+            from_urdf(&Told::default(), &recorded(names), "r.urdf".into(), urdf(&ARM), false).unwrap()
+        };
+        let whole = found(&["f1", "b", "a", "f2", "lift"]);
+        assert_eq!(
+            (whole.names.join(" "), whole.base_link.as_deref()),
+            ("lift a b".to_owned(), Some("base"))
+        );
+        assert_eq!(whole.tips, ["hand", "l2"]);
+        assert_eq!(whole.carried, ["column", "l1", "l2"]);
+        // What is not read stands still: the arm begins above it.
+        let above = found(&["a", "b"]);
+        assert_eq!((above.names.join(" "), above.base_link.as_deref()), ("a b".to_owned(), Some("column")));
+    }
+
+    #[test]
+    fn two_arms_in_one_file_are_not_guessed_between() {
+        let two = [("a", "revolute", "body", "l1"), ("b", "revolute", "body", "r1")];
+        let find = |told: &Told| from_urdf(told, &recorded(&["a", "b"]), "r.urdf".into(), urdf(&two), false);
+        let refused = find(&Told::default()).err().unwrap().to_string();
+        assert!(refused.contains("l1, r1") && refused.contains("--tip-link"), "{refused}");
+        let told = Told { tip_link: Some("r1".into()), ..Told::default() };
+        assert_eq!(find(&told).unwrap().names, ["b"]);
+    }
+}

@@ -1,0 +1,203 @@
+//! What is on the channels of all recordings: joint names, tracked bodies, a thermometer, the robot's description.
+
+use super::files::Opened;
+use crate::error::Error;
+use armcal_recording::decode::{Plan, Role, Rows, readable_as};
+use armcal_recording::{RawChannel, RawSchema, RecordingError};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Messages of a channel that are looked into for names: the first so many, then every so-manieth.
+const FIRST: u64 = 100;
+const EVERY: u64 = 50;
+/// More names of joints or bodies than this are no arm in a laboratory.
+const MOST_NAMES: usize = 64;
+
+/// A topic of joint readings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JointTopic {
+    /// Its topic.
+    pub topic: String,
+    /// The joints it names, in the order of the messages; empty where it names none.
+    pub names: Vec<String>,
+    /// Messages in all recordings.
+    pub messages: u64,
+}
+
+/// A tracked body.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BodyTopic {
+    /// Its topic.
+    pub topic: String,
+    /// Its name, where the topic has several.
+    pub body: Option<String>,
+}
+
+/// What all the recordings have in common, and what is left over.
+#[derive(Debug, Default)]
+pub struct Channels {
+    /// Joint readings.
+    pub joints: Vec<JointTopic>,
+    /// Tracked bodies.
+    pub bodies: Vec<BodyTopic>,
+    /// Thermometers.
+    pub temperatures: Vec<String>,
+    /// Texts that are a robot's description.
+    pub urdfs: BTreeSet<String>,
+    /// What is not used, and why.
+    pub left: Vec<(String, String)>,
+}
+
+/// What one topic holds.
+#[derive(Default)]
+struct Found {
+    recordings: usize,
+    messages: u64,
+    role: Option<Role>,
+    thermometer: bool,
+    names: Vec<String>,
+    why_not: String,
+}
+
+/// Looks into every recording.
+pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
+    let mut found: BTreeMap<String, Found> = BTreeMap::new();
+    let mut channels = Channels::default();
+    for Opened { entry, recording } in opened {
+        let mut own: BTreeMap<String, Found> = BTreeMap::new();
+        let mut plans = Vec::new();
+        for channel in recording.channels() {
+            let topic = own.entry(channel.topic.clone()).or_default();
+            let Some(schema) = &channel.schema else { continue };
+            match role_of(schema, &channel.message_encoding) {
+                Ok(role) => {
+                    topic.role = topic.role.or(Some(role));
+                    topic.thermometer |= role == Role::Scalar && is_thermometer(&channel);
+                    let plan = Plan::compile(
+                        role,
+                        &schema.name,
+                        &schema.encoding,
+                        &schema.data,
+                        &channel.message_encoding,
+                        None,
+                    );
+                    plans.extend(plan.ok().map(|plan| (channel.clone(), plan)));
+                }
+                Err(why) => topic.why_not = why,
+            }
+        }
+        let wanted = |c: &RawChannel| is_text(c) || plans.iter().any(|(own, _)| **own == *c);
+        let urdfs = &mut channels.urdfs;
+        recording
+            .for_each_raw_of(&wanted, &mut |message| {
+                let Some(topic) = own.get_mut(&message.channel.topic) else { return Ok(()) };
+                topic.messages += 1;
+                if topic.messages > FIRST && topic.messages % EVERY != 0 {
+                    return Ok(());
+                }
+                if is_text(message.channel) {
+                    urdfs.extend(
+                        text_in(message.data).filter(|text| text.contains("<robot")).map(str::to_owned),
+                    );
+                }
+                if let Some((_, plan)) = plans.iter().find(|(own, _)| **own == *message.channel) {
+                    topic.add(names_in(plan, message.data));
+                }
+                Ok(())
+            })
+            .map_err(|source: RecordingError| Error::Recording { recording: entry.name(), source })?;
+        for (topic, own) in own {
+            let all = found.entry(topic).or_default();
+            let Found { messages, role, thermometer, names, why_not, .. } = own;
+            all.recordings += usize::from(messages > 0);
+            all.messages += messages;
+            all.role = all.role.or(role);
+            all.thermometer |= thermometer;
+            all.add(names);
+            all.why_not = why_not;
+        }
+    }
+    for (topic, found) in found {
+        channels.sort(topic, found, opened.len());
+    }
+    Ok(channels)
+}
+
+impl Found {
+    fn add(&mut self, names: Vec<String>) {
+        for name in names {
+            if !self.names.contains(&name) && self.names.len() < MOST_NAMES {
+                self.names.push(name);
+            }
+        }
+    }
+}
+
+impl Channels {
+    fn sort(&mut self, topic: String, found: Found, recordings: usize) {
+        let Found { names, messages, .. } = found;
+        let mut leave = |why: String| self.left.push((topic.clone(), why));
+        match found.role {
+            _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),
+            None if found.why_not.is_empty() => leave("not of a kind that a calibration reads".to_owned()),
+            None => leave(found.why_not),
+            Some(_) if found.recordings < recordings => {
+                leave(format!("only in {} of {recordings} recordings", found.recordings));
+            }
+            Some(Role::Joints) => self.joints.push(JointTopic { topic, names, messages }),
+            Some(Role::Scalar) if found.thermometer => self.temperatures.push(topic),
+            Some(Role::Scalar) => {
+                leave("one number: if it is an instrument, see docs/measures.md".to_owned())
+            }
+            Some(Role::Pose) if names.len() < 2 => self.bodies.push(BodyTopic { topic, body: None }),
+            Some(Role::Pose) => {
+                self.bodies.extend(
+                    names.into_iter().map(|name| BodyTopic { topic: topic.clone(), body: Some(name) }),
+                );
+            }
+        }
+    }
+}
+
+fn role_of(schema: &RawSchema, message_encoding: &str) -> Result<Role, String> {
+    readable_as(&schema.name, &schema.encoding, &schema.data, message_encoding).map_err(|e| e.to_string())
+}
+
+/// The message type says it, or the topic does: a plain number may be anything.
+fn is_thermometer(channel: &RawChannel) -> bool {
+    let schema = channel.schema.as_ref().map_or("", |s| s.name.as_str());
+    [schema, channel.topic.as_str()].iter().any(|name| name.to_lowercase().contains("temperature"))
+}
+
+fn names_in(plan: &Plan, data: &[u8]) -> Vec<String> {
+    match plan.role() {
+        Role::Pose => plan.bodies(data).unwrap_or_default(),
+        Role::Scalar => Vec::new(),
+        Role::Joints => {
+            let mut rows = Rows::new(Role::Joints);
+            match (plan.decode(data, &mut rows), &rows) {
+                (Ok(()), Rows::Joints(rows)) => rows.rows().flat_map(|row| row.names.to_vec()).collect(),
+                _ => Vec::new(),
+            }
+        }
+    }
+}
+
+/// `std_msgs/String`.
+fn is_text(channel: &RawChannel) -> bool {
+    let schema = channel.schema.as_ref();
+    channel.message_encoding == "cdr"
+        && schema.is_some_and(|s| s.name.starts_with("std_msgs/") && s.name.ends_with("/String"))
+}
+
+/// The text of a string message: behind the encapsulation header its length, its bytes, a zero.
+fn text_in(data: &[u8]) -> impl Iterator<Item = &str> {
+    let text = || {
+        let (head, rest) = data.split_at_checked(4)?;
+        let (length, text) = rest.split_first_chunk::<4>()?;
+        let little = head[1] & 1 == 1;
+        let length = if little { u32::from_le_bytes(*length) } else { u32::from_be_bytes(*length) };
+        let bytes = text.get(..usize::try_from(length).ok()?)?;
+        std::str::from_utf8(bytes.strip_suffix(&[0]).unwrap_or(bytes)).ok()
+    };
+    text().into_iter()
+}

@@ -1,0 +1,202 @@
+//! What the recordings say of each body: how far it went, where it was in every pause of the arm, which link it followed.
+
+use super::arm::Arm;
+use super::links::{Placed, place, turned_apart};
+use super::motion::{Likeness, Speeds, likeness};
+use super::read::{AllRead, Read};
+use armcal_core::robust::{median, percentile};
+use armcal_core::{Pose, PoseSamples};
+use armcal_dwell::mean_pose;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Noise of positions [m] and turns [rad] below which no link is better than another.
+const OFF_M: f64 = 2e-3;
+const TURNED_RAD: f64 = 0.01;
+/// Links that explain a body about as well as the best one.
+const ALIKE: f64 = 1.2;
+
+/// A pause in which a body was seen.
+pub struct Pause {
+    /// Which of the recording's dwells.
+    pub dwell: usize,
+    /// Where it was [m].
+    pub at_m: Vector3<f64>,
+    /// How it was turned.
+    pub turned: Option<UnitQuaternion<f64>>,
+}
+
+/// A body in one recording.
+pub struct InRecording {
+    /// Distance from the median position that all but the worst hundredth of the frames keep [m].
+    pub travel_m: f64,
+    /// Its speed and that of the arm's tip.
+    pub likeness: Option<Likeness>,
+    /// The pauses in which it was seen.
+    pub pauses: Vec<Pause>,
+    /// Its mean pose; none without an orientation.
+    pub mean: Option<Pose>,
+    /// Its median position [m].
+    pub middle_m: Vector3<f64>,
+    /// On each link: where it would be, and the angle by which it turned otherwise.
+    pub on_links: Vec<Option<(Placed, f64)>>,
+}
+
+/// All that is known of a body.
+pub struct Evidence {
+    /// By recording; none where it was never seen.
+    pub recordings: Vec<Option<InRecording>>,
+}
+
+/// The link that explains a body best.
+#[derive(Debug, Clone, Copy)]
+pub struct BestLink {
+    /// Its joint, from 0.
+    pub link: usize,
+    /// How far off it is there [m].
+    pub off_m: f64,
+    /// The same as a share of how far the body moves between pauses.
+    pub share: f64,
+    /// How many times worse the best of the other links is.
+    pub lead: f64,
+}
+
+impl Evidence {
+    fn seen(&self) -> impl Iterator<Item = &InRecording> {
+        self.recordings.iter().flatten()
+    }
+
+    /// Furthest travel in a recording [m].
+    pub fn travel_m(&self) -> f64 {
+        self.seen().map(|r| r.travel_m).fold(0.0, f64::max)
+    }
+
+    /// The likeness of speeds, of the recording in which they are most alike.
+    pub fn likeness(&self) -> Option<Likeness> {
+        self.seen().filter_map(|r| r.likeness).max_by(|a, b| a.correlation.total_cmp(&b.correlation))
+    }
+
+    /// Pauses in all recordings.
+    pub fn pauses(&self) -> usize {
+        self.seen().map(|r| r.pauses.len()).sum()
+    }
+
+    /// The link that it follows best; the last of those that explain it alike.
+    pub fn best_link(&self) -> Option<BestLink> {
+        let links = self.seen().map(|r| r.on_links.len()).max()?;
+        let mean = |link: usize, of: &dyn Fn(&(Placed, f64)) -> f64| {
+            let all = self
+                .seen()
+                .filter_map(|r| Some((of(r.on_links.get(link)?.as_ref()?), r.pauses.len() as f64)));
+            let (sum, count) =
+                all.fold((0.0, 0.0), |(sum, n), (value, count)| (sum + value * count, n + count));
+            (count > 0.0).then_some(sum / count)
+        };
+        let off_m: Vec<Option<f64>> =
+            (0..links).map(|link| mean(link, &|(placed, _)| placed.off_m)).collect();
+        let misfit = |link: usize| {
+            let turned =
+                mean(link, &|(_, turned)| *turned).filter(|turned| turned.is_finite()).unwrap_or(TURNED_RAD);
+            Some(off_m[link]?.max(OFF_M) * turned.max(TURNED_RAD))
+        };
+        let misfits: Vec<(usize, f64)> = (0..links).filter_map(|link| Some((link, misfit(link)?))).collect();
+        let least = misfits.iter().map(|(_, m)| *m).reduce(f64::min)?;
+        let (link, own) = *misfits.iter().rev().find(|(_, m)| *m <= ALIKE * least)?;
+        let others = misfits.iter().filter(|(other, _)| *other != link).map(|(_, m)| m / own);
+        let spread: Vec<f64> = self.seen().flat_map(InRecording::spread_m).collect();
+        let off_m = off_m[link]?;
+        Some(BestLink {
+            link,
+            off_m,
+            share: off_m / median(&spread),
+            lead: others.fold(f64::INFINITY, f64::min),
+        })
+    }
+
+    /// Where it is on a link, and where the base then is, by recording.
+    pub fn placed(&self, link: usize) -> impl Iterator<Item = (usize, Placed)> {
+        let on = move |r: &InRecording| r.on_links.get(link)?.map(|(placed, _)| placed);
+        self.recordings.iter().enumerate().filter_map(move |(at, r)| Some((at, on(r.as_ref()?)?)))
+    }
+}
+
+impl InRecording {
+    /// Distances of its pauses from the middle of them [m].
+    fn spread_m(&self) -> Vec<f64> {
+        let axis = |k: usize| median(&self.pauses.iter().map(|p| p.at_m[k]).collect::<Vec<_>>());
+        let middle = Vector3::new(axis(0), axis(1), axis(2));
+        self.pauses.iter().map(|p| (p.at_m - middle).norm()).collect()
+    }
+}
+
+/// Gathers what is known of every body.
+pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
+    let mut all: Vec<Evidence> = read.bodies.iter().map(|_| Evidence { recordings: Vec::new() }).collect();
+    for recording in &read.recordings {
+        let joints = &recording.samples.joints;
+        let nominal = arm.model.nominal();
+        let tip_m = |i: usize| arm.model.tip_in_base(&nominal, &joints.row_rad(i)).translation.vector;
+        let speeds = Speeds::of(&joints.time_ns, tip_m);
+        let alike = |at: usize| {
+            let seen = recording.body(at).filter(|seen| travel(seen).1 > STANDS_M)?;
+            likeness(&speeds, &Speeds::of(&seen.time_ns, |i| seen.position_m[i]))
+        };
+        let likenesses: Vec<Option<Likeness>> = (0..all.len()).map(alike).collect();
+        // The bodies have one clock: the one that is most alike tells how late it is.
+        let clearest = likenesses.iter().flatten().max_by(|a, b| a.correlation.total_cmp(&b.correlation));
+        let delay_s = clearest.filter(|l| l.correlation > 0.5).map_or(0.0, |l| l.delay_s);
+        let poses: Vec<Vec<Pose>> = recording.dwells.iter().map(|d| arm.poses(&d.joint_rad)).collect();
+        for (at, evidence) in all.iter_mut().enumerate() {
+            let own =
+                recording.body(at).map(|seen| in_recording(recording, seen, delay_s, likenesses[at], &poses));
+            evidence.recordings.push(own);
+        }
+    }
+    all
+}
+
+/// A body that stays within this stands still [m].
+pub const STANDS_M: f64 = 0.01;
+
+/// Median position and travel [m].
+fn travel(seen: &PoseSamples) -> (Vector3<f64>, f64) {
+    let axis = |k: usize| median(&seen.position_m.iter().map(|p| p[k]).collect::<Vec<_>>());
+    let middle_m = Vector3::new(axis(0), axis(1), axis(2));
+    let off: Vec<f64> = seen.position_m.iter().map(|p| (p - middle_m).norm()).collect();
+    (middle_m, percentile(&off, 0.99))
+}
+
+fn in_recording(
+    recording: &Read,
+    seen: &PoseSamples,
+    delay_s: f64,
+    likeness: Option<Likeness>,
+    poses: &[Vec<Pose>],
+) -> InRecording {
+    let (middle_m, travel_m) = travel(seen);
+    let delay_ns = (delay_s * 1e9) as i64;
+    let pause = |(dwell, d): (usize, &armcal_core::Dwell)| {
+        let from = seen.time_ns.partition_point(|t| *t < d.start_ns + delay_ns);
+        let to = seen.time_ns.partition_point(|t| *t <= d.end_ns + delay_ns);
+        let rows = from..to;
+        if rows.is_empty() {
+            return None;
+        }
+        let axis = |k: usize| median(&seen.position_m[rows.clone()].iter().map(|p| p[k]).collect::<Vec<_>>());
+        let at_m = Vector3::new(axis(0), axis(1), axis(2));
+        let turned = seen.orientation.as_ref().map(|q| q[rows.start + rows.len() / 2]);
+        Some(Pause { dwell, at_m, turned })
+    };
+    let pauses: Vec<Pause> = recording.dwells.iter().enumerate().filter_map(pause).collect();
+    let links = poses.first().map_or(0, |p| p.len() - 1);
+    let on_link = |link: usize| {
+        let own: Vec<Pose> = pauses.iter().map(|p| poses[p.dwell][link]).collect();
+        let seen_m: Vec<Vector3<f64>> = pauses.iter().map(|p| p.at_m).collect();
+        let turned: Option<Vec<_>> = pauses.iter().map(|p| p.turned).collect();
+        let apart = turned.map_or(f64::NAN, |turned| turned_apart(&own, &turned));
+        Some((place(&own, &seen_m)?, apart))
+    };
+    let moves = travel_m > STANDS_M;
+    let on_links = if moves { (0..links).map(on_link).collect() } else { Vec::new() };
+    let mean = mean_pose(seen).ok().map(|(mean, _)| mean).filter(|m| m.has_orientation && !moves);
+    InRecording { travel_m, likeness, pauses, mean: mean.map(|m| m.pose), middle_m, on_links }
+}

@@ -1,0 +1,114 @@
+//! Which files are one recording: bag folders, globs, the parts of a split bag.
+
+use crate::batch::Manifest;
+use crate::error::Error;
+use crate::pipeline::RecordingEntry;
+use armcal_recording::{Recording, RecordingReport, is_url};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+/// Parts of a split recording follow each other within this time.
+const NEXT_PART_NS: i64 = 5_000_000_000;
+
+/// A recording that was opened, and its place in the pipeline.
+pub struct Opened {
+    /// Name and paths.
+    pub entry: RecordingEntry,
+    /// The recording.
+    pub recording: Recording,
+}
+
+/// Opens what the user named: files, globs, folders. Files of one rosbag2 folder are one recording, and so are
+/// `NAME_0.mcap`, `NAME_1.mcap`, .. of a folder that follow each other in time.
+pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
+    inputs.iter().try_for_each(|input| refuse(Path::new(input)))?;
+    let entries = Manifest::of(inputs, out)?.entries;
+    let opened = entries.into_iter().map(open).collect::<Result<Vec<Opened>, Error>>()?;
+    let mut whole: Vec<Opened> = Vec::new();
+    for next in opened {
+        match whole.last_mut() {
+            Some(before) if continues(before, &next) => {
+                let (name, _) = part(&before.entry.paths[0]).unwrap_or_default();
+                let paths = [before.entry.paths.as_slice(), &next.entry.paths].concat();
+                *before = open(RecordingEntry { name: Some(name), paths, ..next.entry })?;
+            }
+            _ => whole.push(next),
+        }
+    }
+    Ok(whole)
+}
+
+fn open(entry: RecordingEntry) -> Result<Opened, Error> {
+    let failed = |source| Error::Recording { recording: entry.name(), source };
+    let recording = Recording::open(&entry.paths).map_err(failed)?;
+    Ok(Opened { entry, recording })
+}
+
+/// Whether a recording begins where the one before was split.
+fn continues(before: &Opened, next: &Opened) -> bool {
+    let [last, first] =
+        [before.entry.paths.last(), next.entry.paths.first()].map(|p| p.and_then(|p| part(p)));
+    let in_order = last.zip(first).is_some_and(|((a, i), (b, j))| a == b && i + 1 == j);
+    if !in_order || before.entry.paths[0].parent() != next.entry.paths[0].parent() {
+        return false;
+    }
+    let used = |report: &RecordingReport| -> Option<(i64, i64)> {
+        let used = report.channels.iter().filter(|c| c.messages > 0);
+        let bounds = used.map(|c| (c.first_ns, c.last_ns));
+        bounds.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
+    };
+    let spans = used(before.recording.report()).zip(used(next.recording.report()));
+    spans.is_some_and(|((_, end), (start, _))| start.abs_diff(end) < NEXT_PART_NS as u64)
+}
+
+/// `NAME_3.mcap` is part 3 of `NAME`.
+fn part(path: &Path) -> Option<(String, u64)> {
+    let stem = path.file_stem()?.to_str()?;
+    let (name, number) = stem.rsplit_once('_')?;
+    Some((name.to_owned(), number.parse().ok()?))
+}
+
+/// What is no MCAP recording is told for what it is, with the way to one.
+fn refuse(path: &Path) -> Result<(), Error> {
+    let refused = |why: String| Err(Error::Manifest { what: path.display().to_string(), why });
+    if is_url(path) {
+        return Ok(());
+    }
+    if path.is_dir() {
+        let inside = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+        let inside: Vec<PathBuf> = inside.collect();
+        let has = |ext: &str| inside.iter().any(|p| p.extension().is_some_and(|e| e == ext));
+        return match (has("mcap"), has("db3")) {
+            (true, _) => Ok(()),
+            (_, true) => {
+                refused("holds a rosbag2 database: convert it with `ros2 bag convert` to MCAP".into())
+            }
+            _ => refused(
+                "is a folder without any MCAP file; for deeper ones give a pattern such as 'lab/**/*.mcap'"
+                    .into(),
+            ),
+        };
+    }
+    if !path.is_file() {
+        return Ok(());
+    }
+    let read = |source| Error::ReadFile { what: "recording", path: path.to_owned(), source };
+    let (mut head, mut file) = (Vec::new(), armcal_recording::input::open(path).map_err(read)?);
+    file.by_ref().take(16).read_to_end(&mut head).map_err(read)?;
+    match head.as_slice() {
+        b if b.starts_with(b"\x89MCAP") => match path.extension().is_some_and(|e| e == "mcap") {
+            true => Ok(()),
+            false => refused("is a recording (MCAP) whose name does not end in .mcap: rename it".into()),
+        },
+        b if b.starts_with(b"#ROSBAG") => {
+            refused("is a ROS 1 bag: convert it with `mcap convert in.bag out.mcap`".into())
+        }
+        b if b.starts_with(b"SQLite format 3") => {
+            refused("is a rosbag2 database: convert it with `ros2 bag convert` to MCAP".into())
+        }
+        [0x28, 0xb5, 0x2f, 0xfd, ..] => {
+            refused("is compressed as a whole: `zstd -d` makes it a recording".into())
+        }
+        _ => refused("is no MCAP recording".into()),
+    }
+}

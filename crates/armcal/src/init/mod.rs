@@ -1,0 +1,176 @@
+//! `armcal init`: what recordings show of their rig, as a pipeline that runs, with the reason for each line.
+//!
+//! `files -> channels -> arm -> read -> evidence -> roles -> sockets -> proposal -> page`, then the proposal is tried.
+//!
+//! What a body is follows from how it moves; what it is called decides nothing. Nothing is asked that can be seen, and what
+//! could not be seen is said.
+
+mod arm;
+mod channels;
+mod draft;
+mod evidence;
+mod files;
+mod links;
+mod motion;
+mod page;
+mod proposal;
+mod read;
+mod roles;
+mod seats;
+mod sockets;
+
+pub use arm::Told;
+pub use channels::BodyTopic;
+pub use proposal::Proposal;
+pub use roles::{Cast, Role};
+
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::setup::Inputs;
+use crate::stages::perceive;
+use crate::story;
+use armcal_calibrate::HoldoutConfig;
+use armcal_table::Board;
+use proposal::Known;
+use std::path::{Path, PathBuf};
+
+/// Pauses below which nothing can be calibrated.
+const FEWEST_PAUSES: usize = 6;
+
+/// What a proposal is made from.
+#[derive(Debug, Clone)]
+pub struct Asked {
+    /// Recordings: files, folders, patterns.
+    pub inputs: Vec<String>,
+    /// What the user says of the arm.
+    pub told: Told,
+    /// Board file.
+    pub board: Option<PathBuf>,
+    /// Where the pipeline will be.
+    pub out: PathBuf,
+}
+
+/// Looks at the recordings and proposes a pipeline for them; nothing is written.
+///
+/// # Errors
+/// What is no recording, no arm, joints that are not recorded, an arm that never pauses, nothing that says where the tip was.
+pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
+    progress.step("opening the recordings");
+    let opened = files::open_all(&asked.inputs, &asked.out)?;
+    let channels = channels::look(&opened)?;
+    if channels.joints.is_empty() {
+        return Err(no_joints(&channels.left));
+    }
+    let arm = arm::find(&asked.told, &channels, &asked.out.with_extension("urdf"))?;
+    progress.step("reading the recordings");
+    let read = read::read(&arm, &channels, &opened)?;
+    let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
+    if pauses < FEWEST_PAUSES {
+        let problem = format!(
+            "the joints on {} stand still {pauses} times in all recordings; a calibration takes {FEWEST_PAUSES} pauses of about a \
+             second at the very least (docs/guide.md says how to record them)",
+            arm.topic
+        );
+        return Err(Error::Init { problem });
+    }
+    progress.step("comparing motions");
+    let board = asked.board.as_deref().map(read_board).transpose()?;
+    let evidence = evidence::gather(&arm, &read);
+    let (cast, seats) = roles::cast(&arm, &evidence, board.as_ref());
+    let tracked =
+        cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
+    // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
+    let sockets = if tracked { None } else { sockets::find(&arm, &read)? };
+    if board.is_none() && !tracked && sockets.is_none() {
+        return Err(nothing_seen(&read, &cast));
+    }
+    let board = asked.board.as_deref().zip(board.as_ref());
+    let mut known = Known {
+        asked,
+        opened: &opened,
+        arm: &arm,
+        read: &read,
+        evidence: &evidence,
+        cast: &cast,
+        seats,
+        board,
+        sockets,
+    };
+    if known.sockets.is_some() && known.board.is_none() {
+        progress.step("measuring the sockets");
+        size_sockets(&mut known)?;
+    }
+    let mut proposal = known.propose(channels.left)?;
+    progress.step("trying the proposal");
+    proposal.tried = Some(tried(&proposal));
+    progress.finish();
+    Ok(proposal)
+}
+
+fn read_board(path: &Path) -> Result<Board, Error> {
+    Ok(Board::from_toml(&crate::pipeline::read_text("board", path)?, path)?)
+}
+
+fn no_joints(left: &[(String, String)]) -> Error {
+    let seen: Vec<String> = left.iter().map(|(topic, why)| format!("{topic} ({why})")).collect();
+    let seen = if seen.is_empty() { "there is no channel at all".to_owned() } else { seen.join("; ") };
+    Error::Init { problem: format!("no topic has joint readings in every recording: {seen}") }
+}
+
+fn nothing_seen(read: &read::AllRead, cast: &[Cast]) -> Error {
+    let bodies = read.bodies.iter().zip(cast).map(|(body, cast)| format!("{}: {}", body.topic, cast.why));
+    let bodies: Vec<String> = bodies.collect();
+    let bodies = if bodies.is_empty() { "no body is tracked".to_owned() } else { bodies.join("; ") };
+    let problem = format!(
+        "nothing says where the tip was: {bodies}; and its pauses are not in a few places that it came back to in other postures. \
+         Give --board FILE if it sat in cavities of a board (docs/guide.md shows one)"
+    );
+    Error::Init { problem }
+}
+
+/// Finds how large the fixture is, with the pipeline as it would be proposed.
+fn size_sockets(known: &mut Known<'_>) -> Result<(), Error> {
+    let mut pipeline = known.propose(Vec::new())?.pipeline;
+    pipeline.holdout = HoldoutConfig::None;
+    let chain =
+        match (known.sockets.as_ref().and_then(|s| s.tip_link.as_ref()), pipeline.model.urdf.is_some()) {
+            (Some(tip), true) => known.arm.model_to(tip)?.chain().clone(),
+            _ => known.arm.model.chain().clone(),
+        };
+    let chain = match &pipeline.model.deviation {
+        Some(deviation) => chain.with_deviation(deviation, &known.arm.file)?,
+        None => chain,
+    };
+    let recordings = perceive::open_all(&pipeline, &Progress::silent())?;
+    let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Progress::silent(), &mut drop)?;
+    if let Some(sockets) = &mut known.sockets {
+        let board = Some(sockets.board.clone());
+        sockets.sized(&Inputs { pipeline, chain, board, seen, changes: Vec::new(), most_rounds: 2 });
+    }
+    Ok(())
+}
+
+/// What a first calibration with a proposal came to.
+#[derive(Debug, Clone)]
+pub struct Tried {
+    /// Held-out points, or all where none is held out.
+    pub points: usize,
+    /// Mean error there before and after [m].
+    pub mean_m: [f64; 2],
+    /// What contradicts the data about the setup, in words.
+    pub mistakes: Vec<String>,
+}
+
+/// Calibrates with a proposal whose files may not be written yet: they are put beside a copy of it.
+fn tried(proposal: &Proposal) -> Result<Tried, String> {
+    let attempt = || -> Result<Tried, Error> {
+        let folder =
+            tempfile::tempdir().map_err(|source| Error::Folder { path: std::env::temp_dir(), source })?;
+        let pipeline = proposal.in_folder(folder.path())?;
+        let settled = story::settle(&pipeline, &Progress::silent())?;
+        let judged = settled.fitted.calibration.judged();
+        let mistakes = settled.setup.mistakes().map(|m| m.message.clone()).collect();
+        Ok(Tried { points: judged.fitted.n, mean_m: [judged.nominal.mean_m, judged.fitted.mean_m], mistakes })
+    };
+    attempt().map_err(|e| e.to_string())
+}
