@@ -122,11 +122,13 @@ fn off_m(tips_m: &[Vector3<f64>], heap: &[usize]) -> Vec<f64> {
     heap.iter().map(|i| (tips_m[*i] - middle).norm()).collect()
 }
 
-/// The same number of heaps in every recording: the one that stands out most.
+/// The same number of heaps in every recording: of several the one that stands out most, a single one where there are not. A
+/// stray pause is further from all sockets than these from each other, and would make them one.
 fn in_all(recordings: &[BTreeMap<usize, (f64, Heaps)>]) -> Option<Vec<Heaps>> {
     let falls = |count: usize| recordings.iter().map(|r| Some(r.get(&count)?.0.ln())).sum::<Option<f64>>();
     let all = (1..=MOST).filter_map(|count| Some((count, falls(count)? / recordings.len() as f64)));
-    let (count, _) = all.filter(|(_, fall)| *fall > APART.ln()).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let clear = all.filter(|(_, fall)| *fall > APART.ln());
+    let (count, _) = clear.max_by(|a, b| (a.0 > 1).cmp(&(b.0 > 1)).then(a.1.total_cmp(&b.1)))?;
     Some(recordings.iter().map(|r| r[&count].1.clone()).collect())
 }
 

@@ -14,9 +14,9 @@ pub(crate) struct Settings {
     pub step_tolerance: f64,
 }
 
-/// A last step of no more standard deviations of the estimate may end where the linearised problem has it: what that leaves out
-/// is of the square of it.
-const NEGLIGIBLE: f64 = 1e-5;
+/// A last step of no more standard deviations of the estimate may end where the linearised problem has it. That is less than the
+/// tolerance of convergence: who goes on from there does not learn what a fresh linearisation would say.
+const NEGLIGIBLE: f64 = 1e-7;
 
 /// Where the iteration ended.
 #[derive(Debug, Clone)]
