@@ -39,7 +39,8 @@ fn what_is_proposed_errs_no_more_than_what_was_written_by_hand() {
     let real = real_recordings();
     let own = |path: &str| root().join(path);
     let mukca = own("pipelines/boards/mukca.toml");
-    let mut cases: Vec<(&str, Vec<PathBuf>, &str, PathBuf, Option<PathBuf>)> = vec![
+    type Case<'a> = (&'a str, Vec<PathBuf>, &'a str, PathBuf, Option<PathBuf>);
+    let mut cases: Vec<Case<'_>> = vec![
         (
             "paper",
             vec![own("fixtures/paper")],

@@ -98,7 +98,7 @@ fn edit(case: &Case, log: &mut Log) {
         log.messages.iter().filter(|m| m.channel == tip).map(|m| (m.stamp_ns, m.log_ns)).collect();
     for (name, moves) in [(&case.wand, true), (&case.stand, false)] {
         let Some(name) = name else { continue };
-        let channel = log.channel(&topic(name), Kind::PoseStamped, "vicon/world", &[name.clone()]);
+        let channel = log.channel(&topic(name), Kind::PoseStamped, "vicon/world", std::slice::from_ref(name));
         // The same in every recording: what stands was not moved between them.
         let mut draw = ChaCha8Rng::seed_from_u64(case.config.seed + u64::from(moves));
         let phase: [f64; 6] = std::array::from_fn(|_| draw.random_range(0.2..1.1));

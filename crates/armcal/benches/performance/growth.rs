@@ -62,13 +62,15 @@ pub fn section(options: &Options) -> Result<Section> {
 
 /// Processor time over poses, both by powers of ten: a straight line grows with a constant exponent.
 fn diagram(curve: &[(usize, [f64; 2])]) -> String {
-    let list =
-        |value: &dyn Fn(&(usize, [f64; 2])) -> String| curve.iter().map(value).collect::<Vec<_>>().join(", ");
-    let line = |k: usize| list(&|(_, cpu_s)| format!("{:.2}", cpu_s[k].log10()));
+    let poses: Vec<String> = curve.iter().map(|(poses, _)| poses.to_string()).collect();
+    let line = |k: usize| {
+        let values = curve.iter().map(|(_, cpu_s)| format!("{:.2}", cpu_s[k].log10()));
+        values.collect::<Vec<_>>().join(", ")
+    };
     format!(
         "xychart-beta\n    title \"CPU time: below without, above with diagnosis\"\n    x-axis \"poses (steps of a power of \
          ten's root)\" [{}]\n    y-axis \"log10 of CPU seconds\" -1 --> 3\n    line [{}]\n    line [{}]\n",
-        list(&|(poses, _)| poses.to_string()),
+        poses.join(", "),
         line(0),
         line(1)
     )
