@@ -240,17 +240,17 @@ impl Judge<'_> {
             let all = 0..self.observations.len();
             all.filter(|i| held.binary_search(i).is_ok() == is_held).collect()
         };
-        let side = |is_held: bool| {
-            let places = places(is_held);
+        let side = |places: &[usize]| {
             let chosen = places.iter().map(|&i| &self.observations[i]);
             match self.elsewhere {
                 None => ModelProblem::new(self.model, chosen, self.config),
                 Some(who) => {
-                    Ok(ModelProblem::elsewhere(self.model, chosen.collect(), &places, who, self.config))
+                    Ok(ModelProblem::elsewhere(self.model, chosen.collect(), places, who, self.config))
                 }
             }
         };
-        let (train, test) = (side(false)?, side(true)?);
+        let seen = places(false);
+        let (train, test) = (side(&seen)?, side(&places(true))?);
         let unseen = self.frames_only_in(&test, &train);
         let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
@@ -262,7 +262,7 @@ impl Judge<'_> {
         let free = |p: &Parameter| p.free && !of_unseen(p);
         let mut fit = match near {
             Some((near, looked)) => {
-                let looked = looked.and_then(|looked| self.looked_at(looked, &places(false), &train));
+                let looked = looked.and_then(|looked| self.looked_at(looked, &seen, &train));
                 let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
                 fit_near(&train, near, &free, self.config)?
             }

@@ -76,19 +76,18 @@ pub struct Ended {
 }
 
 /// Where a fit from these parameters ends: what is asked of [`fit_problem`] where nobody asks how sure they are. Priors are
-/// those of the problem. Near where a fit of part of the observations `ended` the scale is known, and the way is short.
+/// those of the problem. Near the end of another fit the scale is known roughly, and the way is short.
 pub fn fitted_values(
     problem: &dyn Problem,
     start: &[f64],
-    ended: Option<&Ended>,
+    sigma_scale: Option<f64>,
     config: &FitConfig,
 ) -> Result<Ended, CalibrateError> {
     config.check()?;
     let free = &|p: &Parameter| p.free;
-    let start = ended.map_or(start, |ended| &ended.values);
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
-    let solved = solve(&white, ended.map(|ended| ended.sigma_scale), config)?;
+    let solved = solve(&white, sigma_scale, config)?;
     let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
     Ok(Ended { values: white.parameters_at(&solved.at.x), sigma_scale: solved.sigma_scale })
 }

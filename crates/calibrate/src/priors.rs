@@ -11,17 +11,16 @@
 //! one step of expectation-maximisation, `s_new^2 = s^2 sum (x_k^2 + v_k) / n`, which never overshoots. The default prior
 //! is the widest it becomes. Bounds that the arm goes beyond are [`crate::wider`]'s matter.
 
-use crate::elsewhere::Away;
 use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
-use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
+use crate::problem::{Problem, Told, as_beneath};
 use crate::statistics::posterior;
 use crate::whitened::{Axis, Whitened};
 use crate::wider::wider;
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
 use armcal_model::Asked;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -43,28 +42,10 @@ pub(crate) struct WithPriors<'a> {
 }
 
 impl Problem for WithPriors<'_> {
+    as_beneath!(self => self.problem);
+
     fn parameters(&self) -> &[Parameter] {
         &self.parameters
-    }
-
-    fn blocks(&self) -> usize {
-        self.problem.blocks()
-    }
-
-    fn name(&self, block: usize) -> String {
-        self.problem.name(block)
-    }
-
-    fn joint_rad(&self, block: usize) -> &[f64] {
-        self.problem.joint_rad(block)
-    }
-
-    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        self.problem.residual(block, p)
-    }
-
-    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
-        self.problem.linearised(block, p)
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
@@ -73,22 +54,6 @@ impl Problem for WithPriors<'_> {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         self.problem.covariance(block, p)
-    }
-
-    fn noise_depends(&self) -> bool {
-        self.problem.noise_depends()
-    }
-
-    fn known(&self) -> Vec<Known> {
-        self.problem.known()
-    }
-
-    fn elsewhere(&self) -> Option<&Away<'_>> {
-        self.problem.elsewhere()
-    }
-
-    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
-        self.problem.symmetries(p)
     }
 }
 

@@ -86,33 +86,57 @@ pub trait Problem: Sync {
     }
 }
 
+/// What a [`Problem`] that stands on another one takes from it as it is: all but parameters, rows and covariances.
+macro_rules! as_beneath {
+    ($self:ident => $beneath:expr) => {
+        fn blocks(&$self) -> usize {
+            $beneath.blocks()
+        }
+
+        fn observations_of(&$self, block: usize) -> usize {
+            $beneath.observations_of(block)
+        }
+
+        fn name(&$self, block: usize) -> String {
+            $beneath.name(block)
+        }
+
+        fn joint_rad(&$self, block: usize) -> &[f64] {
+            $beneath.joint_rad(block)
+        }
+
+        fn residual(&$self, block: usize, p: &[f64]) -> nalgebra::DVector<f64> {
+            $beneath.residual(block, p)
+        }
+
+        fn linearised(&$self, block: usize, p: &[f64]) -> $crate::problem::Linearised {
+            $beneath.linearised(block, p)
+        }
+
+        fn noise_depends(&$self) -> bool {
+            $beneath.noise_depends()
+        }
+
+        fn known(&$self) -> Vec<$crate::problem::Known> {
+            $beneath.known()
+        }
+
+        fn elsewhere(&$self) -> Option<&$crate::elsewhere::Away<'_>> {
+            $beneath.elsewhere()
+        }
+
+        fn symmetries(&$self, p: &[f64]) -> Vec<$crate::problem::Symmetry> {
+            $beneath.symmetries(p)
+        }
+    };
+}
+pub(crate) use as_beneath;
+
 impl<P: Problem + ?Sized> Problem for &P {
+    as_beneath!(self => (**self));
+
     fn parameters(&self) -> &[Parameter] {
         (**self).parameters()
-    }
-
-    fn blocks(&self) -> usize {
-        (**self).blocks()
-    }
-
-    fn observations_of(&self, block: usize) -> usize {
-        (**self).observations_of(block)
-    }
-
-    fn name(&self, block: usize) -> String {
-        (**self).name(block)
-    }
-
-    fn joint_rad(&self, block: usize) -> &[f64] {
-        (**self).joint_rad(block)
-    }
-
-    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        (**self).residual(block, p)
-    }
-
-    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
-        (**self).linearised(block, p)
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
@@ -121,21 +145,5 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         (**self).covariance(block, p)
-    }
-
-    fn noise_depends(&self) -> bool {
-        (**self).noise_depends()
-    }
-
-    fn known(&self) -> Vec<Known> {
-        (**self).known()
-    }
-
-    fn elsewhere(&self) -> Option<&Away<'_>> {
-        (**self).elsewhere()
-    }
-
-    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
-        (**self).symmetries(p)
     }
 }

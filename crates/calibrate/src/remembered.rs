@@ -1,13 +1,12 @@
 //! A problem that remembers where it was looked at last: a fit with other priors begins where the one before it ended, and a
 //! fit without some observations where that of all did.
 
-use crate::elsewhere::Away;
-use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
+use crate::problem::{Linearised, Problem, Told, as_beneath};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::Parameter;
 use armcal_model::Asked;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -84,32 +83,10 @@ impl<'a> Remembered<'a> {
 }
 
 impl Problem for Remembered<'_> {
+    as_beneath!(self => self.problem);
+
     fn parameters(&self) -> &[Parameter] {
         self.problem.parameters()
-    }
-
-    fn blocks(&self) -> usize {
-        self.problem.blocks()
-    }
-
-    fn observations_of(&self, block: usize) -> usize {
-        self.problem.observations_of(block)
-    }
-
-    fn name(&self, block: usize) -> String {
-        self.problem.name(block)
-    }
-
-    fn joint_rad(&self, block: usize) -> &[f64] {
-        self.problem.joint_rad(block)
-    }
-
-    fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        self.problem.residual(block, p)
-    }
-
-    fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
-        self.problem.linearised(block, p)
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
@@ -143,22 +120,6 @@ impl Problem for Remembered<'_> {
         let looked = self.at(p);
         let own = looked.covariances[block].get_or_init(|| Arc::new(self.problem.covariance(block, p)));
         own.as_ref().clone()
-    }
-
-    fn noise_depends(&self) -> bool {
-        self.problem.noise_depends()
-    }
-
-    fn known(&self) -> Vec<Known> {
-        self.problem.known()
-    }
-
-    fn elsewhere(&self) -> Option<&Away<'_>> {
-        self.problem.elsewhere()
-    }
-
-    fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
-        self.problem.symmetries(p)
     }
 }
 

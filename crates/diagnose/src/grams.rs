@@ -6,7 +6,7 @@
 
 use crate::columns::Columns;
 use crate::evidence::Metric;
-use crate::problem::{DwellRow, Problem};
+use crate::problem::Problem;
 use crate::projection::{Gram, Projection};
 use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
@@ -119,15 +119,28 @@ impl<'p> ByDwell<'p> {
             with_geometry: vec![DMatrix::zeros(n, p); c],
         };
         let dwells = &problem.dwells;
+        // Nearly always all dwells have as many rows: products whose length is known take a fraction of the time.
+        let alike = dwells.first().map(|d| d.rows).filter(|rows| dwells.iter().all(|d| d.rows == *rows));
+        let dot =
+            |a: DVectorView<'_, f64>, b: DVectorView<'_, f64>, mut products: DVectorViewMut<'_, f64>| {
+                let (a, b, products) = (a.as_slice(), b.as_slice(), products.as_mut_slice());
+                match alike {
+                    Some(3) => dot_by::<3>(a, b, products),
+                    Some(6) => dot_by::<6>(a, b, products),
+                    _ => products.iter_mut().zip(dwells).for_each(|(product, d)| {
+                        *product = a[d.range()].iter().zip(&b[d.range()]).map(|(a, b)| a * b).sum();
+                    }),
+                }
+            };
         for i in 0..c {
             let own = base.column(i);
-            dot_by_dwell(own, projection.residual.column(0), dwells, by_dwell.with_residual.column_mut(i));
+            dot(own, projection.residual.column(0), by_dwell.with_residual.column_mut(i));
             for j in 0..c {
-                dot_by_dwell(own, base.column(j), dwells, by_dwell.square.column_mut(i * c + j));
+                dot(own, base.column(j), by_dwell.square.column_mut(i * c + j));
             }
             let of_base = &mut by_dwell.with_geometry[i];
             for (q, products) in projection.q.column_iter().zip(of_base.column_iter_mut()) {
-                dot_by_dwell(own, q, dwells, products);
+                dot(own, q, products);
             }
         }
         by_dwell
@@ -223,24 +236,7 @@ impl<'p> ByDwell<'p> {
     }
 }
 
-/// Products of two columns dwell by dwell.
-fn dot_by_dwell(
-    a: DVectorView<'_, f64>,
-    b: DVectorView<'_, f64>,
-    dwells: &[DwellRow],
-    mut products: DVectorViewMut<'_, f64>,
-) {
-    let (a, b, products) = (a.as_slice(), b.as_slice(), products.as_mut_slice());
-    // Most dwells have as many rows as the first: a product whose length is known takes a fraction of the time.
-    match dwells.first().map(|first| first.rows).filter(|rows| dwells.iter().all(|d| d.rows == *rows)) {
-        Some(3) => dot_by::<3>(a, b, products),
-        Some(6) => dot_by::<6>(a, b, products),
-        _ => products.iter_mut().zip(dwells).for_each(|(product, d)| {
-            *product = a[d.range()].iter().zip(&b[d.range()]).map(|(a, b)| a * b).sum();
-        }),
-    }
-}
-
+/// Products of two columns dwell by dwell, each of so many rows.
 fn dot_by<const ROWS: usize>(a: &[f64], b: &[f64], products: &mut [f64]) {
     let pairs = a.as_chunks::<ROWS>().0.iter().zip(b.as_chunks::<ROWS>().0);
     for (product, (a, b)) in products.iter_mut().zip(pairs) {

@@ -9,8 +9,7 @@ use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
 use armcal_calibrate::{
-    Calibration, Ended, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram,
-    linearise,
+    Calibration, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram, linearise,
 };
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
@@ -148,13 +147,17 @@ impl ModelRefit<'_> {
         let mut values = self.values.clone();
         values.extend(&model.nominal()[values.len()..]);
         if !specs.is_empty() {
-            let fitted = |some: &[&Observation], start: &[f64], ended: Option<&Ended>| {
+            let fitted = |some: &[&Observation], start: &[f64], sigma_scale: Option<f64>| {
                 let problem = ModelProblem::new(&model, some.iter().copied(), self.fit)?;
-                fitted_values(&problem, start, ended, self.fit)
+                fitted_values(&problem, start, sigma_scale, self.fit)
             };
-            let ended = (!self.few.is_empty()).then(|| fitted(self.few, &values, None)).transpose()?;
+            let mut sigma_scale = None;
+            if !self.few.is_empty() {
+                let ended = fitted(self.few, &values, None)?;
+                (values, sigma_scale) = (ended.values, Some(ended.sigma_scale));
+            }
             let all: Vec<&Observation> = self.observations.iter().collect();
-            values = fitted(&all, &values, ended.as_ref())?.values;
+            values = fitted(&all, &values, sigma_scale)?.values;
         }
         self.fits.insert(names.to_vec(), (model.clone(), values.clone()));
         Ok((model, values))
