@@ -63,8 +63,15 @@ pub(crate) fn fit_near(
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
-    let problem = Remembered::new(problem, near.looked.take());
-    fit_from(&problem, &near.values, Some(&near), free, config)
+    let looked = near.looked.take();
+    let stays = looked.as_ref().filter(|_| !config.every_step);
+    if let Some(about) = stays.and_then(|looked| Remembered::about(problem, looked)) {
+        let fit = fit_from(&about, &near.values, Some(&near), free, config)?;
+        if about.is_straight_to(&fit.values()) {
+            return Ok(fit);
+        }
+    }
+    fit_from(&Remembered::new(problem, looked), &near.values, Some(&near), free, config)
 }
 
 /// All parameters where a fit ended, and the scale of its residuals in units of the declared noise.

@@ -323,7 +323,7 @@ impl Problem for ModelProblem<'_> {
         };
         for run in self.alike(&self.observations[of_blocks]) {
             let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
-            model.residuals_with_jacobians(&p, run, asked, &mut of);
+            model.residuals_with_jacobians(&p, run, (asked, self.use_orientation), &mut of);
         }
     }
 

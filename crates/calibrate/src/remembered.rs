@@ -1,18 +1,18 @@
 //! A problem that remembers where it was looked at last: a fit with other priors begins where the one before it ended, and a
-//! fit without some observations where that of all did.
+//! fit without some observations where that of all did. Of many observations that one's derivative serves all the way.
 
 use crate::problem::{Linearised, Problem, Told, as_beneath};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::Parameter;
 use armcal_model::Asked;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What a problem is at some parameters, block by block as far as anybody asked.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Looked {
     p: Vec<f64>,
     blocks: Vec<OnceLock<Arc<Block>>>,
@@ -50,7 +50,20 @@ impl Looked {
 pub(crate) struct Remembered<'a> {
     problem: &'a dyn Problem,
     last: Mutex<Arc<Looked>>,
+    about: Option<About>,
 }
+
+/// Where a problem is known, whose derivative, and noise that is not estimated, stand for those nearby.
+struct About {
+    looked: Arc<Looked>,
+    blocks: Vec<Arc<Block>>,
+}
+
+/// From so many blocks on a fit without some of them ends so near that of all that the derivative stays.
+const MANY_BLOCKS: usize = 1_000;
+/// The derivative stays where it changes by less than this share of itself: the fit then ends within about that many of its
+/// standard deviations.
+const STRAIGHT: f64 = 1e-4;
 
 /// A problem at these parameters, as fits of the parameters `free` will ask of it.
 pub(crate) fn look(
@@ -69,7 +82,38 @@ impl<'a> Remembered<'a> {
     pub fn new(problem: &'a dyn Problem, looked: Option<Looked>) -> Remembered<'a> {
         let looked = looked.filter(|looked| looked.blocks.len() == problem.blocks());
         let looked = looked.unwrap_or_else(|| Looked::nothing_yet(&[], problem.blocks()));
-        Remembered { problem, last: Mutex::new(Arc::new(looked)) }
+        Remembered { problem, last: Mutex::new(Arc::new(looked)), about: None }
+    }
+
+    /// A problem of many blocks near parameters at which it is known: there its derivative stays, while residuals are exact
+    /// everywhere. Whether that was right where a fit ended is for [`Remembered::is_straight_to`] to say.
+    pub fn about(problem: &'a dyn Problem, looked: &Looked) -> Option<Remembered<'a>> {
+        let blocks: Vec<Arc<Block>> =
+            looked.blocks.iter().map(|block| block.get().cloned()).collect::<Option<_>>()?;
+        let mut remembered = Remembered::new(problem, Some(looked.clone()));
+        let looked = remembered.at(&looked.p);
+        remembered.about = (blocks.len() >= MANY_BLOCKS).then_some(About { looked, blocks });
+        remembered.about.is_some().then_some(remembered)
+    }
+
+    /// Whether the derivative hardly changes on the way to these parameters, by twice what the residuals differ from their
+    /// linearisation over what this has them move.
+    pub fn is_straight_to(&self, p: &[f64]) -> bool {
+        let Some(About { looked, blocks }) = &self.about else { return true };
+        let step: Vec<f64> = p.iter().zip(&looked.p).map(|(to, from)| to - from).collect();
+        let groups = self.problem.known();
+        let (mut beside, mut along) = (0.0, 0.0);
+        for (block, known) in blocks.iter().enumerate() {
+            let (residual, derivative) = &known.linearised;
+            let own = match groups.iter().find(|group| group.blocks.contains(&block)) {
+                Some(group) => group.parameters.iter().map(|k| step[*k]).collect(),
+                None => step.clone(),
+            };
+            let moved = derivative * DVector::from_vec(own);
+            beside += (self.problem.residual(block, p) - residual - &moved).norm_squared();
+            along += moved.norm_squared();
+        }
+        2.0 * beside.sqrt() <= STRAIGHT * along.sqrt()
     }
 
     /// What is known of the problem at these parameters.
@@ -90,6 +134,13 @@ impl Problem for Remembered<'_> {
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
+        if let Some(about) = self.about.as_ref().filter(|about| about.looked.p != p) {
+            for block in blocks {
+                let derivative = about.blocks[block].linearised.1.clone();
+                each(block, Cow::Owned((self.problem.residual(block, p), derivative)));
+            }
+            return;
+        }
         let looked = self.at(p);
         let known = &looked.blocks[blocks.clone()];
         let columns = known.iter().find_map(|known| Some(known.get()?.asked.len()));
@@ -117,7 +168,8 @@ impl Problem for Remembered<'_> {
     }
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
-        let looked = self.at(p);
+        let about = self.about.as_ref().filter(|_| !self.problem.noise_depends());
+        let looked = about.map_or_else(|| self.at(p), |about| about.looked.clone());
         let own = looked.covariances[block].get_or_init(|| Arc::new(self.problem.covariance(block, p)));
         own.as_ref().clone()
     }

@@ -7,7 +7,7 @@ use crate::elsewhere::{Part, Weighting};
 use crate::loss::{Loss, chi_median};
 use crate::problem::Linearised;
 use crate::products::gram;
-use crate::solver::{Arrow, Cost, Curvature, Quadratic, triangle};
+use crate::solver::{Arrow, Cost, Curvature, Quadratic, root};
 use crate::structure::Structure;
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
@@ -186,7 +186,7 @@ impl RobustCost<'_, '_> {
             let mut rows = jacobian.rows_mut(*at, direction.len());
             rows -= direction * along;
         }
-        Part { gradient, squares, curvature: triangle(jacobian) }
+        Part { gradient, squares, curvature: root(jacobian) }
     }
 }
 

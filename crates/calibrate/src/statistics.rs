@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn groups_count_the_weak_directions_of_the_whole() {
-        use crate::solver::triangle;
+        use crate::solver::root;
         use crate::structure::{Group, Structure};
         use rand::RngExt as _;
         for seed in 0..40 {
@@ -205,7 +205,7 @@ mod tests {
             let triangles = (0..3).map(|_| {
                 let sizes = DVector::from_fn(6, |_, _| 10_f64.powf(rng.random_range(-2.0..2.0)));
                 let rows = DMatrix::from_fn(rng.random_range(1..9), 6, |_, _| rng.random_range(-1.0..1.0));
-                triangle(rows * DMatrix::from_diagonal(&sizes))
+                root(rows * DMatrix::from_diagonal(&sizes))
             });
             let arrow = Arrow::new(structure.into(), triangles.collect(), DVector::zeros(10));
             let whole = split(&arrow.dense_squares()).1.ncols();

@@ -8,10 +8,11 @@
 //! Q_k' [A_k B_k; sqrt(D_k) 0] = [R_k T_k; 0 S_k],   Q' [S_1; ..; S_n; sqrt(D_s)] = [R; 0]
 //! ```
 //!
-//! so that `R'R` is the Schur complement of the own unknowns, without its squares ever being formed: work and memory
+//! so that `R'R` is the Schur complement of the own unknowns, without its squares being formed: work and memory
 //! grow with the number of groups. Groups are reduced in their order, so that threads do not change the result.
 
 use crate::covariance::{Covariance, Own};
+use crate::products::gram;
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -24,7 +25,7 @@ const STACKED: usize = 16;
 #[derive(Debug, Clone)]
 pub(crate) struct Arrow {
     structure: Arc<Structure>,
-    /// `[A_k | B_k]` of every group, as the triangle that has the same squares.
+    /// `[A_k | B_k]` of every group, as the triangle that has the same squares ([`root`]).
     triangles: Arc<Vec<DMatrix<f64>>>,
     /// D, by axis.
     diagonal: DVector<f64>,
@@ -49,7 +50,7 @@ struct EliminatedGroup {
 }
 
 impl Arrow {
-    /// `triangles`: one a group, columns in the order of [`Structure::axes`]; see [`triangle`].
+    /// `triangles`: one a group, columns in the order of [`Structure::axes`]; see [`root`].
     pub fn new(structure: Arc<Structure>, triangles: Vec<DMatrix<f64>>, diagonal: DVector<f64>) -> Arrow {
         Arrow { structure, triangles: Arc::new(triangles), diagonal }
     }
@@ -200,6 +201,28 @@ impl Arrow {
     }
 }
 
+/// A square root of `m'm`: an upper triangle R with `R'R = m'm`. Very tall matrices go through their product with themselves, which
+/// takes a fraction of the time and is as exact as that of a [`super::Curvature::Dense`]. Where columns depend on each other, its diagonal is raised by
+/// what its own rounding may have taken from it (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorem 10.7).
+pub(crate) fn root(m: DMatrix<f64>) -> DMatrix<f64> {
+    if m.nrows() < TALL * m.ncols() {
+        return triangle(m);
+    }
+    let squares = gram(&m);
+    let raised = || {
+        let mut raised = squares.clone();
+        let rounding = m.ncols() as f64 * (2.0 + (m.nrows() as f64).sqrt()) * f64::EPSILON;
+        let up = |square: f64| (square * (1.0 + rounding)).max(f64::MIN_POSITIVE);
+        (0..m.ncols()).for_each(|k| raised[(k, k)] = up(raised[(k, k)]));
+        raised.cholesky()
+    };
+    let factor = squares.clone().cholesky().or_else(raised);
+    factor.map_or_else(|| triangle(m), |factor| factor.unpack().transpose())
+}
+
+/// From so many rows a column on reflections are most of the time of a fit.
+const TALL: usize = 16;
+
 /// Rows, for each column, that a triangle takes up at once: so much stays in the processor's cache.
 const ROWS_A_COLUMN: usize = 3;
 
@@ -230,4 +253,27 @@ fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
         at += part.nrows();
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{root, triangle};
+    use nalgebra::DMatrix;
+
+    /// Through the product as by reflections, of columns in any units, one of which is the sum of others and one nothing.
+    #[test]
+    fn a_root_has_the_squares_of_its_matrix() {
+        let mut m = DMatrix::from_fn(400, 9, |i, j| ((i * 31 + j * j * 17) as f64).sin());
+        m.column_iter_mut().enumerate().for_each(|(j, mut column)| column *= 10_f64.powi(j as i32 - 4));
+        m.set_column(7, &(m.column(1) + m.column(2)));
+        m.column_mut(8).fill(0.0);
+        let squares = m.tr_mul(&m);
+        for r in [root(m.clone()), triangle(m.clone())] {
+            assert_eq!((r.shape(), &r), ((9, 9), &r.upper_triangle()));
+            let off = r.tr_mul(&r) - &squares;
+            let size = squares.diagonal().map(f64::sqrt);
+            let of_size = off.zip_map(&(&size * size.transpose()), |off, size| off.abs() - 1e-12 * size);
+            assert!(of_size.max() <= f64::MIN_POSITIVE, "{of_size}");
+        }
+    }
 }

@@ -15,7 +15,7 @@ mod bounded_qp;
 mod curvature;
 mod levenberg;
 
-pub(crate) use arrow::{Arrow, triangle};
+pub(crate) use arrow::{Arrow, root};
 pub(crate) use curvature::Curvature;
 pub(crate) use levenberg::{Settings, Solution, minimise};
 

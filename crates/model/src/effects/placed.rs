@@ -210,12 +210,12 @@ impl Effects {
         let count = p.len();
         let (p, q, in_board_m) = self.deformed(p, x);
         let tip = tree.with(&self.routes[feature.0], &p, &q);
-        let (mut parameters, twists): (Vec<_>, Vec<_>) =
-            tip.parameters.into_iter().partition(|(index, _)| *index < count);
+        let mut parameters = tip.parameters;
         let mut motions = vec![Twist::none(); p.len()];
-        for (index, twist) in parameters.iter().chain(&twists) {
+        for (index, twist) in &parameters {
             motions[*index] = *twist;
         }
+        parameters.retain(|(index, _)| *index < count);
         let mut joint_motions = vec![Twist::none(); q.len()];
         for (index, twist) in &tip.joints {
             joint_motions[*index].add(twist, 1.0);

@@ -18,6 +18,8 @@ pub(crate) struct Linearisation<'a> {
     arm: Arm<'a>,
     /// The boards that something is seated in, by recording.
     boards: BTreeMap<usize, LinearisedSegment>,
+    /// Whether rows of orientation are asked for.
+    turns: bool,
 }
 
 enum Arm<'a> {
@@ -27,12 +29,14 @@ enum Arm<'a> {
 }
 
 impl<'a> Linearisation<'a> {
-    /// For these observations and the parameters `asked` for: columns of others may be zero.
+    /// For these observations and the parameters `asked` for: columns of others may be zero. Rows of orientation are there
+    /// where they are seen and `turns` are asked for.
     pub fn of(
         model: &'a Model,
         p: &'a [f64],
         observations: &[&Observation],
         asked: &Asked<'_>,
+        turns: bool,
     ) -> Linearisation<'a> {
         let arm = match &model.effects {
             None => Arm::Rigid(TreeAt::of(&model.tree, p, Some(asked))),
@@ -41,7 +45,7 @@ impl<'a> Linearisation<'a> {
         let seated = observations.iter().filter_map(|o| Some((o.dwell.recording, model.board_under(o)?)));
         let boards: BTreeMap<usize, &Segment> = seated.collect();
         let boards = boards.into_iter().map(|(recording, board)| (recording, board.linearised(p, &[])));
-        Linearisation { model, p, arm, boards: boards.collect() }
+        Linearisation { model, p, arm, boards: boards.collect(), turns }
     }
 
     /// The residual of one of them and d residual / d p.
@@ -75,7 +79,8 @@ impl<'a> Linearisation<'a> {
         }
         let board = self.model.board_under(o).zip(self.boards.get(&o.dwell.recording));
         let measured_m = measured_m(o, board.map(|(_, at)| &at.transform), &in_board_m);
-        let residual = Sides::with_point(measured_m, predicted).residual(o);
+        let mut residual = Sides::with_point(measured_m, predicted).residual(o);
+        residual.rotation_rad = residual.rotation_rad.filter(|_| self.turns);
         let mut jacobian = DMatrix::zeros(residual.len(), self.model.parameters.len());
         for (column, twist) in &columns {
             add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);

@@ -45,17 +45,17 @@ impl Model {
             let (residual, jacobian) = model.residual_with_jacobian(&own, o);
             return (residual, self.by_all(&jacobian, o));
         }
-        Linearisation::of(self, p, &[o], &|_| true).residual_with_jacobian(o)
+        Linearisation::of(self, p, &[o], &|_| true, true).residual_with_jacobian(o)
     }
 
     /// Calls `each` with the [`Model::residual_with_jacobian`] of every one of many observations at the same parameters, in
     /// their order: what is alike for all of them is worked out once, where no recording has parameters of its own, and
-    /// columns of parameters that are not `asked` for may be zero.
+    /// columns of parameters that are not `asked` for may be zero, and rows of orientation are missing where no `turns` are.
     pub fn residuals_with_jacobians(
         &self,
         p: &[f64],
         observations: &[&Observation],
-        asked: &Asked<'_>,
+        (asked, turns): (&Asked<'_>, bool),
         each: &mut dyn FnMut(&Observation, ModelResidual, DMatrix<f64>),
     ) {
         if self.scopes.is_some() {
@@ -65,7 +65,7 @@ impl Model {
             }
             return;
         }
-        let at = Linearisation::of(self, p, observations, asked);
+        let at = Linearisation::of(self, p, observations, asked, turns);
         for o in observations {
             let (residual, jacobian) = at.residual_with_jacobian(o);
             each(o, residual, jacobian);
