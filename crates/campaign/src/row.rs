@@ -2,6 +2,8 @@
 
 use armcal_core::Unit;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// What one recording gave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +51,18 @@ pub struct Row {
     pub quantities: Vec<Quantity>,
 }
 
+impl Row {
+    /// Takes the names of its quantities from those of other rows: thousands of rows have few names.
+    pub fn share_names(&mut self, names: &mut BTreeSet<Arc<str>>) {
+        for q in &mut self.quantities {
+            match names.get(&q.name) {
+                Some(known) => q.name = known.clone(),
+                None => _ = names.insert(q.name.clone()),
+            }
+        }
+    }
+}
+
 /// Whether a result can be relied upon; decides between exit codes 0 and 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -91,7 +105,7 @@ pub struct ErrorFigures {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
     /// Its name, the same in every recording: `joint1.theta`, `board_in_base.x`, `error.mean`.
-    pub name: String,
+    pub name: Arc<str>,
     /// Unit of value and standard error.
     pub unit: Unit,
     /// Its value in this recording.

@@ -37,7 +37,7 @@ pub fn series(rows: &[Row], counts: impl Fn(usize) -> bool) -> Vec<Series> {
     for (row, of) in rows.iter().enumerate().filter(|(row, _)| counts(*row)) {
         for q in of.quantities.iter().filter(|q| q.determined && q.value.is_finite()) {
             let at = *order.entry(&q.name).or_insert_with(|| {
-                found.push(Series { quantity: q.name.clone(), unit: q.unit, points: Vec::new() });
+                found.push(Series { quantity: q.name.to_string(), unit: q.unit, points: Vec::new() });
                 found.len() - 1
             });
             let sigma = q.sigma.filter(|s| s.is_finite());

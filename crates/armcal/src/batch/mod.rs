@@ -25,6 +25,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use armcal_report::{Campaign, FailedRecording, write_campaign};
 use shard::{Done, Receipt};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use store::Store;
 
@@ -107,10 +108,13 @@ fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<Pat
     let (pipeline, done) = shard::together(receipts, out)?;
     let store = Store::open(out)?;
     let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+    let mut names = BTreeSet::new();
     for one in done {
         match one {
             Done::Calibrated { folder, .. } => {
-                rows.push(store.row(&folder)?);
+                let mut row = store.row(&folder)?;
+                row.share_names(&mut names);
+                rows.push(row);
                 folders.push(folder);
             }
             Done::Failed { failed: one, .. } => failed.push(one),

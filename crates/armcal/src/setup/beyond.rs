@@ -34,7 +34,10 @@ pub fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool 
                 t.misfit.times_floor() < WORTH_LOOKING && !one_effect_explains(now, &t.hypothesis)
             }
             "target-offset" => before.calibration.times_floor() > EXPLAINED,
-            code => moved(now, code, before, &t.fitted).is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD),
+            code => {
+                moved(now, code, before, &t.fitted).is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD)
+                    && !one_recording_differs(now)
+            }
         }),
     }
 }
@@ -61,21 +64,38 @@ pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f6
     }
 }
 
-/// Whether one effect that begins with the recording, or at a dwell of it, explains how it differs: a tool or frame that
-/// was shifted, a zero that slipped. Then it is physics, and the diagnosis will name it.
+/// Whether one effect that begins with a recording explains the errors of all: a frame that is let go in every recording takes a
+/// share of it in each, and with the arm's own parameters may end anywhere.
+fn one_recording_differs(now: &Inputs) -> bool {
+    now.seen.len() > 1 && (0..now.seen.len()).any(|recording| begins_with(now, recording))
+}
+
+/// Whether one effect that begins with the recording, or at a dwell of it, explains how it differs. Then it is physics, and the
+/// diagnosis will name it.
 fn one_effect_explains(now: &Inputs, h: &Hypothesis) -> bool {
     let Some(recording) = h.recording else { return false };
-    let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
-    let events: Vec<String> =
-        ["tool_shift", "frame_shift", "board_shift"].map(str::to_owned).into_iter().chain(zeros).collect();
-    let times_floor = |since: String| Some(with_effect(now, &since)?.times_floor());
-    let explained = |floors: Option<f64>| floors.is_some_and(|floors| floors < WORTH_LOOKING);
-    if events.iter().any(|event| explained(times_floor(format!("{event}@{recording}")))) {
-        return true;
-    }
     let dwells = now.seen[recording].dwells.len();
-    let at = |event: &String, dwell: usize| times_floor(format!("{event}@{recording}.{dwell}"));
-    events.iter().any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
+    let at = |event: &String, dwell: usize| times_floor(now, &format!("{event}@{recording}.{dwell}"));
+    begins_with(now, recording)
+        || events(now).iter().any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
+}
+
+fn begins_with(now: &Inputs, recording: usize) -> bool {
+    events(now).iter().any(|event| explained(times_floor(now, &format!("{event}@{recording}"))))
+}
+
+/// What happens to an arm at one moment: a tool or frame is shifted, a zero slips.
+fn events(now: &Inputs) -> Vec<String> {
+    let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
+    ["tool_shift", "frame_shift", "board_shift"].map(str::to_owned).into_iter().chain(zeros).collect()
+}
+
+fn times_floor(now: &Inputs, since: &str) -> Option<f64> {
+    Some(with_effect(now, since)?.times_floor())
+}
+
+fn explained(times_floor: Option<f64>) -> bool {
+    times_floor.is_some_and(|floors| floors < WORTH_LOOKING)
 }
 
 /// The misfit with one more effect.

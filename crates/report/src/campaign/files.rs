@@ -152,12 +152,12 @@ fn quantities(c: &mut Columns, rows: &[Row]) {
     let mut names: Vec<(&str, Unit)> = Vec::new();
     let mut known = std::collections::BTreeSet::new();
     for q in rows.iter().flat_map(|r| &r.quantities) {
-        if known.insert(q.name.as_str()) {
+        if known.insert(&*q.name) {
             names.push((&q.name, q.unit));
         }
     }
     for (name, unit) in names {
-        let find = |r: &Row| r.quantities.iter().find(|q| q.name == name).cloned();
+        let find = |r: &Row| r.quantities.iter().find(|q| &*q.name == name).cloned();
         let symbol = unit.symbol();
         c.number(format!("{name} [{symbol}]"), rows.iter().map(|r| find(r).map(|q| q.value)));
         c.number(format!("{name} sigma [{symbol}]"), rows.iter().map(|r| find(r).and_then(|q| q.sigma)));

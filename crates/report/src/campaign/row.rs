@@ -73,7 +73,7 @@ fn missing(run: &Run) -> Vec<String> {
 
 fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
     let known = |name: String, unit, value| Quantity {
-        name,
+        name: name.into(),
         unit,
         value,
         sigma: None,
@@ -106,7 +106,7 @@ fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
 
 fn parameter(e: &Estimate) -> Quantity {
     Quantity {
-        name: e.parameter.name.clone(),
+        name: e.parameter.name.as_str().into(),
         unit: e.parameter.unit,
         value: e.value,
         sigma: Some(e.sigma).filter(|s| s.is_finite()),

@@ -25,7 +25,7 @@ pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {
     let name = printable(&change.quantity);
     match change.kind {
         ChangeKind::Step { before, after } => {
-            let own = campaign.rows[after].quantities.iter().find(|q| q.name == change.quantity);
+            let own = campaign.rows[after].quantities.iter().find(|q| *q.name == *change.quantity);
             let more = if own.is_some_and(|q| q.at_bound) { ", to its bound or beyond," } else { "" };
             format!("{name} steps by {}{more} between {} and {}", size(change, 1.0), row(before), row(after))
         }
