@@ -8,7 +8,7 @@ use crate::recording_names::RecordingNames;
 use crate::run::Run;
 use crate::sizes::{clear, size_in_table, sizes, sizes_of};
 use crate::text::printable;
-use armcal_core::SetupReport;
+use armcal_core::{Certainty, SetupReport};
 use armcal_diagnose::{Diagnosis, FoundEffect, HeldOut, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
@@ -300,6 +300,13 @@ pub fn driver_told(driver: &str) -> String {
 pub(crate) fn setup_sentence(setup: &SetupReport) -> Option<String> {
     let messages: Vec<&str> = setup.mistakes().map(|f| f.message.as_str()).collect();
     (!messages.is_empty()).then(|| printable(&format!("Setup first: {}.", messages.join("; also, "))))
+}
+
+/// The change of the setup that leaves less of the error than what is named physically, in one sentence.
+pub(crate) fn setup_beside(setup: &SetupReport) -> Option<String> {
+    let tried =
+        setup.findings.iter().find(|f| f.certainty == Certainty::Possible && f.before_mm.is_some())?;
+    Some(printable(&format!("Or the setup: {}.", tried.message)))
 }
 
 /// Numbers of the joints that err over their own angle, the strongest first.

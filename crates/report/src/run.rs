@@ -2,7 +2,7 @@
 
 pub use armcal_campaign::Status;
 
-use crate::diagnosis_text::{headline, setup_sentence};
+use crate::diagnosis_text::{headline, setup_beside, setup_sentence};
 use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
@@ -188,7 +188,10 @@ impl Run {
             return Answer { word: "setup", sentence: self.in_words(&sentence) };
         }
         if let Some(diagnosis) = &self.diagnosis {
-            return Answer { word: diagnosis.verdict.word(), sentence: headline(self, diagnosis) };
+            let beside = setup_beside(&self.setup).map(|beside| self.in_words(&beside));
+            let sentence =
+                [headline(self, diagnosis)].into_iter().chain(beside).collect::<Vec<_>>().join(" ");
+            return Answer { word: diagnosis.verdict.word(), sentence };
         }
         let sentence = match self.undiagnosed {
             Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.".to_owned(),

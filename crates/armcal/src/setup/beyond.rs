@@ -42,6 +42,12 @@ pub fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool 
     }
 }
 
+/// Whether a change lets a frame go that is elsewhere than it was taken to be in every recording, near or far.
+pub fn stands_off(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool {
+    let moves = |before: &Fitted| moved(now, t.hypothesis.code, before, &t.fitted).is_some();
+    before.is_some_and(moves) && !one_recording_differs(now)
+}
+
 /// How far one pose lies from another [m], [rad].
 pub fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
     let by = a.inverse() * b;

@@ -2,7 +2,7 @@
 
 use super::alone::each_alone;
 use super::attempt::{Tried, attempted};
-use super::beyond::beyond_physics;
+use super::beyond::{beyond_physics, stands_off};
 use super::hypotheses::{Freedom, Hypothesis, hypotheses};
 use super::trial::{Inputs, Misfit};
 use super::unseen::unseen;
@@ -107,14 +107,16 @@ fn told(
     found.iter().map(one).collect()
 }
 
-/// The change of the model's own parameters that would explain as much as a physical effect: told beside its name.
+/// The change of a frame or of the model's own parameters that would explain as much as a physical effect: told beside its name.
 fn perhaps(inputs: &Inputs, fitted: &Fitted, begun: &Misfit, possible: &[Tried]) -> Option<SetupFinding> {
     let weights: Vec<(Freedom, f64)> = possible.iter().map(weight).collect();
     let Tried { hypothesis, misfit, .. } = &possible[best(&weights)?];
-    let (before, after) = (&fitted.calibration, hypothesis.undone(inputs).fit().ok()?.calibration);
+    let mended = hypothesis.undone(inputs).fit().ok()?;
+    let (before, after) = (&fitted.calibration, &mended.calibration);
     let errs_less = after.judged().fitted.mean_m < before.judged().fitted.mean_m;
+    let moved = moved_frame(inputs, hypothesis, fitted, &mended);
     let finding =
-        finding(hypothesis, &hypothesis.change, &[], None, (Some(before), *begun), (Some(&after), *misfit));
+        finding(hypothesis, &hypothesis.change, &[], moved, (Some(before), *begun), (Some(after), *misfit));
     errs_less.then_some(SetupFinding { certainty: Certainty::Possible, ..finding })
 }
 
@@ -123,7 +125,8 @@ fn weight(t: &Tried) -> (Freedom, f64) {
 }
 
 /// Those that explain the errors; of what explains them with a number that physics reaches, freedom and misfit. Where too
-/// little was above the floor to be sure, frames and changes of the model's own parameters are `possible`.
+/// little was above the floor to be sure, frames and changes of the model's own parameters are `possible`, and so are frames that
+/// are no further off than physics may have it.
 fn explaining(
     now: &Inputs,
     first: Option<&Fitted>,
@@ -144,6 +147,7 @@ fn explaining(
             (true, true) => far.push(t),
             (true, false) => possible.push(t),
             (false, true) if t.hypothesis.number.is_some() => within.push(weight(&t)),
+            (false, true) if stands_off(now, first, &t) => possible.push(t),
             (false, _) => {}
         }
     }
