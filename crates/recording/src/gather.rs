@@ -3,6 +3,7 @@
 use crate::clock::Stamps;
 use crate::decode::{Plan, Role, Rows};
 use crate::error::nearest;
+use crate::foreign::{DEFINITION_FROM, inflated};
 use crate::joints::JointTable;
 use crate::open::{RecordingFile, ns};
 use crate::poses::PoseTable;
@@ -11,6 +12,7 @@ use crate::records::Message;
 use crate::sweep::{At, blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -202,6 +204,7 @@ fn compile(channel: &Arc<RawChannel>, kind: Kind<'_>) -> Result<(Plan, f64), Str
     let encoding = &channel.message_encoding;
     let plan = Plan::compile(kind.role(), &schema.name, &schema.encoding, &schema.data, encoding, body)
         .map_err(|e| e.to_string())?;
+    let plan = if channel.metadata.contains_key(DEFINITION_FROM) { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
         Kind::Pose { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),
@@ -240,9 +243,10 @@ impl<'a> Stretch<'a> {
         let Stretch { rows, gathered, .. } = self;
         gathered.messages += 1;
         rows.clear();
-        if let Err(e) = target.plan.decode(message.data, rows) {
+        let decode = |data: Cow<'_, [u8]>| target.plan.decode(&data, rows).map_err(|e| e.to_string());
+        if let Err(why) = inflated(message.data).and_then(decode) {
             gathered.undecodable += 1;
-            gathered.first_error.get_or_insert_with(|| e.to_string());
+            gathered.first_error.get_or_insert(why);
         }
         let Gathered { stamps, joints, poses, scalars, .. } = gathered;
         let mut stamp = |header_ns| stamps.push(header_ns, ns(message.publish_ns), ns(message.log_ns));

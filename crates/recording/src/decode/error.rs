@@ -47,6 +47,17 @@ pub enum DecodeError {
         /// What the field needs at least [bytes].
         needed: usize,
     },
+    /// The message goes on behind its schema.
+    #[error(
+        "message of {bytes} bytes goes on for {left} bytes behind its last field: the definition in the file is not \
+         the one it was written with"
+    )]
+    LeftOver {
+        /// Length of the message [bytes].
+        bytes: usize,
+        /// What is behind the last field [bytes].
+        left: usize,
+    },
     /// The four bytes before a CDR message name a representation that is not read.
     #[error(
         "CDR encapsulation {id:#06x} is not read; supported are plain CDR, plain CDR2 and delimited CDR2"

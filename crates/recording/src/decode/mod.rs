@@ -118,6 +118,15 @@ impl Plan {
         })
     }
 
+    /// The same plan, which refuses messages that do not end where their definition does: for definitions that did not
+    /// come with the messages.
+    pub fn exact(mut self) -> Plan {
+        if let Code::Binary(code) = &mut self.code {
+            code.go_to_the_end();
+        }
+        self
+    }
+
     /// What the plan reads.
     pub fn role(&self) -> Role {
         self.role

@@ -2,6 +2,7 @@
 
 mod conformance;
 mod damage;
+mod foreign;
 mod many;
 mod memory;
 mod mutation;
