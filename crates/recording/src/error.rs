@@ -112,7 +112,7 @@ pub enum RecordingError {
 }
 
 /// ` (did you mean "x"?)`, or nothing.
-fn did_you_mean(nearest: &Option<String>) -> String {
+pub(crate) fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean {n:?}?)"))
 }
 

@@ -1,7 +1,7 @@
 //! Messages of the wanted streams, decoded block by block in parallel and put together in file order.
 
 use crate::clock::Stamps;
-use crate::decode::{Plan, Role, Rows};
+use crate::decode::{Place, Plan, Role, Rows};
 use crate::error::nearest;
 use crate::foreign::{DEFINITION_FROM, inflated};
 use crate::joints::JointTable;
@@ -22,20 +22,22 @@ const BODIES_SAMPLED: u64 = 20;
 const LEAST_BYTES: u64 = 16;
 
 /// One stream asked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Request<'a> {
     pub role: &'static str,
     /// Which of several of this role.
     pub name: Option<&'a str>,
     pub topic: &'a str,
     pub kind: Kind<'a>,
+    /// Where its values are, if the pipeline says so.
+    pub fields: Vec<(Place, &'a str)>,
 }
 
 /// What to read out of the messages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind<'a> {
     Joints { wanted: &'a [String] },
-    Pose { body: Option<&'a str>, unit: LengthUnit },
+    Pose { body: Option<&'a str>, frame: Option<&'a str>, unit: LengthUnit },
     Scalar,
 }
 
@@ -163,7 +165,7 @@ fn target(
     let mut readable = 0;
     for (file, wanted) in recording.files.iter().zip(wanted) {
         for (id, channel) in file.channels.iter().filter(|(_, c)| c.topic == request.topic) {
-            match compile(channel, request.kind) {
+            match compile(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
                     wanted.entry(*id).or_default().push(Target { request: index, plan, to_m });
@@ -193,17 +195,21 @@ fn target(
     Err(RecordingError::NotDecodable { role, topic, why })
 }
 
-fn compile(channel: &Arc<RawChannel>, kind: Kind<'_>) -> Result<(Plan, f64), String> {
+fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f64), String> {
     let Some(schema) = &channel.schema else {
         return Err("a channel without a schema cannot be decoded".to_owned());
     };
+    let (kind, fields) = (request.kind, request.fields.as_slice());
     let body = match kind {
         Kind::Pose { body, .. } => body,
         _ => None,
     };
-    let encoding = &channel.message_encoding;
-    let plan = Plan::compile(kind.role(), &schema.name, &schema.encoding, &schema.data, encoding, body)
-        .map_err(|e| e.to_string())?;
+    let (name, data, encoding) = (&schema.name, &schema.data, &channel.message_encoding);
+    let plan = match fields {
+        [] => Plan::compile(kind.role(), name, &schema.encoding, data, encoding, body),
+        _ => Plan::at(kind.role(), name, &schema.encoding, data, encoding, (body, fields)),
+    };
+    let plan = plan.map_err(|e| e.to_string())?;
     let plan = if channel.metadata.contains_key(DEFINITION_FROM) { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
@@ -255,7 +261,13 @@ impl<'a> Stretch<'a> {
                 let kept = rows.rows().filter(|row| joints.take(row, wanted));
                 kept.for_each(|row| stamp(row.stamp_ns));
             }
-            (Rows::Pose(rows), _) => rows.rows().for_each(|row| {
+            (Rows::Pose(rows), kind) => rows.rows().for_each(|row| {
+                if let Kind::Pose { frame: Some(frame), .. } = kind
+                    && frame != row.frame_id
+                {
+                    poses.other_frames.insert(row.frame_id.to_owned());
+                    return;
+                }
                 poses.take(&row, target.to_m);
                 stamp(row.stamp_ns);
             }),

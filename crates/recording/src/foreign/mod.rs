@@ -59,7 +59,8 @@ fn kind(head: &[u8]) -> Option<Kind> {
 
 /// Copies the messages of a file that is not MCAP itself; `None` if it is no recording that is known here.
 pub(crate) fn convert(bytes: &FileBytes, path: &Path) -> Result<Option<Converted>, RecordingError> {
-    match kind(&bytes.read(0..HEAD_BYTES)?) {
+    let head = bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?;
+    match kind(&head) {
         Some(Kind::Zstd) => match bytes {
             FileBytes::Mapped(map) => in_frame(map, path).map(Some),
             FileBytes::Ranged(ranged) => in_frame(&ranged.spool(path)?, path).map(Some),

@@ -2,6 +2,7 @@
 
 mod conformance;
 mod damage;
+mod fields;
 mod foreign;
 mod many;
 mod memory;
