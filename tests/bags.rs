@@ -123,3 +123,27 @@ fn messages_longer_than_their_definition_are_refused() {
     let said = said(&output);
     assert!(said.contains("/joint_states") && said.contains("behind its last field"), "{said}");
 }
+
+/// What is proposed for a database is what is proposed for the same messages as MCAP, but for the path.
+#[test]
+fn a_pipeline_is_proposed_for_a_database_as_for_mcap() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let Some(bags) = bags(folder.path()) else { return };
+    let [dh, board] =
+        ["models/right_arm.toml", "boards/paper.toml"].map(|name| root().join("pipelines").join(name));
+    let proposed = |form: &str| {
+        let out = folder.path().join(format!("{form}.toml"));
+        let files = [Path::new("--dh"), &dh, Path::new("--board"), &board, Path::new("--out"), &out];
+        let output = armcal([&[Path::new("init"), &bags[form]], &files[..]].concat());
+        assert_eq!(output.status.code(), Some(0), "{form}: {}", said(&output));
+        let text = std::fs::read_to_string(out).expect("a pipeline");
+        text.lines().filter(|l| !l.contains(form)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let expected = proposed("mcap");
+    assert!(expected.iter().any(|line| line.contains("[streams.joints]")), "{expected:?}");
+    for form in ["old", "file", "split"] {
+        // A split bag says that it has two parts.
+        let differ = proposed(form).iter().filter(|line| !expected.contains(line)).count();
+        assert_eq!(differ, 0, "{form}: {:?} {expected:?}", proposed(form));
+    }
+}

@@ -217,7 +217,7 @@ impl PoseStream {
     }
 }
 
-fn paths<'a, const N: usize>(fields: [(Place, &'a Option<String>); N]) -> Vec<(Place, &'a str)> {
+fn paths<const N: usize>(fields: [(Place, &Option<String>); N]) -> Vec<(Place, &str)> {
     fields.into_iter().filter_map(|(place, path)| Some((place, path.as_deref()?))).collect()
 }
 

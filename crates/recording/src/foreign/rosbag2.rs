@@ -18,8 +18,9 @@ use std::path::{Path, PathBuf};
 
 /// SQLite keeps what is not yet in a database in files of its name with these endings.
 const PENDING: [&str; 2] = ["-wal", "-journal"];
-/// The longest text or list of bytes that a damaged database may make SQLite hold [bytes].
+/// The longest text or list of bytes that a database may make SQLite hold [bytes]; its own statements need some.
 const MAX_VALUE_BYTES: u64 = 1 << 30;
+const LEAST_VALUE_BYTES: u64 = 1 << 20;
 
 /// Copies the messages of a database.
 pub(super) fn read(file: &Path, copy: &mut Copy) -> Result<(), RecordingError> {
@@ -34,8 +35,7 @@ pub(super) fn read(file: &Path, copy: &mut Copy) -> Result<(), RecordingError> {
     };
     let unreadable = |e: Error| refused(format!("it is an SQLite database that cannot be read ({e})"));
     let database = opened.map_err(unreadable)?;
-    let bytes = std::fs::metadata(file).map_or(0, |about| about.len()).clamp(1 << 20, MAX_VALUE_BYTES);
-    harden(&database, bytes as i32).map_err(unreadable)?;
+    harden(&database, longest(file)).map_err(unreadable)?;
     let is_corrupt = |e: &Error| e.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt);
     let (tables, corrupt) = match tables(&database) {
         Err(e) if is_corrupt(&e) => {
@@ -65,6 +65,13 @@ fn harden(database: &Connection, longest: i32) -> rusqlite::Result<()> {
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)?;
     database.set_limit(Limit::SQLITE_LIMIT_LENGTH, longest)?;
     database.pragma_update(None, "cell_size_check", true)
+}
+
+/// No value is longer than a database and what is not in it yet [bytes].
+fn longest(file: &Path) -> i32 {
+    let parts = PENDING.map(|ending| beside(file, ending));
+    let bytes = parts.iter().map(PathBuf::as_path).chain([file]).map(bytes_of).sum::<u64>();
+    i32::try_from(bytes.clamp(LEAST_VALUE_BYTES, MAX_VALUE_BYTES)).unwrap_or(i32::MAX)
 }
 
 /// The tables whose columns are all stored.
@@ -181,13 +188,8 @@ impl From<Error> for Stop {
 
 /// A copy of a database and of what SQLite has not put into it yet, if there is any.
 fn pending(file: &Path) -> std::io::Result<Option<(tempfile::TempDir, PathBuf)>> {
-    let beside = |path: &Path, ending: &str| {
-        let mut name = OsString::from(path);
-        name.push(ending);
-        PathBuf::from(name)
-    };
-    let left = |ending: &str| std::fs::metadata(beside(file, ending)).is_ok_and(|about| about.len() > 0);
-    let endings: Vec<&str> = PENDING.into_iter().filter(|ending| left(ending)).collect();
+    let endings: Vec<&str> =
+        PENDING.into_iter().filter(|ending| bytes_of(&beside(file, ending)) > 0).collect();
     if endings.is_empty() {
         return Ok(None);
     }
@@ -198,6 +200,17 @@ fn pending(file: &Path) -> std::io::Result<Option<(tempfile::TempDir, PathBuf)>>
         std::fs::copy(beside(file, ending), beside(&copied, ending))?;
     }
     Ok(Some((folder, copied)))
+}
+
+fn beside(file: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(file);
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+/// Size of a file; 0 where there is none.
+fn bytes_of(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |about| about.len())
 }
 
 /// A path as a URI by which SQLite opens a file that nobody changes.

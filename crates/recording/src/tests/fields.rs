@@ -17,9 +17,9 @@ fn recording() -> Recording {
         (time(i), time(i), data)
     };
     let tip = |i: u64| {
-        let frame_id = if i % 2 == 0 { "map" } else { "base" };
+        let frame_id = if i.is_multiple_of(2) { "map" } else { "base" };
         let header = Header { stamp_ns: time(i) as i64, frame_id };
-        let x_m = if i % 2 == 0 { 1.0 } else { 2.0 };
+        let x_m = if i.is_multiple_of(2) { 1.0 } else { 2.0 };
         (
             time(i),
             time(i),
@@ -73,7 +73,7 @@ fn the_chosen_frame_alone_is_read_and_missing_stamps_are_said() {
 
 #[test]
 fn wrong_fields_and_frames_name_what_there_is() {
-    let why = |streams: &Streams| recording().read(streams).err().expect("refused").to_string();
+    let why = |streams: &Streams| recording().read(streams).expect_err("refused").to_string();
     let frame = why(&streams("data[]", Some("bases")));
     assert!(frame.contains("frame \"bases\"") && frame.contains("did you mean \"base\"?"), "{frame}");
     let path = why(&streams("dat[]", None));
