@@ -40,7 +40,8 @@ pub enum Command {
     },
     /// Channels, rates, gaps, clocks and occlusion of recordings, before a long run.
     Inspect {
-        /// Recordings (parts of one: .mcap, .db3, also compressed), a folder of them or s3://BUCKET/KEY, or one pipeline file to inspect what it would use.
+        /// Recordings (parts of one: .mcap, .db3, also compressed), a folder of them or s3://BUCKET/KEY, or one pipeline file
+        /// to inspect what it would use.
         #[arg(required = true)]
         inputs: Vec<PathBuf>,
         /// Print JSON.

@@ -105,6 +105,8 @@ struct Target {
     request: usize,
     plan: Plan,
     to_m: f64,
+    /// Whether its messages may be compressed one by one, which no CDR message looks like.
+    cdr: bool,
 }
 
 /// Decodes the wanted channels in one pass. The surveys of the pass are remembered by the recording.
@@ -168,7 +170,8 @@ fn target(
             match compile(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
-                    wanted.entry(*id).or_default().push(Target { request: index, plan, to_m });
+                    let cdr = channel.message_encoding == "cdr";
+                    wanted.entry(*id).or_default().push(Target { request: index, plan, to_m, cdr });
                 }
                 Err(why) => {
                     unreadable.insert(why);
@@ -250,7 +253,8 @@ impl<'a> Stretch<'a> {
         gathered.messages += 1;
         rows.clear();
         let decode = |data: Cow<'_, [u8]>| target.plan.decode(&data, rows).map_err(|e| e.to_string());
-        if let Err(why) = inflated(message.data).and_then(decode) {
+        let data = if target.cdr { inflated(message.data) } else { Ok(message.data.into()) };
+        if let Err(why) = data.and_then(decode) {
             gathered.undecodable += 1;
             gathered.first_error.get_or_insert(why);
         }

@@ -1,7 +1,7 @@
 //! A recording: one or more files, opened, laid out, and reported on.
 
 use crate::bytes::{Access, FileBytes};
-use crate::foreign::names::{files_of, without_ending};
+use crate::foreign::names::{files_of, is_recording, without_ending};
 use crate::foreign::{self, Converted};
 use crate::index::{self, Found};
 use crate::layout::{Damage, Layout};
@@ -81,8 +81,8 @@ impl Recording {
         Recording::open_with(paths, Access::from_env())
     }
 
-    /// Opens the files of one recording; a folder stands for the recordings in it. Their structure is found without inflating anything, unless a file has no
-    /// sound summary. Objects, and local files with [`Access::Ranges`], are read by ranges: the summary first, later
+    /// Opens the files of one recording; a folder stands for the recordings in it. Their structure is found without
+    /// inflating anything, unless a file has no sound summary. Objects, and local files with [`Access::Ranges`], are read by ranges: the summary first, later
     /// only chunks with a wanted channel. One without a sound summary is copied whole to an unnamed file in the folder
     /// for temporary files, and read from there; so are the messages of a rosbag2 database and of a file that is compressed
     /// as a whole.
@@ -447,8 +447,11 @@ fn refuse_repeated(paths: &[PathBuf]) -> Result<(), RecordingError> {
     if let Some(pair) = real.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         return Err(RecordingError::ListedTwice { path: pair[1].1.clone() });
     }
-    let mut parts: Vec<(PathBuf, &PathBuf)> =
-        real.into_iter().map(|(real, p)| (without_ending(&real), p)).collect();
+    let mut parts: Vec<(PathBuf, &PathBuf)> = real
+        .into_iter()
+        .filter(|(_, p)| is_recording(p))
+        .map(|(real, p)| (without_ending(&real), p))
+        .collect();
     parts.sort();
     match parts.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => Err(RecordingError::TwoForms { path: pair[0].1.clone(), other: pair[1].1.clone() }),

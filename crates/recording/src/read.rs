@@ -327,7 +327,7 @@ impl Reading {
         let has_none = clock != Clock::Header && !matches!(role, "temperature" | "gauges");
         if asked.is_none() && has_none && stamps.header_ns.iter().all(Option::is_none) {
             let text = format!(
-                "its messages carry no stamp: {} time is used, which is when they were recorded",
+                "its messages carry no stamp of their own: {} time is used in its place",
                 clock.word()
             );
             self.say(Severity::Notice, "no-stamp", text);

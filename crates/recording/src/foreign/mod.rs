@@ -89,7 +89,10 @@ fn in_frame(map: &Map, path: &Path) -> Result<Converted, RecordingError> {
         .map_err(no_room(path))?;
     match kind(&head) {
         Some(Kind::Mcap) => {
-            Map::of(named.as_file()).map(|map| Converted { map, damage }).map_err(no_room(path))
+            let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
+            // The identity is that of the original.
+            map.hashed = None;
+            Ok(Converted { map, damage })
         }
         Some(Kind::Database) => {
             let mut converted = database(named.path(), path)?;

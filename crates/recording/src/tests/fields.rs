@@ -64,7 +64,10 @@ fn the_chosen_frame_alone_is_read_and_missing_stamps_are_said() {
     assert_eq!((tip.frame_id.as_str(), tip.position_m.len()), ("base", N as usize / 2));
     assert!(tip.position_m.iter().all(|p| p.x == 2.0));
     let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    assert!(said.iter().any(|text| text.contains("/q") && text.contains("carry no stamp")), "{said:?}");
+    assert!(
+        said.iter().any(|text| text.contains("/q") && text.contains("no stamp of their own")),
+        "{said:?}"
+    );
     assert!(!said.iter().any(|text| text.contains("/tip") && text.contains("stamp")), "{said:?}");
 
     let (.., warnings) = recording().read(&streams("data[]", None)).expect("readable");
