@@ -231,10 +231,7 @@ fn what_is_no_pipeline_is_named_for_what_it_is() {
         ("normal.mcap", "normal.mcap is a recording (MCAP), where a pipeline belongs"),
         ("normal.mcap", "armcal inspect normal.mcap"),
         ("old.bag", "old.bag is a ROS 1 bag, where a pipeline belongs: convert it with `mcap convert"),
-        (
-            "new.db3",
-            "new.db3 is a rosbag2 database, where a pipeline belongs: convert it with `ros2 bag convert`",
-        ),
+        ("new.db3", "new.db3 is a rosbag2 database, where a pipeline belongs: name it under [[recordings]]"),
         ("result", "result is a folder, where a pipeline belongs"),
         ("odd.toml", "reading the pipeline odd.toml: it is not UTF-8 text"),
         ("none.toml", "reading the pipeline none.toml: No such file"),

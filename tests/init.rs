@@ -199,6 +199,7 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
     };
     let ros1 = file("a.bag", b"#ROSBAG V2.0\n");
     let database = file("b.db3", b"SQLite format 3\0");
+    let unnamed = file("f.sqlite", b"SQLite format 3\0");
     let packed = file("c.mcap.zstd", &[0x28, 0xb5, 0x2f, 0xfd, 0, 0]);
     let garbage = file("d.mcap", b"garbage");
     let renamed = file("e.data", b"\x89MCAP0\r\n");
@@ -216,12 +217,13 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
     let option = Path::new;
     let cases: Vec<(Vec<&Path>, i32, Vec<&str>)> = vec![
         (vec![&ros1], 1, vec!["ROS 1 bag", "mcap convert"]),
-        (vec![&database], 1, vec!["rosbag2 database", "ros2 bag convert"]),
-        (vec![&packed], 1, vec!["compressed", "zstd -d"]),
+        (vec![&database], 1, vec!["b.db3", "SQLite database that cannot be read"]),
+        (vec![&packed], 1, vec!["c.mcap.zstd", "compressed", "cut off"]),
+        (vec![&unnamed], 1, vec!["f.sqlite", "database", ".db3: rename"]),
         (vec![&garbage, option("--dh"), &dh], 1, vec!["d.mcap", "no MCAP"]),
         (vec![&renamed], 1, vec!["e.data", "rename"]),
-        (vec![&empty], 1, vec!["empty", "without any MCAP"]),
-        (vec![&ros2], 1, vec!["ros2", "database"]),
+        (vec![&empty], 1, vec!["empty", "without any recording"]),
+        (vec![&ros2], 1, vec!["x_0.db3", "database"]),
         (vec![&nowhere, option("--dh"), &dh], 1, vec!["nowhere.mcap"]),
         (vec![&paper], 1, vec!["--urdf", "--dh", "joint1, joint2, joint3"]),
         (vec![&paper, option("--urdf"), &urdf], 1, vec!["panda_joint1", "joint1, joint2, joint3"]),

@@ -23,6 +23,9 @@ mod init_roles;
 /// Does every shipped pipeline run, from a clone or with the data that it names?
 mod shipped_pipelines;
 
+/// Are rosbag2's databases and compressed recordings read as they are, to the same numbers as MCAP?
+mod bags;
+
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
 

@@ -40,7 +40,8 @@ pub enum Command {
     },
     /// Channels, rates, gaps, clocks and occlusion of recordings, before a long run.
     Inspect {
-        /// MCAP files (parts of one recording) or s3://BUCKET/KEY, or one pipeline file to inspect what it would use.
+        /// Recordings (parts of one: .mcap, .db3, also compressed), a folder of them or s3://BUCKET/KEY, or one pipeline file
+        /// to inspect what it would use.
         #[arg(required = true)]
         inputs: Vec<PathBuf>,
         /// Print JSON.
@@ -94,8 +95,8 @@ pub enum Command {
     /// Results that are there already, made from the same file, pipeline and version, are kept: after a kill at any moment
     /// the same command goes on. Exit codes: 0 done, 1 failed, 2 usage, 3 some recordings failed or are doubtful.
     Batch {
-        /// Patterns such as 'lab/**/*.mcap', MCAP files, folders of split bags; or one manifest (TOML with [[recordings]], or
-        /// a path a line).
+        /// Patterns such as 'lab/**/*.mcap', recordings (.mcap, .db3), folders of split bags; or one manifest (TOML with
+        /// [[recordings]], or a path a line).
         #[arg(required = true)]
         inputs: Vec<String>,
         /// Pipeline file, whose own recordings do not count; the manifest's when absent.

@@ -23,7 +23,7 @@ use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
 use armcal_model::{Deviation, EffectTable, Masses};
-use armcal_recording::{Streams, input};
+use armcal_recording::{Streams, files_of, input, is_url, without_ending};
 use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
 use serde::Deserialize;
@@ -120,7 +120,7 @@ pub struct Pipeline {
 pub struct RecordingEntry {
     /// Name used in parameters and outputs; the stem of the first file when absent.
     pub name: Option<String>,
-    /// Its files: one, or the parts of a split bag; paths, or URLs such as `s3://bucket/key` (feature `s3`).
+    /// Its files: one, the parts of a split bag or the folder of one; paths, or URLs such as `s3://bucket/key` (feature `s3`).
     pub paths: Vec<PathBuf>,
     /// Declared tilt of the board.
     #[serde(default)]
@@ -142,7 +142,8 @@ impl RecordingEntry {
 
 /// The given name, or the stem of the first file.
 pub(crate) fn recording_name(given: Option<&String>, paths: &[PathBuf]) -> String {
-    let stem = || paths.first().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
+    let stem = || paths.first().map(|p| without_ending(p));
+    let stem = || stem().and_then(|p| p.file_name().map(|s| s.to_string_lossy().into_owned()));
     given.cloned().or_else(stem).unwrap_or_default()
 }
 
@@ -367,7 +368,21 @@ impl Pipeline {
             gauges.filter_map(|m| Some((m.name().to_owned(), m.reading.clone()?))).collect();
         pipeline.folder = folder.to_owned();
         pipeline.text = text;
+        pipeline.open_folders();
         Ok(pipeline)
+    }
+
+    /// Puts the files of a bag in the place of its folder.
+    fn open_folders(&mut self) {
+        for entry in &mut self.recordings {
+            let is_folder = |p: &PathBuf| !is_url(p) && self.folder.join(p).is_dir();
+            if entry.paths.iter().any(is_folder) {
+                entry.name = Some(entry.name());
+                let paths: Vec<PathBuf> =
+                    entry.paths.iter().map(|p| armcal_recording::resolve(&self.folder, p)).collect();
+                entry.paths = files_of(&paths);
+            }
+        }
     }
 
     /// Notes every file that the pipeline names, so that no output is begun in its place.

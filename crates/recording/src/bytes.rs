@@ -76,7 +76,7 @@ impl FileBytes {
         // Looked at before it is opened: opening a pipe waits for whoever writes to it.
         let about = std::fs::metadata(path).map_err(open)?;
         if about.is_dir() {
-            return Err(refused("it is a folder; name the .mcap files in it"));
+            return Err(refused("it is a folder without a recording in it (.mcap, .db3); name the files"));
         }
         if !about.is_file() {
             return Err(refused("it is a pipe or a device; copy it into a file first"));

@@ -36,6 +36,19 @@ pub enum RecordingError {
         bytes: u64,
         source: std::io::Error,
     },
+    /// The messages of another format cannot be copied to where they can be read.
+    #[error(
+        "the messages of {} cannot be copied to {}: {source}; set TMPDIR to a folder with enough room",
+        path.display(),
+        std::env::temp_dir().display()
+    )]
+    Copy { path: PathBuf, source: std::io::Error },
+    /// A recording in another format cannot be read.
+    #[error("cannot read {}: {why}", path.display())]
+    Foreign { path: PathBuf, why: String },
+    /// Two files of one recording are the same part of it.
+    #[error("{} and {} are one part in two forms: name one of them", path.display(), other.display())]
+    TwoForms { path: PathBuf, other: PathBuf },
     /// A file is not an MCAP file.
     #[error("{} is not an MCAP recording: {why}", path.display())]
     NotMcap { path: PathBuf, why: String },
@@ -99,7 +112,7 @@ pub enum RecordingError {
 }
 
 /// ` (did you mean "x"?)`, or nothing.
-fn did_you_mean(nearest: &Option<String>) -> String {
+pub(crate) fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or(String::new(), |n| format!(" (did you mean {n:?}?)"))
 }
 

@@ -1,8 +1,9 @@
 //! Messages of the wanted streams, decoded block by block in parallel and put together in file order.
 
 use crate::clock::Stamps;
-use crate::decode::{Plan, Role, Rows};
+use crate::decode::{Place, Plan, Role, Rows};
 use crate::error::nearest;
+use crate::foreign::{DEFINITION_FROM, inflated};
 use crate::joints::JointTable;
 use crate::open::{RecordingFile, ns};
 use crate::poses::PoseTable;
@@ -11,6 +12,7 @@ use crate::records::Message;
 use crate::sweep::{At, blocks, sweep};
 use crate::{LengthUnit, Recording, RecordingError};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -20,20 +22,22 @@ const BODIES_SAMPLED: u64 = 20;
 const LEAST_BYTES: u64 = 16;
 
 /// One stream asked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Request<'a> {
     pub role: &'static str,
     /// Which of several of this role.
     pub name: Option<&'a str>,
     pub topic: &'a str,
     pub kind: Kind<'a>,
+    /// Where its values are, if the pipeline says so.
+    pub fields: Vec<(Place, &'a str)>,
 }
 
 /// What to read out of the messages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind<'a> {
     Joints { wanted: &'a [String] },
-    Pose { body: Option<&'a str>, unit: LengthUnit },
+    Pose { body: Option<&'a str>, frame: Option<&'a str>, unit: LengthUnit },
     Scalar,
 }
 
@@ -101,6 +105,8 @@ struct Target {
     request: usize,
     plan: Plan,
     to_m: f64,
+    /// Whether its messages may be compressed one by one, which no CDR message looks like.
+    cdr: bool,
 }
 
 /// Decodes the wanted channels in one pass. The surveys of the pass are remembered by the recording.
@@ -161,10 +167,11 @@ fn target(
     let mut readable = 0;
     for (file, wanted) in recording.files.iter().zip(wanted) {
         for (id, channel) in file.channels.iter().filter(|(_, c)| c.topic == request.topic) {
-            match compile(channel, request.kind) {
+            match compile(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
-                    wanted.entry(*id).or_default().push(Target { request: index, plan, to_m });
+                    let cdr = channel.message_encoding == "cdr";
+                    wanted.entry(*id).or_default().push(Target { request: index, plan, to_m, cdr });
                 }
                 Err(why) => {
                     unreadable.insert(why);
@@ -191,17 +198,22 @@ fn target(
     Err(RecordingError::NotDecodable { role, topic, why })
 }
 
-fn compile(channel: &Arc<RawChannel>, kind: Kind<'_>) -> Result<(Plan, f64), String> {
+fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f64), String> {
     let Some(schema) = &channel.schema else {
         return Err("a channel without a schema cannot be decoded".to_owned());
     };
+    let (kind, fields) = (request.kind, request.fields.as_slice());
     let body = match kind {
         Kind::Pose { body, .. } => body,
         _ => None,
     };
-    let encoding = &channel.message_encoding;
-    let plan = Plan::compile(kind.role(), &schema.name, &schema.encoding, &schema.data, encoding, body)
-        .map_err(|e| e.to_string())?;
+    let (name, data, encoding) = (&schema.name, &schema.data, &channel.message_encoding);
+    let plan = match fields {
+        [] => Plan::compile(kind.role(), name, &schema.encoding, data, encoding, body),
+        _ => Plan::at(kind.role(), name, &schema.encoding, data, encoding, (body, fields)),
+    };
+    let plan = plan.map_err(|e| e.to_string())?;
+    let plan = if channel.metadata.contains_key(DEFINITION_FROM) { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
         Kind::Pose { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),
@@ -240,9 +252,11 @@ impl<'a> Stretch<'a> {
         let Stretch { rows, gathered, .. } = self;
         gathered.messages += 1;
         rows.clear();
-        if let Err(e) = target.plan.decode(message.data, rows) {
+        let decode = |data: Cow<'_, [u8]>| target.plan.decode(&data, rows).map_err(|e| e.to_string());
+        let data = if target.cdr { inflated(message.data) } else { Ok(message.data.into()) };
+        if let Err(why) = data.and_then(decode) {
             gathered.undecodable += 1;
-            gathered.first_error.get_or_insert_with(|| e.to_string());
+            gathered.first_error.get_or_insert(why);
         }
         let Gathered { stamps, joints, poses, scalars, .. } = gathered;
         let mut stamp = |header_ns| stamps.push(header_ns, ns(message.publish_ns), ns(message.log_ns));
@@ -251,7 +265,13 @@ impl<'a> Stretch<'a> {
                 let kept = rows.rows().filter(|row| joints.take(row, wanted));
                 kept.for_each(|row| stamp(row.stamp_ns));
             }
-            (Rows::Pose(rows), _) => rows.rows().for_each(|row| {
+            (Rows::Pose(rows), kind) => rows.rows().for_each(|row| {
+                if let Kind::Pose { frame: Some(frame), .. } = kind
+                    && frame != row.frame_id
+                {
+                    poses.other_frames.insert(row.frame_id.to_owned());
+                    return;
+                }
                 poses.take(&row, target.to_m);
                 stamp(row.stamp_ns);
             }),

@@ -121,6 +121,9 @@ pub(crate) fn check_config(stream: &JointStream) -> Result<(), RecordingError> {
     if distinct.len() != stream.names.len() {
         return wrong(format!("`names` lists a joint twice: {:?}", stream.names));
     }
+    if stream.position.is_none() && (stream.name.is_some() || stream.effort.is_some()) {
+        return wrong("`name` and `effort` are paths of fields beside `position`: give it too".into());
+    }
     if !(stream.max_turns.is_finite() && stream.max_turns > 0.0) {
         return wrong(format!("`max_turns` must be positive, not {}", stream.max_turns));
     }

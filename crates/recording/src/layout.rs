@@ -425,9 +425,6 @@ pub(crate) fn check_magic(bytes: &[u8]) -> Result<(), String> {
         b if b.starts_with(b"#ROSBAG") => {
             "it is a ROS 1 bag; convert it with `mcap convert in.bag out.mcap`".into()
         }
-        b if b.starts_with(b"SQLite format 3") => {
-            "it is a rosbag2 database; convert it with `ros2 bag convert` to storage_id mcap".into()
-        }
         _ => "it does not start with the MCAP magic bytes".into(),
     })
 }

@@ -1,7 +1,8 @@
 //! MCAP recordings in and out.
 //!
 //! Reading, in the order data flows through the modules:
-//! `bytes` (a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`) ->
+//! `bytes` (a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`; of a `foreign`
+//! format, such as rosbag2's database, a copy of its messages) ->
 //! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
 //! `chunk` (inflated and checked, within a `budget`) -> `sweep` (all blocks in parallel, results in file order) ->
 //! `decode` (messages to rows) -> `gather` (rows of a stream) -> `read` (columns: clock, cleaning, units).
@@ -27,6 +28,7 @@ pub mod decode;
 mod error;
 mod extract;
 mod fingerprint;
+mod foreign;
 mod gather;
 mod guard;
 mod identity;
@@ -60,6 +62,7 @@ pub use bytes::{Access, identity_of, sha256_of};
 pub use error::{RecordingError, nearest, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime, hash_of};
+pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
 pub use guard::{may_put, may_write, may_write_all};
 pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;

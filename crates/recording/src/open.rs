@@ -1,6 +1,8 @@
 //! A recording: one or more files, opened, laid out, and reported on.
 
 use crate::bytes::{Access, FileBytes};
+use crate::foreign::names::{files_of, is_recording, without_ending};
+use crate::foreign::{self, Converted};
 use crate::index::{self, Found};
 use crate::layout::{Damage, Layout};
 use crate::raw::{Attachment, RawChannel, RawSchema, parse_metadata};
@@ -31,7 +33,7 @@ pub struct Recording {
 pub(crate) struct RecordingFile {
     pub path: PathBuf,
     pub bytes: FileBytes,
-    /// Set where `bytes` are a copy of the whole file.
+    /// Set where `bytes` are a copy.
     copied: Option<Copied>,
     pub layout: Layout,
     pub channels: BTreeMap<u16, Arc<RawChannel>>,
@@ -52,12 +54,21 @@ impl Unread {
     }
 }
 
-/// Where a copy came from.
-struct Copied {
-    fetched: Fetched,
-    object: Option<ObjectIdentity>,
-    /// Why the whole file was needed.
-    why: &'static str,
+/// What `bytes` are a copy of.
+enum Copied {
+    /// Of all bytes of the file.
+    Whole {
+        fetched: Fetched,
+        object: Option<ObjectIdentity>,
+        /// Why the whole file was needed.
+        why: &'static str,
+    },
+    /// Of the messages of a file in another format.
+    Messages {
+        original: FileBytes,
+        /// What of it could not be used.
+        damage: Vec<Damage>,
+    },
 }
 
 impl Recording {
@@ -70,18 +81,20 @@ impl Recording {
         Recording::open_with(paths, Access::from_env())
     }
 
-    /// Opens the files of one recording. Their structure is found without inflating anything, unless a file has no
-    /// sound summary. Objects, and local files with [`Access::Ranges`], are read by ranges: the summary first, later
+    /// Opens the files of one recording; a folder stands for the recordings in it. Their structure is found without
+    /// inflating anything, unless a file has no sound summary. Objects, and local files with [`Access::Ranges`], are read by ranges: the summary first, later
     /// only chunks with a wanted channel. One without a sound summary is copied whole to an unnamed file in the folder
-    /// for temporary files, and read from there.
+    /// for temporary files, and read from there; so are the messages of a rosbag2 database and of a file that is compressed
+    /// as a whole.
     ///
     /// # Errors
-    /// No paths, a path listed twice, a file that cannot be opened or is not MCAP, an object that is not there or cannot
+    /// No paths, a path listed twice, a file that cannot be opened or is no recording, an object that is not there or cannot
     /// be reached. A damaged MCAP file is no error: see [`RecordingReport::warnings`].
     pub fn open_with(paths: &[PathBuf], access: Access) -> Result<Recording, RecordingError> {
         if paths.is_empty() {
             return Err(RecordingError::NoFiles);
         }
+        let paths = &files_of(paths);
         refuse_repeated(paths)?;
         let open = |path: &PathBuf| RecordingFile::open(path, access);
         let mut files = paths.par_iter().map(open).collect::<Result<Vec<_>, _>>()?;
@@ -217,7 +230,6 @@ impl Recording {
 
 impl RecordingFile {
     fn open(path: &Path, access: Access) -> Result<RecordingFile, RecordingError> {
-        let not_mcap = |why: String| RecordingError::NotMcap { path: path.to_owned(), why };
         let mut file = RecordingFile {
             path: path.to_owned(),
             bytes: FileBytes::open(path, access)?,
@@ -228,30 +240,55 @@ impl RecordingFile {
         if let FileBytes::Ranged(ranged) = &file.bytes {
             match index::find(ranged)? {
                 Found::Layout(layout) => file.layout = *layout,
-                Found::NotMcap(why) => return Err(not_mcap(why)),
+                Found::NotMcap(why) => return file.converted(why),
                 Found::Unusable(why) => {
                     let map = ranged.spool(path)?;
-                    let copied = Copied { fetched: ranged.fetched(), object: ranged.object.clone(), why };
+                    let copied =
+                        Copied::Whole { fetched: ranged.fetched(), object: ranged.object.clone(), why };
                     (file.copied, file.bytes) = (Some(copied), FileBytes::Mapped(map));
                 }
             }
         }
         if let FileBytes::Mapped(map) = &file.bytes {
-            file.layout = Layout::of(map).map_err(not_mcap)?;
+            match Layout::of(map) {
+                Ok(layout) => file.layout = layout,
+                Err(why) => return file.converted(why),
+            }
         }
         Ok(file)
     }
 
+    /// The same of a file in another format; `why` it is no MCAP file.
+    fn converted(mut self, why: String) -> Result<RecordingFile, RecordingError> {
+        let not_mcap = |why: String| RecordingError::NotMcap { path: self.path.clone(), why };
+        let Some(Converted { map, damage }) = foreign::convert(&self.bytes, &self.path)? else {
+            return Err(not_mcap(why));
+        };
+        self.layout = Layout::of(&map).map_err(not_mcap)?;
+        let original = std::mem::replace(&mut self.bytes, FileBytes::Mapped(map));
+        self.copied = Some(Copied::Messages { original, damage });
+        Ok(self)
+    }
+
     /// An object is identified by its store, copied or not.
     fn identity(&self) -> Result<String, RecordingError> {
-        self.object().map_or_else(|| self.bytes.identity(), |object| Ok(object.identity(self.bytes.len())))
+        let bytes = self.original();
+        self.object().map_or_else(|| bytes.identity(), |object| Ok(object.identity(bytes.len())))
     }
 
     fn object(&self) -> Option<&ObjectIdentity> {
-        match (&self.bytes, &self.copied) {
-            (_, Some(copied)) => copied.object.as_ref(),
-            (FileBytes::Ranged(ranged), None) => ranged.object.as_ref(),
-            (FileBytes::Mapped(_), None) => None,
+        match (&self.copied, self.original()) {
+            (Some(Copied::Whole { object, .. }), _) => object.as_ref(),
+            (_, FileBytes::Ranged(ranged)) => ranged.object.as_ref(),
+            (_, FileBytes::Mapped(_)) => None,
+        }
+    }
+
+    /// The bytes of the file itself, or the same bytes elsewhere.
+    fn original(&self) -> &FileBytes {
+        match &self.copied {
+            Some(Copied::Messages { original, .. }) => original,
+            Some(Copied::Whole { .. }) | None => &self.bytes,
         }
     }
 
@@ -279,11 +316,13 @@ impl RecordingFile {
     /// Everything wrong with the file, as far as it was read, by offset.
     fn damage(&self, survey: &FileSurvey) -> Vec<Damage> {
         let mut all: Vec<Damage> = self.layout.damage.iter().chain(&survey.damage).cloned().collect();
-        all.extend(self.copied.as_ref().map(|copied| Damage {
-            offset: 0,
-            why: format!("{}, so all of it was read", copied.why),
-            lost: false,
-        }));
+        match &self.copied {
+            Some(Copied::Whole { why, .. }) => {
+                all.push(Damage { offset: 0, why: format!("{why}, so all of it was read"), lost: false });
+            }
+            Some(Copied::Messages { damage, .. }) => all.extend(damage.iter().cloned()),
+            None => {}
+        }
         let strangers = survey.tallies.iter().filter(|(id, _)| !self.channels.contains_key(id));
         all.extend(strangers.map(|(id, tally)| Damage {
             offset: 0,
@@ -339,10 +378,13 @@ impl RecordingFile {
     fn report(&self, identity: &Result<String, RecordingError>, damage: &[Damage]) -> FileReport {
         FileReport {
             path: self.path.clone(),
-            bytes: self.bytes.len(),
+            bytes: self.original().len(),
             identity: identity.as_ref().cloned().unwrap_or_default(),
             object: self.object().cloned(),
-            fetched: self.copied.as_ref().map(|c| c.fetched).or_else(|| self.bytes.fetched()),
+            fetched: match &self.copied {
+                Some(Copied::Whole { fetched, .. }) => Some(*fetched),
+                _ => self.original().fetched(),
+            },
             source: self.layout.source.unwrap_or(Source::Scan),
             profile: self.layout.profile.clone(),
             library: self.layout.library.clone(),
@@ -397,13 +439,22 @@ fn readable_as(channel: &RawChannel) -> Result<String, String> {
         .map_err(|e| e.to_string())
 }
 
-/// The same file twice would silently double every message.
+/// The same file twice, or a part of a bag beside what it was converted to, would silently double every message.
 fn refuse_repeated(paths: &[PathBuf]) -> Result<(), RecordingError> {
     let mut real: Vec<(PathBuf, &PathBuf)> =
         paths.iter().map(|p| (p.canonicalize().unwrap_or_else(|_| p.clone()), p)).collect();
     real.sort();
-    match real.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        Some(pair) => Err(RecordingError::ListedTwice { path: pair[1].1.clone() }),
+    if let Some(pair) = real.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        return Err(RecordingError::ListedTwice { path: pair[1].1.clone() });
+    }
+    let mut parts: Vec<(PathBuf, &PathBuf)> = real
+        .into_iter()
+        .filter(|(_, p)| is_recording(p))
+        .map(|(real, p)| (without_ending(&real), p))
+        .collect();
+    parts.sort();
+    match parts.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some(pair) => Err(RecordingError::TwoForms { path: pair[0].1.clone(), other: pair[1].1.clone() }),
         None => Ok(()),
     }
 }

@@ -20,6 +20,8 @@ pub(crate) struct PoseTable {
     pub frames: BTreeSet<String>,
     /// Bodies of the rows.
     pub bodies: BTreeSet<String>,
+    /// Frames of poses that were left out, because another was asked for.
+    pub other_frames: BTreeSet<String>,
 }
 
 impl PoseTable {
@@ -45,6 +47,7 @@ impl PoseTable {
         let each = parts.into_iter().map(|mut part| {
             whole.frames.append(&mut part.frames);
             whole.bodies.append(&mut part.bodies);
+            whole.other_frames.append(&mut part.other_frames);
             part.seen
         });
         let seen = joined(each.collect());
@@ -55,6 +58,17 @@ impl PoseTable {
     pub fn is_finite(&self, i: usize) -> bool {
         let s = &self.seen[i];
         s.position_m.iter().chain(s.quaternion_xyzw.iter().flatten()).all(|x| x.is_finite())
+    }
+}
+
+/// Checks what can be checked before reading.
+pub(crate) fn check_config((role, stream): (&'static str, &PoseStream)) -> Result<(), RecordingError> {
+    match stream.orientation.is_some() && stream.position.is_none() {
+        true => Err(RecordingError::Config {
+            role,
+            why: "`orientation` is the path of a field beside `position`: give both".into(),
+        }),
+        false => Ok(()),
     }
 }
 
@@ -87,6 +101,22 @@ pub(crate) fn body_missing(
         role,
         topic: stream.topic.clone(),
         why: format!("never shows body {wanted:?}"),
+        nearest: nearest(&wanted, present),
+        present: present.iter().cloned().collect(),
+    }
+}
+
+/// The error for a frame that no pose is in.
+pub(crate) fn frame_missing(
+    role: &'static str,
+    stream: &PoseStream,
+    present: &BTreeSet<String>,
+) -> RecordingError {
+    let wanted = stream.frame.clone().unwrap_or_default();
+    RecordingError::Body {
+        role,
+        topic: stream.topic.clone(),
+        why: format!("never has that body in frame {wanted:?}"),
         nearest: nearest(&wanted, present),
         present: present.iter().cloned().collect(),
     }

@@ -29,6 +29,9 @@ impl Recording {
         streams: &Streams,
     ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {
         streams.joints.iter().chain(&streams.set_points).try_for_each(joints::check_config)?;
+        let named = [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)];
+        let named = named.into_iter().filter_map(|(role, stream)| Some((role, stream.as_ref()?)));
+        named.chain(streams.bodies.values().map(|s| ("bodies", s))).try_for_each(poses::check_config)?;
         let requests = requests(streams);
         let gathered = gather(self, &requests)?;
         let read = |((place, request), gathered): ((usize, &Request<'_>), Gathered)| {
@@ -77,32 +80,24 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
             name: None,
             topic: &s.topic,
             kind: Kind::Joints { wanted: &s.names },
+            fields: s.fields(),
         })
         .collect();
     for (role, stream) in [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)] {
-        requests.extend(stream.iter().map(|s| Request {
-            role,
-            name: None,
-            topic: &s.topic,
-            kind: Kind::Pose { body: s.body.as_deref(), unit: s.unit },
-        }));
+        requests.extend(stream.iter().map(|s| pose_request(role, None, s)));
     }
-    requests.extend(streams.bodies.iter().map(|(name, s)| Request {
-        role: "bodies",
-        name: Some(name),
-        topic: &s.topic,
-        kind: Kind::Pose { body: s.body.as_deref(), unit: s.unit },
-    }));
-    if let Some(stream) = &streams.temperature {
-        requests.push(Request { role: "temperature", name: None, topic: &stream.topic, kind: Kind::Scalar });
-    }
-    requests.extend(streams.gauges.iter().map(|(name, s)| Request {
-        role: "gauges",
-        name: Some(name),
-        topic: &s.topic,
-        kind: Kind::Scalar,
-    }));
+    requests.extend(streams.bodies.iter().map(|(name, s)| pose_request("bodies", Some(name), s)));
+    let scalar = |role, name, topic| Request { role, name, topic, kind: Kind::Scalar, fields: Vec::new() };
+    requests.extend(streams.temperature.iter().map(|s| scalar("temperature", None, s.topic.as_str())));
+    requests.extend(
+        streams.gauges.iter().map(|(name, s)| scalar("gauges", Some(name.as_str()), s.topic.as_str())),
+    );
     requests
+}
+
+fn pose_request<'a>(role: &'static str, name: Option<&'a str>, s: &'a PoseStream) -> Request<'a> {
+    let kind = Kind::Pose { body: s.body.as_deref(), frame: s.frame.as_deref(), unit: s.unit };
+    Request { role, name, topic: &s.topic, kind, fields: s.fields() }
 }
 
 /// One stream on its way from rows to columns.
@@ -209,6 +204,9 @@ impl Reading {
         if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
             return Err(poses::body_missing(role, stream, &self.gathered.other_bodies));
         }
+        if table.seen.is_empty() && !table.other_frames.is_empty() {
+            return Err(poses::frame_missing(role, stream, &table.other_frames));
+        }
         poses::check_body(role, stream, &table)?;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
         poses::check_unit(role, stream, &table, &rows)?;
@@ -223,7 +221,10 @@ impl Reading {
         self.finish(role, &time_ns, counts)?;
         self.inadequate("unit-doubtful", poses::looks_like_metres(stream, &position_m));
         let several = (table.frames.len() > 1).then(|| {
-            format!("poses come in several frames ({:?}) and are read as if they were one", table.frames)
+            format!(
+                "poses come in several frames ({:?}) and are read as if they were one: set `frame`",
+                table.frames
+            )
         });
         self.inadequate("several-frames", several);
         let unoriented =
@@ -322,6 +323,14 @@ impl Reading {
             let (topic, why) = (self.report.topic.clone(), judge_header(&stamps).err().unwrap_or_default());
             let why = format!("{why}; set \"publish\" or \"log\", or remove the key");
             return Err(RecordingError::NoClock { role, topic, clock: "header", why });
+        }
+        let has_none = clock != Clock::Header && !matches!(role, "temperature" | "gauges");
+        if asked.is_none() && has_none && stamps.header_ns.iter().all(Option::is_none) {
+            let text = format!(
+                "its messages carry no stamp of their own: {} time is used in its place",
+                clock.word()
+            );
+            self.say(Severity::Notice, "no-stamp", text);
         }
         let mut time = stamps.on(clock);
         if clock == Clock::Header {

@@ -1,6 +1,7 @@
 //! Which streams of a recording the pipeline uses: the `[streams]` section of a pipeline file.
 
 use crate::Clock;
+use crate::decode::Place;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -62,6 +63,16 @@ pub struct JointStream {
     /// by index, their first `names.len()` values in this order.
     #[serde(default)]
     pub names: Vec<String>,
+    /// Where the positions are in messages that armcal does not know, such as `measured_joint_state.position[]`: `[]` marks
+    /// a list, `*` at the end all fields of a message.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// With `position`: where the names of the joints are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// With `position`: where the efforts are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effort: Option<String>,
     /// Unit of the readings; default `rad`.
     #[serde(default)]
     pub unit: JointUnit,
@@ -84,6 +95,15 @@ impl JointStream {
     pub(crate) fn called(&self) -> &str {
         self.arm.as_deref().unwrap_or(&self.topic)
     }
+
+    /// The fields that the pipeline names, by their paths; the positions come first.
+    pub(crate) fn fields(&self) -> Vec<(Place, &str)> {
+        paths([
+            (Place::Positions, &self.position),
+            (Place::Names, &self.name),
+            (Place::Efforts, &self.effort),
+        ])
+    }
 }
 
 impl Default for JointStream {
@@ -91,6 +111,9 @@ impl Default for JointStream {
         JointStream {
             topic: String::new(),
             names: Vec::new(),
+            position: None,
+            name: None,
+            effort: None,
             unit: JointUnit::Rad,
             encoders: Vec::new(),
             clock: None,
@@ -166,15 +189,36 @@ impl Encoder {
 pub struct PoseStream {
     /// Topic, such as `/vicon/tip/tip`.
     pub topic: String,
-    /// Body to read (`child_frame_id`, rigid body, marker or subject), required when messages hold several.
+    /// Body to read (`child_frame_id`, rigid body, marker or subject, place from 0 in a list of poses), required when
+    /// messages hold several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<String>,
+    /// Frame that the poses are expressed in (`header.frame_id`), required when the body comes in several, as on `/tf`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<String>,
+    /// Where the position is in messages that armcal does not know: the path of a message with x, y, z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// With `position`: where the orientation is, a message with x, y, z, w.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<String>,
     /// Unit of the positions; default `m`.
     #[serde(default)]
     pub unit: LengthUnit,
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,
+}
+
+impl PoseStream {
+    /// The fields that the pipeline names, by their paths; the position comes first.
+    pub(crate) fn fields(&self) -> Vec<(Place, &str)> {
+        paths([(Place::Position, &self.position), (Place::Orientation, &self.orientation)])
+    }
+}
+
+fn paths<const N: usize>(fields: [(Place, &Option<String>); N]) -> Vec<(Place, &str)> {
+    fields.into_iter().filter_map(|(place, path)| Some((place, path.as_deref()?))).collect()
 }
 
 /// Unit of positions.

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
-use armcal_recording::{input, is_url, list, resolve};
+use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
 use armcal_table::Tilt;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ struct ManifestFile {
 }
 
 impl Manifest {
-    /// From what a user types: one manifest file, or any number of globs, MCAP files and folders of split bags. Files
+    /// From what a user types: one manifest file, or any number of globs, recordings and folders of split bags. Files
     /// below `out` are results and not taken.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Manifest {
         };
         let mut entries = file.recordings;
         for entry in &mut entries {
-            entry.paths = entry.paths.iter().flat_map(|p| parts(&resolve(&folder, p))).collect();
+            entry.paths = entry.paths.iter().flat_map(|p| recordings_at(&resolve(&folder, p))).collect();
         }
         let pipeline = file.pipeline.map(|p| folder.join(p));
         Manifest { entries, pipeline }.checked(&path.display().to_string())
@@ -80,7 +80,7 @@ impl Manifest {
                 for found in glob::glob(input).map_err(|e| bad(e.to_string()))? {
                     let found = found.map_err(|e| bad(e.to_string()))?;
                     let found = std::path::absolute(&found).unwrap_or(found);
-                    files.extend(parts(&found).into_iter().filter(|p| !p.starts_with(&out)));
+                    files.extend(recordings_at(&found).into_iter().filter(|p| !p.starts_with(&out)));
                 }
             }
             if files.len() == before {
@@ -117,18 +117,7 @@ impl Manifest {
 
 /// Anything but a recording, a folder or a pattern.
 fn is_manifest(path: &Path) -> bool {
-    path.is_file() && path.extension().is_none_or(|e| e != "mcap")
-}
-
-/// A folder stands for the MCAP files in it: the parts of a split bag.
-fn parts(path: &Path) -> Vec<PathBuf> {
-    if !path.is_dir() {
-        return vec![path.to_owned()];
-    }
-    let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|e| e.path());
-    let mut files: Vec<PathBuf> = entries.filter(|p| p.extension().is_some_and(|e| e == "mcap")).collect();
-    files.sort();
-    files
+    path.is_file() && !is_recording(path)
 }
 
 /// Files beside a rosbag2 `metadata.yaml` are one recording; every other file is one by itself.
@@ -152,7 +141,7 @@ fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
 /// Names without a name after as many of their last folders as it takes to tell them apart.
 fn name_all(entries: &mut [RecordingEntry]) {
     let stem = |entry: &RecordingEntry, depth: usize| -> String {
-        let path = entry.paths[0].with_extension("");
+        let path = without_ending(&entry.paths[0]);
         let parts: Vec<String> =
             path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
         parts[parts.len().saturating_sub(depth)..].join("/")

@@ -4,7 +4,9 @@ use super::{Outcome, json_text, print};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
 use armcal_core::Severity;
-use armcal_recording::{Extract, Extracted, Recording, RecordingError, RecordingReport, extract, input};
+use armcal_recording::{
+    Extract, Extracted, Recording, RecordingError, RecordingReport, extract, files_of, input,
+};
 use armcal_report::printable;
 use clap::Args;
 use std::fmt::Write as _;
@@ -13,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// What the command is asked to do.
 #[derive(Debug, Clone, Args)]
 pub struct Request {
-    /// MCAP files (parts of one recording), or s3://BUCKET/KEY.
+    /// Recordings (parts of one: .mcap, .db3, also compressed), folders, or s3://BUCKET/KEY.
     #[arg(required = true)]
     pub inputs: Vec<PathBuf>,
     /// File for the thin recording.
@@ -38,7 +40,7 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
     let mut topics = asked.pipeline.as_deref().map_or(Ok(Vec::new()), topics_of)?;
     topics.extend_from_slice(&asked.topics);
     let name = asked.inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
-    asked.inputs.iter().for_each(|path| input::note(path));
+    files_of(&asked.inputs).iter().for_each(|path| input::note(path));
     super::may_write([&asked.out])?;
     let recording = Recording::open(&asked.inputs)
         .map_err(|source| Error::Recording { recording: name.clone(), source })?;

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// What `armcal init` is asked to do.
 #[derive(Debug, Clone, Args)]
 pub struct Request {
-    /// MCAP files, folders of them, patterns such as 'lab/*.mcap'; the parts of a split bag are one recording.
+    /// Recordings (.mcap, .db3, also compressed), folders of them, patterns such as 'lab/*.mcap'; the parts of a split bag
+    /// are one recording.
     #[arg(required = true)]
     pub inputs: Vec<String>,
     /// The pipeline to write; what it needs and no file holds is written beside it.

@@ -3,9 +3,9 @@
 use crate::batch::Manifest;
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
-use armcal_recording::{Recording, RecordingReport, is_url};
+use armcal_recording::{Recording, RecordingReport, is_recording, is_url, recordings_at, without_ending};
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Parts of a split recording follow each other within this time.
 const NEXT_PART_NS: i64 = 5_000_000_000;
@@ -19,7 +19,7 @@ pub struct Opened {
 }
 
 /// Opens what the user named: files, globs, folders. Files of one rosbag2 folder are one recording, and so are
-/// `NAME_0.mcap`, `NAME_1.mcap`, .. of a folder that follow each other in time.
+/// `NAME_0.mcap`, `NAME_1.mcap`, .. (or `.db3`) of a folder that follow each other in time.
 pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
     inputs.iter().try_for_each(|input| refuse(Path::new(input)))?;
     let entries = Manifest::of(inputs, out)?.entries;
@@ -63,31 +63,21 @@ fn continues(before: &Opened, next: &Opened) -> bool {
 
 /// `NAME_3.mcap` is part 3 of `NAME`.
 fn part(path: &Path) -> Option<(String, u64)> {
-    let stem = path.file_stem()?.to_str()?;
+    let stem = without_ending(path);
+    let stem = stem.file_name()?.to_str()?;
     let (name, number) = stem.rsplit_once('_')?;
     Some((name.to_owned(), number.parse().ok()?))
 }
 
-/// What is no MCAP recording is told for what it is, with the way to one.
+/// What is no recording is told for what it is, with the way to one.
 fn refuse(path: &Path) -> Result<(), Error> {
     let refused = |why: String| Err(Error::Manifest { what: path.display().to_string(), why });
     if is_url(path) {
         return Ok(());
     }
-    if path.is_dir() {
-        let inside = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-        let inside: Vec<PathBuf> = inside.collect();
-        let has = |ext: &str| inside.iter().any(|p| p.extension().is_some_and(|e| e == ext));
-        return match (has("mcap"), has("db3")) {
-            (true, _) => Ok(()),
-            (_, true) => {
-                refused("holds a rosbag2 database: convert it with `ros2 bag convert` to MCAP".into())
-            }
-            _ => refused(
-                "is a folder without any MCAP file; for deeper ones give a pattern such as 'lab/**/*.mcap'"
-                    .into(),
-            ),
-        };
+    if path.is_dir() && recordings_at(path).is_empty() {
+        let why = "is a folder without any recording; for deeper ones give a pattern such as 'lab/**/*.mcap'";
+        return refused(why.to_owned());
     }
     if !path.is_file() {
         return Ok(());
@@ -95,20 +85,17 @@ fn refuse(path: &Path) -> Result<(), Error> {
     let read = |source| Error::ReadFile { what: "recording", path: path.to_owned(), source };
     let (mut head, mut file) = (Vec::new(), armcal_recording::input::open(path).map_err(read)?);
     file.by_ref().take(16).read_to_end(&mut head).map_err(read)?;
-    match head.as_slice() {
-        b if b.starts_with(b"\x89MCAP") => match path.extension().is_some_and(|e| e == "mcap") {
-            true => Ok(()),
-            false => refused("is a recording (MCAP) whose name does not end in .mcap: rename it".into()),
-        },
+    let (what, ending) = match head.as_slice() {
+        b if b.starts_with(b"\x89MCAP") => ("a recording (MCAP)", ".mcap"),
+        b if b.starts_with(b"SQLite format 3\0") => ("a database (SQLite)", ".db3"),
+        [0x28, 0xb5, 0x2f, 0xfd, ..] => ("compressed (zstd)", ".mcap.zstd or .db3.zstd"),
         b if b.starts_with(b"#ROSBAG") => {
-            refused("is a ROS 1 bag: convert it with `mcap convert in.bag out.mcap`".into())
+            return refused("is a ROS 1 bag: convert it with `mcap convert in.bag out.mcap`".into());
         }
-        b if b.starts_with(b"SQLite format 3") => {
-            refused("is a rosbag2 database: convert it with `ros2 bag convert` to MCAP".into())
-        }
-        [0x28, 0xb5, 0x2f, 0xfd, ..] => {
-            refused("is compressed as a whole: `zstd -d` makes it a recording".into())
-        }
-        _ => refused("is no MCAP recording".into()),
+        _ => return refused("is no MCAP recording".into()),
+    };
+    match is_recording(path) {
+        true => Ok(()),
+        false => refused(format!("is {what} whose name does not end in {ending}: rename it")),
     }
 }

@@ -24,9 +24,10 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
         b if b.starts_with(b"#ROSBAG") => {
             is("a ROS 1 bag", format!("convert it with `mcap convert in.bag out.mcap`, {own}"))
         }
-        b if b.starts_with(b"SQLite format 3") => {
-            is("a rosbag2 database", format!("convert it with `ros2 bag convert` to MCAP, {own}"))
-        }
+        b if b.starts_with(b"SQLite format 3") => is(
+            "a rosbag2 database",
+            format!("{own}; `armcal inspect {}` shows what is in it", path.display()),
+        ),
         _ => {
             file.read_to_end(&mut bytes).map_err(failed)?;
             let text = String::from_utf8(bytes);

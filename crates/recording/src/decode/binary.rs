@@ -15,8 +15,12 @@ const MAX_DEPTH: usize = 32;
 #[derive(Debug)]
 pub(super) struct Code {
     encoding: Encoding,
+    /// Whether `plain` goes to the end of a message, and nothing may be left over there.
+    to_end: bool,
     /// For messages whose parts just follow one another: messages inside messages are flattened.
     plain: Programs,
+    /// The same to the end of a message; `None` where something on the way has no known length.
+    whole: Option<Programs>,
     /// For CDR2 that delimits each message.
     delimited: Programs,
 }
@@ -37,6 +41,17 @@ pub(super) enum Encoding {
     Cdr,
     /// Packed, little-endian.
     Ros1,
+}
+
+impl Encoding {
+    /// What may follow a message, at most [bytes]: CDR is padded to a multiple of four by some middleware (DDSI-RTPS 2.5,
+    /// 10.2.1.2).
+    fn padding_bytes(self) -> usize {
+        match self {
+            Encoding::Cdr => 3,
+            Encoding::Ros1 => 0,
+        }
+    }
 }
 
 /// Steps over one message type.
@@ -75,13 +90,21 @@ enum What {
 impl Code {
     /// Compiles the steps that read `wanted` out of a message.
     pub(super) fn compile(types: &Types, wanted: &Wanted, encoding: Encoding) -> Result<Code, String> {
-        let compile = |flatten| {
+        let compile = |flatten, to_end: bool| {
             let skips = vec![Skip::Unknown; types.messages.len()];
             let mut compiler = Compiler { types, encoding, flatten, programs: Vec::new(), skips };
-            let main = compiler.read(0, wanted, true, 0)?;
+            let main = compiler.read(0, wanted, !to_end, 0)?;
             Ok::<_, String>(Programs { programs: compiler.programs, main })
         };
-        Ok(Code { encoding, plain: compile(true)?, delimited: compile(false)? })
+        let (plain, delimited) = (compile(true, false)?, compile(false, false)?);
+        Ok(Code { encoding, to_end: false, plain, whole: compile(true, true).ok(), delimited })
+    }
+
+    /// Refuses messages that are longer or shorter than their definition from now on, as far as can be.
+    pub(super) fn go_to_the_end(&mut self) {
+        if let Some(whole) = self.whole.take() {
+            (self.plain, self.to_end) = (whole, true);
+        }
     }
 
     /// Runs over one message.
@@ -95,7 +118,14 @@ impl Code {
             Delimiters::None | Delimiters::Lists => &self.plain,
         };
         let mut machine = Machine { programs: &code.programs, cursor, sink };
-        machine.run(code.main).ok_or_else(|| machine.cursor.into_error())
+        if machine.run(code.main).is_none() {
+            return Err(machine.cursor.into_error());
+        }
+        let left = machine.cursor.rest().len();
+        match self.to_end && left > self.encoding.padding_bytes() {
+            true => Err(DecodeError::LeftOver { bytes: data.len(), left }),
+            false => Ok(()),
+        }
     }
 }
 

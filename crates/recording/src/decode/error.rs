@@ -1,6 +1,7 @@
 //! Why a channel or a message cannot be decoded.
 
 use super::Role;
+use crate::error::did_you_mean;
 use crate::shortened;
 
 /// Why a channel or a message cannot be decoded. The caller adds file and topic.
@@ -25,6 +26,21 @@ pub enum DecodeError {
         shortened(fields)
     )]
     Unknown { schema: String, fields: String },
+    /// The schema has nothing of the kind at a path that the user names.
+    #[error(
+        "{} has no {needs} at {path:?}{}; it has such at: {}",
+        shortened(schema),
+        did_you_mean(nearest),
+        listed(present)
+    )]
+    NoField {
+        schema: String,
+        path: String,
+        /// What has to be there.
+        needs: &'static str,
+        nearest: Option<String>,
+        present: Vec<String>,
+    },
     /// The schema is read in another role than the one asked for.
     #[error("{} holds {found}, not {wanted}: choose another topic for the {wanted}", shortened(schema))]
     OtherRole { schema: String, wanted: Role, found: Role },
@@ -46,6 +62,17 @@ pub enum DecodeError {
         at: usize,
         /// What the field needs at least [bytes].
         needed: usize,
+    },
+    /// The message goes on behind its schema.
+    #[error(
+        "message of {bytes} bytes goes on for {left} bytes behind its last field: the definition in the file is not \
+         the one it was written with"
+    )]
+    LeftOver {
+        /// Length of the message [bytes].
+        bytes: usize,
+        /// What is behind the last field [bytes].
+        left: usize,
     },
     /// The four bytes before a CDR message name a representation that is not read.
     #[error(
@@ -74,6 +101,9 @@ pub enum DecodeError {
 /// At most twenty names.
 fn listed(names: &[String]) -> String {
     const SHOWN: usize = 20;
+    if names.is_empty() {
+        return "none".to_owned();
+    }
     let shown = names.iter().take(SHOWN).map(|n| shortened(n)).collect::<Vec<_>>().join(", ");
     match names.len().saturating_sub(SHOWN) {
         0 => shown,

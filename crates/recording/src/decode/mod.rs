@@ -22,11 +22,13 @@ mod wire;
 
 pub use error::DecodeError;
 pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRows};
+pub use shapes::Place;
 
 use binary::Encoding;
-use shapes::{Shape, Wanted};
+use shapes::Wanted;
 use sink::Sink;
 use slot::Slot;
+use types::Types;
 
 /// What a channel can be read as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,7 +65,8 @@ pub fn readable_as(
     schema_data: &[u8],
     message_encoding: &str,
 ) -> Result<Role, DecodeError> {
-    let (shape, ..) = compile(schema_name, schema_encoding, schema_data, message_encoding)?;
+    let source = [schema_name, schema_encoding, message_encoding];
+    let (shape, ..) = compile(source, schema_data, shapes::recognise)?;
     Ok(shape.role)
 }
 
@@ -72,6 +75,8 @@ pub fn readable_as(
 pub struct Plan {
     role: Role,
     in_millimetres: bool,
+    /// Whether bodies are told by their places in a list.
+    by_place: bool,
     body: Option<Vec<u8>>,
     code: Code,
 }
@@ -87,7 +92,7 @@ impl Plan {
     /// Compiles the plan that reads `role` out of messages of this schema.
     ///
     /// `body` selects one of several bodies by the name the messages give it: `child_frame_id`, `rigid_body_name`,
-    /// `marker_name` (or `subject/marker`), the number of a marker without a name.
+    /// `marker_name` (or `subject/marker`), the number of a marker without a name, the place (from 0) in a list of poses.
     pub fn compile(
         role: Role,
         schema_name: &str,
@@ -96,7 +101,8 @@ impl Plan {
         message_encoding: &str,
         body: Option<&str>,
     ) -> Result<Plan, DecodeError> {
-        let (shape, wanted, code) = compile(schema_name, schema_encoding, schema_data, message_encoding)?;
+        let source = [schema_name, schema_encoding, message_encoding];
+        let (shape, wanted, code) = compile(source, schema_data, shapes::recognise)?;
         if shape.role != role {
             return Err(DecodeError::OtherRole {
                 schema: schema_name.to_owned(),
@@ -107,15 +113,42 @@ impl Plan {
         if let Some(body) = body
             && !wanted.has(Slot::Body)
             && !wanted.has(Slot::BodyIndex)
+            && !shape.by_place
         {
             return Err(DecodeError::NoBodyName { schema: schema_name.to_owned(), body: body.to_owned() });
         }
         Ok(Plan {
             role,
             in_millimetres: shape.in_millimetres,
+            by_place: shape.by_place,
             body: body.map(|b| b.as_bytes().to_vec()),
             code,
         })
+    }
+
+    /// Compiles the plan that reads `role` out of the fields at these paths, as `schema_data` defines them; the first is the
+    /// one that stamp and frame belong to. `[]` in a path marks a list, `*` at its end stands for all fields of a message.
+    pub fn at(
+        role: Role,
+        schema_name: &str,
+        schema_encoding: &str,
+        schema_data: &[u8],
+        message_encoding: &str,
+        (body, fields): (Option<&str>, &[(Place, &str)]),
+    ) -> Result<Plan, DecodeError> {
+        let find = |schema: &str, types: &Types| Ok(((), shapes::at(schema, types, fields)?));
+        let ((), _, code) = compile([schema_name, schema_encoding, message_encoding], schema_data, find)?;
+        let body = body.map(|b| b.as_bytes().to_vec());
+        Ok(Plan { role, in_millimetres: false, by_place: true, body, code })
+    }
+
+    /// The same plan, which refuses messages that do not end where their definition does: for definitions that did not
+    /// come with the messages.
+    pub fn exact(mut self) -> Plan {
+        if let Code::Binary(code) = &mut self.code {
+            code.go_to_the_end();
+        }
+        self
     }
 
     /// What the plan reads.
@@ -165,7 +198,7 @@ impl Plan {
 
     fn decode_pose(&self, data: &[u8], body: Option<&[u8]>, rows: &mut PoseRows) -> Result<(), DecodeError> {
         let value = self.json_value(data)?;
-        let mut sink = pose_sink::PoseSink::new(rows, body);
+        let mut sink = pose_sink::PoseSink::new(rows, body, self.by_place);
         let decoded = self.run(data, &value, &mut sink);
         sink.finish(decoded)
     }
@@ -192,17 +225,17 @@ impl Plan {
     }
 }
 
-/// The shape a schema has, where its values are, and the code that reads them.
-fn compile(
-    schema: &str,
-    schema_encoding: &str,
+/// What `find` makes of the message types of a schema, where its values are, and the code that reads them. The source is the
+/// schema's name and encoding and that of the messages.
+fn compile<T>(
+    [schema, schema_encoding, message_encoding]: [&str; 3],
     data: &[u8],
-    message_encoding: &str,
-) -> Result<(&'static Shape, Wanted, Code), DecodeError> {
+    find: impl Fn(&str, &Types) -> Result<(T, Wanted), DecodeError>,
+) -> Result<(T, Wanted, Code), DecodeError> {
     let unusable = |why: String| DecodeError::Schema { schema: schema.to_owned(), why };
     let binary = |encoding: Encoding| {
         let types = msg::parse(data, schema).map_err(unusable)?;
-        let (shape, wanted) = shapes::recognise(schema, &types)?;
+        let (shape, wanted) = find(schema, &types)?;
         let code = binary::Code::compile(&types, &wanted, encoding).map_err(unusable)?;
         Ok((shape, wanted, Code::Binary(code)))
     };
@@ -211,13 +244,13 @@ fn compile(
         ("ros1msg", "ros1") => binary(Encoding::Ros1),
         ("protobuf", "protobuf") => {
             let descriptors = protobuf::Schema::read(schema, data).map_err(unusable)?;
-            let (shape, wanted) = shapes::recognise(schema, &descriptors.types)?;
+            let (shape, wanted) = find(schema, &descriptors.types)?;
             let code = descriptors.compile(&wanted);
             Ok((shape, wanted, Code::Protobuf(code)))
         }
         ("jsonschema", "json") => {
             let types = json::parse(data).map_err(unusable)?;
-            let (shape, wanted) = shapes::recognise(schema, &types)?;
+            let (shape, wanted) = find(schema, &types)?;
             let code = json::Code::compile(&types, &wanted);
             Ok((shape, wanted, Code::Json(code)))
         }

@@ -15,6 +15,9 @@ pub(super) struct PoseSink<'r, 'm> {
     /// Number of rows before this message.
     start: usize,
     filter: Option<&'m [u8]>,
+    /// Whether items have no names but their places.
+    by_place: bool,
+    items: u32,
     by_item: bool,
     in_item: bool,
     message: Gathered<'m>,
@@ -42,12 +45,14 @@ struct Gathered<'m> {
 }
 
 impl<'r, 'm> PoseSink<'r, 'm> {
-    /// `filter` is the body wanted: its name, or `subject/name`.
-    pub(super) fn new(rows: &'r mut PoseRows, filter: Option<&'m [u8]>) -> Self {
+    /// `filter` is the body wanted: its name, `subject/name`, or, `by_place`, its place in the list.
+    pub(super) fn new(rows: &'r mut PoseRows, filter: Option<&'m [u8]>, by_place: bool) -> Self {
         PoseSink {
             start: rows.len(),
             rows,
             filter,
+            by_place,
+            items: 0,
             by_item: false,
             in_item: false,
             message: Gathered::default(),
@@ -183,7 +188,9 @@ impl<'m> Sink<'m> for PoseSink<'_, 'm> {
 
     fn begin_item(&mut self) {
         (self.by_item, self.in_item) = (true, true);
-        self.item = Gathered::default();
+        let index = self.by_place.then_some(f64::from(self.items));
+        self.item = Gathered { index, ..Gathered::default() };
+        self.items += 1;
     }
 
     fn end_item(&mut self) {

@@ -5,6 +5,7 @@
 use super::slot::Slot;
 use super::types::{Field, Kind, Repeat, Types};
 use super::{DecodeError, Role};
+use crate::error::nearest;
 
 /// A message shape: the fields it must and may have, beside a stamp and of poses a frame, which any may have.
 pub(super) struct Shape {
@@ -12,6 +13,8 @@ pub(super) struct Shape {
     pub(super) role: Role,
     /// Whether its positions are in millimetres by definition.
     pub(super) in_millimetres: bool,
+    /// Whether the bodies of a list have no names but their places in it.
+    pub(super) by_place: bool,
     /// The message that has stamp and frame.
     stamped: &'static str,
     parts: &'static [(Need, &'static str, Part)],
@@ -41,12 +44,12 @@ enum Part {
 use Part::{Frame, Point, Quaternion, Stamp, Value};
 
 const fn joints(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Joints, in_millimetres: false, stamped: "", parts }
+    Shape { role: Role::Joints, in_millimetres: false, by_place: false, stamped: "", parts }
 }
 
 /// Poses of which the message at `stamped` has stamp and frame.
 const fn poses(stamped: &'static str, parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Pose, in_millimetres: false, stamped, parts }
+    Shape { role: Role::Pose, in_millimetres: false, by_place: false, stamped, parts }
 }
 
 const fn pose(parts: &'static [(Need, &'static str, Part)]) -> Shape {
@@ -54,7 +57,7 @@ const fn pose(parts: &'static [(Need, &'static str, Part)]) -> Shape {
 }
 
 const fn scalar(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    Shape { role: Role::Scalar, in_millimetres: false, stamped: "", parts }
+    Shape { role: Role::Scalar, in_millimetres: false, by_place: false, stamped: "", parts }
 }
 
 /// Every shape armcal reads.
@@ -141,11 +144,22 @@ pub(super) static SHAPES: &[Shape] = &[
         (Must, "poses[].pose.orientation", Quaternion),
         (Must, "poses[].name", Value(Slot::Body)),
     ]),
+    // geometry_msgs/PoseArray, foxglove.PosesInFrame
+    Shape {
+        role: Role::Pose,
+        in_millimetres: false,
+        by_place: true,
+        stamped: "",
+        parts: &[(Must, "poses[].position", Point), (Must, "poses[].orientation", Quaternion)],
+    },
+    // geometry_msgs/Pose
+    pose(&[(Must, "position", Point), (Must, "orientation", Quaternion)]),
     // vicon_bridge/Markers passes the millimetres of the Vicon SDK on
     // (vicon_bridge.cpp publishes `GetMarkerGlobalTranslation` unscaled).
     Shape {
         role: Role::Pose,
         in_millimetres: true,
+        by_place: false,
         stamped: "",
         parts: &[
             (Must, "markers[].translation", Point),
@@ -166,6 +180,7 @@ pub(super) static SHAPES: &[Shape] = &[
     Shape {
         role: Role::Pose,
         in_millimetres: true,
+        by_place: false,
         stamped: "",
         parts: &[
             (Must, "x_trans", Value(Slot::X)),
@@ -213,6 +228,111 @@ impl Wanted {
         let at = self.fields.partition_point(|(i, _)| *i < index);
         self.fields.insert(at, (index, want));
     }
+}
+
+/// What a field is read as that the user names by its path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Names of joints.
+    Names,
+    /// Positions of joints.
+    Positions,
+    /// Efforts of joints.
+    Efforts,
+    /// Position of a body: a message with x, y, z.
+    Position,
+    /// Orientation of a body: a message with x, y, z, w.
+    Orientation,
+}
+
+impl Place {
+    fn part(self) -> Part {
+        match self {
+            Place::Names => Value(Slot::Joint),
+            Place::Positions => Value(Slot::Position),
+            Place::Efforts => Value(Slot::Effort),
+            Place::Position => Point,
+            Place::Orientation => Quaternion,
+        }
+    }
+
+    /// What has to be there.
+    fn needs(self) -> &'static str {
+        match self {
+            Place::Names => "texts",
+            Place::Positions | Place::Efforts => "numbers",
+            Place::Position => "message with x, y, z",
+            Place::Orientation => "message with x, y, z, w",
+        }
+    }
+}
+
+/// Where the values at these paths are, and the stamp and frame that belong to them.
+pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Result<Wanted, DecodeError> {
+    let mut wanted = Wanted::default();
+    for &(place, path) in fields {
+        let found = match path.strip_suffix('*').filter(|inside| inside.is_empty() || inside.ends_with('.')) {
+            Some(inside) => add_all(types, &mut wanted, inside, place.part()),
+            None => place.part().add(types, &mut wanted, path),
+        };
+        if !found {
+            let present = paths(types, place.part());
+            return Err(DecodeError::NoField {
+                schema: schema.to_owned(),
+                path: path.to_owned(),
+                needs: place.needs(),
+                nearest: nearest(path, &present),
+                present,
+            });
+        }
+    }
+    let path = fields.first().map_or("", |(_, path)| path);
+    let around = || path.rmatch_indices('.').map(|(end, _)| &path[..end]);
+    _ = around().chain([""]).any(|inside| Frame.add(types, &mut wanted, inside));
+    _ = [""].into_iter().chain(around()).any(|inside| Stamp.add(types, &mut wanted, inside));
+    Ok(wanted)
+}
+
+/// Adds every field of the message at `inside` that fits, in the order of its definition.
+fn add_all(types: &Types, wanted: &mut Wanted, inside: &str, part: Part) -> bool {
+    let mut found = false;
+    for path in paths(types, part) {
+        let name = path.strip_prefix(inside);
+        found |= name.is_some_and(|name| !name.contains(['.', '['])) && part.add(types, wanted, &path);
+    }
+    found
+}
+
+/// Paths that are listed and searched, at most, and messages that they go into.
+const MOST_PATHS: usize = 1000;
+const DEEPEST: usize = 8;
+
+/// The paths at which a part can be read.
+fn paths(types: &Types, part: Part) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut open = vec![(String::new(), 0, 0)];
+    while let Some((inside, message, depth)) = open.pop() {
+        let Some(message) = types.messages.get(message) else { continue };
+        // The last is opened first: what it opens comes before its neighbours.
+        for field in message.fields.iter().rev() {
+            let list = if field.repeat == Repeat::Once { "" } else { "[]" };
+            let path = format!("{inside}{}{list}", field.name);
+            if part.add(types, &mut Wanted::default(), &path) {
+                found.push(path.clone());
+            }
+            if let Kind::Message(inner) = field.kind
+                && depth < DEEPEST
+                && open.len() + found.len() < MOST_PATHS
+            {
+                open.push((path + ".", inner, depth + 1));
+            }
+        }
+        if found.len() >= MOST_PATHS {
+            break;
+        }
+    }
+    found.sort();
+    found
 }
 
 /// The shape that fits these types, and where its values are.

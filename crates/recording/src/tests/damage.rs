@@ -189,13 +189,14 @@ fn a_lost_footer_or_a_bad_summary_loses_nothing() {
 #[test]
 fn what_is_no_mcap_is_refused_with_its_name() {
     let refused = |bytes: &[u8]| match OnDisk::new(&[bytes.to_vec()]).open() {
-        Err(RecordingError::NotMcap { why, .. }) => why,
+        Err(RecordingError::NotMcap { why, .. } | RecordingError::Foreign { why, .. }) => why,
         other => panic!("expected a refusal, got {:?}", other.err()),
     };
     assert!(refused(b"").contains("empty"));
     assert!(refused(b"certainly not a recording").contains("magic"));
     assert!(refused(b"#ROSBAG V2.0\nxxxx").contains("mcap convert"));
-    assert!(refused(b"SQLite format 3\0xxx").contains("ros2 bag convert"));
+    assert!(refused(b"SQLite format 3\0xxx").contains("not a database"));
+    assert!(refused(&[0x28, 0xb5, 0x2f, 0xfd, 0, 0]).contains("compressed"));
     let disk = OnDisk::new(&[]);
     assert!(matches!(disk.open(), Err(RecordingError::NoFiles)));
     let missing = Recording::open(&[disk.path("missing.mcap")]).err().map(|e| e.to_string());

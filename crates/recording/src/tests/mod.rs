@@ -2,6 +2,8 @@
 
 mod conformance;
 mod damage;
+mod fields;
+mod foreign;
 mod many;
 mod memory;
 mod mutation;

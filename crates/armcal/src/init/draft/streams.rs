@@ -7,6 +7,7 @@ use crate::init::page::{list, number, quoted, relative};
 use crate::init::read::key;
 use crate::init::roles::Role;
 use crate::init::seats::tilts;
+use crate::pipeline::recording_name;
 use armcal_recording::{JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;
 use std::collections::BTreeSet;
@@ -30,8 +31,7 @@ impl Draft<'_> {
             let parts = if paths.len() > 1 { format!("{} parts, ", paths.len()) } else { String::new() };
             let why = format!("{parts}{length_s:.0} s, the joints pause {} times", read.dwells.len());
             self.page.line(&format!("paths = [{}]", paths.join(", ")), &why);
-            let stem = opened.entry.paths[0].file_stem().map(|s| s.to_string_lossy());
-            if stem.is_none_or(|stem| stem != read.name) {
+            if recording_name(None, &opened.entry.paths) != read.name {
                 self.page.line(&format!("name = {}", quoted(&read.name)), "");
             }
             let below =

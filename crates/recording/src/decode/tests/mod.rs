@@ -1,5 +1,6 @@
 //! The decoders against messages of other people's encoders, the encoders of this crate, bytes by hand, and damage.
 
+mod fields;
 mod json;
 mod mutation;
 mod oracle;

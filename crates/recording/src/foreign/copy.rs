@@ -1,0 +1,116 @@
+//! The MCAP file that messages of another format are copied into.
+
+use super::Converted;
+use super::inflate::inflated;
+use crate::RecordingError;
+use crate::layout::Damage;
+use crate::map::Map;
+use mcap::records::MessageHeader;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+/// Metadata of a channel whose definition did not come with the file's messages: says where it is from.
+pub(crate) const DEFINITION_FROM: &str = "armcal.definition";
+
+/// Messages of a chunk [bytes]; a chunk is what one thread decodes.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// An MCAP file without a name, under construction.
+pub(super) struct Copy {
+    path: PathBuf,
+    writer: mcap::Writer<BufWriter<File>>,
+    damage: Vec<Damage>,
+    /// Messages that could not be inflated, and why the first of them.
+    broken: Option<(u64, String)>,
+}
+
+impl Copy {
+    /// Of the recording at `path`.
+    pub fn create(path: &Path) -> Result<Copy, RecordingError> {
+        let file = tempfile::tempfile().map_err(no_room(path))?;
+        // Nothing is gained by compressing or summing up what is read at once and then gone.
+        let options = mcap::WriteOptions::new()
+            .profile("ros2")
+            .library("rosbag2 sqlite3")
+            .compression(None)
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .calculate_chunk_crcs(false);
+        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(path, e))?;
+        Ok(Copy { path: path.to_owned(), writer, damage: Vec::new(), broken: None })
+    }
+
+    /// The recording.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Notes what of the recording cannot be used.
+    pub fn lost(&mut self, why: String) {
+        self.damage.push(Damage { offset: 0, why, lost: true });
+    }
+
+    /// Adds a channel with its schema as (name, encoding, data), if it has one.
+    pub fn add_channel(
+        &mut self,
+        topic: &str,
+        schema: Option<(&str, &str, &[u8])>,
+        encoding: &str,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<u16, RecordingError> {
+        let schema = match schema {
+            Some((name, encoding, data)) => self.writer.add_schema(name, encoding, data),
+            None => Ok(0),
+        };
+        let id = schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, metadata));
+        id.map_err(|e| failed(&self.path, e))
+    }
+
+    /// Adds a message, inflated if it is compressed by itself.
+    pub fn put(
+        &mut self,
+        channel_id: u16,
+        sequence: u32,
+        time_ns: u64,
+        data: &[u8],
+    ) -> Result<(), RecordingError> {
+        match inflated(data) {
+            Ok(data) => {
+                let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
+                self.writer.write_to_known_channel(&header, &data).map_err(|e| failed(&self.path, e))
+            }
+            Err(why) => {
+                self.broken.get_or_insert((0, why)).0 += 1;
+                Ok(())
+            }
+        }
+    }
+
+    /// The finished file, mapped.
+    pub fn finish(mut self) -> Result<Converted, RecordingError> {
+        if let Some((messages, why)) = self.broken.take() {
+            self.lost(format!("{messages} compressed messages cannot be used, the first because {why}"));
+        }
+        let Copy { path, mut writer, damage, .. } = self;
+        writer.finish().map_err(|e| failed(&path, e))?;
+        let file = writer.into_inner().into_inner().map_err(|e| no_room(&path)(e.into_error()))?;
+        let mut map = Map::of(&file).map_err(no_room(&path))?;
+        // The identity is that of the original.
+        map.hashed = None;
+        Ok(Converted { map, damage })
+    }
+}
+
+/// Says that a copy cannot be written.
+pub(super) fn no_room(path: &Path) -> impl Fn(io::Error) -> RecordingError {
+    move |source| RecordingError::Copy { path: path.to_owned(), source }
+}
+
+fn failed(path: &Path, error: mcap::McapError) -> RecordingError {
+    match error {
+        mcap::McapError::Io(source) => RecordingError::Copy { path: path.to_owned(), source },
+        other => RecordingError::Foreign { path: path.to_owned(), why: other.to_string() },
+    }
+}

@@ -1,0 +1,116 @@
+//! Recordings in other formats than MCAP: their messages are copied into an MCAP file without a name in the folder for
+//! temporary files, and read from there as from any other.
+//!
+//! So there is one way from bytes to rows. A copy takes as much room on disk as the messages, inflated; memory holds one
+//! message and one chunk. A file keeps its own name, size and identity.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "what is written here are copies that lose their names at once"
+)]
+
+mod copy;
+mod definitions;
+mod inflate;
+pub(crate) mod names;
+mod rosbag2;
+
+pub(crate) use copy::DEFINITION_FROM;
+#[cfg(test)]
+pub(crate) use definitions::{TYPES as KNOWN_TYPES, of as definition_of};
+pub(crate) use inflate::inflated;
+
+use crate::bytes::FileBytes;
+use crate::layout::Damage;
+use crate::map::Map;
+use crate::{RecordingError, url};
+use copy::{Copy, no_room};
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
+/// The messages of a recording in another format.
+pub(crate) struct Converted {
+    /// An MCAP file.
+    pub map: Map,
+    /// What of the original could not be used.
+    pub damage: Vec<Damage>,
+}
+
+/// What a file is, by its first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Mcap,
+    Database,
+    Zstd,
+}
+
+/// So many bytes tell what a file is.
+const HEAD_BYTES: usize = 16;
+
+fn kind(head: &[u8]) -> Option<Kind> {
+    match head {
+        b if b.starts_with(mcap::MAGIC) => Some(Kind::Mcap),
+        b if b.starts_with(b"SQLite format 3\0") => Some(Kind::Database),
+        b if b.starts_with(&inflate::MAGIC) => Some(Kind::Zstd),
+        _ => None,
+    }
+}
+
+/// Copies the messages of a file that is not MCAP itself; `None` if it is no recording that is known here.
+pub(crate) fn convert(bytes: &FileBytes, path: &Path) -> Result<Option<Converted>, RecordingError> {
+    let head = bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?;
+    match kind(&head) {
+        Some(Kind::Zstd) => match bytes {
+            FileBytes::Mapped(map) => in_frame(map, path).map(Some),
+            FileBytes::Ranged(ranged) => in_frame(&ranged.spool(path)?, path).map(Some),
+        },
+        Some(Kind::Database) => match bytes {
+            FileBytes::Ranged(object) if url::is_url(path) => {
+                let mut file = tempfile::NamedTempFile::new().map_err(no_room(path))?;
+                object.each_round(&mut |piece| file.write_all(piece).map_err(no_room(path)))?;
+                database(file.path(), path).map(Some)
+            }
+            _ => database(path, path).map(Some),
+        },
+        Some(Kind::Mcap) | None => Ok(None),
+    }
+}
+
+/// What a file compressed as a whole holds.
+fn in_frame(map: &Map, path: &Path) -> Result<Converted, RecordingError> {
+    let mut named = tempfile::NamedTempFile::new().map_err(no_room(path))?;
+    let damage: Vec<Damage> = inflate::whole(map, path, named.as_file_mut())?.into_iter().collect();
+    let mut head = Vec::new();
+    let mut reread = File::open(named.path()).map_err(no_room(path))?;
+    std::io::Read::by_ref(&mut reread)
+        .take(HEAD_BYTES as u64)
+        .read_to_end(&mut head)
+        .map_err(no_room(path))?;
+    match kind(&head) {
+        Some(Kind::Mcap) => {
+            let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
+            // The identity is that of the original.
+            map.hashed = None;
+            Ok(Converted { map, damage })
+        }
+        Some(Kind::Database) => {
+            let mut converted = database(named.path(), path)?;
+            converted.damage.splice(0..0, damage);
+            Ok(converted)
+        }
+        Some(Kind::Zstd) | None => {
+            let cut = damage.first().map(|d| format!("; {}", d.why)).unwrap_or_default();
+            let why =
+                format!("it is a compressed file (zstd), but no MCAP file or rosbag2 database is in it{cut}");
+            Err(RecordingError::NotMcap { path: path.to_owned(), why })
+        }
+    }
+}
+
+/// The messages of the rosbag2 database `file`, which is or was made of `path`.
+fn database(file: &Path, path: &Path) -> Result<Converted, RecordingError> {
+    let mut copy = Copy::create(path)?;
+    rosbag2::read(file, &mut copy)?;
+    copy.finish()
+}
