@@ -20,6 +20,9 @@ mod init;
 /// Does a proposed pipeline take every tracked body for what it is?
 mod init_roles;
 
+/// Does armcal say of every symptom what the page of symptoms says it does?
+mod symptoms;
+
 /// Does every shipped pipeline run, from a clone or with the data that it names?
 mod shipped_pipelines;
 
