@@ -10,7 +10,7 @@ use armcal_compensate::{SetPoint, resample};
 use armcal_core::{FeatureId, Load};
 use armcal_model::Model;
 use armcal_recording::atomic;
-use armcal_report::{PastArms, PastModel};
+use armcal_report::{PastArms, PastModel, open_model};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -66,7 +66,7 @@ pub struct Request {
 
 /// Reads model and targets, computes, writes, prints.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
-    let past = PastModel::open(&request.result)?;
+    let past = open_model(&request.result)?;
     let arms = past.arms()?;
     let tip = tip(&arms.geometry, request.tip.as_deref())?;
     let frame = target_frame(&past, &request.frame)?;
