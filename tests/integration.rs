@@ -101,6 +101,9 @@ mod report_page;
 /// Do set-points computed through the calibrated model bring the rig to where it is sent?
 mod compensation;
 
+/// Does a calibrated model give the same digits in a C program, in Python and on the command line?
+mod kinematics;
+
 /// Do public parsers read what is written for robots, planners and simulators as the arm that was calibrated?
 mod written_formats;
 
