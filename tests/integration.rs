@@ -98,6 +98,9 @@ mod plan;
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;
 
+/// Do wheel, completions, man pages, the example for CI do what they say, and is nothing in it that may not be?
+mod packaging;
+
 /// Do set-points computed through the calibrated model bring the rig to where it is sent?
 mod compensation;
 
