@@ -101,8 +101,14 @@ mod plan;
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;
 
+/// Do wheel, completions, man pages, the example for CI do what they say, and is nothing in it that may not be?
+mod packaging;
+
 /// Do set-points computed through the calibrated model bring the rig to where it is sent?
 mod compensation;
+
+/// Does a calibrated model give the same digits in a C program, in Python and on the command line?
+mod kinematics;
 
 /// Do public parsers read what is written for robots, planners and simulators as the arm that was calibrated?
 mod written_formats;

@@ -1,7 +1,7 @@
 //! Arms measured against points, distances and planes: what a lab without a camera has.
 
 use crate::support::{armcal, number, read_json, root, run_pipeline, shipped};
-use armcal_report::PastModel;
+use armcal_report::open_model;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ fn a_wire_and_a_height_gauge_calibrate_the_arm_and_find_where_they_stand() {
     }
     // Only the assertion reads where they really stand: how far from the first axis, and what the wire has where it reads zero.
     let truth = read_json(&folder.path().join("made/truth.json"));
-    let past = PastModel::open(&out).expect("model.json").arms().expect("the arm");
+    let past = open_model(&out).expect("model.json").arms().expect("the arm");
     let value = |name: &str| past.values[past.model.index(name).expect("a parameter")];
     let [x, y] = [0, 1].map(|axis| number(&truth, &format!("/gauges/0/in_base/xyz_m/{axis}")));
     let off_m = value("post.x").hypot(value("post.y")) - x.hypot(y);
@@ -108,7 +108,7 @@ fn a_real_arm_is_calibrated_by_points_that_nobody_measured() {
     let board = folder.path().join("board");
     let known = run_pipeline(&written(folder.path(), "by-board", &by_board), &board, &[0, 3]);
     // A tape measure would say it as well: starts are the fixture's places, each coordinate off by 8 mm.
-    let past = PastModel::open(&board).expect("model.json").arms().expect("the arm");
+    let past = open_model(&board).expect("model.json").arms().expect("the arm");
     let mut text = by_board
         .replace("[table]\n", "")
         .lines()

@@ -1,7 +1,7 @@
 use crate::support::{armcal, python_with, quick_pipeline, read_json, root, run_pipeline, shipped, skip};
 use armcal_core::{FeatureId, Parameter, Pose, Unit};
 use armcal_model::{Chain, Frames, Model};
-use armcal_report::{PastArms, PastModel, PastObservations};
+use armcal_report::{PastArms, PastObservations, open_model};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -101,7 +101,7 @@ struct Arm {
 
 impl Arm {
     fn of(result: &Path, at: usize, root: &'static str) -> Arm {
-        let arms = PastModel::open(result).expect("a result").arms().expect("its models");
+        let arms = open_model(result).expect("a result").arms().expect("its models");
         Arm { result: result.to_owned(), arms, at, root }
     }
 
@@ -299,7 +299,7 @@ fn what_is_left_is_what_the_effects_do() {
     let result = with_play(folder, true);
     let said = write(&result, "urdf", &folder.join("arm.urdf"), &[]).expect("written");
     assert_eq!(said["lacks"][0], "effects: backlash:1, backlash:2, backlash:3");
-    let arms = PastModel::open(&result).expect("a result").arms().expect("its models");
+    let arms = open_model(&result).expect("a result").arms().expect("its models");
     let observed = PastObservations::open(&result.join("observations.json")).expect("observations");
     let geometry = &arms.values[..arms.geometry.parameters().len()];
     let gaps = arms.model.gaps(&arms.values);
@@ -334,7 +334,7 @@ fn what_is_left_is_what_the_effects_do() {
 
     // As the controller has it: its nominal arm with the offsets of the file, its base measured anew.
     let Some(python) = python_with("numpy, yaml") else { return };
-    let arms = PastModel::open(&result).expect("a result").arms().expect("its models");
+    let arms = open_model(&result).expect("a result").arms().expect("its models");
     let joints = arms.geometry.chain().joint_names();
     let question = json!({"reader": "offsets", "path": folder.join("joint-zeros"), "joints": joints});
     let answer = answers(&python, &[&question], folder).remove(0);

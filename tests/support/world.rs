@@ -257,6 +257,7 @@ pub fn cases() -> Vec<Case> {
         of(["init", "out"], "--out", &init, vec!["normal.mcap", "board.toml", "arm.toml"], Place::File),
         of(["extract", "out"], "--out", &thin, vec!["normal.mcap", "p.toml"], Place::File),
         of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec![], Place::File),
+        of(["man", "folder"], "", &["man"], vec![], folder(&["armcal.1", "armcal-run.1"])),
         of(["export", "out"], "--out", &["export", "p.toml"], with(&[]), Place::File),
     ]
 }
@@ -289,6 +290,8 @@ pub fn printing() -> Vec<Vec<&'static str>> {
         vec!["simulate", "--hide", "nothing"],
         vec!["extract", "normal.mcap", "--topic", "*", "--out", "thin.mcap"],
         vec!["export", "p.toml"],
+        vec!["completions", "bash"],
+        vec!["man", "pages"],
         vec!["help"],
     ]
 }

@@ -2,6 +2,7 @@
 
 use crate::commands::{add, check, compensate, extract, init, plan, score, write};
 use clap::{Parser, Subcommand};
+use clap_complete::Shell;
 use std::path::PathBuf;
 
 /// Calibrates a robot arm from MCAP recordings.
@@ -243,5 +244,16 @@ pub enum Command {
         /// File to write.
         #[arg(long, default_value = "problem.json")]
         out: PathBuf,
+    },
+    /// What a shell needs to complete commands and options: a script, printed.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// The help of every command as man pages.
+    Man {
+        /// Folder for them; created if missing.
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
     },
 }

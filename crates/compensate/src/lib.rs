@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`target`] | what is asked for: a tip pose in the world, or a point on a board; when, under which load |
 //! | [`spline`] | waypoints with times become a dense Cartesian path |
+//! | [`drive`] | what is asked for of a finished run: its model, as in which recording, in which frame |
 //! | [`past`] | what the commanded path leaves behind in the gears: turning points and directions of arrival |
 //! | [`inverse`] | damped Newton steps on the model's own joint Jacobian |
 //! | [`direction`] | the inverse where `f` depends on the direction of arrival: that of the model is that of the move |
@@ -22,6 +23,7 @@
 mod advice;
 mod crossing;
 pub mod direction;
+pub mod drive;
 mod error;
 pub mod inverse;
 pub mod past;
@@ -32,9 +34,10 @@ pub mod target;
 #[cfg(test)]
 mod tests;
 
+pub use drive::{Drive, TargetFrame, held};
 pub use error::CompensateError;
 pub use inverse::Limits;
 pub use past::Past;
-pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint};
+pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint, Underway};
 pub use spline::resample;
 pub use target::{Conditions, Target};

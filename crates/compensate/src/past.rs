@@ -47,6 +47,14 @@ impl Past {
         self.each(joint_rad, |lane, _, q| lane.then(q))
     }
 
+    /// The same had each joint come to these readings from far away in the direction of its sign (+1, -1; 0: as it does
+    /// come); so did the sum of two neighbours whose signs agree, and the difference of two whose signs are opposite.
+    pub fn coming(&self, joint_rad: &[f64], signs: &[f64]) -> Past {
+        let pairs = signs.windows(2).flat_map(|s| [s[1] + s[0], s[1] - s[0]]);
+        let both = pairs.map(|twice| if twice.abs() > 1.5 { twice.signum() } else { 0.0 });
+        self.arriving(joint_rad, &signs.iter().copied().chain(both).collect::<Vec<f64>>())
+    }
+
     /// The same had every joint, every sum and every difference come to these readings from far away, in the
     /// direction of its sign (+1, -1); with sign 0, as it does come.
     pub(crate) fn arriving(&self, joint_rad: &[f64], signs: &[f64]) -> Past {

@@ -6,7 +6,7 @@ use crate::inverse::{Limits, Miss};
 use crate::{CompensateError, Conditions, Past, Target};
 use armcal_core::{Arrival, Observation};
 use armcal_model::{Model, ModelResidual};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 /// Postures from which a solution is tried, at most.
 const MOST_STARTS: usize = 6;
@@ -103,6 +103,34 @@ pub struct SetPoint {
     pub warnings: Vec<String>,
 }
 
+/// Where the arm stands between two targets, and what the way there left behind: driven by nominal and by corrected set-points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Underway {
+    nominal: Past,
+    corrected: Past,
+    /// The set-point it stands at; none where it was brought there otherwise.
+    last: Option<SetPoint>,
+}
+
+impl Underway {
+    /// The arm waits at `start_rad`, or nobody knows where: from where it came is not known.
+    pub fn from(start_rad: Option<&[f64]>, joints: usize) -> Underway {
+        let past = start_rad.map_or_else(|| Past::unknown(joints), Past::at);
+        Underway { nominal: past.clone(), corrected: past, last: None }
+    }
+
+    /// Both went to these readings [rad].
+    pub fn go(&mut self, joint_rad: &[f64]) {
+        let [nominal, corrected] = [&self.nominal, &self.corrected].map(|past| past.then(joint_rad));
+        *self = Underway { nominal, corrected, last: None };
+    }
+
+    /// What the arm that is driven by corrected set-points went through.
+    pub fn past(&self) -> &Past {
+        &self.corrected
+    }
+}
+
 impl Compensator<'_> {
     /// A set-point for every target, in their order; each begins where the one before it ends.
     ///
@@ -115,55 +143,92 @@ impl Compensator<'_> {
         targets: &[Target],
         start_rad: Option<&[f64]>,
     ) -> Result<Vec<SetPoint>, CompensateError> {
-        self.check(targets, start_rad)?;
-        let joints = self.nominal.model.joint_count();
-        let start = start_rad.map_or_else(|| Past::unknown(joints), Past::at);
-        let mut pasts = [start.clone(), start.clone()];
+        if targets.is_empty() {
+            return Err(CompensateError::NoTargets);
+        }
+        targets.iter().try_for_each(|target| target.check(self.nominal.model.joint_count()))?;
+        self.check(start_rad)?;
+        let mut underway = Underway::from(start_rad, self.nominal.model.joint_count());
+        let start = underway.corrected.clone();
         let mut out: Vec<SetPoint> = Vec::with_capacity(targets.len());
-        for (i, target) in targets.iter().enumerate() {
-            let follows = i > 0 && target.time_s.is_some();
-            let [nominal_past, past] = &pasts;
-            let o = self.conditions.observation(target, joints);
-            let nominal =
-                self.nominal_set_point(target, &o, if follows { nominal_past.joint_rad() } else { None })?;
-            let offs = self.approach(target, [nominal_past, past], &nominal);
-            let [nominal_way, way] =
-                [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
-            // Travel is that of the nominal arm; from where the corrected one stands.
-            let likely = match (past.joint_rad(), nominal_past.joint_rad()) {
-                (Some(stands), Some(stood)) => moved(&stands, &stood, &nominal),
-                _ => nominal.clone(),
-            };
-            let found = invert(&self.calibrated, &o, past, way, &likely, &self.limits)
-                .or_else(|_| invert(&self.calibrated, &o, past, way, &nominal, &self.limits))
-                .map_err(|miss| self.unreachable(target, "calibrated", &miss, 2))?;
-            let nominal_after = nominal_way.past(nominal_past, &nominal);
-            if offs.is_some() {
-                out.push(approach_point(target, nominal_way.via(&nominal), way.via(&found.joint_rad), past));
-            }
-            let before = self.calibrated.left(&o, &nominal_after, &nominal);
-            let crossings = out.last().filter(|_| follows);
-            let crossings = crossings.and_then(|last| self.crossings(last, &found, &nominal));
-            let mut warnings = self.warnings(target, &o, past, &found, offs.is_some());
-            warnings.extend(crossings);
-            out.push(SetPoint {
-                target: target.clone(),
-                kind: Kind::Target,
-                nominal_rad: nominal,
-                joint_rad: found.joint_rad,
-                arrival: found.past.arrival(),
-                reached: Some(Reached {
-                    before_m: before.0,
-                    after_m: found.left_m,
-                    turn_rad: target.has_orientation().then_some([before.1, found.left_rad]),
-                }),
-                warnings,
-            });
-            pasts = [nominal_after, found.past];
+        for target in targets {
+            out.extend(self.next(target, &mut underway)?);
         }
         if self.crossing_s > 0.0 && crossing::spread(&mut out, self.crossing_s) {
             self.predict_again(&mut out, start);
         }
+        Ok(out)
+    }
+
+    /// The set-point of one target from where the arm stands, with the way to it in front where there is one; then it stands
+    /// there. Gaps are crossed in one leap.
+    ///
+    /// # Errors
+    /// A target that cannot be reached or makes no sense; the arm stands where it stood.
+    pub fn next(&self, target: &Target, underway: &mut Underway) -> Result<Vec<SetPoint>, CompensateError> {
+        let joints = self.nominal.model.joint_count();
+        target.check(joints)?;
+        let o = self.conditions.observation(target, joints);
+        let follows = underway.last.is_some() && target.time_s.is_some();
+        let stands_rad = if follows { underway.nominal.joint_rad() } else { None };
+        let nominal = self.nominal_set_point(target, &o, stands_rad)?;
+        self.corrected(target, nominal, underway)
+    }
+
+    /// What the models are asked about an arm at these readings [rad] after this past.
+    pub fn observation(&self, past: &Past, joint_rad: &[f64]) -> Observation {
+        let anywhere = Target::in_world("", Vector3::zeros(), None);
+        at(&self.conditions.observation(&anywhere, joint_rad.len()), past, joint_rad)
+    }
+
+    /// The same where the nominal set-point [rad] is known.
+    ///
+    /// # Errors
+    /// As [`Compensator::next`].
+    pub fn corrected(
+        &self,
+        target: &Target,
+        nominal: Vec<f64>,
+        underway: &mut Underway,
+    ) -> Result<Vec<SetPoint>, CompensateError> {
+        target.check(nominal.len())?;
+        let o = self.conditions.observation(target, nominal.len());
+        let Underway { nominal: nominal_past, corrected: past, last } = &*underway;
+        let offs = self.approach(target, [nominal_past, past], &nominal);
+        let [nominal_way, way] = [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
+        // Travel is that of the nominal arm; from where the corrected one stands.
+        let likely = match (past.joint_rad(), nominal_past.joint_rad()) {
+            (Some(stands), Some(stood)) => moved(&stands, &stood, &nominal),
+            _ => nominal.clone(),
+        };
+        let found = invert(&self.calibrated, &o, past, way, &likely, &self.limits)
+            .or_else(|_| invert(&self.calibrated, &o, past, way, &nominal, &self.limits))
+            .map_err(|miss| self.unreachable(target, "calibrated", &miss, 2))?;
+        let nominal_after = nominal_way.past(nominal_past, &nominal);
+        let mut out = Vec::with_capacity(2);
+        if offs.is_some() {
+            out.push(approach_point(target, nominal_way.via(&nominal), way.via(&found.joint_rad), past));
+        }
+        let before = self.calibrated.left(&o, &nominal_after, &nominal);
+        let crossings = last.as_ref().filter(|_| target.time_s.is_some());
+        let crossings = crossings.and_then(|last| self.crossings(last, &found, &nominal));
+        let mut warnings = self.warnings(target, &o, past, &found, offs.is_some());
+        warnings.extend(crossings);
+        let point = SetPoint {
+            target: target.clone(),
+            kind: Kind::Target,
+            nominal_rad: nominal,
+            joint_rad: found.joint_rad,
+            arrival: found.past.arrival(),
+            reached: Some(Reached {
+                before_m: before.0,
+                after_m: found.left_m,
+                turn_rad: target.has_orientation().then_some([before.1, found.left_rad]),
+            }),
+            warnings,
+        };
+        *underway = Underway { nominal: nominal_after, corrected: found.past, last: Some(point.clone()) };
+        out.push(point);
         Ok(out)
     }
 
@@ -182,12 +247,12 @@ impl Compensator<'_> {
         }
     }
 
-    fn check(&self, targets: &[Target], start_rad: Option<&[f64]>) -> Result<(), CompensateError> {
+    /// That limits and postures, and where the arm waits [rad], are those of this arm.
+    ///
+    /// # Errors
+    /// Which are not.
+    pub fn check(&self, start_rad: Option<&[f64]>) -> Result<(), CompensateError> {
         let joints = self.nominal.model.joint_count();
-        if targets.is_empty() {
-            return Err(CompensateError::NoTargets);
-        }
-        targets.iter().try_for_each(|target| target.check(joints))?;
         let wrong = |what, problem: String| Err(CompensateError::BadJoints { what, problem });
         if let Some(start) = start_rad
             && (start.len() != joints || !start.iter().all(|q| q.is_finite()))
@@ -197,6 +262,10 @@ impl Compensator<'_> {
         let Limits(limits) = &self.limits;
         if limits.len() != joints || !limits.iter().all(|[low, high]| low <= high) {
             return wrong("limits", format!("need {joints} ranges, each from low to high"));
+        }
+        let Compensator { postures_rad, recorded_rad, .. } = self;
+        if recorded_rad.len() != joints || postures_rad.iter().any(|q| q.len() != joints) {
+            return wrong("recorded postures", format!("need {joints} readings, one a joint"));
         }
         Ok(())
     }

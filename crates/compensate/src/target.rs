@@ -61,6 +61,11 @@ impl Target {
         if !self.position_m().iter().all(|v| v.is_finite()) || self.time_s.is_some_and(|t| !t.is_finite()) {
             return bad("a coordinate or its time is not a finite number; correct the file");
         }
+        if let Reference::Tracked { orientation: Some(q), .. } = &self.place
+            && !q.coords.iter().all(|v| v.is_finite())
+        {
+            return bad("its orientation is no rotation; give a quaternion of any length but zero");
+        }
         if self.has_orientation() && joints < 6 {
             return bad(&format!(
                 "an arm of {joints} joints cannot be given an orientation; leave qx, qy, qz, qw out"

@@ -5,7 +5,7 @@
 //! hashes are kept (a bottom-k sketch; Broder 1997, "On the resemblance and containment of documents"): the same rows are
 //! chosen wherever they occur, and memory does not grow with the recording.
 
-use armcal_core::{JointSamples, PoseSamples, Samples};
+use armcal_core::{JointSamples, PoseSamples, Samples, hash_of};
 use std::ops::RangeInclusive;
 
 /// Rows kept of a stream, at most: 64 KiB, and forty rows of an overlap of a hundredth.
@@ -174,20 +174,6 @@ impl Overlap {
     }
 }
 
-/// A hash of a stamp and the values at it, the same on every machine.
-pub fn hash_of(time_ns: i64, values: impl Iterator<Item = f64>) -> u64 {
-    // Zero has two signs, which are one reading.
-    values.fold(mix(time_ns.cast_unsigned()), |hash, value| mix(hash ^ (value + 0.0).to_bits()))
-}
-
-/// Finaliser of SplitMix64 (Steele, Lea and Flood 2014).
-fn mix(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -291,6 +277,7 @@ mod tests {
         #[test]
         fn lost_messages_hide_no_copy(seed in 0_u64..1000, lost in 0.0..0.9_f64, rows in 500_i64..20_000) {
             let whole = samples(0..rows, 0.1);
+            let mix = |seed: u64| hash_of(seed.cast_signed(), std::iter::empty());
             let survives = |i: usize| (mix(seed ^ mix(i as u64)) >> 11) as f64 / (1_u64 << 53) as f64 > lost;
             let copy = kept(&whole, survives);
             prop_assert!(shared(&whole, &copy).is_some());

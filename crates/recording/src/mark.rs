@@ -1,6 +1,6 @@
 //! What a file says it is: everything that armcal writes can be told from what it did not write, by its content.
 //!
-//! * JSON begins with `"schema": "armcal.KIND/N"`; pages, TOML, URDF and Markdown have `armcal.KIND/N` in a comment or
+//! * JSON begins with `"schema": "armcal.KIND/N"`; pages, TOML, URDF, Markdown and man pages have `armcal.KIND/N` in a comment or
 //!   generator tag of their first lines;
 //! * MCAP names the library `armcal/VERSION` and bears a metadata record of its kind;
 //! * Parquet has `armcal.KIND/N` among the key-value pairs of its footer.
@@ -124,7 +124,7 @@ fn of_schema(head: &str) -> Option<String> {
 }
 
 fn of_comment(head: &str) -> Option<String> {
-    let begins = ["# armcal.", "<!-- armcal.", "<meta name=\"generator\" content=\"armcal."];
+    let begins = ["# armcal.", "<!-- armcal.", ".\\\" armcal.", "<meta name=\"generator\" content=\"armcal."];
     head.lines().take(HEAD_LINES).find_map(|line| begins.iter().find_map(|b| kind(line.strip_prefix(b)?)))
 }
 

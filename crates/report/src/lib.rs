@@ -52,6 +52,8 @@ mod verification;
 mod viewer_text;
 mod write;
 
+pub use armcal_core::DwellMark;
+pub use armcal_model_file::{PastArms, PastModel};
 pub use campaign::{
     Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text,
     write_campaign,
@@ -63,7 +65,7 @@ pub use look_at::look_at;
 pub use model_file::marked_xml;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use pairing::{Side, Unpaired};
-pub use past_model::{PastArms, PastModel, RecordingFacts, Value};
+pub use past_model::open_model;
 pub use past_observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedFile, ObservedRecording, PastObservations, StartFrame,
     observations_json, sha256,
@@ -73,7 +75,7 @@ pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pool_json::{POOL_SCHEMA, pool_json};
 pub use recording_names::RecordingNames;
 pub use run::{Answer, EarlierResult, RecordingRun, Refit, Run, Status, Undiagnosed, VERSION};
-pub use same_dwells::{DwellMark, also_in};
+pub use same_dwells::also_in;
 pub use sizes::size as amplitude_text;
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{Detail, terminal};

@@ -4,7 +4,7 @@
 //! same where its files hold the same bytes, or, re-encoded or cut, the same dwells; a dwell is the same where its time is.
 
 use crate::past_run::{PastDwell, PastRecording, PastResidual, PastRun};
-use crate::same_dwells::{DwellMark, also_in};
+use crate::{DwellMark, also_in};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,7 +1,6 @@
 //! Dwells of two results that are one and the same: the same readings at the same time.
 
-use armcal_recording::hash_of;
-use serde::{Deserialize, Serialize};
+use armcal_core::DwellMark;
 
 /// A copy that was cut may begin and end some of its dwells a sample earlier or later; this share of them is exactly the
 /// same in any copy, and in no other recording.
@@ -9,23 +8,6 @@ const LEAST_SHARE: f64 = 0.25;
 
 /// Where a file is cut in a dwell, the middle of what is left moves by less than this [ns]: 1 s.
 const CUT_NS: u64 = 1_000_000_000;
-
-/// What tells a dwell from every other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct DwellMark {
-    /// Middle of the dwell [ns], robot clock.
-    pub time_ns: i64,
-    /// Hash of this time and of the joints' mean readings.
-    pub reading: u32,
-}
-
-impl DwellMark {
-    /// Of a dwell at this time with these readings.
-    pub fn of(time_ns: i64, joint_rad: &[f64]) -> DwellMark {
-        let hash = hash_of(time_ns, joint_rad.iter().copied());
-        DwellMark { time_ns, reading: (hash >> 32) as u32 }
-    }
-}
 
 /// Which dwells of `own` another recording has too; all of them `false` where it is another recording, with less than a
 /// quarter of the dwells exactly alike that the sparser one has while both were recorded.

@@ -6,7 +6,7 @@ use crate::mcap_file::{Attachment, write_mcap};
 use crate::model_file::{self, ModelFile, model_files};
 use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
-use crate::past_model::{self, PastModel};
+use crate::past_model;
 use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
 use crate::points::points;
 use crate::pool_json::{self, pool_json};
@@ -79,7 +79,7 @@ pub fn write_all(
     let points = points(run)?;
     let models = model_files(run)?;
     let parameters = parameters_toml(run)?;
-    let past_model = PastModel::of(run)?.json()?;
+    let past_model = past_model::of_run(run)?.json().map_err(ReportError::Page)?;
     // Observations of earlier results are where they were read, and a second copy of them would be pooled with them.
     let observations = match run.is_pool() {
         true => (pool_json::FILE, pool_json(run)),
@@ -98,7 +98,7 @@ pub fn write_all(
         (REPORT, &page),
         (SUMMARY, &summary),
         (PARAMETERS, &parameters),
-        (past_model::FILE, &past_model),
+        (armcal_model_file::FILE, &past_model),
         (observations.0, &observations.1),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
@@ -116,7 +116,7 @@ pub fn write_all(
         Attachment { name: REPORT, media_type: "text/html", text: &page },
         Attachment { name: SUMMARY, media_type: "application/json", text: &summary },
         Attachment { name: PARAMETERS, media_type: "application/toml", text: &parameters },
-        Attachment { name: past_model::FILE, media_type: "application/json", text: &past_model },
+        Attachment { name: armcal_model_file::FILE, media_type: "application/json", text: &past_model },
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];
@@ -154,7 +154,8 @@ fn files<'a>(
     observations: &str,
 ) -> Vec<PathBuf> {
     let models = arms.into_iter().map(|(arm, urdf)| model_file::name(arm, urdf));
-    let fixed = [RUN, REPORT, SUMMARY, PARAMETERS, past_model::FILE, observations, LAYOUT, LAYOUT_LEGACY];
+    let fixed =
+        [RUN, REPORT, SUMMARY, PARAMETERS, armcal_model_file::FILE, observations, LAYOUT, LAYOUT_LEGACY];
     let fixed = fixed.into_iter().chain(tables::FILES).map(str::to_owned);
     fixed.chain(models).map(|name| out_dir.join(name)).collect()
 }
@@ -168,7 +169,7 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     let texts = [
         (SUMMARY, summary_json(run)),
         (PARAMETERS, parameters_toml(run)?),
-        (past_model::FILE, PastModel::of(run)?.json()?),
+        (armcal_model_file::FILE, past_model::of_run(run)?.json().map_err(ReportError::Page)?),
         (OBSERVATIONS_FILE, observations_json(run)?),
     ];
     for (name, text) in texts {
@@ -188,7 +189,7 @@ pub fn write_pool_brief(run: &Run, out_dir: &Path) -> Result<Vec<PathBuf>, Repor
         (SUMMARY.to_owned(), summary_json(run)),
         (pool_json::FILE.to_owned(), pool_json(run)),
         (PARAMETERS.to_owned(), parameters_toml(run)?),
-        (past_model::FILE.to_owned(), PastModel::of(run)?.json()?),
+        (armcal_model_file::FILE.to_owned(), past_model::of_run(run)?.json().map_err(ReportError::Page)?),
     ];
     let models = model_files(run)?.into_iter().map(|model| (model.name, model.text));
     let stage = |(name, text): (String, String)| stage(&out_dir.join(name), text.as_bytes());

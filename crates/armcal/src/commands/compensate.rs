@@ -2,15 +2,13 @@
 
 use super::{Outcome, joint_range, may_write, print};
 use crate::compensate::table::Sheet;
-use crate::compensate::{
-    Drive, TargetFrame, in_world_m, placed, prepare, recording, recording_index, target_frame, targets,
-};
+use crate::compensate::{in_world_m, placed, recording, recording_index, target_frame, targets};
 use crate::error::Error;
-use armcal_compensate::{SetPoint, resample};
+use armcal_compensate::{Compensator, Drive, SetPoint, TargetFrame, resample};
 use armcal_core::{FeatureId, Load};
 use armcal_model::Model;
 use armcal_recording::atomic;
-use armcal_report::{PastArms, PastModel};
+use armcal_report::{PastArms, PastModel, open_model};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -66,7 +64,7 @@ pub struct Request {
 
 /// Reads model and targets, computes, writes, prints.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
-    let past = PastModel::open(&request.result)?;
+    let past = open_model(&request.result)?;
     let arms = past.arms()?;
     let tip = tip(&arms.geometry, request.tip.as_deref())?;
     let frame = target_frame(&past, &request.frame)?;
@@ -75,7 +73,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let start = request.start.as_deref().map(|words| joints(words, &arms)).transpose()?;
     let drive = drive(request, &past, &arms)?;
     let held = held(&arms.geometry, tip, &drive, start.as_deref())?;
-    let mut compensator = prepare(&past, &arms, (tip, frame), &drive)?;
+    let mut compensator = Compensator::of_result(&past, &arms, (tip, frame), &drive);
     for (joint, at_rad) in &held {
         compensator.limits.0[*joint] = [*at_rad; 2];
     }
@@ -136,11 +134,7 @@ fn held(
     drive: &Drive,
     start: Option<&[f64]>,
 ) -> Result<Vec<(usize, f64)>, Error> {
-    let (own, shared) = (model.joints_to(tip), model.joints_shared_by(tip));
-    let moves = |joint: &usize| {
-        own.contains(joint) && (!shared.contains(joint) || drive.ranges.iter().any(|(j, _)| j == joint))
-    };
-    let held: Vec<usize> = (0..model.joint_count()).filter(|joint| !moves(joint)).collect();
+    let held = armcal_compensate::held(model, tip, drive);
     match (held.first(), start) {
         (None, _) => Ok(Vec::new()),
         (Some(_), Some(start)) => Ok(held.into_iter().map(|joint| (joint, start[joint])).collect()),

@@ -5,12 +5,14 @@ mod batch;
 pub mod check;
 mod compare;
 pub mod compensate;
+mod completions;
 mod diagnose;
 mod effects;
 mod export;
 pub mod extract;
 pub mod init;
 mod inspect;
+mod man;
 pub mod plan;
 mod pool;
 mod run;
@@ -67,6 +69,8 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
         Command::Reduce { out, json } => batch::reduce(out, *json),
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Compensate(asked) => compensate::run(asked),
+        Command::Completions { shell } => completions::run(*shell),
+        Command::Man { folder } => man::run(folder),
         Command::Diagnose { input, json } => diagnose::run(input, *json),
         Command::Add(asked) => add::run(asked),
         Command::Effects { name, json } => effects::run(name.as_deref(), *json),

@@ -8,7 +8,7 @@ use crate::write::{Made, Source, made};
 use armcal_core::ErrorStats;
 use armcal_formats::Format;
 use armcal_recording::atomic;
-use armcal_report::{PastArms, PastModel, millimetres, plain_table, printable, table_text};
+use armcal_report::{PastArms, PastModel, millimetres, open_model, plain_table, printable, table_text};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use comfy_table::ContentArrangement;
@@ -44,7 +44,7 @@ pub struct Request {
 /// Reads the result, writes the file, prints what is in it and what is not.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     let format = request.format;
-    let past = PastModel::open(&request.result)?;
+    let past = open_model(&request.result)?;
     let arms = past.arms()?;
     let source = Source::of(&past, &arms, arm(&arms, request.arm.as_deref())?);
     let hash_from = hash_from(format, request.hash_from.as_deref())?;

@@ -17,7 +17,7 @@ use crate::stages::perceive::Seen;
 use crate::stages::{frames, observe, perceive};
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
-use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording};
+use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording, open_model};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -31,7 +31,7 @@ const OF_NOMINAL_CLOCK: [&str; 4] =
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
 pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result<Verification, Error> {
-    let past = PastModel::open(result)?;
+    let past = open_model(result)?;
     let (_, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let recordings = perceive::open_all(pipeline, progress)?;

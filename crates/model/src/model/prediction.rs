@@ -7,7 +7,7 @@ use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::Segment;
 use crate::tree::Asked;
-use armcal_core::{Against, FeatureId, Observation};
+use armcal_core::{Against, FeatureId, Observation, Pose};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};
 
 impl Model {
@@ -31,6 +31,11 @@ impl Model {
     /// Where the model puts what the observation is of, a tip or a marker, in the world [m], effects included.
     pub fn predicted_tip_in_world(&self, p: &[f64], o: &Observation) -> Vector3<f64> {
         self.sides(p, o).predicted.translation_m
+    }
+
+    /// The same with its orientation.
+    pub fn predicted_pose_in_world(&self, p: &[f64], o: &Observation) -> Pose {
+        Pose::from(&self.sides(p, o).predicted)
     }
 
     /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of a

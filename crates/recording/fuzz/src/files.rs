@@ -8,7 +8,7 @@ use armcal::compensate::targets;
 use armcal_lab::LabConfig;
 use armcal_lab::pair::PairConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Frames, Model, Session};
-use armcal_report::PastModel;
+use armcal_report::open_model;
 use armcal_table::Board;
 use std::io::Write as _;
 use std::path::Path;
@@ -97,7 +97,7 @@ pub fn results(bytes: &[u8]) {
     match kind % 4 {
         0 => {
             let file = in_file(text, ".json");
-            if let Ok(past) = PastModel::open(file.path())
+            if let Ok(past) = open_model(file.path())
                 && let Ok(arms) = past.arms()
             {
                 let joints = vec![0.1; arms.model.joint_count()];

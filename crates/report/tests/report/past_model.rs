@@ -1,6 +1,6 @@
 use crate::synthetic::synthetic;
 use armcal_model::{EffectTable, Model};
-use armcal_report::{OutputConfig, PastModel, Run, write_all};
+use armcal_report::{OutputConfig, Run, open_model, write_all};
 use std::path::Path;
 
 /// What the model of a run predicts, in millimetres, at parameters that are off in every entry.
@@ -9,7 +9,7 @@ fn predictions_m(model: &Model, values: &[f64], run: &Run) -> Vec<nalgebra::Vect
 }
 
 fn agree(run: &Run, path: &Path) {
-    let past = PastModel::open(path).unwrap();
+    let past = open_model(path).unwrap();
     let arms = past.arms().unwrap();
     assert_eq!(arms.values.len(), run.model.parameters().len());
     let kept: Vec<&str> = past.parameters.iter().map(|p| p.name.as_str()).collect();
@@ -104,11 +104,11 @@ fn the_session_is_written_in_the_words_of_the_format() {
 #[test]
 fn a_file_that_is_not_a_model_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
-    let missing = PastModel::open(folder.path()).unwrap_err().to_string();
+    let missing = open_model(folder.path()).unwrap_err().to_string();
     assert!(missing.contains("model.json") && missing.contains("run an older result again"), "{missing}");
     let path = folder.path().join("model.json");
     for text in ["", "{}", "{\"schema\": \"armcal.model/9\"}", "null"] {
         std::fs::write(&path, text).unwrap();
-        assert!(PastModel::open(&path).unwrap_err().to_string().contains("run the pipeline again"));
+        assert!(open_model(&path).unwrap_err().to_string().contains("run the pipeline again"));
     }
 }

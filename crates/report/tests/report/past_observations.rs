@@ -1,7 +1,7 @@
 use crate::synthetic::synthetic;
 use armcal_core::{Observation, Reference};
 use armcal_report::{
-    BoardFacts, OBSERVATIONS_FILE, OutputConfig, PastModel, PastObservations, observations_json, write_all,
+    BoardFacts, OBSERVATIONS_FILE, OutputConfig, PastObservations, observations_json, open_model, write_all,
 };
 
 #[test]
@@ -48,7 +48,7 @@ fn what_a_fit_saw_comes_back_to_the_last_bit() {
     let files =
         |past: &PastObservations| past.recordings.iter().flat_map(|r| r.files.clone()).collect::<Vec<_>>();
     assert_eq!(files(&before), files(&past));
-    let files = |folder: &std::path::Path| PastModel::open(folder).unwrap().recordings[0].identity.clone();
+    let files = |folder: &std::path::Path| open_model(folder).unwrap().recordings[0].identity.clone();
     assert_eq!(files(&earlier), files(&out));
 }
 

@@ -1,0 +1,33 @@
+//! `armcal man`: the help of every command as man pages.
+
+use super::{Outcome, may_write, print_written};
+use crate::cli::Cli;
+use crate::error::Error;
+use armcal_recording::atomic;
+use clap::{Command, CommandFactory as _};
+use clap_mangen::Man;
+use std::path::{Path, PathBuf};
+
+/// What tells a page from one that armcal did not make.
+const MARK: &str = ".\\\" armcal.man/1\n";
+
+/// Writes `armcal.1` and a page a command.
+pub fn run(folder: &Path) -> Result<Outcome, Error> {
+    let mut root = Cli::command();
+    root.build();
+    // Built, each knows its whole name: `armcal-run`.
+    let commands = root.get_subcommands().filter(|c| c.get_name() != "help").cloned();
+    let pages: Vec<Command> = std::iter::once(root.clone()).chain(commands).collect();
+    let name = |page: &Command| page.get_display_name().unwrap_or(page.get_name()).to_owned();
+    let paths: Vec<PathBuf> = pages.iter().map(|page| folder.join(name(page) + ".1")).collect();
+    let failed = |source| Error::Folder { path: folder.to_owned(), source };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    may_write(&paths)?;
+    for (page, path) in pages.into_iter().zip(&paths) {
+        let mut text = MARK.as_bytes().to_vec();
+        Man::new(page).render(&mut text).map_err(failed)?;
+        atomic::write(path, &text).map_err(Error::Output)?;
+    }
+    print_written(folder, &paths)?;
+    Ok(Outcome::Done)
+}
