@@ -105,7 +105,8 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
         return gathered(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
     let last = judge.turn((&[], judge.nominal.of_all.as_ref()), None)?;
-    // A turn iterates to its own minimum; only its way there is shorter from the minimum of all.
+    // A turn iterates to its own minimum; only its way there is shorter from the minimum of all, and of many dwells the
+    // derivative of that is exact enough for it.
     let near = match judge.config.objective {
         Objective::Paper => None,
         _ => Some((&last, judge.look(&last, holdout.turns.len())?)),

@@ -85,15 +85,18 @@ impl<'a> Remembered<'a> {
         Remembered { problem, last: Mutex::new(Arc::new(looked)), about: None }
     }
 
-    /// A problem of many blocks near parameters at which it is known: there its derivative stays, while residuals are exact
-    /// everywhere. Whether that was right where a fit ended is for [`Remembered::is_straight_to`] to say.
+    /// A problem of many blocks near parameters at which it is known, by all columns that will be asked for: there its derivative
+    /// stays, while residuals are exact everywhere. Whether that was right where a fit ended is for [`Remembered::is_straight_to`] to say.
     pub fn about(problem: &'a dyn Problem, looked: &Looked) -> Option<Remembered<'a>> {
         let blocks: Vec<Arc<Block>> =
             looked.blocks.iter().map(|block| block.get().cloned()).collect::<Option<_>>()?;
         let mut remembered = Remembered::new(problem, Some(looked.clone()));
         let looked = remembered.at(&looked.p);
-        remembered.about = (blocks.len() >= MANY_BLOCKS).then_some(About { looked, blocks });
-        remembered.about.is_some().then_some(remembered)
+        let many = blocks.len() >= MANY_BLOCKS && blocks.len() == problem.blocks();
+        many.then(|| {
+            remembered.about = Some(About { looked, blocks });
+            remembered
+        })
     }
 
     /// Whether the derivative hardly changes on the way to these parameters, by twice what the residuals differ from their
