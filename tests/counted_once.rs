@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, quick_pipeline, read_json, root, run_pipeline, shipped};
+use crate::support::{armcal, in_one_line, number, quick_pipeline, read_json, root, run_pipeline, shipped};
 use armcal_recording::Recording;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -63,7 +63,7 @@ fn pipeline(folder: &Path, name: &str, recordings: &[&Path]) -> PathBuf {
 
 fn said(output: &Output) -> String {
     let all = [output.stdout.as_slice(), &output.stderr].concat();
-    String::from_utf8_lossy(&all).split_whitespace().collect::<Vec<_>>().join(" ")
+    in_one_line(&String::from_utf8_lossy(&all))
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use crate::support::slurm::slurm;
-use crate::support::{armcal, number, python_with, read_json, root, run_pipeline, shipped};
+use crate::support::{armcal, in_one_line, number, python_with, read_json, root, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -80,7 +80,7 @@ fn pool(pipeline: &Path, results: &[PathBuf], out: &Path) -> Output {
 }
 
 fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
+    in_one_line(&String::from_utf8_lossy(&output.stderr))
 }
 
 fn week() -> Week {

@@ -1,5 +1,5 @@
 use crate::support::browser::{browser, scripted};
-use crate::support::{armcal, paper_pipeline, read_json, root, run_pipeline};
+use crate::support::{armcal, in_one_line, paper_pipeline, read_json, root, run_pipeline};
 use serde_json::Value;
 use std::borrow::Cow;
 use std::io::{BufRead as _, BufReader};
@@ -169,7 +169,7 @@ fn says_the_same(out: &Path, terminal: &str) {
         let plain = ["&#60;<", "&#62;>", "&#38;&", "&#39;'", "&#34;\""]
             .iter()
             .fold(text.to_owned(), |text, pair| text.replace(&pair[..5], &pair[5..]));
-        plain.split_whitespace().collect::<Vec<_>>().join(" ")
+        in_one_line(&plain)
     };
     let page = std::fs::read_to_string(out.join("report.html")).expect("report.html");
     let header = page.split_once("</header>").expect("a header").0;

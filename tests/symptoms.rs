@@ -1,7 +1,7 @@
 //! The page of symptoms, line by line: every recording is made by the command that stands there, and armcal says of it what
 //! is quoted.
 
-use crate::support::{read_json, root, shipped};
+use crate::support::{in_one_line, read_json, root, shipped};
 use rayon::prelude::*;
 use std::path::Path;
 use std::process::Command;
@@ -21,11 +21,7 @@ fn page() -> String {
 /// The first quotation after this place of the page, in one line.
 fn quoted(after: &str) -> String {
     let lines = after.lines().skip_while(|line| !line.starts_with("> "));
-    words(&lines.map_while(|line| line.strip_prefix("> ")).collect::<Vec<_>>().join(" "))
-}
-
-fn words(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    in_one_line(&lines.map_while(|line| line.strip_prefix("> ")).collect::<Vec<_>>().join(" "))
 }
 
 fn shown(page: &str) -> Vec<Shown> {
@@ -49,7 +45,7 @@ fn said(command: &str, folder: &Path) -> String {
         "{command}: {}",
         String::from_utf8_lossy(&output.stderr)
     );
-    words(&String::from_utf8_lossy(&output.stdout))
+    in_one_line(&String::from_utf8_lossy(&output.stdout))
 }
 
 #[test]

@@ -46,6 +46,11 @@ pub fn python_with(packages: &str) -> Option<PathBuf> {
     None
 }
 
+/// A text in one line, however it was wrapped.
+pub fn in_one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Runs `armcal` and returns what it said.
 pub fn armcal<I: IntoIterator<Item = S>, S: AsRef<std::ffi::OsStr>>(args: I) -> Output {
     Command::new(env!("CARGO_BIN_EXE_armcal")).args(args).output().expect("starting armcal")

@@ -40,4 +40,4 @@ pub use inverse::Limits;
 pub use past::Past;
 pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint, Underway};
 pub use spline::resample;
-pub use target::{Conditions, Target};
+pub use target::{Conditions, ORIENTING_JOINTS, Target};

@@ -4,6 +4,9 @@ use crate::CompensateError;
 use armcal_core::{DwellId, FeatureId, Load, Observation, Reference};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+/// An arm with fewer joints cannot be given an orientation.
+pub const ORIENTING_JOINTS: usize = 6;
+
 /// A place for the tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
@@ -66,7 +69,7 @@ impl Target {
         {
             return bad("its orientation is no rotation; give a quaternion of any length but zero");
         }
-        if self.has_orientation() && joints < 6 {
+        if self.has_orientation() && joints < ORIENTING_JOINTS {
             return bad(&format!(
                 "an arm of {joints} joints cannot be given an orientation; leave qx, qy, qz, qw out"
             ));

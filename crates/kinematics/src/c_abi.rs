@@ -113,6 +113,11 @@ pub(crate) fn guarded(work: impl FnOnce() -> Result<(), KinematicsError>) -> Cod
     code
 }
 
+/// The same with the motion that it is about.
+fn with<H>(motion: Option<H>, work: impl FnOnce(H) -> Result<(), KinematicsError>) -> Code {
+    guarded(|| work(motion.ok_or_else(|| null("motion"))?))
+}
+
 fn null(what: &'static str) -> KinematicsError {
     KinematicsError::Argument { what, problem: "must not be NULL".into() }
 }
@@ -121,6 +126,16 @@ fn null(what: &'static str) -> KinematicsError {
 unsafe fn numbers<'a>(at: *const f64, length: usize) -> Option<&'a [f64]> {
     // SAFETY: as above.
     (!at.is_null()).then(|| unsafe { std::slice::from_raw_parts(at, length) })
+}
+
+/// SAFETY: `at` is NULL or points to `length` numbers.
+unsafe fn needed<'a>(
+    at: *const f64,
+    length: usize,
+    what: &'static str,
+) -> Result<&'a [f64], KinematicsError> {
+    // SAFETY: as above.
+    unsafe { numbers(at, length) }.ok_or_else(|| null(what))
 }
 
 /// SAFETY: `at` is NULL or has room for as many numbers as there are.
@@ -320,20 +335,16 @@ pub unsafe extern "C" fn armcal_motion_free(motion: *mut MotionHandle) {
 /// Where the arm waits.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armcal_motion_start(motion: *mut MotionHandle, joint: *const f64) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, and NULL or a number a joint.
-        let handle = unsafe { motion.as_mut() }.ok_or_else(|| null("motion"))?;
-        handle.motion.start(unsafe { numbers(joint, handle.joints) })
-    })
+    // SAFETY: the contract: NULL or a handle, and NULL or a number a joint.
+    with(unsafe { motion.as_mut() }, |handle| handle.motion.start(unsafe { numbers(joint, handle.joints) }))
 }
 
 /// The arm goes there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armcal_motion_go(motion: *mut MotionHandle, joint: *const f64) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, and a number a joint.
-        let handle = unsafe { motion.as_mut() }.ok_or_else(|| null("motion"))?;
-        handle.motion.go(unsafe { numbers(joint, handle.joints) }.ok_or_else(|| null("joint"))?)
+    // SAFETY: the contract: NULL or a handle, and a number a joint.
+    with(unsafe { motion.as_mut() }, |handle| {
+        handle.motion.go(unsafe { needed(joint, handle.joints, "joint") }?)
     })
 }
 
@@ -347,17 +358,17 @@ pub unsafe extern "C" fn armcal_motion_tip(
     effort: *const f64,
     tip: *mut CPose,
 ) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, and NULL or a number a joint, room for a pose.
+    // SAFETY: the contract: NULL or a handle.
+    with(unsafe { motion.as_ref() }, |handle| {
+        // SAFETY: the contract: NULL or a number a joint, room for a pose.
         unsafe {
-            let handle = motion.as_ref().ok_or_else(|| null("motion"))?;
             let of_joints = |at: *const f64| numbers(at, handle.joints);
             let driven = Driven {
                 direction: of_joints(direction),
                 velocity_radps: of_joints(velocity),
                 effort_nm: of_joints(effort),
             };
-            let at = handle.motion.tip(of_joints(joint).ok_or_else(|| null("joint"))?, &driven)?;
+            let at = handle.motion.tip(needed(joint, handle.joints, "joint")?, &driven)?;
             set(tip, "tip", CPose::from(&at))
         }
     })
@@ -370,11 +381,11 @@ pub unsafe extern "C" fn armcal_motion_nominal_tip(
     joint: *const f64,
     tip: *mut CPose,
 ) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, a number a joint, room for a pose.
+    // SAFETY: the contract: NULL or a handle.
+    with(unsafe { motion.as_ref() }, |handle| {
+        // SAFETY: the contract: a number a joint, room for a pose.
         unsafe {
-            let handle = motion.as_ref().ok_or_else(|| null("motion"))?;
-            let joint = numbers(joint, handle.joints).ok_or_else(|| null("joint"))?;
+            let joint = needed(joint, handle.joints, "joint")?;
             set(tip, "tip", CPose::from(&handle.motion.nominal_tip(joint)?))
         }
     })
@@ -390,11 +401,11 @@ pub unsafe extern "C" fn armcal_motion_correct(
     direction: *mut f64,
     reached: *mut CReached,
 ) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, a number a joint, NULL or room for what is asked.
+    // SAFETY: the contract: NULL or a handle.
+    with(unsafe { motion.as_mut() }, |handle| {
+        // SAFETY: the contract: a number a joint, NULL or room for what is asked.
         unsafe {
-            let handle = motion.as_mut().ok_or_else(|| null("motion"))?;
-            let nominal = numbers(nominal, handle.joints).ok_or_else(|| null("nominal"))?;
+            let nominal = needed(nominal, handle.joints, "nominal")?;
             let point = handle.motion.correct(nominal, known(time_s))?;
             handle.answer(&point, [ptr::null_mut(), corrected, direction], reached);
             Ok(())
@@ -414,11 +425,11 @@ pub unsafe extern "C" fn armcal_motion_set_point(
     direction: *mut f64,
     reached: *mut CReached,
 ) -> Code {
-    guarded(|| {
-        // SAFETY: the contract: a handle, three numbers, NULL or four, NULL or room for what is asked.
+    // SAFETY: the contract: NULL or a handle.
+    with(unsafe { motion.as_mut() }, |handle| {
+        // SAFETY: the contract: three numbers, NULL or four, NULL or room for what is asked.
         unsafe {
-            let handle = motion.as_mut().ok_or_else(|| null("motion"))?;
-            let position = numbers(position_m, 3).ok_or_else(|| null("position_m"))?;
+            let position = needed(position_m, 3, "position_m")?;
             let turned = numbers(quaternion_xyzw, 4).map(|q| Quaternion::new(q[3], q[0], q[1], q[2]));
             let place = Point {
                 position_m: Vector3::from_column_slice(position),

@@ -1,13 +1,10 @@
 //! One arm on its way: where it stands, and what the way there left behind in its gears.
 
 use crate::{CalibratedArm, Conditions, KinematicsError};
-use armcal_compensate::{Compensator, Past, SetPoint, TargetFrame, Underway, held};
+use armcal_compensate::{Compensator, ORIENTING_JOINTS, Past, SetPoint, TargetFrame, Underway, held};
 use armcal_core::{FeatureId, Observation, Pose};
 use armcal_model::Model;
 use nalgebra::{UnitQuaternion, Vector3};
-
-/// Joints with fewer than this cannot be given an orientation.
-const ORIENTING: usize = 6;
 
 /// An arm on its way.
 #[derive(Debug, Clone)]
@@ -132,7 +129,7 @@ impl<'a> Motion<'a> {
     /// A set-point out of reach or behind a limit; the arm stands where it stood.
     pub fn correct(&mut self, nominal_rad: &[f64], time_s: Option<f64>) -> Result<SetPoint, KinematicsError> {
         let at = self.nominal_tip(nominal_rad)?;
-        let turned = (nominal_rad.len() >= ORIENTING).then_some(at.rotation);
+        let turned = (nominal_rad.len() >= ORIENTING_JOINTS).then_some(at.rotation);
         let place = (at.translation.vector, turned);
         let mut target = self.frame.target(&self.arm.models, self.tip, "the nominal set-point", place)?;
         target.time_s = time_s;

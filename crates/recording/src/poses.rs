@@ -96,14 +96,8 @@ pub(crate) fn body_missing(
     stream: &PoseStream,
     present: &BTreeSet<String>,
 ) -> RecordingError {
-    let wanted = stream.body.clone().unwrap_or_default();
-    RecordingError::Body {
-        role,
-        topic: stream.topic.clone(),
-        why: format!("never shows body {wanted:?}"),
-        nearest: nearest(&wanted, present),
-        present: present.iter().cloned().collect(),
-    }
+    let wanted = stream.body.as_deref().unwrap_or_default();
+    missing((role, stream), wanted, format!("never shows body {wanted:?}"), present)
 }
 
 /// The error for a frame that no pose is in.
@@ -112,12 +106,21 @@ pub(crate) fn frame_missing(
     stream: &PoseStream,
     present: &BTreeSet<String>,
 ) -> RecordingError {
-    let wanted = stream.frame.clone().unwrap_or_default();
+    let wanted = stream.frame.as_deref().unwrap_or_default();
+    missing((role, stream), wanted, format!("never has that body in frame {wanted:?}"), present)
+}
+
+fn missing(
+    (role, stream): (&'static str, &PoseStream),
+    wanted: &str,
+    why: String,
+    present: &BTreeSet<String>,
+) -> RecordingError {
     RecordingError::Body {
         role,
         topic: stream.topic.clone(),
-        why: format!("never has that body in frame {wanted:?}"),
-        nearest: nearest(&wanted, present),
+        why,
+        nearest: nearest(wanted, present),
         present: present.iter().cloned().collect(),
     }
 }

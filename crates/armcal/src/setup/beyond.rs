@@ -8,6 +8,7 @@ use crate::story::Fitted;
 use armcal_core::Pose;
 use armcal_model::{EffectSpec, EffectTable};
 use rayon::prelude::*;
+use std::cell::OnceCell;
 
 /// A frame that is estimated is a mistake of the setup only if it lies this far from where it was taken to be, beyond
 /// what any effect of the catalogue moves it [m], [rad].
@@ -16,36 +17,77 @@ pub const FAR_RAD: f64 = 0.05;
 /// Dwells of a recording at which an event is tried first.
 const COARSE_STEPS: usize = 8;
 
-/// Whether what was estimated lies further off than any effect of the catalogue could move it; a sign or an order always
-/// does.
-pub fn beyond_physics(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool {
-    let estimates = &t.fitted.calibration.fit.estimates;
-    match t.hypothesis.freedom {
-        Freedom::Discrete => true,
-        Freedom::Number | Freedom::Frame if !t.hypothesis.estimated.is_empty() => {
-            t.hypothesis.estimated.iter().any(|own| {
-                let of = estimates.iter().filter(|e| e.parameter.name == own.parameter);
-                of.into_iter().any(|e| (e.value - own.nominal).abs() > own.far)
-            })
-        }
-        Freedom::Number => t.hypothesis.number.as_ref().is_none_or(|n| (n.value - n.nothing).abs() >= n.far),
-        Freedom::Frame => before.is_none_or(|before| match t.hypothesis.code {
-            "recordings-disagree" => {
-                t.misfit.times_floor() < WORTH_LOOKING && !one_effect_explains(now, &t.hypothesis)
-            }
-            "target-offset" => before.calibration.times_floor() > EXPLAINED,
-            code => {
-                moved(now, code, before, &t.fitted).is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD)
-                    && !one_recording_differs(now)
-            }
-        }),
-    }
+/// What physics could do to the inputs as they are, beside which changes of them are judged.
+pub struct Physics<'a> {
+    now: &'a Inputs,
+    /// Their fit.
+    fitted: Option<&'a Fitted>,
+    /// Of each recording whether one effect that begins with it explains the errors, once somebody asked.
+    begins: Vec<OnceCell<bool>>,
 }
 
-/// Whether a change lets a frame go that is elsewhere than it was taken to be in every recording, near or far.
-pub fn stands_off(now: &Inputs, before: Option<&Fitted>, t: &Tried) -> bool {
-    let moves = |before: &Fitted| moved(now, t.hypothesis.code, before, &t.fitted).is_some();
-    before.is_some_and(moves) && !one_recording_differs(now)
+impl<'a> Physics<'a> {
+    pub fn of(now: &'a Inputs, fitted: Option<&'a Fitted>) -> Physics<'a> {
+        Physics { now, fitted, begins: now.seen.iter().map(|_| OnceCell::new()).collect() }
+    }
+
+    /// Whether what was estimated lies further off than any effect of the catalogue could move it; a sign or an order always
+    /// does.
+    pub fn is_outdone_by(&self, t: &Tried) -> bool {
+        let estimates = &t.fitted.calibration.fit.estimates;
+        match t.hypothesis.freedom {
+            Freedom::Discrete => true,
+            Freedom::Number | Freedom::Frame if !t.hypothesis.estimated.is_empty() => {
+                t.hypothesis.estimated.iter().any(|own| {
+                    let of = estimates.iter().filter(|e| e.parameter.name == own.parameter);
+                    of.into_iter().any(|e| (e.value - own.nominal).abs() > own.far)
+                })
+            }
+            Freedom::Number => {
+                t.hypothesis.number.as_ref().is_none_or(|n| (n.value - n.nothing).abs() >= n.far)
+            }
+            Freedom::Frame => self.fitted.is_none_or(|before| match t.hypothesis.code {
+                "recordings-disagree" => {
+                    t.misfit.times_floor() < WORTH_LOOKING && !self.one_effect_explains(&t.hypothesis)
+                }
+                "target-offset" => before.calibration.times_floor() > EXPLAINED,
+                code => {
+                    let by = moved(self.now, code, before, &t.fitted);
+                    by.is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD) && !self.one_recording_differs()
+                }
+            }),
+        }
+    }
+
+    /// Whether a change lets a frame go that is elsewhere than it was taken to be in every recording, near or far.
+    pub fn leaves_standing(&self, t: &Tried) -> bool {
+        let moves = |before: &Fitted| moved(self.now, t.hypothesis.code, before, &t.fitted).is_some();
+        self.fitted.is_some_and(moves) && !self.one_recording_differs()
+    }
+
+    /// Whether one effect that begins with a recording explains the errors of all: a frame that is let go in every recording
+    /// takes a share of it in each, and with the arm's own parameters may end anywhere.
+    fn one_recording_differs(&self) -> bool {
+        self.begins.len() > 1 && (0..self.begins.len()).any(|recording| self.begins_with(recording))
+    }
+
+    /// Whether one effect that begins with the recording, or at a dwell of it, explains how it differs. Then it is physics, and
+    /// the diagnosis will name it.
+    fn one_effect_explains(&self, h: &Hypothesis) -> bool {
+        let Some(recording) = h.recording else { return false };
+        let dwells = self.now.seen[recording].dwells.len();
+        let at =
+            |event: &String, dwell: usize| times_floor(self.now, &format!("{event}@{recording}.{dwell}"));
+        self.begins_with(recording)
+            || events(self.now)
+                .iter()
+                .any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
+    }
+
+    fn begins_with(&self, recording: usize) -> bool {
+        let begins = |event: &String| explained(times_floor(self.now, &format!("{event}@{recording}")));
+        *self.begins[recording].get_or_init(|| events(self.now).iter().any(begins))
+    }
 }
 
 /// How far one pose lies from another [m], [rad].
@@ -68,26 +110,6 @@ pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f6
         }
         _ => None,
     }
-}
-
-/// Whether one effect that begins with a recording explains the errors of all: a frame that is let go in every recording takes a
-/// share of it in each, and with the arm's own parameters may end anywhere.
-fn one_recording_differs(now: &Inputs) -> bool {
-    now.seen.len() > 1 && (0..now.seen.len()).any(|recording| begins_with(now, recording))
-}
-
-/// Whether one effect that begins with the recording, or at a dwell of it, explains how it differs. Then it is physics, and the
-/// diagnosis will name it.
-fn one_effect_explains(now: &Inputs, h: &Hypothesis) -> bool {
-    let Some(recording) = h.recording else { return false };
-    let dwells = now.seen[recording].dwells.len();
-    let at = |event: &String, dwell: usize| times_floor(now, &format!("{event}@{recording}.{dwell}"));
-    begins_with(now, recording)
-        || events(now).iter().any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
-}
-
-fn begins_with(now: &Inputs, recording: usize) -> bool {
-    events(now).iter().any(|event| explained(times_floor(now, &format!("{event}@{recording}"))))
 }
 
 /// What happens to an arm at one moment: a tool or frame is shifted, a zero slips.

@@ -2,7 +2,7 @@
 
 use super::alone::each_alone;
 use super::attempt::{Tried, attempted};
-use super::beyond::{beyond_physics, stands_off};
+use super::beyond::Physics;
 use super::hypotheses::{Freedom, Hypothesis, hypotheses};
 use super::trial::{Inputs, Misfit};
 use super::unseen::unseen;
@@ -58,12 +58,13 @@ fn one_upon_the_other(
         now.pipeline.fit.give_up_above_m =
             first.as_ref().map(|f| HOPELESS * f.calibration.judged().nominal.mean_m);
         let (mut tried, mut within) = (Vec::new(), Vec::new());
+        let physics = Physics::of(&now, first.as_ref());
         for some in hypotheses(&now, &at_bound) {
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
                 report.tried += some.len();
                 let all = attempted(&now, &before, some);
-                let (far, near) = explaining(&now, first.as_ref(), &before, all, possible);
+                let (far, near) = explaining(&physics, &before, all, possible);
                 tried.extend(far);
                 within.extend(near);
             }
@@ -128,8 +129,7 @@ fn weight(t: &Tried) -> (Freedom, f64) {
 /// little was above the floor to be sure, frames and changes of the model's own parameters are `possible`, and so are frames that
 /// are no further off than physics may have it.
 fn explaining(
-    now: &Inputs,
-    first: Option<&Fitted>,
+    physics: &Physics<'_>,
     before: &Misfit,
     tried: Vec<Tried>,
     possible: &mut Vec<Tried>,
@@ -143,11 +143,11 @@ fn explaining(
             continue;
         }
         let certain = explains && (t.hypothesis.recording.is_some() || sure(before, t.hypothesis.freedom));
-        match (beyond_physics(now, first, &t), certain) {
+        match (physics.is_outdone_by(&t), certain) {
             (true, true) => far.push(t),
             (true, false) => possible.push(t),
             (false, true) if t.hypothesis.number.is_some() => within.push(weight(&t)),
-            (false, true) if stands_off(now, first, &t) => possible.push(t),
+            (false, true) if physics.leaves_standing(&t) => possible.push(t),
             (false, _) => {}
         }
     }
