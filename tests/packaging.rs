@@ -202,7 +202,7 @@ fn every_dependency_is_under_a_licence_that_is_allowed() {
 /// Whatever somebody else wrote is named where everybody looks for it.
 #[test]
 fn everything_vendored_stands_in_the_notice() {
-    let notice = read("NOTICE.md");
+    let notice = read("docs/notices.md");
     let Ok(listed) = Command::new("git").args(["ls-files"]).current_dir(root()).output() else {
         return skip("no git to list the files of the repository");
     };
@@ -218,7 +218,7 @@ fn everything_vendored_stands_in_the_notice() {
     let foreign: Vec<&str> = listed.lines().filter(foreign).collect();
     assert!(foreign.len() >= 3, "{foreign:?}");
     for path in foreign {
-        assert!(notice.contains(&format!("`{path}`")), "NOTICE.md does not name {path}");
+        assert!(notice.contains(&format!("`{path}`")), "docs/notices.md does not name {path}");
     }
 }
 
