@@ -1,6 +1,6 @@
 //! Products of tall matrices.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Dyn, Matrix, Storage};
 
 /// Up to this many columns dot products are faster than a transposed copy.
 const NARROW: usize = 4;
@@ -8,7 +8,11 @@ const NARROW: usize = 4;
 const BLOCK: usize = 96;
 
 /// `a'b`; by the blocked product where it is large, as nalgebra's `tr_mul` takes one dot product for each entry.
-pub fn inner(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn inner<A, B>(a: &Matrix<f64, Dyn, Dyn, A>, b: &Matrix<f64, Dyn, Dyn, B>) -> DMatrix<f64>
+where
+    A: Storage<f64, Dyn, Dyn>,
+    B: Storage<f64, Dyn, Dyn>,
+{
     if a.ncols().min(b.ncols()) <= NARROW { a.tr_mul(b) } else { a.transpose() * b }
 }
 

@@ -24,8 +24,6 @@ pub(crate) fn promise(columns: impl Iterator<Item = [f64; 2]>) -> f64 {
 pub(crate) struct Metric {
     /// Which noise.
     pub noise: Noise,
-    /// Its size (declared noise = 1).
-    pub amplitude: f64,
     /// Whitening by it.
     pub whitener: Whitener,
     /// Geometry projected out.
@@ -54,53 +52,40 @@ impl Metric {
     }
 }
 
-/// All alternatives of the noise for a problem whose residual noise is `scale` times the declared one.
-pub(crate) fn metrics(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Vec<Metric> {
-    let kinds = Noise::available(problem);
-    let others = kinds.len().saturating_sub(1).max(1) as f64;
-    let mut metrics: Vec<Metric> = Vec::new();
-    for noise in &kinds {
-        let (prior, amplitudes) = match noise {
-            Noise::White => (1.0 - config.prior_correlated_noise, &[0.0][..]),
-            _ => (config.prior_correlated_noise / others, &config.amplitude_scales[..]),
-        };
-        for b in amplitudes {
-            let metric = Metric::new(*noise, *b, problem, scale);
-            let metric = metric.weighed(prior / amplitudes.len() as f64, metrics.first(), config);
-            if !noise.widens() || metrics.first().is_none_or(|white| metric.ln_weight > white.ln_weight) {
-                metrics.push(metric);
-            }
-        }
-    }
-    let by_weight = |a: &&Metric, b: &&Metric| a.ln_weight.total_cmp(&b.ln_weight);
-    let Some(leading) = metrics.iter().max_by(by_weight).map(|m| m.noise) else { return metrics };
-    let both = |m: &Metric| Some((m.noise.and_place(leading, &kinds)?, m.amplitude));
-    let with_places = metrics.iter().filter(|m| both(m).is_some()).max_by(by_weight).and_then(both);
-    if let Some((noise, b)) = with_places {
-        let metric = Metric::new(noise, b, problem, scale);
-        metrics.push(metric.weighed(config.prior_correlated_noise / others, metrics.first(), config));
-    }
-    metrics
-}
-
 impl Metric {
     pub(crate) fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
+        let by = |geometry: DMatrix<f64>, residual| {
+            let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
+            Projection::new(&geometry, precision, offset, residual)
+        };
+        Metric::projected((noise, amplitude), problem, scale, by)
+    }
+
+    /// The same by a [rough](Projection::rough) projection.
+    pub(crate) fn rough(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
+        let by = |geometry, residual| {
+            Projection::rough(geometry, &problem.geometry_precision, &problem.geometry_offset, residual)
+        };
+        Metric::projected((noise, amplitude), problem, scale, by)
+    }
+
+    fn projected(
+        (noise, amplitude): (Noise, f64),
+        problem: &Problem,
+        scale: f64,
+        by: impl FnOnce(DMatrix<f64>, DVector<f64>) -> Projection,
+    ) -> Metric {
         let whitener = Whitener::new(noise, amplitude, problem);
         let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
         let mut geometry = problem.geometry.clone();
         whitener.apply(&mut residual);
         whitener.apply(&mut geometry);
-        let projection = Projection::new(
-            &(geometry / scale),
-            &problem.geometry_precision,
-            &problem.geometry_offset,
-            residual.column(0) / scale,
-        );
-        Metric { noise, amplitude, whitener, projection, ln_weight: 0.0 }
+        let projection = by(geometry / scale, residual.column(0) / scale);
+        Metric { noise, whitener, projection, ln_weight: 0.0 }
     }
 
     /// ln of its prior times the evidence of nothing in it, against white noise.
-    fn weighed(self, prior: f64, white: Option<&Metric>, config: &DiagnosisConfig) -> Metric {
+    pub(crate) fn weighed(self, prior: f64, white: Option<&Metric>, config: &DiagnosisConfig) -> Metric {
         let (p, nu) = (&self.projection, config.noise_prior_dof);
         let white = white.map_or(p, |m| &m.projection);
         let ln_weight = prior.ln()
@@ -182,21 +167,6 @@ pub(crate) fn over_noise(
         });
     }
     result
-}
-
-/// The metrics worth their time for many terms: white, and of every other kind the amplitude that explains nothing or
-/// a catalogue entry best. `parts[term][metric]`, the null among the terms.
-pub(crate) fn leading(metrics: &[Metric], parts: &[Vec<f64>]) -> Vec<usize> {
-    let mut kept: Vec<usize> = Vec::new();
-    let value = |m: usize| parts.iter().map(|ln| ln[m]).fold(f64::NEG_INFINITY, f64::max);
-    for m in 0..metrics.len() {
-        match kept.iter().position(|k| metrics[*k].noise == metrics[m].noise) {
-            Some(k) if value(m) > value(kept[k]) => kept[k] = m,
-            Some(_) => {}
-            None => kept.push(m),
-        }
-    }
-    kept
 }
 
 /// Posterior mean and covariance (noise variance 1) of a term's coefficients at amplitude `a`.

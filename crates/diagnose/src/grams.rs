@@ -81,15 +81,15 @@ fn dense(
     }
     let white = metric.whitened(stacked);
     let projection = &metric.projection;
-    let spent = inner(&projection.q, &white);
+    let spent = projection.spent(inner(&projection.q, &white));
     let score = white.tr_mul(&projection.residual) - spent.tr_mul(&projection.z);
     let mut at = 0;
     for k in block {
         let m = terms[*k].len();
         let (x, c) = (white.columns(at, m), spent.columns(at, m));
-        let full = x.transpose() * x;
+        let full = inner(&x, &x);
         let raw = full.diagonal();
-        let (a, g) = (full - c.transpose() * c, score.rows(at, m).into_owned());
+        let (a, g) = (full - inner(&c, &c), score.rows(at, m).into_owned());
         let gram = Gram { raw, a, g, spent: c.into_owned() };
         each(*k, &gram);
         at += m;
@@ -104,7 +104,7 @@ struct ByDwell<'p> {
     square: DMatrix<f64>,
     /// Times the residual: dwells x c.
     with_residual: DMatrix<f64>,
-    /// Of each base column, times every column of Q: dwells x p.
+    /// Of each base column, times every column of the projection's `q`: dwells x p.
     with_geometry: Vec<DMatrix<f64>>,
 }
 
@@ -158,7 +158,8 @@ impl<'p> ByDwell<'p> {
         }
         let score = stacked.tr_mul(&self.with_residual);
         // Rows of Q' X, column by column of the base.
-        let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(|q| inner(q, &stacked)).collect();
+        let spent = |q: &DMatrix<f64>| self.projection.spent(inner(q, &stacked));
+        let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(spent).collect();
         let mut at = 0;
         for (k, basis) in block.iter().zip(&functions) {
             let m = basis.ncols();
@@ -177,7 +178,7 @@ impl<'p> ByDwell<'p> {
                     if i == j {
                         gram.raw.rows_mut(i * m, m).copy_from(&full.diagonal());
                     }
-                    let left = full - own(i).tr_mul(&own(j));
+                    let left = full - inner(&own(i), &own(j));
                     gram.a.view_mut((j * m, i * m), (m, m)).copy_from(&left.transpose());
                     gram.a.view_mut((i * m, j * m), (m, m)).copy_from(&left);
                 }
@@ -205,7 +206,8 @@ impl<'p> ByDwell<'p> {
             let (c, p) = (self.c, self.projection.q.ncols());
             let within = at(on.end) - at(on.start);
             let full = DMatrix::from_column_slice(c, c, &within.as_slice()[..c * c]);
-            let spent = DMatrix::from_column_slice(p, c, &within.as_slice()[c * c + c..]);
+            let products = DMatrix::from_column_slice(p, c, &within.as_slice()[c * c + c..]);
+            let spent = self.projection.spent(products);
             let gram = Gram {
                 raw: full.diagonal(),
                 g: within.rows(c * c, c) - spent.tr_mul(&self.projection.z),

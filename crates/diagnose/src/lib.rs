@@ -73,6 +73,7 @@ mod ripple;
 mod rivals;
 mod rooms;
 mod scans;
+mod sizes;
 mod special;
 mod stretches;
 mod structure;

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
-//! 2015), which is as orthogonal as Householder's and a matrix product fast.
+//! 2015), which is as orthogonal as Householder's and a matrix product fast. To choose among many kinds and sizes of noise one
+//! factor is enough, and Q itself is not put together: with `R'R = J'J + P`, `Q'g = R'^-1 J'g`.
 
 use armcal_calibrate::{gram, inner};
 use nalgebra::{DMatrix, DVector};
@@ -16,8 +17,10 @@ use nalgebra::{DMatrix, DVector};
 /// Geometry projected out of one set of whitened rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Projection {
-    /// Data rows of Q: rows x p.
+    /// Data rows of Q, or of the geometry that `back` takes to Q: rows x p.
     pub q: DMatrix<f64>,
+    /// `R'^-1`, where Q was not put together.
+    back: Option<DMatrix<f64>>,
     /// `Q' e_a`.
     pub z: DVector<f64>,
     /// The whitened residual before projection.
@@ -82,7 +85,40 @@ impl Projection {
         let z = data.tr_mul(&residual) + prior.tr_mul(&prior_residual);
         let rss = residual.norm_squared() + prior_residual.norm_squared() - z.norm_squared();
         let effective_parameters = data.norm_squared();
-        Projection { q: data, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
+        Projection { q: data, back: None, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
+    }
+
+    /// The same without Q: a fraction of the work, good to about 1e-6.
+    pub fn rough(
+        geometry: DMatrix<f64>,
+        precision: &DVector<f64>,
+        offset: &DVector<f64>,
+        residual: DVector<f64>,
+    ) -> Projection {
+        let p = geometry.ncols();
+        let precision = precision.map(|v| v.max(1e-12));
+        let factor = cholesky_upper(gram(&geometry) + DMatrix::from_diagonal(&precision));
+        let ln_det = factor.diagonal().iter().zip(&precision).map(|(r, v)| 2.0 * r.ln() - v.ln()).sum();
+        let back = factor
+            .transpose()
+            .solve_lower_triangular(&DMatrix::identity(p, p))
+            .unwrap_or_else(|| DMatrix::identity(p, p));
+        let z = &back * (geometry.tr_mul(&residual) - offset.component_mul(&precision));
+        let prior = offset.component_mul(offset).dot(&precision);
+        let rss = residual.norm_squared() + prior - z.norm_squared();
+        // The trace of J (J'J + P)^-1 J'.
+        let held: f64 = back.column_iter().zip(&precision).map(|(c, v)| v * c.norm_squared()).sum();
+        let effective_parameters = p as f64 - held;
+        let (rss, back) = (rss.max(1e-12), Some(back));
+        Projection { q: geometry, back, z, rss, effective_parameters, ln_det, residual }
+    }
+
+    /// `Q'X`, from the products of [`Projection::q`] with X.
+    pub fn spent(&self, products: DMatrix<f64>) -> DMatrix<f64> {
+        match &self.back {
+            Some(back) => back * products,
+            None => products,
+        }
     }
 
     /// Variance of the residual (declared noise = 1) once something took so much of its square.

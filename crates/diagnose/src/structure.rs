@@ -62,8 +62,8 @@ pub(crate) fn structure(problem: &Problem, config: &DiagnosisConfig) -> Structur
 }
 
 fn effective_parameters(problem: &Problem) -> f64 {
-    let p = crate::projection::Projection::new(
-        &problem.geometry,
+    let p = crate::projection::Projection::rough(
+        problem.geometry.clone(),
         &problem.geometry_precision,
         &problem.geometry_offset,
         problem.residual.clone(),

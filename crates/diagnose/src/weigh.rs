@@ -4,10 +4,11 @@ use crate::cells::{Dependences, Unlisted, cells, discrepancies};
 use crate::config::DiagnosisConfig;
 use crate::confusion::Crossed;
 use crate::crossval::{EFFECT_PRECISION, Group, gain};
-use crate::evidence::{Metric, best_amplitude, coefficients, leading, metrics, over_noise};
+use crate::evidence::{Metric, best_amplitude, coefficients, over_noise};
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem};
+use crate::sizes;
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
 use nalgebra::DMatrix;
@@ -22,9 +23,6 @@ const SCAN_POINTS: usize = 32;
 const FEW_SCAN_POINTS: usize = 8;
 /// Entries of the catalogue, the best under white noise, by which the size of every other kind of noise is chosen.
 const SCOUTS: usize = 32;
-/// Of many dwells, a kind of noise that puts nothing, and no scout, less than this behind another kind is not asked further
-/// [nats]: of all probability it has less than one part in a thousand million.
-const OUT_OF_THE_QUESTION: f64 = 21.0;
 /// Up to so many dwells everything unlisted is weighed under every kind of noise; of more, so many shapes of a family.
 const MANY_DWELLS: usize = 400;
 const SHAPES: usize = 32;
@@ -197,11 +195,17 @@ fn over_metrics(
     scale: f64,
     config: &DiagnosisConfig,
 ) -> (Vec<Metric>, Vec<Vec<Vec<f64>>>) {
-    let all = metrics(problem, scale, config);
+    let ours = sizes::white(problem, scale, config);
     let columns: Vec<&Columns> = terms.iter().flat_map(|t| t.columns.iter().copied()).collect();
-    let mut white = over_noise(&columns, problem, scale, &all[..1], config).into_iter().map(|ln| ln[0]);
+    let of_white = over_noise(&columns, problem, scale, std::slice::from_ref(&ours), config);
+    let mut white = of_white.into_iter().map(|ln| ln[0]);
     let white: Vec<Vec<f64>> = terms.iter().map(|t| white.by_ref().take(t.columns.len()).collect()).collect();
-    let metrics = kept(all, (&terms[0].columns, &white[0]), problem, scale, config);
+    let (catalogue, ln_catalogue) = (&terms[0].columns, &white[0]);
+    let best = promising(ln_catalogue, SCOUTS);
+    let scouts: Vec<&Columns> = best.iter().map(|k| catalogue[*k]).collect();
+    let ln_scouts = best.iter().map(|k| ln_catalogue[*k]).collect();
+    let many = problem.dwells.len() > MANY_DWELLS;
+    let metrics = sizes::metrics(ours, (&scouts, ln_scouts), problem, scale, many, config);
     let best: Vec<Vec<usize>> = terms.iter().zip(&white).map(|(t, white)| promising(white, t.most)).collect();
     let of_best = terms.iter().zip(&best).flat_map(|(t, best)| best.iter().map(|k| t.columns[*k]));
     let others = over_noise(&of_best.collect::<Vec<_>>(), problem, scale, &metrics[1..], config);
@@ -221,29 +225,6 @@ fn over_metrics(
     };
     let told = terms.iter().zip(white).zip(best).map(told).collect();
     (metrics, told)
-}
-
-/// Of every kind of noise the size that explains nothing, or one of the scouts among these terms, best.
-fn kept(
-    all: Vec<Metric>,
-    (columns, white): (&[&Columns], &[f64]),
-    problem: &Problem,
-    scale: f64,
-    config: &DiagnosisConfig,
-) -> Vec<Metric> {
-    let best = promising(white, SCOUTS);
-    let scouts: Vec<&Columns> = best.iter().map(|k| columns[*k]).collect();
-    let others = over_noise(&scouts, problem, scale, &all[1..], config);
-    let mut parts: Vec<Vec<f64>> =
-        best.iter().zip(others).map(|(k, others)| [&[white[*k]], others.as_slice()].concat()).collect();
-    parts.push(all.iter().map(|m| m.ln_weight).collect());
-    let mut kept = leading(&all, &parts);
-    if problem.dwells.len() > MANY_DWELLS {
-        let most = |ln: &[f64]| ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        kept.retain(|m| *m == 0 || parts.iter().any(|ln| ln[*m] > most(ln) - OUT_OF_THE_QUESTION));
-    }
-    let mut all: Vec<Option<Metric>> = all.into_iter().map(Some).collect();
-    kept.iter().filter_map(|m| all[*m].take()).collect()
 }
 
 /// The terms with the largest evidence under white noise, at most so many.

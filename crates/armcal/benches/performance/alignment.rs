@@ -34,7 +34,8 @@ const CPU_S: f64 = 0.15;
 
 pub fn section(options: &Options) -> Result<Section> {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
-    let pipeline = campaign::place(&options.data.join("campaign-200"), 200, false, &models)?;
+    let pipeline =
+        campaign::place(&options.data.join("campaign-200"), 200, campaign::Weighed::None, &models)?;
     let pipeline = Pipeline::load(&pipeline)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let model = frames::bare(&chain, frames::markers(&pipeline))?;

@@ -137,6 +137,13 @@ fn batch(made: &[PathBuf], folder: &Path, count: usize, jobs: usize) -> Result<C
     Ok(cost)
 }
 
+/// The pipeline of one of the recordings, which is made where it is not there.
+pub fn one(options: &Options) -> Result<PathBuf> {
+    let folder = options.data.join("batch");
+    make(&folder)?;
+    Ok(folder.join("1/pipeline.toml"))
+}
+
 /// The different recordings; all are of one pipeline, that of the first.
 fn make(folder: &Path) -> Result<Vec<PathBuf>> {
     let one = |seed: u64| -> Result<PathBuf> {

@@ -46,9 +46,19 @@ const REST_ROWS: usize = 35;
 const MOVE_ROWS: usize = 30;
 const START_NS: i64 = 1_760_000_000_000_000_000;
 
-/// Writes the recordings and a pipeline of so many poses into a folder, unless they are there; gives the pipeline, with or
-/// without diagnosis.
-pub fn place(folder: &Path, poses: usize, diagnosed: bool, models: &Path) -> Result<PathBuf> {
+/// How many of a campaign's poses a diagnosis weighs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Weighed {
+    /// There is no diagnosis.
+    None,
+    /// As many as a pipeline that does not say.
+    Default,
+    /// Every one.
+    All,
+}
+
+/// Writes the recordings and a pipeline of so many poses into a folder, unless they are there; gives the pipeline.
+pub fn place(folder: &Path, poses: usize, weighed: Weighed, models: &Path) -> Result<PathBuf> {
     std::fs::create_dir_all(folder)?;
     let mut random = ChaCha8Rng::seed_from_u64(2038);
     let arm = Arm::built(&mut random);
@@ -64,15 +74,20 @@ pub fn place(folder: &Path, poses: usize, diagnosed: bool, models: &Path) -> Res
         let _ = write!(recordings, "[[recordings]]\npaths = [\"{}\"]\n\n", path.display());
     }
     let names = NAMES.map(|name| format!("\"{name}\"")).join(", ");
+    let diagnosis = match weighed {
+        Weighed::None => "enabled = false".to_owned(),
+        Weighed::Default => "enabled = true".to_owned(),
+        Weighed::All => format!("max_weighed = {poses}"),
+    };
     let text = format!(
         "name = \"campaign\"\n\n{recordings}[streams.joints]\ntopic = \"/joint_states\"\nnames = [{names}]\n\n\
          [streams.tip]\ntopic = \"/tracker/tip\"\n\n[streams.base]\ntopic = \"/tracker/base\"\n\n\
          [model]\ndh = \"{}\"\n\n[frames.base]\npose = \"measured\"\nsigma_mm = 0.02\nsigma_deg = 0.001\n\n\
          [frames.tip]\npose = \"estimated\"\nat = {{ xyz_m = [0.0, 0.0, 0.1] }}\n\n\
-         [pool]\nper_recording = [\"base.*\"]\n\n[holdout]\nkind = \"cavity-folds\"\nk = 10\n\n[diagnosis]\nenabled = {diagnosed}\n",
+         [pool]\nper_recording = [\"base.*\"]\n\n[holdout]\nkind = \"cavity-folds\"\nk = 10\n\n[diagnosis]\n{diagnosis}\n",
         models.join("ur10.toml").display()
     );
-    let pipeline = folder.join(format!("pipeline-{diagnosed}.toml"));
+    let pipeline = folder.join(format!("pipeline-{weighed:?}.toml"));
     std::fs::write(&pipeline, text)?;
     Ok(pipeline)
 }

@@ -6,7 +6,7 @@
 //! `--poses N` the most poses of a campaign.
 //! Data go to `target/bench-data`.
 //!
-//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes),
+//! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes), `stages` of a run,
 //! `memory`, `alignment` (of clocks), `batch` are the parts; `peers` finds or makes
 //! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `child`
 //! measures processes, `page` lays out, `machine` says on what.
@@ -28,6 +28,7 @@ mod page;
 mod peers;
 mod reading;
 mod recordings;
+mod stages;
 mod walk;
 
 use page::Section;
@@ -39,11 +40,12 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 type Part = fn(&Options) -> Result<Section>;
 
 /// Each by its name, in the order of the page.
-const PARTS: [(&str, Part); 7] = [
+const PARTS: [(&str, Part); 8] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
     ("growth", growth::section),
+    ("stages", stages::section),
     ("memory", memory::section),
     ("alignment", alignment::section),
     ("batch", batch::section),

@@ -105,9 +105,13 @@ fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f6
     let mut sorted: Vec<f64> = read_rad.iter().map(|q| sign * q[joint]).collect();
     sorted.sort_by(|a, b| b.total_cmp(a));
     let end = *sorted.first()?;
-    let like = |value: f64| sorted.iter().filter(|q| (*q - value).abs() < ONE_END_RAD).count();
+    // They fall: those near a value are between two places.
+    let near = |value: f64| {
+        let [from, to] = [value + ONE_END_RAD, value - ONE_END_RAD];
+        sorted.partition_point(|q| *q > to) - sorted.partition_point(|q| *q >= from)
+    };
     let there: Vec<&&[f64]> = read_rad.iter().filter(|q| end - sign * q[joint] < ONE_END_RAD).collect();
-    let elsewhere = sorted[there.len()..].iter().map(|q| like(*q)).max()?;
+    let elsewhere = sorted[there.len()..].iter().map(|q| near(*q)).max()?;
     let first = there.first()?;
     let turned = |q: &&&[f64]| q.iter().zip(first.iter()).any(|(a, b)| (a - b).abs() > TURNS_RAD);
     let many = there.len() >= MANY_STILL.max(read_rad.len() / 5) && there.len() >= CROWD * elsewhere;

@@ -1,0 +1,91 @@
+//! The noises that everything is weighed under: of every kind the size that explains nothing, or one of a few scouts, best.
+//!
+//! Sizes are tried one at a time by a rough projection; only those that are kept are projected in full.
+
+use crate::config::DiagnosisConfig;
+use crate::evidence::{Metric, over_noise};
+use crate::noise::Noise;
+use crate::problem::{Columns, Problem};
+
+/// Of many dwells, a kind of noise that puts nothing, and no scout, less than this behind another kind is not asked further
+/// [nats]: of all probability it has less than one part in a thousand million.
+const OUT_OF_THE_QUESTION: f64 = 21.0;
+
+/// A kind and size of noise, tried.
+struct Trial {
+    noise: Noise,
+    amplitude: f64,
+    prior: f64,
+    /// ln (weight x evidence) of nothing, then of every scout.
+    parts: Vec<f64>,
+}
+
+impl Trial {
+    fn nothing(&self) -> f64 {
+        self.parts[0]
+    }
+
+    fn best(&self) -> f64 {
+        self.parts.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// The problem under white noise.
+pub(crate) fn white(problem: &Problem, scale: f64, config: &DiagnosisConfig) -> Metric {
+    let prior = 1.0 - config.prior_correlated_noise;
+    Metric::new(Noise::White, 0.0, problem, scale).weighed(prior, None, config)
+}
+
+/// The alternatives of the noise, white first, for a problem whose residual noise is `scale` times the declared one.
+/// `ln_scouts` are what white noise says of the scouts. Of `many` dwells those out of the question are left out.
+pub(crate) fn metrics(
+    white: Metric,
+    (scouts, ln_scouts): (&[&Columns], Vec<f64>),
+    problem: &Problem,
+    scale: f64,
+    many: bool,
+    config: &DiagnosisConfig,
+) -> Vec<Metric> {
+    let kinds = Noise::available(problem);
+    let share = config.prior_correlated_noise / kinds.len().saturating_sub(1).max(1) as f64;
+    let tried = |noise: Noise, amplitude: f64, prior: f64| {
+        let metric = Metric::rough(noise, amplitude, problem, scale).weighed(prior, Some(&white), config);
+        let nothing = metric.ln_weight;
+        (!noise.widens() || nothing > white.ln_weight).then(|| {
+            let of_scouts = over_noise(scouts, problem, scale, &[metric], config).into_iter().flatten();
+            Trial { noise, amplitude, prior, parts: std::iter::once(nothing).chain(of_scouts).collect() }
+        })
+    };
+    let parts = std::iter::once(white.ln_weight).chain(ln_scouts).collect();
+    let prior = 1.0 - config.prior_correlated_noise;
+    let mut trials = vec![Trial { noise: Noise::White, amplitude: 0.0, prior, parts }];
+    let sizes = &config.amplitude_scales;
+    for noise in kinds.iter().filter(|noise| **noise != Noise::White) {
+        trials.extend(sizes.iter().filter_map(|size| tried(*noise, *size, share / sizes.len() as f64)));
+    }
+    let by_nothing = |a: &&Trial, b: &&Trial| a.nothing().total_cmp(&b.nothing());
+    let leading = trials.iter().max_by(by_nothing).map_or(Noise::White, |trial| trial.noise);
+    let both = |trial: &Trial| Some((trial.noise.and_place(leading, &kinds)?, trial.amplitude));
+    let with_places = trials.iter().filter(|trial| both(trial).is_some()).max_by(by_nothing).and_then(both);
+    trials.extend(with_places.and_then(|(noise, size)| tried(noise, size, share)));
+
+    let mut kept: Vec<&Trial> = Vec::new();
+    for trial in &trials {
+        match kept.iter_mut().find(|kept| kept.noise == trial.noise) {
+            Some(kept) if trial.best() > kept.best() => *kept = trial,
+            Some(_) => {}
+            None => kept.push(trial),
+        }
+    }
+    let most = |k: usize| trials.iter().map(|trial| trial.parts[k]).fold(f64::NEG_INFINITY, f64::max);
+    let most: Vec<f64> = (0..scouts.len() + 1).map(most).collect();
+    let in_question = |trial: &&Trial| {
+        let near = |(part, most): (&f64, &f64)| *part > most - OUT_OF_THE_QUESTION;
+        !many || trial.parts.iter().zip(&most).any(near)
+    };
+    let of = |trial: &Trial| {
+        Metric::new(trial.noise, trial.amplitude, problem, scale).weighed(trial.prior, Some(&white), config)
+    };
+    let others: Vec<Metric> = kept[1..].iter().copied().filter(in_question).map(of).collect();
+    std::iter::once(white).chain(others).collect()
+}
