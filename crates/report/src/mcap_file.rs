@@ -9,6 +9,7 @@ use armcal_recording::atomic::AtomicFile;
 use armcal_recording::output::McapOutput;
 use armcal_recording::{RawChannel, Recording, RecordingError};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 
 /// Beginning of the names of armcal's attachments and metadata records.
@@ -83,21 +84,16 @@ pub(crate) fn earlier_results(run: &Run) -> Vec<Warning> {
 }
 
 fn copy_messages(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingError> {
-    // Channels by topic, so that a schema is hashed once and not with every message.
-    let mut known: BTreeMap<String, Vec<(RawChannel, u16)>> = BTreeMap::new();
+    // By the address at which the recording holds it, so that a schema is hashed once and not with every message.
+    let mut known: BTreeMap<usize, u16> = BTreeMap::new();
     input.for_each_raw(&mut |message| {
         let channel = message.channel;
         if channel.topic.starts_with(PREFIX) {
             return Ok(());
         }
-        let seen = known.get(&channel.topic).and_then(|all| all.iter().find(|(c, _)| c == channel));
-        let id = match seen {
-            Some((_, id)) => *id,
-            None => {
-                let id = add_channel(channel, out)?;
-                known.entry(channel.topic.clone()).or_default().push((channel.clone(), id));
-                id
-            }
+        let id = match known.entry(std::ptr::from_ref(channel).addr()) {
+            Entry::Occupied(id) => *id.get(),
+            Entry::Vacant(place) => *place.insert(add_channel(channel, out)?),
         };
         out.put(id, message.sequence, message.log_ns, message.publish_ns, message.data)
     })
@@ -125,12 +121,18 @@ fn copy_extras(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingE
 }
 
 fn put_results(results: Vec<ResultMessage>, out: &mut McapOutput) -> Result<(), RecordingError> {
-    let mut sequences: BTreeMap<String, u32> = BTreeMap::new();
+    // By topic: its channel, and how many messages it has.
+    let mut channels: BTreeMap<String, (u16, u32)> = BTreeMap::new();
     for m in results {
-        let schema = (m.schema.name.as_str(), m.schema.encoding.as_str(), m.schema.data.as_ref());
-        let id = out.add_channel(&m.topic, Some(schema), &m.message_encoding, &BTreeMap::new())?;
-        let sequence = sequences.entry(m.topic.clone()).or_insert(0);
-        out.put(id, *sequence, m.log_ns, m.publish_ns, &m.data)?;
+        let (id, sequence) = match channels.entry(m.topic) {
+            Entry::Occupied(channel) => channel.into_mut(),
+            Entry::Vacant(place) => {
+                let schema = (m.schema.name.as_str(), m.schema.encoding.as_str(), m.schema.data.as_ref());
+                let id = out.add_channel(place.key(), Some(schema), &m.message_encoding, &BTreeMap::new())?;
+                place.insert((id, 0))
+            }
+        };
+        out.put(*id, *sequence, m.log_ns, m.publish_ns, &m.data)?;
         *sequence += 1;
     }
     Ok(())

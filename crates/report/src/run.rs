@@ -14,6 +14,7 @@ use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport, sha256_of};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Version of the tool, as every output states it.
@@ -244,7 +245,8 @@ impl Run {
 
     /// Dwells of a recording that the fit could use.
     pub(crate) fn used(&self, recording: &RecordingRun) -> usize {
-        recording.dwells.iter().filter(|d| self.observations.iter().any(|o| o.dwell == d.id)).count()
+        let observed: BTreeSet<DwellId> = self.observations.iter().map(|o| o.dwell).collect();
+        recording.dwells.iter().filter(|d| observed.contains(&d.id)).count()
     }
 
     /// What each of the steps adds to the one before.
@@ -316,6 +318,17 @@ impl RecordingRun {
     /// Where the tip was during each dwell; empty without a board.
     pub fn assignments(&self) -> &[Assignment] {
         self.association.as_ref().map_or(&[], |a| &a.assignments)
+    }
+
+    /// Where each of its dwells was.
+    pub(crate) fn assigned(&self) -> BTreeMap<DwellId, &Assignment> {
+        self.assignments().iter().map(|a| (a.dwell, a)).collect()
+    }
+
+    /// Why dwells did not become observations.
+    pub(crate) fn why_not(&self) -> BTreeMap<DwellId, &str> {
+        // Of several reasons the first.
+        self.rejections.iter().rev().map(|r| (r.dwell, r.why.as_str())).collect()
     }
 
     /// Dwells found in it.

@@ -5,12 +5,13 @@ use crate::ReportError;
 use crate::points::Point;
 use crate::run::{RecordingRun, Run, role_word};
 use armcal_calibrate::Estimate;
-use armcal_core::{Dwell, Observation};
+use armcal_core::{Dwell, DwellId, Observation};
 use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
 use polars::prelude::{
     Column, DataFrame, KeyValueMetadata, NamedFrom, ParquetWriter, PolarsError, PolarsResult, Series,
 };
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Names of the tables of a run.
 pub(crate) const FILES: [&str; 3] = ["dwells.parquet", "observations.parquet", "parameters.parquet"];
@@ -53,12 +54,14 @@ fn dwells(run: &Run, points: &[Point]) -> Columns {
     c.number("tip_x_m", rows.iter().map(|(_, d)| tip(d, |p| p.x)));
     c.number("tip_y_m", rows.iter().map(|(_, d)| tip(d, |p| p.y)));
     c.number("tip_z_m", rows.iter().map(|(_, d)| tip(d, |p| p.z)));
-    let places: Vec<Option<&Assignment>> =
-        rows.iter().map(|(r, d)| r.assignments().iter().find(|a| a.dwell == d.id)).collect();
+    let assigned: BTreeMap<DwellId, &Assignment> =
+        run.recordings.iter().flat_map(RecordingRun::assigned).collect();
+    let places: Vec<Option<&Assignment>> = rows.iter().map(|(_, d)| assigned.get(&d.id).copied()).collect();
     c.places(&places);
-    c.flag("used", rows.iter().map(|(_, d)| points.iter().any(|p| p.observation.dwell == d.id)));
-    let why = |r: &'_ RecordingRun, d: &Dwell| r.rejections.iter().position(|x| x.dwell == d.id);
-    c.text("why_not", rows.iter().map(|(r, d)| why(r, d).map(|i| r.rejections[i].why.as_str())));
+    let used: BTreeSet<DwellId> = points.iter().map(|p| p.observation.dwell).collect();
+    c.flag("used", rows.iter().map(|(_, d)| used.contains(&d.id)));
+    let why_not: BTreeMap<DwellId, &str> = run.recordings.iter().flat_map(RecordingRun::why_not).collect();
+    c.text("why_not", rows.iter().map(|(_, d)| why_not.get(&d.id).copied()));
     c
 }
 
@@ -73,7 +76,10 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
     c.text("feature", points.iter().map(|p| Some(run.model.feature_name(p.observation.feature))));
     let against = |p: &Point| p.observation.against().map(|against| run.model.against_name(against));
     c.text("against", points.iter().map(against));
-    let places: Vec<Option<&Assignment>> = points.iter().map(|p| assignment(run, p.observation)).collect();
+    let assigned: BTreeMap<DwellId, &Assignment> =
+        run.recordings.iter().flat_map(RecordingRun::assigned).collect();
+    let places: Vec<Option<&Assignment>> =
+        points.iter().map(|p| assigned.get(&p.observation.dwell).copied()).collect();
     c.confidence(&places);
     for j in 0..run.model.joint_count() {
         let joint = format!("joint{}", j + 1);
@@ -123,10 +129,6 @@ fn parameters(run: &Run) -> Columns {
     c.text("role", rows.iter().map(|e| Some(role_word(e.parameter.role))));
     c.text("meaning", rows.iter().map(|e| Some(e.parameter.meaning.as_str())));
     c
-}
-
-fn assignment<'a>(run: &'a Run, o: &Observation) -> Option<&'a Assignment> {
-    run.recordings.get(o.dwell.recording)?.assignments().iter().find(|a| a.dwell == o.dwell)
 }
 
 /// A table under construction, column by column.

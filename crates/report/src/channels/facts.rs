@@ -4,13 +4,14 @@ use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use crate::points::Point;
 use crate::proto;
 use crate::recording_names::RecordingNames;
-use crate::run::{RecordingRun, Run, VERSION, effects, role_word, status_word};
+use crate::run::{Run, VERSION, effects, role_word, status_word};
 use crate::text::{conclusion, estimate_shown, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
-use armcal_core::{Dwell, ErrorStats, TipMeasurement};
+use armcal_core::{Dwell, DwellId, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
-use armcal_table::Place;
+use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
@@ -25,8 +26,10 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
         begin_ns,
         &calibration(&run.pipeline_name, &run.calibration, conclusion(&run.calibration), begin_ns),
     );
+    let used: BTreeSet<DwellId> = points.iter().map(|p| p.observation.dwell).collect();
     for (index, recording) in run.recordings.iter().enumerate() {
         let start_ns = start_ns(recording);
+        let (assigned, why_not) = (recording.assigned(), recording.why_not());
         if let Some(clock) = &recording.clock {
             let message = clock_alignment(clock, &recording.name, index, start_ns);
             out.put("/armcal/clock", start_ns, &message);
@@ -36,8 +39,9 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
             let seen = recording.clock.as_ref().filter(|_| dwell.tip.is_some());
             let publish_ns = seen.map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
             out.put_published("/armcal/dwells", time_ns, publish_ns, &dwell_message(&recording.name, dwell));
-            let used = points.iter().any(|p| p.observation.dwell == dwell.id);
-            out.put("/armcal/assignments", time_ns, &assignment(recording, dwell, used));
+            let place = (assigned.get(&dwell.id).copied(), why_not.get(&dwell.id).copied());
+            let message = assignment(&recording.name, dwell, place, used.contains(&dwell.id));
+            out.put("/armcal/assignments", time_ns, &message);
         }
     }
     for point in points {
@@ -80,18 +84,22 @@ fn tip(t: &TipMeasurement) -> proto::TipMeasurement {
     }
 }
 
-fn assignment(recording: &RecordingRun, dwell: &Dwell, used: bool) -> proto::Assignment {
+/// Where a dwell of the recording of this name was, and why it was not used.
+fn assignment(
+    recording: &str,
+    dwell: &Dwell,
+    (assigned, why_not): (Option<&Assignment>, Option<&str>),
+    used: bool,
+) -> proto::Assignment {
     use proto::assignment::Place as P;
-    let assigned = recording.assignments().iter().find(|a| a.dwell == dwell.id);
-    let rejection = recording.rejections.iter().find(|r| r.dwell == dwell.id);
     let mut message = proto::Assignment {
         timestamp: time(dwell.mid_ns()),
-        recording: recording.name.clone(),
+        recording: recording.to_owned(),
         recording_index: count(dwell.id.recording),
         dwell: count(dwell.id.dwell),
         distance_mm: assigned.map(|a| a.distance_m * 1e3).filter(|d| d.is_finite()),
         used,
-        why: rejection.map(|r| r.why.clone()).unwrap_or_default(),
+        why: why_not.unwrap_or_default().to_owned(),
         ..Default::default()
     };
     match assigned.map(|a| &a.place) {

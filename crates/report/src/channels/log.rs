@@ -4,9 +4,10 @@ use super::{Messages, run_end_ns, run_start_ns, start_ns, timestamp};
 use crate::findings::Findings;
 use crate::run::{Run, VERSION};
 use crate::text::conclusion;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{DwellId, Severity, Stage, Warning};
 use foxglove::messages as fox;
 use foxglove::messages::log::Level;
+use std::collections::BTreeMap;
 
 const TOPIC: &str = "/armcal/log";
 
@@ -31,9 +32,9 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
         for warning in recording.all_warnings() {
             put_warning(out, start_ns, &names.warning(warning));
         }
+        let mid_ns: BTreeMap<DwellId, i64> = recording.dwells.iter().map(|d| (d.id, d.mid_ns())).collect();
         for rejection in &recording.rejections {
-            let dwell = recording.dwells.iter().find(|d| d.id == rejection.dwell);
-            let time_ns = dwell.map_or(start_ns, |d| d.mid_ns());
+            let time_ns = mid_ns.get(&rejection.dwell).copied().unwrap_or(start_ns);
             let why = format!("dwell {} not used: {}", rejection.dwell.dwell, rejection.why);
             put(out, time_ns, Level::Debug, "armcal.dwell", &recording.name, why);
         }
