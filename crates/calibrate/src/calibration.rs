@@ -24,7 +24,7 @@ use crate::nominal::{self, Nominal};
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::poses::measured_together;
 use crate::priors::scales_of;
-use crate::remembered::{Looked, is_of_many_blocks, look};
+use crate::remembered::{Looked, look};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::Model;
@@ -109,11 +109,11 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     // derivative of that is exact enough for it.
     let near = match judge.config.objective {
         Objective::Paper => None,
-        _ => Some(Nearby { looked: judge.look(&last, holdout.turns.len())?, turn: &last }),
+        _ => Some((&last, judge.look(&last, holdout.turns.len())?)),
     };
+    let near = near.as_ref().map(|(last, looked)| (*last, looked.as_deref()));
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
-    let turn =
-        |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near.as_ref());
+    let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
     let turns: Vec<Result<Turn, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
     gathered(judge, holdout, &turns, last)
@@ -229,26 +229,13 @@ struct Judge<'a> {
     elsewhere: Option<&'a dyn Elsewhere>,
 }
 
-/// A turn that saw more.
-struct Nearby<'a> {
-    turn: &'a Turn,
-    looked: Looks,
-}
-
-/// All observations where the fit to them ended, and where the nominal arm's frames did.
-#[derive(Default)]
-struct Looks {
-    fit: Option<Arc<Looked>>,
-    nominal: Option<Arc<Looked>>,
-}
-
 impl Judge<'_> {
     /// Fits without the observations `held`, from nominal or from the turn `near` that saw them too. Where the nominal arm and
     /// its frames are known they are not looked for.
     fn turn(
         &self,
         (held, nominal): (&[usize], Option<&Vec<f64>>),
-        near: Option<&Nearby<'_>>,
+        near: Option<(&Turn, Option<&Looked>)>,
     ) -> Result<Turn, CalibrateError> {
         let places = |is_held: bool| -> Vec<usize> {
             let all = 0..self.observations.len();
@@ -268,20 +255,16 @@ impl Judge<'_> {
         let unseen = self.frames_only_in(&test, &train);
         let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
-        let here = |all: &Option<Arc<Looked>>| self.looked_at(all.as_deref()?, &seen, &train);
         let mut nominal_values = match (nominal, near) {
             (Some(known), _) => known.clone(),
-            (None, Some(near)) => {
-                let looked = here(&near.looked.nominal);
-                frames::fit_on_fewer(&train, (&near.turn.nominal_values, looked), self.config)?
-            }
+            (None, Some((near, _))) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
             (None, None) => frames::fit_on(&train, self.config)?,
         };
         let free = |p: &Parameter| p.free && !of_unseen(p);
         let mut fit = match near {
-            Some(near) => {
-                let looked = here(&near.looked.fit);
-                let near = Near { looked, ..self.near(&near.turn.fit, &nominal_values, &of_unseen) };
+            Some((near, looked)) => {
+                let looked = looked.and_then(|looked| self.looked_at(looked, &seen, &train));
+                let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
                 fit_near(&train, near, &free, self.config)?
             }
             None => fit_problem(&train, &nominal_values, &free, self.config)?,
@@ -355,18 +338,13 @@ impl Judge<'_> {
         Near { values, sigma_scale: fit.sigma_scale, prior_scales, looked: None }
     }
 
-    /// What several turns begin with that begin where the last one ended.
-    fn look(&self, last: &Turn, turns: usize) -> Result<Looks, CalibrateError> {
+    /// All observations where the fit to them ended, for several turns that begin there.
+    fn look(&self, last: &Turn, turns: usize) -> Result<Option<Arc<Looked>>, CalibrateError> {
         if turns < 2 || self.elsewhere.is_some() {
-            return Ok(Looks::default());
+            return Ok(None);
         }
         let problem = ModelProblem::new(self.model, self.observations, self.config)?;
-        let fit = Some(look(&problem, &last.values, &|p| p.free, self.config)?);
-        let nominal = match self.nominal.turns.is_empty() && is_of_many_blocks(&problem) {
-            true => Some(look(&problem, &last.nominal_values, &frames::is_free, self.config)?),
-            false => None,
-        };
-        Ok(Looks { fit, nominal })
+        look(&problem, &last.values, &|p| p.free, self.config).map(Some)
     }
 
     /// What is known of all observations, of a problem with those at these places; none where its blocks are others.

@@ -6,8 +6,7 @@
 //! turns off. What remains is left to the solver, over these parameters alone.
 
 use crate::model_problem::ModelProblem;
-use crate::problem::Problem;
-use crate::remembered::{Looked, Remembered};
+use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, fit};
@@ -64,10 +63,9 @@ pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<V
 }
 
 /// [`fit_on`] from where the frames of more observations ended, those among them: to the same minimum, only the way is shorter.
-/// Of many the derivative there, where it is known, stays.
 pub(crate) fn fit_on_fewer(
     problem: &ModelProblem<'_>,
-    (of_more, looked): (&[f64], Option<Looked>),
+    of_more: &[f64],
     config: &FitConfig,
 ) -> Result<Vec<f64>, CalibrateError> {
     let touched = touched(problem);
@@ -75,13 +73,6 @@ pub(crate) fn fit_on_fewer(
     let mut start = problem.model().nominal();
     let known = problem.parameters().iter().zip(of_more).zip(&mut start).filter(|((p, _), _)| free(p));
     known.for_each(|((_, value), start)| *start = *value);
-    let looked = looked.filter(|_| !config.every_step);
-    if let Some(about) = looked.and_then(|looked| Remembered::about(problem, &looked)) {
-        let values = solved(&about, start.clone(), config, &free)?;
-        if about.is_straight_to(&values) {
-            return Ok(values);
-        }
-    }
     solved(problem, start, config, &free)
 }
 
@@ -109,13 +100,13 @@ pub(crate) fn fit_some(
     solved(problem, start, config, &free)
 }
 
-pub(crate) fn is_free(p: &Parameter) -> bool {
+fn is_free(p: &Parameter) -> bool {
     p.free && p.role == Role::EstimatedFrame
 }
 
 /// The frames `free` where the solver ends with them, the others at `start`.
 fn solved(
-    problem: &dyn Problem,
+    problem: &ModelProblem<'_>,
     start: Vec<f64>,
     config: &FitConfig,
     free: &dyn Fn(&Parameter) -> bool,

@@ -65,11 +65,6 @@ const MANY_BLOCKS: usize = 1_000;
 /// standard deviations.
 const STRAIGHT: f64 = 1e-4;
 
-/// Whether a fit to some of its blocks ends where the derivative is that of all.
-pub(crate) fn is_of_many_blocks(problem: &dyn Problem) -> bool {
-    problem.blocks() >= MANY_BLOCKS
-}
-
 /// A problem at these parameters, as fits of the parameters `free` will ask of it.
 pub(crate) fn look(
     problem: &dyn Problem,
@@ -97,7 +92,7 @@ impl<'a> Remembered<'a> {
             looked.blocks.iter().map(|block| block.get().cloned()).collect::<Option<_>>()?;
         let mut remembered = Remembered::new(problem, Some(looked.clone()));
         let looked = remembered.at(&looked.p);
-        let many = is_of_many_blocks(problem) && blocks.len() == problem.blocks();
+        let many = blocks.len() >= MANY_BLOCKS && blocks.len() == problem.blocks();
         many.then(|| {
             remembered.about = Some(About { looked, blocks });
             remembered

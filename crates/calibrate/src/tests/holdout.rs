@@ -1,7 +1,7 @@
 use super::rig;
 use crate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, calibrate, fit};
 use armcal_core::{DwellId, Observation, Pose, Reference};
-use armcal_model::Model;
+use armcal_model::{Frame, Model};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -16,7 +16,15 @@ fn tracked() -> (Model, Vec<Observation>) {
 }
 
 fn tracked_often(dwells: usize) -> (Model, Vec<Observation>) {
-    let model = rig::tracked_model();
+    on(rig::tracked_model(), dwells)
+}
+
+/// Nobody measured where the base stands.
+fn placed_somewhere(dwells: usize) -> (Model, Vec<Observation>) {
+    on(rig::model(Frame::estimated("base", Pose::identity()), Vec::new()), dwells)
+}
+
+fn on(model: Model, dwells: usize) -> (Model, Vec<Observation>) {
     let mut rng = rig::rng(31);
     let truth = rig::planted(&model, &mut rng, 0.9);
     let observations = rig::tracked(&model, &truth, dwells, &mut rng);
@@ -65,7 +73,7 @@ fn what_is_held_out_does_not_touch_the_fit() {
 /// evaluates everything does; one of many dwells too, to which the derivative of that fit is enough.
 #[test]
 fn shorter_ways_end_at_the_same_place() {
-    for (model, observations) in [tracked(), boards(), tracked_often(1_400)] {
+    for (model, observations) in [tracked(), boards(), tracked_often(1_400), placed_somewhere(1_400)] {
         let holdout: HoldoutConfig = toml::from_str("kind = \"cavity-folds\"\nk = 4").unwrap();
         let of = |every_step| {
             let config = FitConfig { every_step, ..FitConfig::default() };
@@ -78,6 +86,7 @@ fn shorter_ways_end_at_the_same_place() {
         }
         for (a, b) in short.residuals.iter().zip(&long.residuals) {
             assert!((a.whitened - b.whitened).amax() < 1e-4, "{}", a.dwell);
+            assert!((a.nominal_m - b.nominal_m).amax() < 1e-4 * rig::SIGMA_M, "{}", a.dwell);
         }
     }
 }
