@@ -30,7 +30,7 @@ pub struct Request {
     /// Board whose cavities the tip sat in.
     #[arg(long, value_name = "FILE")]
     pub board: Option<PathBuf>,
-    /// Topic of the joint readings, where several could be it.
+    /// Topic of the joint readings, where several could be it; of a field in a message TOPIC:PATH.
     #[arg(long, value_name = "TOPIC")]
     pub joints: Option<String>,
     /// First link of the arm in the URDF.
@@ -92,10 +92,14 @@ fn free(path: &Path, force: bool) -> Result<(), Error> {
 fn text(proposal: &Proposal) -> String {
     let mut out = String::new();
     for (body, cast) in &proposal.bodies {
-        let name =
-            body.body.as_ref().map_or_else(|| body.topic.clone(), |name| format!("{name} of {}", body.topic));
         let sure = if cast.sure { "" } else { " (unsure)" };
-        let _ = writeln!(out, " {}: {}{sure}: {}", printable(&name), cast.role.word(), printable(&cast.why));
+        let _ = writeln!(
+            out,
+            " {}: {}{sure}: {}",
+            printable(&body.shown()),
+            cast.role.word(),
+            printable(&cast.why)
+        );
     }
     for (what, all) in [("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)] {
         for said in all {
