@@ -152,6 +152,9 @@ fn a_split_bag_is_one_recording_and_describes_its_robot() {
     assert!(text.contains("[\"right_0.mcap\", \"right_1.mcap\"]"), "{text}");
     assert!(text.contains("urdf = \"proposed.urdf\""), "{text}");
     assert_eq!(std::fs::read_to_string(folder.path().join("proposed.urdf")).expect("URDF"), urdf);
+    let again = init(&pipeline, &[&bag, &first, &second, &other, Path::new("--force")]);
+    let said = String::from_utf8_lossy(&again.stdout).into_owned();
+    assert!(said.contains("proposed.urdf") && !said.contains("Not used"), "{said}");
     let whole_mm = held_out_mm(folder.path(), "whole", shipped("mukca-panda4.toml"));
     let split_mm = held_out_mm(folder.path(), "split", text);
     println!("whole {whole_mm:.3}, split {split_mm:.3} mm");

@@ -80,7 +80,7 @@ fn of_a_vendor(out: &Path) {
                 let pose = ros2::pose_stamped(header, [p.x, p.y, p.z], [r.x, r.y, r.z, r.w]);
                 put(
                     "/driver/tcp",
-                    (&ros2::POSE_STAMPED.name, "ros2msg", ros2::POSE_STAMPED.text.as_bytes()),
+                    (ros2::POSE_STAMPED.name, "ros2msg", ros2::POSE_STAMPED.text.as_bytes()),
                     &pose,
                 );
                 k += 1;

@@ -48,12 +48,20 @@ fn points_of_a_tracker_calibrate_the_arm() {
     let hole = measured.lines().nth(9).expect("a row").to_owned();
     std::fs::write(folder.path().join("points.csv"), measured.replace(&hole, "P8,-,-,-")).expect("written");
     let summary = run_pipeline(&pipeline(folder.path(), ""), &folder.path().join("out"), &[0, 3]);
-    let said = summary["warnings"].to_string();
+    let said = summary["recordings"][0]["warnings"].to_string();
     assert!(said.contains("its 56 rows are the dwells 2 to 57; 6 of 61 dwells have no point"), "{said}");
     let [nominal_mm, mm] =
         ["nominal", "fitted"].map(|n| number(&summary, &format!("/fit/holdout/{n}_mm/mean")));
     println!("{nominal_mm:.3} to {mm:.3} mm");
-    assert_eq!(number(&summary, "/fit/holdout/fitted_mm/n"), 55.0);
+    assert_eq!(number(&summary, "/fit/holdout/n"), 55.0);
+    // The same points, said to be the dwells after these: told.
+    let wrong = pipeline(folder.path(), ", first_dwell = 4");
+    let wrong = run_pipeline(&wrong, &folder.path().join("wrong"), &[0, 3]);
+    let said = wrong["recordings"][0]["warnings"].to_string();
+    assert!(
+        said.contains("are the rows in the order of the dwells") && said.contains("inadequate"),
+        "{said}"
+    );
     // One reading of the camera: 0.15 mm an axis or 0.24 mm on average.
     assert!(mm < 0.35, "{mm}");
 }

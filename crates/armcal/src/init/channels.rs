@@ -80,6 +80,7 @@ struct Found {
     messages: u64,
     role: Option<Role>,
     thermometer: bool,
+    describes: bool,
     names: Vec<String>,
     why_not: String,
 }
@@ -135,7 +136,10 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
                     fields.add(topic.messages, message.log_ns as i64, &data);
                 }
                 if is_text(message.channel) {
-                    urdfs.extend(text_in(&data).filter(|text| text.contains("<robot")).map(str::to_owned));
+                    let found = text_in(&data).filter(|text| text.contains("<robot")).map(str::to_owned);
+                    let before = urdfs.len();
+                    urdfs.extend(found);
+                    topic.describes |= urdfs.len() > before;
                 }
                 if let Some((_, plan)) = plans.iter().find(|(own, _)| **own == *message.channel) {
                     topic.add(names_in(plan, &data));
@@ -145,11 +149,12 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
             .map_err(|source: RecordingError| Error::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();
-            let Found { messages, role, thermometer, names, why_not, .. } = own;
+            let Found { messages, role, thermometer, describes, names, why_not, .. } = own;
             all.recordings += usize::from(messages > 0);
             all.messages += messages;
             all.role = all.role.or(role);
             all.thermometer |= thermometer;
+            all.describes |= describes;
             all.add(names);
             all.why_not = why_not;
         }
@@ -184,6 +189,8 @@ impl Channels {
         let mut leave = |why: String| self.left.push((topic.clone(), why));
         match found.role {
             _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),
+            // What it describes is told with the arm.
+            None if found.describes => {}
             None if found.why_not.is_empty() => leave("not of a kind that a calibration reads".to_owned()),
             None => leave(found.why_not),
             Some(_) if found.recordings < recordings => {

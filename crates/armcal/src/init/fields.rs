@@ -132,9 +132,8 @@ impl Fields {
             }
             let Rows::Pose(rows) = &rows else { continue };
             for p in &rows.position {
-                for k in 0..3 {
-                    point.low[k] = point.low[k].min(p[k]);
-                    point.high[k] = point.high[k].max(p[k]);
+                for ((low, high), x) in point.low.iter_mut().zip(&mut point.high).zip(p) {
+                    (*low, *high) = (low.min(*x), high.max(*x));
                 }
             }
         }

@@ -7,13 +7,16 @@
 use crate::error::Error;
 use crate::pipeline::{PointsFile, read_text};
 use crate::stages::links::place;
-use armcal_core::{Dwell, Severity, Stage, TipMeasurement, Warning};
+use armcal_core::robust::median;
+use armcal_core::{Dwell, Pose, Severity, Stage, TipMeasurement, Warning};
 use armcal_model::Model;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
 /// A run of dwells must explain the rows so many times better than the next.
 const CLEAR: f64 = 2.0;
+/// Rows that are off by more than this share of how far they are apart were measured in other dwells.
+const DOUBTFUL: f64 = 0.25;
 
 /// Gives each dwell of a recording the point of its row.
 pub fn add(
@@ -27,16 +30,19 @@ pub fn add(
         problem: format!("{}: {problem}", path.display()),
     };
     let rows = parse(&read_text("CSV of points", path)?, points.unit.to_m()).map_err(bad)?;
+    let fit = Fit::of(&rows, model, dwells);
     let first = match points.first_dwell {
         Some(first) if first + rows.len() <= dwells.len() => first,
         Some(first) => {
-            let (rows, dwells) = (rows.len(), dwells.len());
-            return Err(bad(format!(
-                "{rows} rows from dwell {first} on are more than the {dwells} dwells of the recording"
-            )));
+            let (rows, all) = (rows.len(), dwells.len());
+            let said =
+                format!("{rows} rows from dwell {first} on are more than the {all} dwells of the recording");
+            return Err(bad(said));
         }
-        None => first_of(&rows, model, dwells).map_err(bad)?,
+        None => fit.first().map_err(bad)?,
     };
+    let off_m = fit.off_m(first);
+    let is_doubtful = off_m.is_finite() && off_m > DOUBTFUL * fit.spread_m();
     let variance_m2 = (points.sigma_mm * 1e-3).powi(2);
     for (dwell, row) in dwells[first..].iter_mut().zip(&rows) {
         dwell.tip = row.map(|position_m| TipMeasurement {
@@ -50,42 +56,73 @@ pub fn add(
     }
     let without = dwells.iter().filter(|d| d.tip.is_none()).count();
     let (rows, all, last) = (rows.len(), dwells.len(), first + rows.len() - 1);
-    let said =
-        format!("its {rows} rows are the dwells {first} to {last}; {without} of {all} dwells have no point");
-    Ok(Warning::new(Severity::Notice, Stage::Dwell, "points-file", path.display().to_string(), said))
+    let (severity, doubt) = match is_doubtful {
+        true => {
+            (Severity::Inadequate, " only: are the rows in the order of the dwells, and is the unit right?")
+        }
+        false => (Severity::Notice, ""),
+    };
+    let fits = match off_m.is_finite() {
+        true => format!("; half of them fit the nominal arm to {:.1} mm{doubt}", off_m * 1e3),
+        false => String::new(),
+    };
+    let said = format!(
+        "its {rows} rows are the dwells {first} to {last}; {without} of {all} dwells have no point{fits}"
+    );
+    Ok(Warning::new(severity, Stage::Dwell, "points-file", path.display().to_string(), said))
 }
 
-/// The dwell of the first row: of all runs of dwells that are as long, the one that explains the rows.
-fn first_of(rows: &[Option<Vector3<f64>>], model: &Model, dwells: &[Dwell]) -> Result<usize, String> {
-    let (n, m) = (rows.len(), dwells.len());
-    if n > m {
-        return Err(format!(
-            "{n} rows are more than the {m} dwells of the recording: leave out rows of points at which the arm did not pause, or mend \
-             [dwell] (`armcal run -v` lists what is a dwell)"
-        ));
+/// Rows, and where the nominal arm was in every dwell.
+struct Fit<'a> {
+    rows: &'a [Option<Vector3<f64>>],
+    poses: Vec<Pose>,
+}
+
+impl Fit<'_> {
+    fn of<'a>(rows: &'a [Option<Vector3<f64>>], model: &Model, dwells: &[Dwell]) -> Fit<'a> {
+        let nominal = model.nominal();
+        Fit { rows, poses: dwells.iter().map(|d| model.tip_in_base(&nominal, &d.joint_rad)).collect() }
     }
-    let nominal = model.nominal();
-    let poses: Vec<_> = dwells.iter().map(|d| model.tip_in_base(&nominal, &d.joint_rad)).collect();
-    let off_m = |first: usize| {
-        let seen = poses[first..].iter().zip(rows).filter_map(|(pose, row)| Some((*pose, (*row)?)));
+
+    /// How far the rows are off the nominal arm as the dwells from one on, the median [m]; infinite for fewer than six.
+    fn off_m(&self, first: usize) -> f64 {
+        let seen = self.poses[first..].iter().zip(self.rows).filter_map(|(pose, row)| Some((*pose, (*row)?)));
         let (poses, seen_m): (Vec<_>, Vec<_>) = seen.unzip();
         place(&poses, &seen_m).map_or(f64::INFINITY, |placed| placed.off_m)
-    };
-    let mut all: Vec<(f64, usize)> = (0..=m - n).map(|first| (off_m(first), first)).collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    match all.as_slice() {
-        [(_, only)] => Ok(*only),
-        [(best_m, _), ..] if best_m.is_infinite() => Err(format!(
-            "so few points do not tell which {n} of the {m} dwells they were measured in: set first_dwell"
-        )),
-        [(best_m, first), (next_m, _), ..] if *best_m * CLEAR < *next_m => Ok(*first),
-        [(best_m, first), (next_m, next), ..] => Err(format!(
-            "{n} rows and {m} dwells: from dwell {first} on they fit the nominal arm to {:.2} mm, from {next} on to {:.2} mm, which \
-             does not tell; set first_dwell, and leave a row without coordinates for a dwell that was not measured",
-            best_m * 1e3,
-            next_m * 1e3
-        )),
-        [] => Ok(0),
+    }
+
+    /// How far half of the points are from their middle [m].
+    fn spread_m(&self) -> f64 {
+        let points: Vec<Vector3<f64>> = self.rows.iter().flatten().copied().collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        median(&points.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>())
+    }
+
+    /// The dwell of the first row: of all runs of dwells that are as long, the one that explains the rows.
+    fn first(&self) -> Result<usize, String> {
+        let (n, m) = (self.rows.len(), self.poses.len());
+        if n > m {
+            return Err(format!(
+                "{n} rows are more than the {m} dwells of the recording: leave out points at which the arm did not pause; [dwell] says \
+                 what is a pause"
+            ));
+        }
+        let mut all: Vec<(f64, usize)> = (0..=m - n).map(|first| (self.off_m(first), first)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match all.as_slice() {
+            [] => Ok(0),
+            [(_, only)] => Ok(*only),
+            [(best_m, _), ..] if best_m.is_infinite() => Err(format!(
+                "so few points do not tell which {n} of the {m} dwells they were measured in: set first_dwell"
+            )),
+            [(best_m, first), (next_m, _), ..] if *best_m * CLEAR < *next_m => Ok(*first),
+            [(best_m, first), (next_m, next), ..] => Err(format!(
+                "{n} rows and {m} dwells: from dwell {first} on they fit the nominal arm to {:.2} mm, from {next} on to {:.2} mm, \
+                 which does not tell; set first_dwell, and leave a row without coordinates for a dwell that was not measured",
+                best_m * 1e3,
+                next_m * 1e3
+            )),
+        }
     }
 }
 
