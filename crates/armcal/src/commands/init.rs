@@ -67,10 +67,14 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         out: request.out.clone(),
     };
     let proposal = propose(&asked, &Progress::new())?;
-    for (path, text) in &proposal.beside {
+    // What is there already, word for word, stays: a robot's description has no mark of armcal's.
+    let is_new =
+        |(path, text): &&(PathBuf, String)| std::fs::read(path).ok().as_deref() != Some(text.as_bytes());
+    let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();
+    for (path, text) in &beside {
         free(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
     }
-    for (path, text) in &proposal.beside {
+    for (path, text) in &beside {
         atomic::write(path, text.as_bytes()).map_err(Error::Output)?;
     }
     atomic::write(&proposal.out, proposal.pipeline.text.as_bytes()).map_err(Error::Output)?;
