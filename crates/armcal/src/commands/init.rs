@@ -68,6 +68,10 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     };
     let proposal = propose(&asked, &Progress::new())?;
     // What is there already, word for word, stays: a robot's description has no mark of armcal's.
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "an output of an earlier time, not an input: it may be written over"
+    )]
     let is_new =
         |(path, text): &&(PathBuf, String)| std::fs::read(path).ok().as_deref() != Some(text.as_bytes());
     let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();
