@@ -152,6 +152,9 @@ fn a_split_bag_is_one_recording_and_describes_its_robot() {
     assert!(text.contains("[\"right_0.mcap\", \"right_1.mcap\"]"), "{text}");
     assert!(text.contains("urdf = \"proposed.urdf\""), "{text}");
     assert_eq!(std::fs::read_to_string(folder.path().join("proposed.urdf")).expect("URDF"), urdf);
+    let again = init(&pipeline, &[&bag, &first, &second, &other, Path::new("--force")]);
+    let said = String::from_utf8_lossy(&again.stdout).into_owned();
+    assert!(said.contains("proposed.urdf") && !said.contains("Not used"), "{said}");
     let whole_mm = held_out_mm(folder.path(), "whole", shipped("mukca-panda4.toml"));
     let split_mm = held_out_mm(folder.path(), "split", text);
     println!("whole {whole_mm:.3}, split {split_mm:.3} mm");
@@ -208,6 +211,13 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
     std::fs::create_dir(&ros2).expect("a folder");
     std::fs::write(ros2.join("x_0.db3"), b"SQLite format 3\0").expect("a file");
     let nowhere = folder.path().join("nowhere.mcap");
+    let nothing = file("g.mcap", b"");
+    let metadata = file("metadata.yaml", b"rosbag2_bagfile_information: {}\n");
+    let no_joints = folder.path().join("no-joints.mcap");
+    let normal = root().join("fixtures/paper/normal.mcap");
+    let thin = ["--topic", "/vicon/tip/tip", "--out"].map(Path::new);
+    let thinned = armcal([&[Path::new("extract"), &normal], &thin[..], &[no_joints.as_path()]].concat());
+    assert!(thinned.status.success(), "{}", String::from_utf8_lossy(&thinned.stderr));
     let fixtures = root().join("fixtures");
     let (paper, panda) = (fixtures.join("paper/normal.mcap"), fixtures.join("mukca-panda4/front.mcap"));
     let urdf = fixtures.join("mukca-panda4/panda.urdf");
@@ -222,6 +232,16 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
         (vec![&unnamed], 1, vec!["f.sqlite", "database", ".db3: rename"]),
         (vec![&garbage, option("--dh"), &dh], 1, vec!["d.mcap", "no MCAP"]),
         (vec![&renamed], 1, vec!["e.data", "rename"]),
+        (vec![&nothing], 1, vec!["g.mcap", "is empty", "nothing was recorded"]),
+        (vec![&metadata], 1, vec!["metadata.yaml", "give the folder"]),
+        (vec![&urdf], 1, vec!["panda.urdf", "--urdf"]),
+        (
+            vec![&no_joints, option("--dh"), &dh],
+            1,
+            vec!["/vicon/tip/tip (a tracked body)", "record the topic"],
+        ),
+        (vec![&panda, option("--dh"), &urdf], 1, vec!["panda.urdf", "--urdf"]),
+        (vec![&panda, option("--urdf"), &dh], 1, vec!["right_arm.toml", "--dh"]),
         (vec![&empty], 1, vec!["empty", "without any recording"]),
         (vec![&ros2], 1, vec!["x_0.db3", "database"]),
         (vec![&nowhere, option("--dh"), &dh], 1, vec!["nowhere.mcap"]),
@@ -277,6 +297,27 @@ fn changed(folder: &Path, configure: impl Fn(&mut LabConfig), change: impl Fn(&m
     arguments.extend([Path::new("--dh"), &dh, Path::new("--board"), &board]);
     let pipeline = proposed(folder, &arguments);
     std::fs::read_to_string(pipeline).expect("a proposal")
+}
+
+/// What lies there is not asked for: the one URDF beside the recordings, bags in folders of a folder.
+#[test]
+fn what_lies_beside_the_recordings_is_found() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let fixture = root().join("fixtures/mukca-panda4");
+    let session = folder.path().join("monday");
+    for part in ["front", "right", "very-front"] {
+        let bag = session.join(part);
+        std::fs::create_dir_all(&bag).expect("a folder");
+        std::fs::copy(fixture.join(format!("{part}.mcap")), bag.join("bag_0.mcap")).expect("copied");
+        std::fs::write(bag.join("metadata.yaml"), "rosbag2_bagfile_information: {}\n").expect("metadata");
+    }
+    let urdf = fixture.join("panda.urdf");
+    let text = std::fs::read_to_string(proposed(folder.path(), &[&session, Path::new("--urdf"), &urdf]))
+        .expect("a proposal");
+    assert_eq!(text.matches("\n[[recordings]]\n").count(), 3, "{text}");
+    let other = tempfile::tempdir().expect("temporary folder");
+    let text = std::fs::read_to_string(proposed(other.path(), &[&fixture])).expect("a proposal");
+    assert!(text.contains("panda.urdf\" # the only one beside the recordings"), "{text}");
 }
 
 /// Each changes nothing but how the same session is recorded: the proposal says so, and errs as the unchanged one.

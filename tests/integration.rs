@@ -16,6 +16,7 @@ mod real_robots;
 
 /// Is a pipeline proposed from recordings alone as good as one written by hand, and honest about what it could not see?
 mod init;
+mod init_fields;
 
 /// Does a proposed pipeline take every tracked body for what it is?
 mod init_roles;
@@ -120,6 +121,7 @@ mod counted_once;
 mod verify;
 
 /// Does what one session taught help in another, effect by effect?
+mod tracker_points;
 mod transfer;
 
 /// Does the calibration table do without a camera?

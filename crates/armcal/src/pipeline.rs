@@ -6,12 +6,14 @@
 mod loads;
 mod markers;
 mod measures;
+mod points;
 mod text;
 
 pub use loads::LoadEntry;
 pub use markers::MarkerSection;
 pub(crate) use measures::knowledge;
 pub use measures::{Measure, MeasureKind, MeasureSection};
+pub use points::PointsFile;
 pub(crate) use text::read_text;
 
 use crate::check::CheckSection;
@@ -131,6 +133,8 @@ pub struct RecordingEntry {
     /// Loads at any tip or marker.
     #[serde(default)]
     pub loads: Vec<LoadEntry>,
+    /// Points of the tip that a laser tracker exported, one a dwell.
+    pub points: Option<PointsFile>,
 }
 
 impl RecordingEntry {
@@ -464,13 +468,13 @@ impl Pipeline {
         if self.frames.base.pose == FramePose::Measured && self.streams.base.is_none() {
             return fail("frames.base.pose", "is \"measured\" but there is no [streams.base]".into());
         }
-        let tracked = self.streams.tip.is_some() || !self.markers.is_empty();
+        let tracked = self.tip_is_tracked() || !self.markers.is_empty();
         let measured = self.closed_chain.is_some() || !self.measure.is_empty();
         if !measured && self.table.is_none() && !tracked {
-            let problem =
-                "is absent and so are [streams.tip] and [[measure]]: nothing says where the tip was";
+            let problem = "is absent and so are [streams.tip], `points` of [[recordings]] and [[measure]]: nothing says where the tip was";
             return fail("table", problem.into());
         }
+        points::check(self, &fail)?;
         markers::check(self, &fail)?;
         measures::check(self, &fail)?;
         if let Some((key, said)) = self.closed_chain.as_ref().and_then(|chain| chain.contradiction(self)) {

@@ -62,6 +62,7 @@ pub use bytes::{Access, identity_of, sha256_of};
 pub use error::{RecordingError, nearest, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime};
+pub use foreign::inflated;
 pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
 pub use guard::{may_put, may_write, may_write_all};
 pub use mark::SET_POINTS_METADATA;

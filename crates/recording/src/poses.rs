@@ -107,7 +107,10 @@ pub(crate) fn frame_missing(
     present: &BTreeSet<String>,
 ) -> RecordingError {
     let wanted = stream.frame.as_deref().unwrap_or_default();
-    missing((role, stream), wanted, format!("never has that body in frame {wanted:?}"), present)
+    let why = format!(
+        "never has that body in frame {wanted:?} (one transform is read, not a chain of them: a frame that it is a child of)"
+    );
+    missing((role, stream), wanted, why, present)
 }
 
 fn missing(

@@ -4,6 +4,7 @@ use crate::clean::{Counts, Kept, drop_duplicates, in_time_order, rate_and_gap};
 use crate::clock::{choose, drop_stray, judge_header};
 use crate::gather::{Gathered, Kind, Request, gather};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
+use crate::streams::field_of;
 use crate::temperature::{Scale, like_fahrenheit};
 use crate::{
     Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
@@ -87,11 +88,12 @@ fn requests(streams: &Streams) -> Vec<Request<'_>> {
         requests.extend(stream.iter().map(|s| pose_request(role, None, s)));
     }
     requests.extend(streams.bodies.iter().map(|(name, s)| pose_request("bodies", Some(name), s)));
-    let scalar = |role, name, topic| Request { role, name, topic, kind: Kind::Scalar, fields: Vec::new() };
-    requests.extend(streams.temperature.iter().map(|s| scalar("temperature", None, s.topic.as_str())));
-    requests.extend(
-        streams.gauges.iter().map(|(name, s)| scalar("gauges", Some(name.as_str()), s.topic.as_str())),
-    );
+    let scalar =
+        |role, name, topic, value| Request { role, name, topic, kind: Kind::Scalar, fields: field_of(value) };
+    requests
+        .extend(streams.temperature.iter().map(|s| scalar("temperature", None, s.topic.as_str(), &s.value)));
+    let gauges = streams.gauges.iter();
+    requests.extend(gauges.map(|(name, s)| scalar("gauges", Some(name.as_str()), &s.topic, &s.value)));
     requests
 }
 

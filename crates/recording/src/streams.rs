@@ -248,6 +248,9 @@ impl LengthUnit {
 pub struct GaugeStream {
     /// Topic: a message of one number.
     pub topic: String,
+    /// Where the number is in messages that armcal does not know.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<String>,
     /// Unit of the readings; default `mm`.
     #[serde(default = "millimetres")]
     pub unit: LengthUnit,
@@ -257,6 +260,11 @@ pub struct GaugeStream {
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,
+}
+
+/// The one field of a message of one number, if the pipeline names it.
+pub(crate) fn field_of(value: &Option<String>) -> Vec<(Place, &str)> {
+    paths([(Place::Value, value)])
 }
 
 fn millimetres() -> LengthUnit {
@@ -269,6 +277,9 @@ fn millimetres() -> LengthUnit {
 pub struct ScalarStream {
     /// Topic.
     pub topic: String,
+    /// Where the number is in messages that armcal does not know, such as `motor.temperature`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<String>,
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,

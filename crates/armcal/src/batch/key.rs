@@ -122,9 +122,13 @@ fn settings(text: &str) -> String {
 }
 
 fn declared(entry: &RecordingEntry) -> String {
-    let RecordingEntry { tilt, load_kg, loads, .. } = entry;
+    let RecordingEntry { tilt, load_kg, loads, points, .. } = entry;
+    let points = points.as_ref().map_or(String::new(), |points| {
+        let content = armcal_recording::input::read_to_string(&points.csv).unwrap_or_default();
+        hash([format!("{points:?}"), content])
+    });
     let more: String = loads.iter().map(|load| format!(" {}:{:e}", load.at, load.kg)).collect();
-    hash([entry.name(), format!("{:e} {:e} {load_kg:e}{more}", tilt.roll_rad, tilt.pitch_rad)])
+    hash([entry.name(), format!("{:e} {:e} {load_kg:e}{more}{points}", tilt.roll_rad, tilt.pitch_rad)])
 }
 
 /// SHA-256 of parts that cannot run into each other.

@@ -59,6 +59,9 @@ impl Manifest {
         };
         let mut entries = file.recordings;
         for entry in &mut entries {
+            if let Some(points) = &mut entry.points {
+                points.csv = resolve(&folder, &points.csv);
+            }
             entry.paths = entry.paths.iter().flat_map(|p| recordings_at(&resolve(&folder, p))).collect();
         }
         let pipeline = file.pipeline.map(|p| folder.join(p));
@@ -80,7 +83,7 @@ impl Manifest {
                 for found in glob::glob(input).map_err(|e| bad(e.to_string()))? {
                     let found = found.map_err(|e| bad(e.to_string()))?;
                     let found = std::path::absolute(&found).unwrap_or(found);
-                    files.extend(recordings_at(&found).into_iter().filter(|p| !p.starts_with(&out)));
+                    files.extend(recordings_below(&found).into_iter().filter(|p| !p.starts_with(&out)));
                 }
             }
             if files.len() == before {
@@ -120,6 +123,14 @@ fn is_manifest(path: &Path) -> bool {
     path.is_file() && !is_recording(path)
 }
 
+/// The recordings in a folder, and those of the rosbag2 folders in it; of anything else itself.
+pub fn recordings_below(path: &Path) -> Vec<PathBuf> {
+    let inside = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut bags: Vec<PathBuf> = inside.filter(|p| p.join("metadata.yaml").is_file()).collect();
+    bags.sort();
+    recordings_at(path).into_iter().chain(bags.iter().flat_map(|bag| recordings_at(bag))).collect()
+}
+
 /// Files beside a rosbag2 `metadata.yaml` are one recording; every other file is one by itself.
 fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
     let mut bags: Vec<(PathBuf, Vec<PathBuf>)> = Vec::new();
@@ -135,7 +146,7 @@ fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
 }
 
 fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
-    RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0, loads: Vec::new() }
+    RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0, loads: Vec::new(), points: None }
 }
 
 /// Names without a name after as many of their last folders as it takes to tell them apart.

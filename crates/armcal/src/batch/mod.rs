@@ -16,7 +16,7 @@ mod work;
 mod workers;
 
 pub(crate) use key::Keys;
-pub use manifest::Manifest;
+pub use manifest::{Manifest, recordings_below};
 pub use shard::Shard;
 pub(crate) use store::write_one;
 

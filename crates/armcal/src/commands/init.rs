@@ -30,7 +30,7 @@ pub struct Request {
     /// Board whose cavities the tip sat in.
     #[arg(long, value_name = "FILE")]
     pub board: Option<PathBuf>,
-    /// Topic of the joint readings, where several could be it.
+    /// Topic of the joint readings, where several could be it; of a field in a message TOPIC:PATH.
     #[arg(long, value_name = "TOPIC")]
     pub joints: Option<String>,
     /// First link of the arm in the URDF.
@@ -67,10 +67,18 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         out: request.out.clone(),
     };
     let proposal = propose(&asked, &Progress::new())?;
-    for (path, text) in &proposal.beside {
+    // What is there already, word for word, stays: a robot's description has no mark of armcal's.
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "an output of an earlier time, not an input: it may be written over"
+    )]
+    let is_new =
+        |(path, text): &&(PathBuf, String)| std::fs::read(path).ok().as_deref() != Some(text.as_bytes());
+    let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();
+    for (path, text) in &beside {
         free(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
     }
-    for (path, text) in &proposal.beside {
+    for (path, text) in &beside {
         atomic::write(path, text.as_bytes()).map_err(Error::Output)?;
     }
     atomic::write(&proposal.out, proposal.pipeline.text.as_bytes()).map_err(Error::Output)?;
@@ -92,10 +100,14 @@ fn free(path: &Path, force: bool) -> Result<(), Error> {
 fn text(proposal: &Proposal) -> String {
     let mut out = String::new();
     for (body, cast) in &proposal.bodies {
-        let name =
-            body.body.as_ref().map_or_else(|| body.topic.clone(), |name| format!("{name} of {}", body.topic));
         let sure = if cast.sure { "" } else { " (unsure)" };
-        let _ = writeln!(out, " {}: {}{sure}: {}", printable(&name), cast.role.word(), printable(&cast.why));
+        let _ = writeln!(
+            out,
+            " {}: {}{sure}: {}",
+            printable(&body.shown()),
+            cast.role.word(),
+            printable(&cast.why)
+        );
     }
     for (what, all) in [("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)] {
         for said in all {

@@ -130,7 +130,7 @@ fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Resu
 
 /// How well the sensor saw the tip in the dwells of these recordings (their median).
 fn tracking(pipeline: &Pipeline, settled: &Settled) -> Option<Tracking> {
-    if pipeline.streams.tip.is_none() || !pipeline.observations.tracked {
+    if !pipeline.tip_is_tracked() || !pipeline.observations.tracked {
         return None;
     }
     let settings = &pipeline.observations;

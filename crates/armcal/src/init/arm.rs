@@ -1,11 +1,13 @@
 //! The nominal arm: which of its joints are recorded, from which link to which.
 
 use super::channels::{Channels, JointTopic};
+use super::fields::Field;
 use crate::error::Error;
 use crate::stages::frames::bare;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model};
 use roxmltree::{Document, Node};
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -39,8 +41,8 @@ pub struct Arm {
     pub base_link: Option<String>,
     /// Links that the tip may be, all behind the last joint; the first is the likeliest. Of a DH table none.
     pub tips: Vec<String>,
-    /// Topic of the joint readings, and the names in it in the order of the model.
-    pub topic: String,
+    /// The joint readings.
+    pub source: JointTopic,
     /// Joint names as recorded, in the order of the model.
     pub names: Vec<String>,
     /// Every link of the URDF.
@@ -75,15 +77,92 @@ impl Arm {
     }
 }
 
-/// Finds the arm: a file that the user names, or the description in the recordings, which goes `beside`.
-pub fn find(told: &Told, channels: &Channels, beside: &Path) -> Result<Arm, Error> {
+/// Finds the arm: a file that the user names, or the description in the recordings, which goes `beside`, or the only one in
+/// their `folders`. Joint readings of a known type come before fields with names, and these before fields without.
+pub fn find(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> Result<Arm, Error> {
+    if let Some(asked) = &told.joints
+        && !channels.joints.iter().any(|j| is_called(j, asked))
+    {
+        let present: Vec<String> = channels.joints.iter().map(JointTopic::shown).collect();
+        let problem = format!(
+            "--joints {asked} is no topic of joint readings in all recordings; there are: {}",
+            present.join(", ")
+        );
+        return Err(Error::of_usage(Error::Init { problem }));
+    }
+    let unnamed = |j: &JointTopic| {
+        let field = j.field.clone().map(|f| Field { name: None, ..f });
+        JointTopic { names: Vec::new(), field, ..j.clone() }
+    };
+    let all = || channels.joints.iter();
+    let ways: [Vec<JointTopic>; 3] = [
+        all().filter(|j| j.field.is_none()).cloned().collect(),
+        all().filter(|j| j.field.is_some() && !j.names.is_empty()).cloned().collect(),
+        all().filter(|j| j.field.is_some()).map(unnamed).collect(),
+    ];
+    let mut refused = None;
+    for joints in ways.into_iter().filter(|way| !way.is_empty()) {
+        let way = Channels { joints, urdfs: channels.urdfs.clone(), ..Channels::default() };
+        match found(told, &way, folders, beside) {
+            Ok(mut arm) => {
+                arm.unsure.extend(rivals(&arm.source, channels));
+                return Ok(arm);
+            }
+            Err(error) => _ = refused.get_or_insert(error),
+        }
+    }
+    Err(refused.unwrap_or_else(|| no_arm(channels, "no joint is recorded")))
+}
+
+/// The other fields that the joints may be in.
+fn rivals(own: &JointTopic, channels: &Channels) -> Option<String> {
+    let Field { values, why, .. } = own.field.as_ref()?;
+    let as_many =
+        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && j.shown() != own.shown();
+    let others: Vec<String> = channels.joints.iter().filter(as_many).map(JointTopic::shown).collect();
+    let said = format!(
+        "the joints are at {}: {why}; --joints chooses another of {}",
+        own.shown(),
+        others.join(", ")
+    );
+    (!others.is_empty()).then_some(said)
+}
+
+fn is_called(joints: &JointTopic, asked: &str) -> bool {
+    joints.topic == asked || joints.shown() == asked
+}
+
+/// The URDF files beside the recordings.
+fn urdfs_in(folders: &BTreeSet<PathBuf>) -> Vec<PathBuf> {
+    let files =
+        folders.iter().filter_map(|f| std::fs::read_dir(f).ok()).flatten().flatten().map(|e| e.path());
+    let mut found: Vec<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "urdf")).collect();
+    found.sort();
+    found
+}
+
+fn found(told: &Told, channels: &Channels, folders: &BTreeSet<PathBuf>, beside: &Path) -> Result<Arm, Error> {
     if let Some(path) = &told.dh {
         return from_dh(told, channels, path);
     }
+    let read = |path: &Path| crate::pipeline::read_text("URDF", path);
     let (file, text, recorded) = match (&told.urdf, channels.urdfs.len()) {
-        (Some(path), _) => (path.clone(), crate::pipeline::read_text("URDF", path)?, false),
+        (Some(path), _) => (path.clone(), read(path)?, false),
         (None, 1) => (beside.to_owned(), channels.urdfs.iter().next().cloned().unwrap_or_default(), true),
-        (None, 0) => return Err(no_arm(channels, "no /robot_description (std_msgs/String) is recorded")),
+        (None, 0) => match urdfs_in(folders).as_slice() {
+            [only] => (only.clone(), read(only)?, false),
+            several => {
+                let said = "no /robot_description (std_msgs/String) is recorded";
+                let lie = several.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+                let lie = if lie.is_empty() { lie } else { format!(", and beside the recordings lie {lie}") };
+                return Err(no_arm(channels, &format!("{said}{lie}")));
+            }
+        },
         (None, n) => {
             return Err(no_arm(
                 channels,
@@ -95,7 +174,7 @@ pub fn find(told: &Told, channels: &Channels, beside: &Path) -> Result<Arm, Erro
 }
 
 fn no_arm(channels: &Channels, why: &str) -> Error {
-    let names = channels.joints.iter().map(|j| format!("{} ({})", j.topic, j.names.join(", ")));
+    let names = channels.joints.iter().map(|j| format!("{} ({})", j.shown(), said(j)));
     let problem = format!(
         "nothing says what the arm is: {why}; give --urdf FILE or --dh FILE (docs/guide.md shows one). Recorded joints: {}",
         names.collect::<Vec<_>>().join("; ")
@@ -103,12 +182,24 @@ fn no_arm(channels: &Channels, why: &str) -> Error {
     Error::Init { problem }
 }
 
+/// The joints of a topic in words.
+fn said(joints: &JointTopic) -> String {
+    match &joints.field {
+        Some(field) if joints.names.is_empty() => format!("{} numbers", field.values),
+        _ => joints.names.join(", "),
+    }
+}
+
 fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> {
     let text = crate::pipeline::read_text("DH model", path)?;
+    if text.trim_start().starts_with('<') {
+        let problem = format!("{} is XML and no DH table: a URDF is given with --urdf", path.display());
+        return Err(Error::Init { problem });
+    }
     let chain = Chain::from_dh_toml(&text, path)?;
     let rows = chain.joint_names().to_vec();
     let mut unsure = Vec::new();
-    let (topic, names) = match topic_of(told, channels, &rows)? {
+    let (source, names) = match topic_of(told, channels, &rows) {
         Some(found) => found,
         None => {
             // A table may name its rows as it likes: as many joints on one topic are taken in their order.
@@ -120,10 +211,10 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> 
                 rows.join(", "),
                 only.names.join(", ")
             ));
-            (only.topic.clone(), only.names.clone())
+            (only.clone(), only.names.clone())
         }
     };
-    unsure.extend(others(told, channels, &topic, &names));
+    unsure.extend(others(told, channels, &source.topic, &names));
     let model = bare(&chain, Vec::new())?;
     Ok(Arm {
         file: path.to_owned(),
@@ -131,7 +222,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> 
         recorded: false,
         base_link: None,
         tips: Vec::new(),
-        topic,
+        source,
         names,
         links: BTreeSet::new(),
         model,
@@ -141,7 +232,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> 
 }
 
 fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
-    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.topic, j.names.join(", ")));
+    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.shown(), said(j)));
     let problem = format!(
         "no topic has the joints of {} ({}): {}",
         path.display(),
@@ -153,7 +244,7 @@ fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
 
 /// The topics that may be meant.
 fn chosen<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
-    channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|topic| *topic == j.topic))
+    channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|asked| is_called(j, asked)))
 }
 
 /// Other topics that have the same joints: of another arm, of set-points, or of a driver beside the first.
@@ -166,26 +257,15 @@ fn others(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Ve
 
 /// The topic that has all these joints, and their names in it; of several the one with most messages. Messages without names
 /// are read in the order of the model.
-fn topic_of(
-    told: &Told,
-    channels: &Channels,
-    joints: &[String],
-) -> Result<Option<(String, Vec<String>)>, Error> {
-    if let Some(topic) =
-        told.joints.as_ref().filter(|topic| !channels.joints.iter().any(|j| j.topic == **topic))
-    {
-        let present: Vec<&str> = channels.joints.iter().map(|j| j.topic.as_str()).collect();
-        let problem = format!(
-            "--joints {topic} is no topic of joint readings in all recordings; there are: {}",
-            present.join(", ")
-        );
-        return Err(Error::of_usage(Error::Init { problem }));
-    }
+fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(JointTopic, Vec<String>)> {
     let has_all = |j: &&JointTopic| joints.iter().all(|name| j.names.contains(name));
-    let all: Vec<&JointTopic> = chosen(told, channels).filter(has_all).collect();
-    let unnamed = || chosen(told, channels).find(|j| j.names.is_empty());
-    let most = all.into_iter().max_by(|a, b| a.messages.cmp(&b.messages).then(b.topic.cmp(&a.topic)));
-    Ok(most.or_else(unnamed).map(|j| (j.topic.clone(), joints.to_vec())))
+    let unnamed = |j: &&JointTopic| {
+        j.names.is_empty() && j.field.as_ref().is_none_or(|field| field.values == joints.len())
+    };
+    // Of fields the first: they are in the order of what speaks for them.
+    let most = |j: &&JointTopic| j.field.is_none().then(|| (Reverse(j.messages), j.topic.clone()));
+    let found = chosen(told, channels).filter(has_all).min_by_key(most);
+    found.or_else(|| chosen(told, channels).find(unnamed)).map(|j| (j.clone(), joints.to_vec()))
 }
 
 /// A joint of a URDF.
@@ -204,7 +284,8 @@ fn from_urdf(
     recorded: bool,
 ) -> Result<Arm, Error> {
     let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", file.display()) };
-    let document = Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}")))?;
+    let document =
+        Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}; a DH table is given with --dh")))?;
     let joints = joints_of(document.root_element());
     let named: BTreeSet<&str> = chosen(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
     let unnamed = named.is_empty() && chosen(told, channels).next().is_some();
@@ -246,7 +327,7 @@ fn from_urdf(
         return Err(bad(format!("no recorded joint leads to {end}")));
     }
     let model_joints: Vec<String> = moving.iter().map(|link| joints[link].joint.to_owned()).collect();
-    let (topic, names) = topic_of(told, channels, &model_joints)?
+    let (source, names) = topic_of(told, channels, &model_joints)
         .ok_or_else(|| other_joints(channels, &model_joints, &file))?;
     let first = way[behind];
     let above = joints[first].parent;
@@ -269,14 +350,14 @@ fn from_urdf(
     let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
     links.extend(joints.values().map(|l| l.parent.to_owned()));
     let carried = moving.iter().map(|link| (*link).to_owned()).collect();
-    let mut unsure = others(told, channels, &topic, &names);
+    let mut unsure = others(told, channels, &source.topic, &names);
     if unnamed {
-        unsure
-            .push(format!("the messages of {topic} name no joints: they are read in the order of the model"));
+        let said = format!("{} names no joints: they are read in the order of the model", source.shown());
+        unsure.push(said);
     }
     let base_link = Some(base_link);
     drop(document);
-    Ok(Arm { file, recorded, base_link, tips, topic, names, links, model, carried, unsure, text })
+    Ok(Arm { file, recorded, base_link, tips, source, names, links, model, carried, unsure, text })
 }
 
 /// Every joint by the link that it carries.
@@ -344,7 +425,7 @@ mod tests {
     fn recorded(names: &[&str]) -> Channels {
         let names = names.iter().map(|n| (*n).to_owned()).collect();
         Channels {
-            joints: vec![JointTopic { topic: "/j".into(), names, messages: 1 }],
+            joints: vec![JointTopic { topic: "/j".into(), names, messages: 1, field: None }],
             ..Channels::default()
         }
     }

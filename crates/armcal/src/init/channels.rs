@@ -1,9 +1,11 @@
 //! What is on the channels of all recordings: joint names, tracked bodies, a thermometer, the robot's description.
 
+use super::fields::{Field, Fields};
 use super::files::Opened;
 use crate::error::Error;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
-use armcal_recording::{RawChannel, RawSchema, RecordingError};
+use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Messages of a channel that are looked into for names: the first so many, then every so-manieth.
@@ -13,7 +15,7 @@ const EVERY: u64 = 50;
 const MOST_NAMES: usize = 64;
 
 /// A topic of joint readings.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct JointTopic {
     /// Its topic.
     pub topic: String,
@@ -21,15 +23,37 @@ pub struct JointTopic {
     pub names: Vec<String>,
     /// Messages in all recordings.
     pub messages: u64,
+    /// Where they are in a message that armcal does not know.
+    pub field: Option<Field>,
+}
+
+impl JointTopic {
+    /// What `--joints` calls it.
+    pub fn shown(&self) -> String {
+        self.field.as_ref().map_or_else(|| self.topic.clone(), |f| format!("{}:{}", self.topic, f.position))
+    }
 }
 
 /// A tracked body.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BodyTopic {
     /// Its topic.
     pub topic: String,
     /// Its name, where the topic has several.
     pub body: Option<String>,
+    /// Where it is in a message that armcal does not know.
+    pub position: Option<String>,
+    /// With `position`: how it is turned.
+    pub orientation: Option<String>,
+}
+
+impl BodyTopic {
+    /// What it is called where people read it.
+    pub fn shown(&self) -> String {
+        let what =
+            [&self.body, &self.position].into_iter().flatten().cloned().collect::<Vec<_>>().join(" at ");
+        if what.is_empty() { self.topic.clone() } else { format!("{what} of {}", self.topic) }
+    }
 }
 
 /// What all the recordings have in common, and what is left over.
@@ -41,6 +65,8 @@ pub struct Channels {
     pub bodies: Vec<BodyTopic>,
     /// Thermometers.
     pub temperatures: Vec<String>,
+    /// Numbers called temperatures in messages that armcal does not know: topic and path.
+    pub warm: Vec<(String, String)>,
     /// Texts that are a robot's description.
     pub urdfs: BTreeSet<String>,
     /// What is not used, and why.
@@ -54,6 +80,7 @@ struct Found {
     messages: u64,
     role: Option<Role>,
     thermometer: bool,
+    describes: bool,
     names: Vec<String>,
     why_not: String,
 }
@@ -61,6 +88,7 @@ struct Found {
 /// Looks into every recording.
 pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
     let mut found: BTreeMap<String, Found> = BTreeMap::new();
+    let mut fields: BTreeMap<String, Fields> = BTreeMap::new();
     let mut channels = Channels::default();
     for Opened { entry, recording } in opened {
         let mut own: BTreeMap<String, Found> = BTreeMap::new();
@@ -82,43 +110,66 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
                     );
                     plans.extend(plan.ok().map(|plan| (channel.clone(), plan)));
                 }
-                Err(why) => topic.why_not = why,
+                Err(why) => {
+                    topic.why_not = why;
+                    let own = fields.entry(channel.topic.clone());
+                    own.or_insert_with(|| Fields::of(schema, &channel.message_encoding)).next_recording();
+                }
             }
         }
-        let wanted = |c: &RawChannel| is_text(c) || plans.iter().any(|(own, _)| **own == *c);
+        let promising: BTreeSet<String> =
+            fields.iter().filter(|(_, f)| !f.is_empty()).map(|(topic, _)| topic.clone()).collect();
+        let wanted = |c: &RawChannel| {
+            is_text(c) || promising.contains(&c.topic) || plans.iter().any(|(own, _)| **own == *c)
+        };
         let urdfs = &mut channels.urdfs;
         recording
             .for_each_raw_of(&wanted, &mut |message| {
                 let Some(topic) = own.get_mut(&message.channel.topic) else { return Ok(()) };
                 topic.messages += 1;
-                if topic.messages > FIRST && topic.messages % EVERY != 0 {
+                // Two that follow each other, so that what changes is seen too.
+                if topic.messages > FIRST && topic.messages % EVERY > 1 {
                     return Ok(());
                 }
+                let Ok(data) = inflated(message.data) else { return Ok(()) };
+                if let Some(fields) = fields.get_mut(&message.channel.topic) {
+                    fields.add(topic.messages, message.log_ns as i64, &data);
+                }
                 if is_text(message.channel) {
-                    urdfs.extend(
-                        text_in(message.data).filter(|text| text.contains("<robot")).map(str::to_owned),
-                    );
+                    let found = text_in(&data).filter(|text| text.contains("<robot")).map(str::to_owned);
+                    let before = urdfs.len();
+                    urdfs.extend(found);
+                    topic.describes |= urdfs.len() > before;
                 }
                 if let Some((_, plan)) = plans.iter().find(|(own, _)| **own == *message.channel) {
-                    topic.add(names_in(plan, message.data));
+                    topic.add(names_in(plan, &data));
                 }
                 Ok(())
             })
             .map_err(|source: RecordingError| Error::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();
-            let Found { messages, role, thermometer, names, why_not, .. } = own;
+            let Found { messages, role, thermometer, describes, names, why_not, .. } = own;
             all.recordings += usize::from(messages > 0);
             all.messages += messages;
             all.role = all.role.or(role);
             all.thermometer |= thermometer;
+            all.describes |= describes;
             all.add(names);
             all.why_not = why_not;
         }
     }
     for (topic, found) in found {
+        let all = found.recordings == opened.len() && found.role.is_none();
+        if let Some(fields) = fields.get(&topic).filter(|_| all) {
+            channels.joints.extend(fields.joints(&topic, found.messages));
+            channels.bodies.extend(fields.bodies(&topic));
+            channels.warm.extend(fields.thermometers.iter().map(|path| (topic.clone(), path.clone())));
+        }
         channels.sort(topic, found, opened.len());
     }
+    // The surest field first; what is known by its type before any.
+    channels.joints.sort_by_key(|j| j.field.as_ref().map(|f| Reverse(f.surety)));
     Ok(channels)
 }
 
@@ -138,21 +189,27 @@ impl Channels {
         let mut leave = |why: String| self.left.push((topic.clone(), why));
         match found.role {
             _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),
+            // What it describes is told with the arm.
+            None if found.describes => {}
             None if found.why_not.is_empty() => leave("not of a kind that a calibration reads".to_owned()),
             None => leave(found.why_not),
             Some(_) if found.recordings < recordings => {
                 leave(format!("only in {} of {recordings} recordings", found.recordings));
             }
-            Some(Role::Joints) => self.joints.push(JointTopic { topic, names, messages }),
+            Some(Role::Joints) => self.joints.push(JointTopic { topic, names, messages, field: None }),
             Some(Role::Scalar) if found.thermometer => self.temperatures.push(topic),
             Some(Role::Scalar) => {
                 leave("one number: if it is an instrument, see docs/measures.md".to_owned())
             }
-            Some(Role::Pose) if names.len() < 2 => self.bodies.push(BodyTopic { topic, body: None }),
+            Some(Role::Pose) if names.len() < 2 => {
+                self.bodies.push(BodyTopic { topic, ..BodyTopic::default() })
+            }
             Some(Role::Pose) => {
-                self.bodies.extend(
-                    names.into_iter().map(|name| BodyTopic { topic: topic.clone(), body: Some(name) }),
-                );
+                self.bodies.extend(names.into_iter().map(|name| BodyTopic {
+                    topic: topic.clone(),
+                    body: Some(name),
+                    ..BodyTopic::default()
+                }));
             }
         }
     }

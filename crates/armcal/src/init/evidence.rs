@@ -1,9 +1,9 @@
 //! What the recordings say of each body: how far it went, where it was in every pause of the arm, which link it followed.
 
 use super::arm::Arm;
-use super::links::{Placed, place, turned_apart};
 use super::motion::{Likeness, Speeds, likeness};
 use super::read::{AllRead, Read};
+use crate::stages::links::{Placed, place, turned_apart};
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Pose, PoseSamples};
 use armcal_dwell::mean_pose;

@@ -1,9 +1,9 @@
 //! Which files are one recording: bag folders, globs, the parts of a split bag.
 
-use crate::batch::Manifest;
+use crate::batch::{Manifest, recordings_below};
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
-use armcal_recording::{Recording, RecordingReport, is_recording, is_url, recordings_at, without_ending};
+use armcal_recording::{Recording, RecordingReport, is_recording, is_url, without_ending};
 use std::io::Read as _;
 use std::path::Path;
 
@@ -75,8 +75,8 @@ fn refuse(path: &Path) -> Result<(), Error> {
     if is_url(path) {
         return Ok(());
     }
-    if path.is_dir() && recordings_at(path).is_empty() {
-        let why = "is a folder without any recording; for deeper ones give a pattern such as 'lab/**/*.mcap'";
+    if path.is_dir() && recordings_below(path).is_empty() {
+        let why = "is a folder without any recording or bag; for deeper ones give a pattern such as 'lab/**/*.mcap' or 'lab/**/*.db3'";
         return refused(why.to_owned());
     }
     if !path.is_file() {
@@ -92,7 +92,18 @@ fn refuse(path: &Path) -> Result<(), Error> {
         b if b.starts_with(b"#ROSBAG") => {
             return refused("is a ROS 1 bag: convert it with `mcap convert in.bag out.mcap`".into());
         }
-        _ => return refused("is no MCAP recording".into()),
+        [] => {
+            return refused(
+                "is empty: nothing was recorded, or the recorder was ended before it wrote".into(),
+            );
+        }
+        _ if path.file_name().is_some_and(|name| name == "metadata.yaml") => {
+            return refused("is the description of a bag: give the folder that it is in".into());
+        }
+        b if b.trim_ascii_start().starts_with(b"<") => {
+            return refused("is XML and no recording: a URDF is given with --urdf".into());
+        }
+        _ => return refused("is no MCAP recording and no rosbag2 database".into()),
     };
     match is_recording(path) {
         true => Ok(()),

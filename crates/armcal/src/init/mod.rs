@@ -9,8 +9,8 @@ mod arm;
 mod channels;
 mod draft;
 mod evidence;
+mod fields;
 mod files;
-mod links;
 mod motion;
 mod page;
 mod proposal;
@@ -31,6 +31,7 @@ use crate::stages::perceive;
 use crate::story;
 use armcal_calibrate::HoldoutConfig;
 use armcal_table::Board;
+use channels::Channels;
 use proposal::Known;
 use std::path::{Path, PathBuf};
 
@@ -59,9 +60,11 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     let opened = files::open_all(&asked.inputs, &asked.out)?;
     let channels = channels::look(&opened)?;
     if channels.joints.is_empty() {
-        return Err(no_joints(&channels.left));
+        return Err(no_joints(&channels));
     }
-    let arm = arm::find(&asked.told, &channels, &asked.out.with_extension("urdf"))?;
+    let paths = opened.iter().flat_map(|o| &o.entry.paths);
+    let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
+    let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
     progress.step("reading the recordings");
     let read = read::read(&arm, &channels, &opened)?;
     let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
@@ -69,7 +72,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
         let problem = format!(
             "the joints on {} stand still {pauses} times in all recordings; a calibration takes {FEWEST_PAUSES} pauses of about a \
              second at the very least (docs/guide.md says how to record them)",
-            arm.topic
+            arm.source.shown()
         );
         return Err(Error::Init { problem });
     }
@@ -82,7 +85,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
     let sockets = if tracked { None } else { sockets::find(&arm, &read)? };
     if board.is_none() && !tracked && sockets.is_none() {
-        return Err(nothing_seen(&read, &cast));
+        return Err(nothing_seen(&arm, &read, &cast));
     }
     let board = asked.board.as_deref().zip(board.as_ref());
     let mut known = Known {
@@ -95,12 +98,16 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
         seats,
         board,
         sockets,
+        warm: &channels.warm,
     };
     if known.sockets.is_some() && known.board.is_none() {
         progress.step("measuring the sockets");
         size_sockets(&mut known)?;
     }
-    let mut proposal = known.propose(channels.left)?;
+    let mut left = channels.left;
+    let used = |topic: &str| topic == arm.source.topic || read.bodies.iter().any(|b| b.topic == topic);
+    left.retain(|(topic, _)| !used(topic));
+    let mut proposal = known.propose(left)?;
     progress.step("trying the proposal");
     proposal.tried = Some(tried(&proposal));
     progress.finish();
@@ -111,19 +118,31 @@ fn read_board(path: &Path) -> Result<Board, Error> {
     Ok(Board::from_toml(&crate::pipeline::read_text("board", path)?, path)?)
 }
 
-fn no_joints(left: &[(String, String)]) -> Error {
-    let seen: Vec<String> = left.iter().map(|(topic, why)| format!("{topic} ({why})")).collect();
-    let seen = if seen.is_empty() { "there is no channel at all".to_owned() } else { seen.join("; ") };
-    Error::Init { problem: format!("no topic has joint readings in every recording: {seen}") }
+fn no_joints(channels: &Channels) -> Error {
+    let left = channels.left.iter().map(|(topic, why)| format!("{topic} ({why})"));
+    let bodies = channels.bodies.iter().map(|b| format!("{} (a tracked body)", b.shown()));
+    let warm = channels.temperatures.iter().map(|t| format!("{t} (a thermometer)"));
+    let seen: Vec<String> = bodies.chain(warm).chain(left).collect();
+    let problem = match seen.is_empty() {
+        true => "nothing is recorded: there is no channel at all. `armcal inspect` shows what a file holds"
+            .to_owned(),
+        false => format!(
+            "no topic has joint readings in every recording: {}; record the topic of the joints too (ros2 bag record /joint_states ..)",
+            seen.join("; ")
+        ),
+    };
+    Error::Init { problem }
 }
 
-fn nothing_seen(read: &read::AllRead, cast: &[Cast]) -> Error {
-    let bodies = read.bodies.iter().zip(cast).map(|(body, cast)| format!("{}: {}", body.topic, cast.why));
+fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> Error {
+    let bodies = read.bodies.iter().zip(cast).map(|(body, cast)| format!("{}: {}", body.shown(), cast.why));
     let bodies: Vec<String> = bodies.collect();
     let bodies = if bodies.is_empty() { "no body is tracked".to_owned() } else { bodies.join("; ") };
+    let left = read.left.iter().map(|(what, why)| format!("; not used: {what}: {why}")).collect::<String>();
+    let unsure = arm.unsure.iter().map(|said| format!(". Unsure: {said}")).collect::<String>();
     let problem = format!(
-        "nothing says where the tip was: {bodies}; and its pauses are not in a few places that it came back to in other postures. \
-         Give --board FILE if it sat in cavities of a board (docs/guide.md shows one)"
+        "nothing says where the tip was: {bodies}{left}; and its pauses are not in a few places that it came back to in other \
+         postures. Give --board FILE if it sat in cavities of a board (docs/guide.md shows one){unsure}"
     );
     Error::Init { problem }
 }

@@ -82,6 +82,8 @@ pub struct Known<'a> {
     pub board: Option<(&'a Path, &'a Board)>,
     /// Sockets without a drawing.
     pub sockets: Option<Sockets>,
+    /// Numbers called temperatures, by topic and path.
+    pub warm: &'a [(String, String)],
 }
 
 impl Known<'_> {

@@ -1,7 +1,7 @@
 //! Everything that could matter, read as columns, with the units that the numbers themselves show.
 
 use super::arm::Arm;
-use super::channels::{BodyTopic, Channels};
+use super::channels::{BodyTopic, Channels, JointTopic};
 use super::files::Opened;
 use crate::error::Error;
 use armcal_core::{Dwell, PoseSamples, Samples};
@@ -59,26 +59,41 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
     let mut left = Vec::new();
     let mut bodies: Vec<BodyTopic> = Vec::new();
     for body in &channels.bodies {
-        let name =
-            || body.body.as_ref().map_or_else(|| body.topic.clone(), |b| format!("{} of {}", b, body.topic));
+        let of_controller = |j: &JointTopic| {
+            j.topic == body.topic && j.field.as_ref().is_some_and(|f| f.values == arm.names.len())
+        };
         if body.body.as_ref().is_some_and(|b| arm.links.contains(b)) {
-            left.push((name(), "a link of the robot's own description: computed, not measured".to_owned()));
+            left.push((
+                body.shown(),
+                "a link of the robot's own description: computed, not measured".to_owned(),
+            ));
+        } else if channels.joints.iter().any(of_controller) {
+            left.push((
+                body.shown(),
+                "in the message of the joints: computed from them, not measured".to_owned(),
+            ));
         } else if bodies.len() == MOST_BODIES {
-            left.push((name(), format!("one of more than {MOST_BODIES} bodies")));
+            left.push((body.shown(), format!("one of more than {MOST_BODIES} bodies")));
         } else {
             bodies.push(body.clone());
         }
     }
-    let pose =
-        |b: &BodyTopic| PoseStream { topic: b.topic.clone(), body: b.body.clone(), ..PoseStream::default() };
+    let pose = |b: &BodyTopic| {
+        let BodyTopic { topic, body, position, orientation } = b.clone();
+        PoseStream { topic, body, position, orientation, ..PoseStream::default() }
+    };
+    let field = arm.source.field.as_ref();
+    let thermometer = |topic: &String| ScalarStream { topic: topic.clone(), ..ScalarStream::default() };
     let mut streams = Streams {
         joints: vec![JointStream {
-            topic: arm.topic.clone(),
+            topic: arm.source.topic.clone(),
             names: arm.names.clone(),
+            position: field.map(|f| f.position.clone()),
+            name: field.and_then(|f| f.name.clone()),
             ..JointStream::default()
         }],
         bodies: bodies.iter().enumerate().map(|(at, body)| (key(at), pose(body))).collect(),
-        temperature: channels.temperatures.first().map(|t| ScalarStream { topic: t.clone(), clock: None }),
+        temperature: channels.temperatures.first().map(thermometer),
         ..Streams::default()
     };
     left.extend(channels.temperatures.iter().skip(1).map(|t| (t.clone(), "another thermometer".to_owned())));

@@ -11,6 +11,8 @@ use nalgebra::Vector3;
 /// Off its link by less than this share of its motion, a body is on the arm; below the smaller one surely.
 const ON_ARM: f64 = 0.4;
 const SURELY_ON_ARM: f64 = 0.25;
+/// No arm is built, and no sensor sees it, as exactly as this [m].
+const COMPUTED_M: f64 = 3e-5;
 /// Speeds that are alike, where too few pauses show a link.
 const ALIKE: f64 = 0.7;
 /// A link that explains a body so many times better than the others is its link.
@@ -40,6 +42,8 @@ pub enum Role {
     Still,
     /// It moves, but not with the arm.
     Other,
+    /// Somebody's forward kinematics of the same arm and joints.
+    Computed,
     /// It was never seen, or only while nothing could be told.
     Unknown,
 }
@@ -54,6 +58,7 @@ impl Role {
             Role::Table => "table",
             Role::Still => "stands still",
             Role::Other => "moves by itself",
+            Role::Computed => "computed",
             Role::Unknown => "unknown",
         }
     }
@@ -100,6 +105,13 @@ fn first_look(arm: &Arm, e: &Evidence) -> Cast {
     let speeds = correlation
         .map_or(String::new(), |c| format!(", correlation of its speed with that of the arm {c:.2}"));
     match e.best_link() {
+        Some(best) if best.off_m < COMPUTED_M && e.pauses() >= 8 => {
+            let (pauses, off_mm) = (e.pauses(), best.off_m * 1e3);
+            let why = format!(
+                "in half of {pauses} pauses within {off_mm:.3} mm of the nominal arm: forward kinematics, no measurement"
+            );
+            said(Role::Computed, true, why)
+        }
         Some(best) if best.share < ON_ARM && e.pauses() >= 8 => {
             let carried = &arm.carried[best.link];
             // Nothing follows the last link: where no motion shows the last joint, the link before it is the same.
@@ -176,7 +188,7 @@ fn the_tip(
 fn the_base(evidence: &[Evidence], tip: usize, still: &[usize], seats: Option<&Seats>, all: &mut [Cast]) {
     let Some(best) = evidence[tip].best_link() else { return };
     let apart = |body: usize| {
-        let of = |(at, placed): (usize, super::links::Placed)| {
+        let of = |(at, placed): (usize, crate::stages::links::Placed)| {
             let seen = evidence[body].recordings[at].as_ref()?;
             let turned = seen.mean.map_or(f64::NAN, |mean| mean.rotation.angle_to(&placed.base.rotation));
             Some(((seen.middle_m - placed.base.translation.vector).norm(), turned))

@@ -4,10 +4,10 @@
 //! How far the sockets are from each other is then what the calibration itself finds: the size at which it errs least.
 
 use super::arm::Arm;
-use super::links::rigid;
 use super::read::AllRead;
 use crate::error::Error;
 use crate::setup::Inputs;
+use crate::stages::links::rigid;
 use armcal_core::robust::median;
 use armcal_table::{Board, Cavity};
 use nalgebra::Vector3;

@@ -196,7 +196,7 @@ pub(super) fn check(
             return fail(&format!("{key}.pose"), "is \"measured\" without sigma_mm".to_owned());
         }
     }
-    let seen = pipeline.table.is_some() || pipeline.streams.tip.is_some() || !pipeline.markers.is_empty();
+    let seen = pipeline.table.is_some() || pipeline.tip_is_tracked() || !pipeline.markers.is_empty();
     let all_estimated = || {
         let mut places = pipeline.points.values().chain(pipeline.planes.values());
         places.all(|place| place.pose == FramePose::Estimated)

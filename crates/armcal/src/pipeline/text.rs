@@ -10,23 +10,28 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
     let failed = |source| Error::ReadFile { what, path: path.to_owned(), source };
     let is = |found, next| Err(Error::NotText { path: path.to_owned(), found, wanted: what, next });
     let own = "name it under [[recordings]] of a pipeline file (docs/pipeline-reference.md), and give that";
+    let shown = path.display();
     if path.is_dir() {
         let next = "name the TOML file; recordings are listed in it, under [[recordings]]";
-        return is("a folder", next.to_owned());
+        return is("a folder", format!("{next}; of a folder of them `armcal init {shown}` proposes one"));
     }
     let (mut bytes, mut file) = (Vec::new(), input::open(path).map_err(failed)?);
     file.by_ref().take(16).read_to_end(&mut bytes).map_err(failed)?;
     match bytes.as_slice() {
         b if b.starts_with(b"\x89MCAP") => is(
             "a recording (MCAP)",
-            format!("{own}; `armcal inspect {}` shows what is in it", path.display()),
+            format!(
+                "{own}, or have one proposed: `armcal init {shown}`; `armcal inspect {shown}` shows what is in it"
+            ),
         ),
         b if b.starts_with(b"#ROSBAG") => {
             is("a ROS 1 bag", format!("convert it with `mcap convert in.bag out.mcap`, {own}"))
         }
         b if b.starts_with(b"SQLite format 3") => is(
             "a rosbag2 database",
-            format!("{own}; `armcal inspect {}` shows what is in it", path.display()),
+            format!(
+                "{own}, or have one proposed: `armcal init {shown}`; `armcal inspect {shown}` shows what is in it"
+            ),
         ),
         _ => {
             file.read_to_end(&mut bytes).map_err(failed)?;

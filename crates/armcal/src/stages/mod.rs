@@ -3,9 +3,11 @@
 pub mod doubts;
 pub mod effort;
 pub mod frames;
+pub mod links;
 pub mod measures;
 pub mod observe;
 pub mod past;
 pub mod perceive;
+pub mod points;
 pub mod readings;
 pub mod rigid;

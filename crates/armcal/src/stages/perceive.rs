@@ -7,6 +7,7 @@ use crate::setup;
 use crate::stages::doubts::Doubts;
 use crate::stages::effort;
 use crate::stages::frames;
+use crate::stages::points;
 use crate::stages::readings::{self, Readings};
 use crate::stages::rigid;
 use armcal_core::robust::{median, percentile};
@@ -197,6 +198,10 @@ fn dwells_of_one(
     let (mut dwells, said) =
         detect_dwells(index, &samples, clock.as_ref(), &pipeline.dwell).map_err(in_dwell)?;
     warnings.extend(said);
+    if let Some(points) = &entry.points {
+        let path = pipeline.resolve(&points.csv);
+        warnings.push(points::add(points, (&path, name), speed_model, &mut dwells)?);
+    }
     warnings.extend(rigid::reject(speed_model, &mut dwells));
     let (base, table) = static_bodies(pipeline, &samples, name, &mut warnings)?;
     let bodies = [("base", base.is_some(), &samples.base), ("table", table.is_some(), &samples.table)];

@@ -118,7 +118,14 @@ impl TwoArms {
         let [first, _] = &two.arms;
         let entry = |r: RecordingPaths| {
             let name = Some(recording_name(r.name.as_ref(), &r.paths));
-            RecordingEntry { name, paths: r.paths, tilt: Default::default(), load_kg: 0.0, loads: r.loads }
+            RecordingEntry {
+                name,
+                paths: r.paths,
+                tilt: Default::default(),
+                load_kg: 0.0,
+                loads: r.loads,
+                points: None,
+            }
         };
         Ok(Pipeline {
             name: file.name,

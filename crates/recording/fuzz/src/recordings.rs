@@ -46,7 +46,7 @@ fn streams(report: &RecordingReport) -> Option<Streams> {
     Some(Streams {
         joints: vec![JointStream { topic: topic(Role::Joints)?, names, ..JointStream::default() }],
         tip: topic(Role::Pose).map(|topic| PoseStream { topic, ..PoseStream::default() }),
-        temperature: topic(Role::Scalar).map(|topic| ScalarStream { topic, clock: None }),
+        temperature: topic(Role::Scalar).map(|topic| ScalarStream { topic, ..ScalarStream::default() }),
         ..Streams::default()
     })
 }

@@ -70,6 +70,20 @@ pub fn readable_as(
     Ok(shape.role)
 }
 
+/// The paths of the fields of this schema in which there can be what `place` needs, whole numbers left out; none where the
+/// schema cannot be read.
+pub fn fields_for(
+    place: Place,
+    schema_name: &str,
+    schema_encoding: &str,
+    schema_data: &[u8],
+    message_encoding: &str,
+) -> Vec<String> {
+    let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Wanted::default()));
+    compile([schema_name, schema_encoding, message_encoding], schema_data, find)
+        .map_or(Vec::new(), |(fields, ..)| fields)
+}
+
 /// How to decode the messages of one channel; compiled once from its schema, shared by threads.
 #[derive(Debug)]
 pub struct Plan {

@@ -3,7 +3,7 @@
 //! Adding one: an entry in [`SHAPES`]. The first shape that fits a schema decides its role.
 
 use super::slot::Slot;
-use super::types::{Field, Kind, Repeat, Types};
+use super::types::{Field, Kind, Number, Repeat, Types};
 use super::{DecodeError, Role};
 use crate::error::nearest;
 
@@ -243,6 +243,8 @@ pub enum Place {
     Position,
     /// Orientation of a body: a message with x, y, z, w.
     Orientation,
+    /// The one number of an instrument or a thermometer.
+    Value,
 }
 
 impl Place {
@@ -253,6 +255,7 @@ impl Place {
             Place::Efforts => Value(Slot::Effort),
             Place::Position => Point,
             Place::Orientation => Quaternion,
+            Place::Value => Value(Slot::Value),
         }
     }
 
@@ -263,6 +266,7 @@ impl Place {
             Place::Positions | Place::Efforts => "numbers",
             Place::Position => "message with x, y, z",
             Place::Orientation => "message with x, y, z, w",
+            Place::Value => "number",
         }
     }
 }
@@ -272,11 +276,13 @@ pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Resul
     let mut wanted = Wanted::default();
     for &(place, path) in fields {
         let found = match path.strip_suffix('*').filter(|inside| inside.is_empty() || inside.ends_with('.')) {
+            // One number is not a list of them.
+            _ if place == Place::Value && path.contains(['[', '*']) => false,
             Some(inside) => add_all(types, &mut wanted, inside, place.part()),
             None => place.part().add(types, &mut wanted, path),
         };
         if !found {
-            let present = paths(types, place.part());
+            let present = fields_for(types, place, |_| true);
             return Err(DecodeError::NoField {
                 schema: schema.to_owned(),
                 path: path.to_owned(),
@@ -296,7 +302,7 @@ pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Resul
 /// Adds every field of the message at `inside` that fits, in the order of its definition.
 fn add_all(types: &Types, wanted: &mut Wanted, inside: &str, part: Part) -> bool {
     let mut found = false;
-    for path in paths(types, part) {
+    for path in paths(types, part, |_| true) {
         let name = path.strip_prefix(inside);
         found |= name.is_some_and(|name| !name.contains(['.', '['])) && part.add(types, wanted, &path);
     }
@@ -308,7 +314,7 @@ const MOST_PATHS: usize = 1000;
 const DEEPEST: usize = 8;
 
 /// The paths at which a part can be read.
-fn paths(types: &Types, part: Part) -> Vec<String> {
+fn paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> Vec<String> {
     let mut found = Vec::new();
     let mut open = vec![(String::new(), 0, 0)];
     while let Some((inside, message, depth)) = open.pop() {
@@ -317,7 +323,7 @@ fn paths(types: &Types, part: Part) -> Vec<String> {
         for field in message.fields.iter().rev() {
             let list = if field.repeat == Repeat::Once { "" } else { "[]" };
             let path = format!("{inside}{}{list}", field.name);
-            if part.add(types, &mut Wanted::default(), &path) {
+            if is_wanted(field) && part.add(types, &mut Wanted::default(), &path) {
                 found.push(path.clone());
             }
             if let Kind::Message(inner) = field.kind
@@ -333,6 +339,20 @@ fn paths(types: &Types, part: Part) -> Vec<String> {
     }
     found.sort();
     found
+}
+
+/// The paths at which a message of these types has what a place needs, in fields that are wanted.
+fn fields_for(types: &Types, place: Place, is_wanted: fn(&Field) -> bool) -> Vec<String> {
+    let mut found = paths(types, place.part(), is_wanted);
+    found.retain(|path| place != Place::Value || !path.contains('['));
+    found
+}
+
+/// The same where a measured quantity can be: not among whole numbers, which are counters, flags and pixels.
+pub(super) fn quantities_for(types: &Types, place: Place) -> Vec<String> {
+    fields_for(types, place, |field| {
+        !matches!(field.kind, Kind::Number(Number::Unsigned(_) | Number::Signed(_)))
+    })
 }
 
 /// The shape that fits these types, and where its values are.

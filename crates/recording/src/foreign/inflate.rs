@@ -44,7 +44,10 @@ pub(super) fn whole(map: &Map, path: &Path, to: &mut File) -> Result<Option<Dama
 }
 
 /// A message, inflated where it is compressed. No CDR message begins as compressed ones do.
-pub(crate) fn inflated(data: &[u8]) -> Result<Cow<'_, [u8]>, String> {
+///
+/// # Errors
+/// What is compressed is damaged or too large, in words.
+pub fn inflated(data: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     if !data.starts_with(&MAGIC) {
         return Ok(data.into());
     }

@@ -18,7 +18,7 @@ mod rosbag2;
 pub(crate) use copy::DEFINITION_FROM;
 #[cfg(test)]
 pub(crate) use definitions::{TYPES as KNOWN_TYPES, of as definition_of};
-pub(crate) use inflate::inflated;
+pub use inflate::inflated;
 
 use crate::bytes::FileBytes;
 use crate::layout::Damage;

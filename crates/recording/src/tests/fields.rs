@@ -3,19 +3,23 @@
 use super::{Style, Track, mcap_bytes, open};
 use crate::foreign::definition_of;
 use crate::ros2::{self, Header};
-use crate::{JointStream, PoseStream, Recording, RecordingError, Streams};
+use crate::{JointStream, PoseStream, Recording, RecordingError, ScalarStream, Streams};
 
 const N: u64 = 200;
 
+fn time(i: u64) -> u64 {
+    1_000_000_000 + i * 10_000_000
+}
+
+fn array(i: u64) -> (u64, u64, Vec<u8>) {
+    // No dimension, offset 0, two numbers.
+    let mut data = [&[0, 1, 0, 0][..], &[0; 8], &2_u32.to_le_bytes(), &[0; 4]].concat();
+    [1e-3 * i as f64, 0.5].iter().for_each(|q| data.extend(q.to_le_bytes()));
+    (time(i), time(i), data)
+}
+
 /// Joints without names or stamps in a list of numbers; a tip that comes in two frames by turns, 1 m apart.
 fn recording() -> Recording {
-    let time = |i: u64| 1_000_000_000 + i * 10_000_000;
-    let array = |i: u64| {
-        // No dimension, offset 0, two numbers.
-        let mut data = [&[0, 1, 0, 0][..], &[0; 8], &2_u32.to_le_bytes(), &[0; 4]].concat();
-        [1e-3 * i as f64, 0.5].iter().for_each(|q| data.extend(q.to_le_bytes()));
-        (time(i), time(i), data)
-    };
     let tip = |i: u64| {
         let frame_id = if i.is_multiple_of(2) { "map" } else { "base" };
         let header = Header { stamp_ns: time(i) as i64, frame_id };
@@ -88,4 +92,58 @@ fn wrong_fields_and_frames_name_what_there_is() {
     let mut no_position = streams("data[]", None);
     no_position.tip = no_position.tip.map(|tip| PoseStream { orientation: Some("q".into()), ..tip });
     assert!(matches!(recording().read(&no_position), Err(RecordingError::Config { role: "tip", .. })));
+}
+
+/// A thermometer inside a message that armcal does not know: by its path; a list is not one number.
+#[test]
+fn one_number_is_read_by_its_path() {
+    let text = definition_of("sensor_msgs/Temperature").expect("known");
+    let nested = format!("float64 load\nsensor_msgs/Temperature motor\nfloat64[2] cells\n{}", "=".repeat(80))
+        + &format!("\nMSG: sensor_msgs/Temperature\n{text}")
+        + &format!(
+            "{}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+            "=".repeat(80)
+        )
+        + &format!("{}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n", "=".repeat(80));
+    let state = |i: u64| {
+        let time = 1_000_000_000 + i * 1_000_000_000;
+        let mut data = vec![0, 1, 0, 0];
+        data.extend(9.5_f64.to_le_bytes());
+        // Stamp, frame "" and what brings the next number to a multiple of eight.
+        data.extend((i as i32 + 1).to_le_bytes());
+        data.extend([0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]);
+        [20.0 + 0.1 * i as f64, 0.0, 51.0, 52.0].iter().for_each(|x: &f64| data.extend(x.to_le_bytes()));
+        (time + 7, time + 7, data)
+    };
+    let joints = Track {
+        topic: "/q",
+        schema: (
+            "std_msgs/msg/Float64MultiArray",
+            "ros2msg",
+            definition_of("std_msgs/Float64MultiArray").expect("known").leak().as_bytes(),
+        ),
+        encoding: "cdr",
+        messages: (0..N).map(array).collect(),
+    };
+    let state = Track {
+        topic: "/state",
+        schema: ("vendor/msg/State", "ros2msg", nested.leak().as_bytes()),
+        encoding: "cdr",
+        messages: (0..30).map(state).collect(),
+    };
+    let recording = open(&mcap_bytes(&[joints, state], &Style::default()));
+    let read = |path: &str| {
+        let temperature = ScalarStream { topic: "/state".into(), value: Some(path.into()), clock: None };
+        recording.read(&Streams { tip: None, temperature: Some(temperature), ..streams("data[]", None) })
+    };
+    let (samples, ..) = read("motor.temperature").expect("readable");
+    let temperature = samples.temperature.expect("a thermometer");
+    assert_eq!((temperature.time_ns[3], temperature.value[3]), (4_000_000_000, 20.0 + 0.1 * 3.0));
+    for wrong in ["cells[]", "motor.temperatur"] {
+        let why = read(wrong).expect_err("refused").to_string();
+        assert!(
+            why.contains("no number at") && why.contains("motor.temperature") && !why.contains("cells[],"),
+            "{why}"
+        );
+    }
 }

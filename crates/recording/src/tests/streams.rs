@@ -374,7 +374,7 @@ fn with_thermometer(cell_c: impl Fn(i64) -> f64) -> (Samples, Vec<StreamReport>,
         (stamp_ns as u64, stamp_ns as u64, data)
     };
     let tracks = [joint_track(moving()), track("/cell", ros2::TEMPERATURE, (0..10).map(at).collect())];
-    let temperature = Some(ScalarStream { topic: "/cell".into(), clock: None });
+    let temperature = Some(ScalarStream { topic: "/cell".into(), ..ScalarStream::default() });
     ok(&tracks, &Streams { temperature, ..two_joints() })
 }
 

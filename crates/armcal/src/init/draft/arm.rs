@@ -23,7 +23,11 @@ impl Draft<'_> {
             self.page.line(&line, &format!("given: {} moving joints", arm.names.len()));
             return Ok(());
         }
-        let why = if arm.recorded { "as the recording has it in /robot_description" } else { "given" };
+        let why = match (arm.recorded, &self.known.asked.told.urdf) {
+            (true, _) => "as the recording has it in /robot_description",
+            (false, None) => "the only one beside the recordings",
+            (false, Some(_)) => "given",
+        };
         let path = if arm.recorded { self.beside(".urdf", arm.text.clone()) } else { arm.file.clone() };
         self.page.line(&format!("urdf = {}", relative(&path, &self.folder)), why);
         let base = arm.base_link.as_deref().unwrap_or_default();

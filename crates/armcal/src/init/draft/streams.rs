@@ -59,7 +59,18 @@ impl Draft<'_> {
         self.page.section("[streams.joints]");
         let report = known.read.recordings.first().and_then(|r| r.report("joints"));
         self.page.line(&format!("topic = {}", quoted(&joints.topic)), &rate(report));
-        self.page.line(&format!("names = {}", list(&joints.names)), "as recorded, in the order of the model");
+        let source = &known.arm.source;
+        let why = match source.names.is_empty() {
+            true => "as the model has them: the messages name none",
+            false => "as recorded, in the order of the model",
+        };
+        self.page.line(&format!("names = {}", list(&joints.names)), why);
+        if let Some(field) = &source.field {
+            self.page.line(&format!("position = {}", quoted(&field.position)), &field.why);
+            if let Some(name) = &field.name {
+                self.page.line(&format!("name = {}", quoted(name)), "the names beside them");
+            }
+        }
         if joints.unit == JointUnit::Deg {
             self.page.line("unit = \"deg\"", "the readings are too large for radians");
         }
@@ -79,7 +90,7 @@ impl Draft<'_> {
             if !cast.sure {
                 self.unsure.push(format!(
                     "{} is on the arm, but not surely on {carried}: left out ({})",
-                    shown(&known.read.bodies[body]),
+                    known.read.bodies[body].shown(),
                     cast.why
                 ));
                 continue;
@@ -96,21 +107,27 @@ impl Draft<'_> {
             let report = known.read.recordings.first().and_then(|r| r.report("temperature"));
             self.page.line(&format!("topic = {}", quoted(&temperature.topic)), &rate(report));
         } else {
-            self.unseen.push("the temperature: effects of heat go by time alone".to_owned());
+            let called = known.warm.iter().map(|(topic, path)| format!("topic {topic} with value {path}"));
+            let called: Vec<String> = called.collect();
+            let called = match called.is_empty() {
+                true => String::new(),
+                false => format!("; numbers called so, for [streams.temperature]: {}", called.join(", ")),
+            };
+            self.unseen.push(format!("the temperature: effects of heat go by time alone{called}"));
         }
         for (body, cast) in known.read.bodies.iter().zip(known.cast) {
             match cast.role {
-                Role::Still | Role::Other | Role::Unknown => {
+                Role::Still | Role::Other | Role::Computed | Role::Unknown => {
                     let unsure = if cast.sure { "" } else { " (unsure)" };
-                    self.page.note(&format!("not used: {}, which {}{unsure}", shown(body), cast.why));
+                    self.page.note(&format!("not used: {}, which {}{unsure}", body.shown(), cast.why));
                 }
                 Role::Table if known.seats.is_none() => {
-                    self.page.note(&format!("{}: the table, as it seems; {}", shown(body), cast.why))
+                    self.page.note(&format!("{}: the table, as it seems; {}", body.shown(), cast.why))
                 }
                 _ => {}
             }
             if !cast.sure && cast.role != Role::Unknown && !matches!(cast.role, Role::Marker(_)) {
-                self.unsure.push(format!("{} as {}: {}", shown(body), cast.role.word(), cast.why));
+                self.unsure.push(format!("{} as {}: {}", body.shown(), cast.role.word(), cast.why));
             }
         }
         self.clock();
@@ -124,6 +141,10 @@ impl Draft<'_> {
         self.page.line(&format!("topic = {}", quoted(&stream.topic)), &known.cast[body].why);
         if let Some(name) = &stream.body {
             self.page.line(&format!("body = {}", quoted(name)), "the topic has several");
+        }
+        let fields = [("position", &stream.position), ("orientation", &stream.orientation)];
+        for (key, path) in fields.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?))) {
+            self.page.line(&format!("{key} = {}", quoted(path)), "a field of the message");
         }
         if stream.unit == LengthUnit::Mm {
             self.page.line("unit = \"mm\"", "too far away for metres");
@@ -159,10 +180,6 @@ fn rate(report: Option<&StreamReport>) -> String {
         };
         format!("{:.1} Hz{hidden}; {} clock: {}", r.rate_hz, r.clock.word(), r.clock_reason)
     })
-}
-
-fn shown(body: &BodyTopic) -> String {
-    body.body.as_ref().map_or_else(|| body.topic.clone(), |name| format!("{name} of {}", body.topic))
 }
 
 /// What a marker is called: the last of its own name, in letters that a section may have.
