@@ -1,7 +1,8 @@
 //! The numbers of speed and memory that the design promises, each measured beside its peer in one run.
 //!
 //! `cargo bench -p armcal --bench performance` measures everything and rewrites `docs/performance.md`. With names of
-//! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`.
+//! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`; with `--into-page` a
+//! part without bars takes its place on the page, and says when it was measured.
 //! `--size-mb N` sets the size of the recording that is read, `--recordings N` the most recordings of a batch (1000 both),
 //! `--poses N` the most poses of a campaign.
 //! Data go to `target/bench-data`.
@@ -75,6 +76,7 @@ fn main() -> Result<()> {
     let mut options =
         Options { size_mb: 1000, recordings: 1000, poses: 20_000, data: root.join("target/bench-data") };
     let mut named = Vec::new();
+    let mut into_page = false;
     let mut arguments = arguments.iter();
     while let Some(argument) = arguments.next() {
         if argument == "--size-mb" {
@@ -83,6 +85,8 @@ fn main() -> Result<()> {
             options.recordings = count(argument, arguments.next())?;
         } else if argument == "--poses" {
             options.poses = count(argument, arguments.next())?;
+        } else if argument == "--into-page" {
+            into_page = true;
         } else if PARTS.iter().any(|(name, _)| name == argument) {
             named.push(argument.as_str());
         } else {
@@ -98,10 +102,14 @@ fn main() -> Result<()> {
         println!("{}", section.text());
         sections.push(section);
     }
+    let path = root.join("docs/performance.md");
     if named.is_empty() {
-        let page = root.join("docs/performance.md");
-        std::fs::write(&page, page::page(&sections, &options))?;
-        println!("{}", page.display());
+        std::fs::write(&path, page::page(&sections, &options))?;
+        println!("{}", path.display());
+    } else if into_page {
+        let page = std::fs::read_to_string(&path)?;
+        let page = sections.iter().try_fold(page, |page, section| page::with(&page, section, &options));
+        std::fs::write(&path, page.ok_or("a part has bars, or is not on the page: measure all parts")?)?;
     }
     Ok(())
 }

@@ -132,7 +132,7 @@ impl Section {
 /// The whole page.
 pub fn page(sections: &[Section], options: &Options) -> String {
     let mut text = String::from("# Performance\n\n");
-    let about = "Written by `cargo bench -p armcal --bench performance`; do not edit. Every number is of one run, armcal \
+    let about = "Written by `cargo bench -p armcal --bench performance`; do not edit. Every number is of one run, where a part does not say otherwise, armcal \
                  and its peers taking turns on the same machine. CPU is time on a processor, of all threads: where wall \
                  time is longer, the machine was busy with something else. How often hidden effects are named rightly, and how \
                  often nothing is claimed where nothing is hidden, is counted by `armcal score` (`docs/confusion.md`).";
@@ -147,6 +147,21 @@ pub fn page(sections: &[Section], options: &Options) -> String {
     text += "\n";
     text += &sections.iter().map(Section::text).collect::<Vec<_>>().join("");
     text.trim_end().to_owned() + "\n"
+}
+
+/// The page with one part measured anew; none where it is not on the page, or has bars, which stand on its top too.
+pub fn with(page: &str, section: &Section, options: &Options) -> Option<String> {
+    let head = format!("## {}\n", section.title);
+    let (before, rest) = page.split_once(&head)?;
+    let behind = rest.find("\n## ").map_or("", |at| &rest[at + 1..]);
+    let text = section.text();
+    let own = text.strip_prefix(&head).filter(|_| section.bars.is_empty())?;
+    let facts =
+        machine::facts(options).into_iter().filter(|f| f.starts_with("date") || f.starts_with("armcal"));
+    let when =
+        wrapped(&format!("This part was measured by itself: {}.", facts.collect::<Vec<_>>().join("; ")));
+    let page = format!("{before}{head}\n{when}{own}{behind}");
+    Some(page.trim_end().to_owned() + "\n")
 }
 
 fn bars<'a>(bars: impl Iterator<Item = &'a Bar>) -> String {
