@@ -52,7 +52,8 @@ pub fn section(options: &Options) -> Result<Section> {
          derivatives by every parameter in every dwell, at least one for the fit and one for each of ten turns of the hold-out. \
          A fit takes a few evaluations, the products of their rows, its start and its intervals; a diagnosis fits what it \
          finds to all poses, again without each name with all turns, and weighs its catalogue on those of `max_weighed` \
-         beside each of these fits.",
+         beside each of these fits. The system counts time on a processor in ticks of some milliseconds, which shows in the first \
+         column.",
     );
     let mut all = vec![one.install(|| costs("a recording of the batch".into(), &batch::one(options)?))?];
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
@@ -76,7 +77,7 @@ pub fn section(options: &Options) -> Result<Section> {
     }
     row("together", &|c| format!("{:.3}", c.stages.iter().map(|s| s.cpu_s).sum::<f64>()));
     row("inflating and walking alone", &|c| format!("{:.4}", c.walk_s));
-    row("one evaluation", &|c| format!("{:.4}", c.evaluation_s));
+    row("one evaluation", &|c| format!("{:.5}", c.evaluation_s));
     row("of it a dwell [us]", &|c| format!("{:.1}", c.evaluation_s / c.dwells as f64 * 1e6));
     row("floor: the walk and eleven evaluations", &|c| format!("{:.3}", c.walk_s + FITS * c.evaluation_s));
     row("fit and hold-out, in evaluations", &|c| format!("{:.0}", c.stages[1].cpu_s / c.evaluation_s));
