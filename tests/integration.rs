@@ -16,6 +16,8 @@ mod real_robots;
 
 /// Is a pipeline proposed from recordings alone as good as one written by hand, and honest about what it could not see?
 mod init;
+
+/// Are joints and bodies found inside messages of types that nobody told armcal?
 mod init_fields;
 
 /// Does a proposed pipeline take every tracked body for what it is?
@@ -120,8 +122,10 @@ mod counted_once;
 /// What is a calibrated model worth on recordings it never saw?
 mod verify;
 
-/// Does what one session taught help in another, effect by effect?
+/// Do the points that a laser tracker exported calibrate the arm whose joints were recorded, dwell by dwell?
 mod tracker_points;
+
+/// Does what one session taught help in another, effect by effect?
 mod transfer;
 
 /// Does the calibration table do without a camera?

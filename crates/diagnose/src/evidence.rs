@@ -4,7 +4,7 @@ use crate::config::DiagnosisConfig;
 use crate::grams::each_gram;
 use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, Projection, cholesky_upper, eigen};
+use crate::projection::{Gram, Projecting, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
 use nalgebra::{DMatrix, DVector};
@@ -54,33 +54,22 @@ impl Metric {
 
 impl Metric {
     pub(crate) fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
-        let by = |geometry: DMatrix<f64>, residual| {
-            let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
-            Projection::new(&geometry, precision, offset, residual)
-        };
-        Metric::projected((noise, amplitude), problem, scale, by)
+        Metric::by(Projection::new, (noise, amplitude), problem, scale)
     }
 
     /// The same by a [rough](Projection::rough) projection.
     pub(crate) fn rough(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
-        let by = |geometry, residual| {
-            Projection::rough(geometry, &problem.geometry_precision, &problem.geometry_offset, residual)
-        };
-        Metric::projected((noise, amplitude), problem, scale, by)
+        Metric::by(Projection::rough, (noise, amplitude), problem, scale)
     }
 
-    fn projected(
-        (noise, amplitude): (Noise, f64),
-        problem: &Problem,
-        scale: f64,
-        by: impl FnOnce(DMatrix<f64>, DVector<f64>) -> Projection,
-    ) -> Metric {
+    fn by(projected: Projecting, (noise, amplitude): (Noise, f64), problem: &Problem, scale: f64) -> Metric {
         let whitener = Whitener::new(noise, amplitude, problem);
         let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
         let mut geometry = problem.geometry.clone();
         whitener.apply(&mut residual);
         whitener.apply(&mut geometry);
-        let projection = by(geometry / scale, residual.column(0) / scale);
+        let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
+        let projection = projected(geometry / scale, precision, offset, residual.column(0) / scale);
         Metric { noise, whitener, projection, ln_weight: 0.0 }
     }
 

@@ -46,7 +46,7 @@ fn with(problem: &Problem, weighed: &Weighed, effect: &DMatrix<f64>) -> Projecti
         DVector::from_iterator(p + m, v.iter().copied().chain(std::iter::repeat_n(value, m)))
     };
     Projection::new(
-        &geometry,
+        geometry,
         &longer(&problem.geometry_precision, EFFECT_PRECISION),
         &longer(&problem.geometry_offset, 0.0),
         &problem.residual / weighed.scale,

@@ -58,17 +58,20 @@ impl Gram {
     }
 }
 
+/// Projects out geometry with its prior's precision and offsets; last the residual.
+pub(crate) type Projecting = fn(DMatrix<f64>, &DVector<f64>, &DVector<f64>, DVector<f64>) -> Projection;
+
 impl Projection {
     /// `geometry` with prior precision `precision` and offsets `offset` in its units; `residual` at that point.
     pub fn new(
-        geometry: &DMatrix<f64>,
+        geometry: DMatrix<f64>,
         precision: &DVector<f64>,
         offset: &DVector<f64>,
         residual: DVector<f64>,
     ) -> Projection {
         let p = geometry.ncols();
         let root = precision.map(|v| v.max(1e-12).sqrt());
-        let mut data = geometry.clone();
+        let mut data = geometry;
         let mut prior = DMatrix::from_diagonal(&root);
         let mut ln_det = -2.0 * root.iter().map(|v| v.ln()).sum::<f64>();
         for _ in 0..2 {

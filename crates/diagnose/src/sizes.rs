@@ -69,8 +69,17 @@ pub(crate) fn metrics(
     let with_places = trials.iter().filter(|trial| both(trial).is_some()).max_by(by_nothing).and_then(both);
     trials.extend(with_places.and_then(|(noise, size)| tried(noise, size, share)));
 
+    let of = |trial: &Trial| {
+        Metric::new(trial.noise, trial.amplitude, problem, scale).weighed(trial.prior, Some(&white), config)
+    };
+    let others: Vec<Metric> = kept(&trials, many)[1..].iter().map(|trial| of(trial)).collect();
+    std::iter::once(white).chain(others).collect()
+}
+
+/// Of each kind the best size, in the order of the kinds: of `many` dwells the first, and those not out of the question.
+fn kept(trials: &[Trial], many: bool) -> Vec<&Trial> {
     let mut kept: Vec<&Trial> = Vec::new();
-    for trial in &trials {
+    for trial in trials {
         match kept.iter_mut().find(|kept| kept.noise == trial.noise) {
             Some(kept) if trial.best() > kept.best() => *kept = trial,
             Some(_) => {}
@@ -78,14 +87,10 @@ pub(crate) fn metrics(
         }
     }
     let most = |k: usize| trials.iter().map(|trial| trial.parts[k]).fold(f64::NEG_INFINITY, f64::max);
-    let most: Vec<f64> = (0..scouts.len() + 1).map(most).collect();
     let in_question = |trial: &&Trial| {
-        let near = |(part, most): (&f64, &f64)| *part > most - OUT_OF_THE_QUESTION;
-        !many || trial.parts.iter().zip(&most).any(near)
+        let near = |(k, part): (usize, &f64)| *part > most(k) - OUT_OF_THE_QUESTION;
+        !many || trial.noise == Noise::White || trial.parts.iter().enumerate().any(near)
     };
-    let of = |trial: &Trial| {
-        Metric::new(trial.noise, trial.amplitude, problem, scale).weighed(trial.prior, Some(&white), config)
-    };
-    let others: Vec<Metric> = kept[1..].iter().copied().filter(in_question).map(of).collect();
-    std::iter::once(white).chain(others).collect()
+    kept.retain(in_question);
+    kept
 }

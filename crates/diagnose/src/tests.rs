@@ -210,7 +210,8 @@ fn evidence_equals_the_dense_marginal_likelihood() {
     let rows = p.rows() as f64;
     let j = &p.geometry;
     let base = DMatrix::identity(p.rows(), p.rows()) + j * j.transpose();
-    let projection = Projection::new(j, &p.geometry_precision, &p.geometry_offset, p.residual.clone());
+    let projection =
+        Projection::new(j.clone(), &p.geometry_precision, &p.geometry_offset, p.residual.clone());
     let solve = |c: &DMatrix<f64>| {
         let factor = c.clone().cholesky().unwrap();
         let ln_det = 2.0 * factor.l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
@@ -332,8 +333,12 @@ fn bootstrap_p_values_are_uniform_under_noise() {
     let mut below = 0;
     for seed in 0..60 {
         let p = small(200 + seed);
-        let projection =
-            Projection::new(&p.geometry, &p.geometry_precision, &p.geometry_offset, p.residual.clone());
+        let projection = Projection::new(
+            p.geometry.clone(),
+            &p.geometry_precision,
+            &p.geometry_offset,
+            p.residual.clone(),
+        );
         let grams = p.candidates.iter().map(|c| (c, projection.gram(&c.columns.dense(&p.dwells, 1.0))));
         let directions: Vec<_> =
             grams.map(|(c, gram)| crate::bootstrap::Direction::new(&c.columns, 1.0, &gram)).collect();

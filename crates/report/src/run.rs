@@ -245,8 +245,18 @@ impl Run {
 
     /// Dwells of a recording that the fit could use.
     pub(crate) fn used(&self, recording: &RecordingRun) -> usize {
-        let observed: BTreeSet<DwellId> = self.observations.iter().map(|o| o.dwell).collect();
+        let observed = self.observed();
         recording.dwells.iter().filter(|d| observed.contains(&d.id)).count()
+    }
+
+    /// Dwells that are observations.
+    pub(crate) fn observed(&self) -> BTreeSet<DwellId> {
+        self.observations.iter().map(|o| o.dwell).collect()
+    }
+
+    /// Where each dwell of all recordings was.
+    pub(crate) fn assigned(&self) -> BTreeMap<DwellId, &Assignment> {
+        self.recordings.iter().flat_map(RecordingRun::assigned).collect()
     }
 
     /// What each of the steps adds to the one before.

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use polars::prelude::{
     Column, DataFrame, KeyValueMetadata, NamedFrom, ParquetWriter, PolarsError, PolarsResult, Series,
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Names of the tables of a run.
 pub(crate) const FILES: [&str; 3] = ["dwells.parquet", "observations.parquet", "parameters.parquet"];
@@ -21,11 +21,11 @@ pub(crate) fn parquet_files(
     run: &Run,
     points: &[Point],
 ) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
-    let tables = [dwells(run, points), observations(run, points), parameters(run)];
+    let tables = [dwells(run), observations(run, points), parameters(run)];
     FILES.into_iter().zip(tables).map(|(name, columns)| Ok((name, columns.encode(name)?))).collect()
 }
 
-fn dwells(run: &Run, points: &[Point]) -> Columns {
+fn dwells(run: &Run) -> Columns {
     let rows: Vec<(&RecordingRun, &Dwell)> =
         run.recordings.iter().flat_map(|r| r.dwells.iter().map(move |d| (r, d))).collect();
     let mut c = Columns::default();
@@ -54,11 +54,10 @@ fn dwells(run: &Run, points: &[Point]) -> Columns {
     c.number("tip_x_m", rows.iter().map(|(_, d)| tip(d, |p| p.x)));
     c.number("tip_y_m", rows.iter().map(|(_, d)| tip(d, |p| p.y)));
     c.number("tip_z_m", rows.iter().map(|(_, d)| tip(d, |p| p.z)));
-    let assigned: BTreeMap<DwellId, &Assignment> =
-        run.recordings.iter().flat_map(RecordingRun::assigned).collect();
+    let assigned = run.assigned();
     let places: Vec<Option<&Assignment>> = rows.iter().map(|(_, d)| assigned.get(&d.id).copied()).collect();
     c.places(&places);
-    let used: BTreeSet<DwellId> = points.iter().map(|p| p.observation.dwell).collect();
+    let used = run.observed();
     c.flag("used", rows.iter().map(|(_, d)| used.contains(&d.id)));
     let why_not: BTreeMap<DwellId, &str> = run.recordings.iter().flat_map(RecordingRun::why_not).collect();
     c.text("why_not", rows.iter().map(|(_, d)| why_not.get(&d.id).copied()));
@@ -76,8 +75,7 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
     c.text("feature", points.iter().map(|p| Some(run.model.feature_name(p.observation.feature))));
     let against = |p: &Point| p.observation.against().map(|against| run.model.against_name(against));
     c.text("against", points.iter().map(against));
-    let assigned: BTreeMap<DwellId, &Assignment> =
-        run.recordings.iter().flat_map(RecordingRun::assigned).collect();
+    let assigned = run.assigned();
     let places: Vec<Option<&Assignment>> =
         points.iter().map(|p| assigned.get(&p.observation.dwell).copied()).collect();
     c.confidence(&places);

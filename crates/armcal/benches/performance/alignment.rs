@@ -11,7 +11,6 @@ use armcal_core::{FeatureId, JointSamples, PoseSamples};
 use armcal_dwell::align_clocks;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
 
 /// Lengths of the recording, in words and in poses; one takes [`POSE_S`].
 const LENGTHS: [(&str, usize); 4] =
@@ -33,10 +32,7 @@ const TIMES: usize = 5;
 const CPU_S: f64 = 0.15;
 
 pub fn section(options: &Options) -> Result<Section> {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
-    let pipeline =
-        campaign::place(&options.data.join("campaign-200"), 200, campaign::Weighed::None, &models)?;
-    let pipeline = Pipeline::load(&pipeline)?;
+    let pipeline = Pipeline::load(&campaign::place(options, 200, campaign::Weighed::None)?)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let model = frames::bare(&chain, frames::markers(&pipeline))?;
     let doubts = Doubts::of(&pipeline, &model, FeatureId::TIP);

@@ -1,7 +1,7 @@
 //! A campaign of many poses: a 6-axis arm before a laser tracker that stands elsewhere in each of four series, three joints with
 //! the ripple of their gears. By a seed, of any number of poses; its kinematics are its own.
 
-use crate::Result;
+use crate::{Options, Result};
 use armcal_recording::output::McapOutput;
 use armcal_recording::ros2::{self, Header};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -57,9 +57,22 @@ pub enum Weighed {
     All,
 }
 
-/// Writes the recordings and a pipeline of so many poses into a folder, unless they are there; gives the pipeline.
-pub fn place(folder: &Path, poses: usize, weighed: Weighed, models: &Path) -> Result<PathBuf> {
-    std::fs::create_dir_all(folder)?;
+impl Weighed {
+    /// In words.
+    pub fn word(self) -> &'static str {
+        match self {
+            Weighed::None => "no diagnosis",
+            Weighed::Default => "400 weighed",
+            Weighed::All => "all weighed",
+        }
+    }
+}
+
+/// Writes the recordings and a pipeline of so many poses, unless they are there; gives the pipeline.
+pub fn place(options: &Options, poses: usize, weighed: Weighed) -> Result<PathBuf> {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
+    let folder = options.data.join(format!("campaign-{poses}"));
+    std::fs::create_dir_all(&folder)?;
     let mut random = ChaCha8Rng::seed_from_u64(2038);
     let arm = Arm::built(&mut random);
     let mut recordings = String::new();

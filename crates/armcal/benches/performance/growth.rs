@@ -5,13 +5,11 @@ use crate::child::{Cost, armcal_on_one};
 use crate::page::{Bar, Section, Table, seconds};
 use crate::{Options, Result, campaign};
 use std::ffi::OsStr;
-use std::path::Path;
 
 /// Numbers of poses; 2,000 and 16,811 are what the bars are of.
 const POSES: [usize; 6] = [200, 632, 2_000, 6_325, 16_811, 20_000];
-/// How many of them are weighed, and how the table calls it.
-const RUNS: [(Weighed, &str); 3] =
-    [(Weighed::None, "no diagnosis"), (Weighed::Default, "400 weighed"), (Weighed::All, "all weighed")];
+/// How many of them are weighed.
+const RUNS: [Weighed; 3] = [Weighed::None, Weighed::Default, Weighed::All];
 /// Poses, how many are weighed, processor time [s] and memory [MiB] at most.
 const BARS: [(usize, Weighed, f64, f64); 3] = [
     (2_000, Weighed::All, 6.0, 250.0),
@@ -30,12 +28,13 @@ pub fn section(options: &Options) -> Result<Section> {
     );
     let columns = RUNS
         .iter()
-        .flat_map(|(_, how)| [format!("{how} [CPU s]"), "exponent".to_owned(), "peak [MiB]".to_owned()]);
+        .map(|weighed| weighed.word())
+        .flat_map(|how| [format!("{how} [CPU s]"), "exponent".to_owned(), "peak [MiB]".to_owned()]);
     let head: Vec<String> = std::iter::once("poses".to_owned()).chain(columns).collect();
     let mut table = Table::new(&head.iter().map(String::as_str).collect::<Vec<_>>());
     let mut curve: Vec<(usize, Vec<Cost>)> = Vec::new();
     for poses in POSES.into_iter().filter(|poses| *poses <= options.poses) {
-        let costs = RUNS.iter().map(|(weighed, _)| cost(options, poses, *weighed));
+        let costs = RUNS.iter().map(|weighed| cost(options, poses, *weighed));
         let costs = costs.collect::<Result<Vec<Cost>>>()?;
         let exponent = |k: usize| {
             curve.last().map_or_else(String::new, |(fewer, cheaper)| {
@@ -46,12 +45,12 @@ pub fn section(options: &Options) -> Result<Section> {
         let cells =
             |k: usize| [seconds(costs[k].spent.cpu_s), exponent(k), format!("{:.0}", costs[k].peak_mib)];
         table.row(std::iter::once(poses.to_string()).chain((0..RUNS.len()).flat_map(cells)));
-        for ((weighed, how), cost) in RUNS.iter().zip(&costs) {
+        for (weighed, cost) in RUNS.iter().zip(&costs) {
             let of_these = |bar: &&(usize, Weighed, f64, f64)| bar.0 == poses && bar.1 == *weighed;
             let Some((_, _, most_s, most_mib)) = BARS.iter().find(of_these) else { continue };
             let memory = if most_mib.is_finite() { format!(", {most_mib} MiB") } else { String::new() };
             section.bar(Bar {
-                what: format!("{poses} poses, 6 axes, 10 folds, {how}, one core"),
+                what: format!("{poses} poses, 6 axes, 10 folds, {}, one core", weighed.word()),
                 limit: format!("<= {most_s} s{memory}"),
                 measured: format!("{} s, {:.0} MiB", seconds(cost.spent.cpu_s), cost.peak_mib),
                 met: cost.spent.cpu_s <= *most_s && cost.peak_mib <= *most_mib,
@@ -80,10 +79,8 @@ fn diagram(curve: &[(usize, Vec<Cost>)]) -> String {
 }
 
 fn cost(options: &Options, poses: usize, weighed: Weighed) -> Result<Cost> {
-    let folder = options.data.join(format!("campaign-{poses}"));
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
-    let pipeline = campaign::place(&folder, poses, weighed, &models)?;
-    let out = folder.join("out");
+    let pipeline = campaign::place(options, poses, weighed)?;
+    let out = pipeline.with_file_name("out");
     let cost =
         armcal_on_one([OsStr::new("run"), pipeline.as_os_str(), OsStr::new("--out"), out.as_os_str()])?;
     std::fs::remove_dir_all(&out)?;

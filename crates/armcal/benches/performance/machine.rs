@@ -5,6 +5,14 @@ use crate::peers::Python;
 use std::path::Path;
 use std::process::Command;
 
+/// Of what commit, and when.
+pub fn when() -> [String; 2] {
+    [
+        format!("date: {}", said("date", &["-u", "+%Y-%m-%d %H:%M UTC"])),
+        format!("armcal: {}{}", said("git", &["rev-parse", "--short", "HEAD"]), changed()),
+    ]
+}
+
 /// One line a fact.
 pub fn facts(options: &Options) -> Vec<String> {
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
@@ -17,11 +25,12 @@ pub fn facts(options: &Options) -> Vec<String> {
             "machine: {cpu}, {cores} cores, {memory}; load average {load} at the end (the bench itself is part of it)"
         ),
         format!("system: {}", said("uname", &["-sr"])),
-        format!("date: {}", said("date", &["-u", "+%Y-%m-%d %H:%M UTC"])),
-        format!("armcal: {}{}", said("git", &["rev-parse", "--short", "HEAD"]), changed()),
+    ];
+    facts.extend(when());
+    facts.extend([
         format!("compiler: {}", said("rustc", &["--version"])),
         format!("crates: {}", crates(&["mcap", "memmap2", "nalgebra", "num-dual", "rayon", "zstd"])),
-    ];
+    ]);
     if let Ok(Some(python)) = Python::find(options) {
         facts.extend(python.versions());
     }

@@ -108,7 +108,7 @@ fn main() -> Result<()> {
         println!("{}", path.display());
     } else if into_page {
         let page = std::fs::read_to_string(&path)?;
-        let page = sections.iter().try_fold(page, |page, section| page::with(&page, section, &options));
+        let page = sections.iter().try_fold(page, |page, section| page::with(&page, section));
         std::fs::write(&path, page.ok_or("a part has bars, or is not on the page: measure all parts")?)?;
     }
     Ok(())

@@ -150,16 +150,13 @@ pub fn page(sections: &[Section], options: &Options) -> String {
 }
 
 /// The page with one part measured anew; none where it is not on the page, or has bars, which stand on its top too.
-pub fn with(page: &str, section: &Section, options: &Options) -> Option<String> {
+pub fn with(page: &str, section: &Section) -> Option<String> {
     let head = format!("## {}\n", section.title);
     let (before, rest) = page.split_once(&head)?;
     let behind = rest.find("\n## ").map_or("", |at| &rest[at + 1..]);
     let text = section.text();
     let own = text.strip_prefix(&head).filter(|_| section.bars.is_empty())?;
-    let facts =
-        machine::facts(options).into_iter().filter(|f| f.starts_with("date") || f.starts_with("armcal"));
-    let when =
-        wrapped(&format!("This part was measured by itself: {}.", facts.collect::<Vec<_>>().join("; ")));
+    let when = wrapped(&format!("This part was measured by itself: {}.", machine::when().join("; ")));
     let page = format!("{before}{head}\n{when}{own}{behind}");
     Some(page.trim_end().to_owned() + "\n")
 }

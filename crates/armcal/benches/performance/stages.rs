@@ -56,15 +56,8 @@ pub fn section(options: &Options) -> Result<Section> {
          column.",
     );
     let mut all = vec![one.install(|| costs("a recording of the batch".into(), &batch::one(options)?))?];
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/models").canonicalize()?;
     for (poses, weighed) in CAMPAIGNS.into_iter().filter(|(poses, _)| *poses <= options.poses) {
-        let folder = options.data.join(format!("campaign-{poses}"));
-        let pipeline = campaign::place(&folder, poses, weighed, &models)?;
-        let how = match weighed {
-            Weighed::None => "no diagnosis",
-            Weighed::Default => "400 weighed",
-            Weighed::All => "all weighed",
-        };
+        let (pipeline, how) = (campaign::place(options, poses, weighed)?, weighed.word());
         all.push(one.install(|| costs(format!("{poses} poses, {how}"), &pipeline))?);
     }
     let titles: Vec<&str> = std::iter::once("stage").chain(all.iter().map(|c| c.title.as_str())).collect();

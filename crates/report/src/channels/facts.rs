@@ -7,11 +7,10 @@ use crate::recording_names::RecordingNames;
 use crate::run::{Run, VERSION, effects, role_word, status_word};
 use crate::text::{conclusion, estimate_shown, remark};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
-use armcal_core::{Dwell, DwellId, ErrorStats, TipMeasurement};
+use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
 use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
 
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
@@ -26,7 +25,7 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
         begin_ns,
         &calibration(&run.pipeline_name, &run.calibration, conclusion(&run.calibration), begin_ns),
     );
-    let used: BTreeSet<DwellId> = points.iter().map(|p| p.observation.dwell).collect();
+    let used = run.observed();
     for (index, recording) in run.recordings.iter().enumerate() {
         let start_ns = start_ns(recording);
         let (assigned, why_not) = (recording.assigned(), recording.why_not());
