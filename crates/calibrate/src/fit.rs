@@ -8,7 +8,7 @@ use crate::priors::PriorScales;
 use crate::problem::Problem;
 use crate::remembered::{Looked, Remembered};
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
-use crate::solver::{self, Cost as _, Settings};
+use crate::solver::{self, Cost as _, Curvature, Settings};
 use crate::statistics::{self, Uncertainty};
 use crate::whitened::{Point, Whitened};
 use crate::{
@@ -72,31 +72,6 @@ pub(crate) fn fit_near(
         }
     }
     fit_from(&Remembered::new(problem, looked), &near.values, Some(&near), free, config)
-}
-
-/// All parameters where a fit ended, and the scale of its residuals in units of the declared noise.
-pub struct Ended {
-    /// The parameters.
-    pub values: Vec<f64>,
-    /// The scale.
-    pub sigma_scale: f64,
-}
-
-/// Where a fit from these parameters ends: what is asked of [`fit_problem`] where nobody asks how sure they are. Priors are
-/// those of the problem. Near the end of another fit the scale is known roughly, and the way is short.
-pub fn fitted_values(
-    problem: &dyn Problem,
-    start: &[f64],
-    sigma_scale: Option<f64>,
-    config: &FitConfig,
-) -> Result<Ended, CalibrateError> {
-    config.check()?;
-    let free = &|p: &Parameter| p.free;
-    let white = Whitened::new(Box::new(problem), start, free, config)?;
-    enough_equations(&white)?;
-    let solved = solve(&white, sigma_scale, config)?;
-    let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
-    Ok(Ended { values: white.parameters_at(&solved.at.x), sigma_scale: solved.sigma_scale })
 }
 
 /// Where another fit ended.
@@ -188,7 +163,7 @@ fn fit_from(
 
 /// The fit again with the noise of what it found, until that changes nothing: where the noise depends on what is estimated,
 /// as of a joint that rests anywhere in a gap whose width is.
-fn with_its_noise<'a>(
+pub(crate) fn with_its_noise<'a>(
     problem: &'a dyn Problem,
     (mut white, mut solved): (Whitened<'a>, Solved),
     free: &dyn Fn(&Parameter) -> bool,
@@ -220,13 +195,16 @@ pub(crate) struct Solved {
     pub paper: Option<PaperObjective>,
     pub status: Status,
     pub iterations: usize,
+    /// Curvature of the cost there, where it was minimised by it.
+    pub curvature: Option<Curvature>,
 }
 
 impl Solved {
     /// Where the problem starts.
     fn unmoved(white: &Whitened<'_>, sigma_scale: f64) -> Result<Solved, CalibrateError> {
         let at = white.at(white.start(), Some(Weighting::PLAIN))?;
-        Ok(Solved { at, sigma_scale, paper: None, status: Status::Converged, iterations: 0 })
+        let status = Status::Converged;
+        Ok(Solved { at, sigma_scale, paper: None, status, iterations: 0, curvature: None })
     }
 
     /// The cost that was minimised (for eq. 4: the one that stands in for it in the statistics).
@@ -255,6 +233,7 @@ pub(crate) fn solve(
         paper: Some(solution.objective),
         status: solution.status,
         iterations: solution.iterations,
+        curvature: None,
     };
     let cost = solved.cost(white, config);
     solved.sigma_scale = proposal2_scale(&cost, &solved.at, white.axes.len() as f64).max(1.0);
@@ -280,6 +259,7 @@ fn once(white: &Whitened<'_>, known: Option<f64>, config: &FitConfig) -> Result<
             paper: None,
             status,
             iterations: *iterations as usize,
+            curvature: None,
         });
     }
     let solved = solve_robust(white, known, config)?;
@@ -320,14 +300,15 @@ fn solve_robust(
         }
         let settled = (next / sigma_scale - 1.0).abs() < SCALE_TOLERANCE;
         if !rough && (settled || round >= SCALE_ROUNDS) {
-            return Ok(Solved { at, sigma_scale, paper: None, status: solution.status, iterations });
+            let (status, curvature) = (solution.status, Some(solution.hessian));
+            return Ok(Solved { at, sigma_scale, paper: None, status, iterations, curvature });
         }
         sigma_scale = next;
     }
 }
 
 /// Refuses more parameters about which nothing is known than there are equations.
-fn enough_equations(white: &Whitened<'_>) -> Result<(), CalibrateError> {
+pub(crate) fn enough_equations(white: &Whitened<'_>) -> Result<(), CalibrateError> {
     let parameters = white.problem.parameters();
     let unknown: Vec<&Parameter> = white
         .axes

@@ -8,7 +8,7 @@ mod frames; // are frames metres and half turns off found?
 mod holdout; // does the fit never see what is held out?
 mod holdout_turns; // which observations does each kind of hold-out mean?
 mod joined; // do two arms of the lab with joined tips recover what is planted in both?
-mod linear; // is the answer of a linear problem the textbook's?
+pub mod linear; // is the answer of a linear problem the textbook's?
 mod markers; // do several markers a pose share noise, hold-out and weight?
 mod paper; // is eq. 4 solved to its optimality conditions?
 mod pooled; // has a pool solved recording by recording the optimum of one dense fit?

@@ -47,6 +47,12 @@ impl Axis {
         Axis { index, centre: 0.0, scale, precision: 0.0, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
     }
 
+    /// A value, or the bound that it is beyond.
+    pub fn bounded(&self, value: f64) -> f64 {
+        let x = (value - self.centre) / self.scale;
+        if x < self.lower || x > self.upper { self.centre + self.scale * self.at(value) } else { value }
+    }
+
     /// A value in its units, within the bounds.
     fn at(&self, value: f64) -> f64 {
         ((value - self.centre) / self.scale).max(self.lower).min(self.upper)

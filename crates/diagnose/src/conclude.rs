@@ -190,6 +190,11 @@ pub(crate) enum ShownBy {
     Nothing,
 }
 
+/// Whether a mean error falls by an amount worth a name [mm].
+pub(crate) fn is_worth_naming(before_mm: f64, after_mm: f64, floor_mm: f64) -> bool {
+    before_mm - after_mm > WORTH_NAMING * floor_mm
+}
+
 /// Whether a model with more effects errs less by an amount worth a name: on held-out points, with an interval clear of zero;
 /// or clearly less on those that were fitted, where few held-out ones show an effect, so that their mean falls not clear of
 /// chance, or is certainly no worse, or where a turn leaves out what it acts in and cannot learn it. Held-out points that a
@@ -201,7 +206,7 @@ pub(crate) fn shown_by(
     config: &DiagnosisConfig,
 ) -> ShownBy {
     let floor_mm = before.noise_floor_m * 1e3;
-    let worth = error_mm(before) - error_mm(after) > WORTH_NAMING * floor_mm;
+    let worth = is_worth_naming(error_mm(before), error_mm(after), floor_mm);
     let fitted = after.train.fitted.mean_m < CONFIRMED_SHARE * before.train.fitted.mean_m;
     match compare_heldout(before, after, observations, config) {
         Some(held) if worth && held.helps() => ShownBy::Judged,

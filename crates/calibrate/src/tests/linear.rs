@@ -50,7 +50,7 @@ pub fn parameter(name: &str, bound: f64, prior_sigma: Option<f64>) -> Parameter 
 }
 
 /// 20 random 3-row blocks over 4 parameters with priors, no bound near.
-fn random_problem(seed: u64) -> Linear {
+pub fn random_problem(seed: u64) -> Linear {
     let mut rng = super::rig::rng(seed);
     let truth = DVector::from_column_slice(&[0.3, -0.2, 0.1, 0.4]);
     let blocks = (0..20)
