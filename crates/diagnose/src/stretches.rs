@@ -53,9 +53,14 @@ pub(crate) fn stretches(
             }
         }
     }
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let best = tried.iter().take(WEIGHED).map(|(_, stretch)| *stretch).collect();
-    Stretches { best, tried: tried.len() }
+    let count = tried.len();
+    let first = |a: &(f64, (DwellId, usize)), b: &(f64, (DwellId, usize))| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    if count > WEIGHED {
+        tried.select_nth_unstable_by(WEIGHED, first);
+        tried.truncate(WEIGHED);
+    }
+    tried.sort_by(first);
+    Stretches { best: tried.into_iter().map(|(_, stretch)| stretch).collect(), tried: count }
 }
 
 /// What columns promise in the members between two of [`running`] sums.
