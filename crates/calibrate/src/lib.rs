@@ -48,6 +48,7 @@ mod products;
 mod remembered;
 mod rigid_fit;
 mod robust;
+mod rows;
 mod solver;
 mod statistics;
 mod structure;

@@ -14,6 +14,7 @@
 use crate::fit::{Solved, solve};
 use crate::outcome::{Estimate, Fit};
 use crate::problem::{Problem, Told, as_beneath};
+use crate::rows::Kept;
 use crate::statistics::posterior;
 use crate::whitened::{Axis, Whitened};
 use crate::wider::wider;
@@ -54,6 +55,10 @@ impl Problem for WithPriors<'_> {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         self.problem.covariance(block, p)
+    }
+
+    fn straight(&self) -> Option<&Kept> {
+        self.problem.straight()
     }
 }
 

@@ -2,6 +2,7 @@
 //! observation), their exact derivatives, their covariance, and the parameters.
 
 use crate::elsewhere::Away;
+use crate::rows::Kept;
 use armcal_core::Parameter;
 use armcal_model::Asked;
 use nalgebra::{DMatrix, DVector};
@@ -69,6 +70,10 @@ pub trait Problem: Sync {
     /// Whether the covariance depends on what is estimated by more than where the arm stands.
     fn noise_depends(&self) -> bool {
         false
+    }
+    /// Where the whitened derivative is kept, if it is taken for the same at all parameters.
+    fn straight(&self) -> Option<&Kept> {
+        None
     }
     /// Which blocks know which parameters, in the order of the blocks; all of them know all where nothing is said. What
     /// only one group knows is solved for within it, so that work and memory grow with the number of groups.
@@ -145,5 +150,9 @@ impl<P: Problem + ?Sized> Problem for &P {
 
     fn covariance(&self, block: usize, p: &[f64]) -> DMatrix<f64> {
         (**self).covariance(block, p)
+    }
+
+    fn straight(&self) -> Option<&Kept> {
+        (**self).straight()
     }
 }

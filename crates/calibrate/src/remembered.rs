@@ -2,6 +2,7 @@
 //! fit without some observations where that of all did. Of many observations that one's derivative serves all the way.
 
 use crate::problem::{Linearised, Problem, Told, as_beneath};
+use crate::rows::Kept;
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig};
 use armcal_core::Parameter;
@@ -57,6 +58,7 @@ pub(crate) struct Remembered<'a> {
 struct About {
     looked: Arc<Looked>,
     blocks: Vec<Arc<Block>>,
+    kept: Kept,
 }
 
 /// From so many blocks on a fit without some of them ends so near that of all that the derivative stays.
@@ -94,7 +96,8 @@ impl<'a> Remembered<'a> {
         let looked = remembered.at(&looked.p);
         let many = blocks.len() >= MANY_BLOCKS && blocks.len() == problem.blocks();
         many.then(|| {
-            remembered.about = Some(About { looked, blocks });
+            let kept = Kept::of(problem.known().len().max(1));
+            remembered.about = Some(About { looked, blocks, kept });
             remembered
         })
     }
@@ -102,7 +105,7 @@ impl<'a> Remembered<'a> {
     /// Whether the derivative hardly changes on the way to these parameters, by twice what the residuals differ from their
     /// linearisation over what this has them move.
     pub fn is_straight_to(&self, p: &[f64]) -> bool {
-        let Some(About { looked, blocks }) = &self.about else { return true };
+        let Some(About { looked, blocks, .. }) = &self.about else { return true };
         let step: Vec<f64> = p.iter().zip(&looked.p).map(|(to, from)| to - from).collect();
         let groups = self.problem.known();
         let (mut beside, mut along) = (0.0, 0.0);
@@ -175,6 +178,10 @@ impl Problem for Remembered<'_> {
         let looked = about.map_or_else(|| self.at(p), |about| about.looked.clone());
         let own = looked.covariances[block].get_or_init(|| Arc::new(self.problem.covariance(block, p)));
         own.as_ref().clone()
+    }
+
+    fn straight(&self) -> Option<&Kept> {
+        self.about.as_ref().filter(|_| !self.problem.noise_depends()).map(|about| &about.kept)
     }
 }
 

@@ -5,15 +5,16 @@
 
 use crate::elsewhere::{Part, Weighting};
 use crate::loss::{Loss, chi_median};
-use crate::problem::Linearised;
 use crate::products::gram;
-use crate::solver::{Arrow, Cost, Curvature, Quadratic, root};
+use crate::rows::Rows;
+use crate::solver::{Arrow, Cost, Curvature, Quadratic, is_tall, root, root_of};
 use crate::structure::Structure;
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::robust::median;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The cost at a fixed scale.
@@ -149,45 +150,91 @@ impl RobustCost<'_, '_> {
     }
 
     /// What the blocks of one group add to the model, over the group's columns.
-    pub fn part(&self, group: usize, (residual, jacobian): &Linearised) -> Part {
-        let blocks = self.white.structure.groups[group].blocks.clone();
+    pub fn part(&self, group: usize, rows: &Rows) -> Part {
+        let structure = &self.white.structure;
+        let blocks = structure.groups[group].blocks.clone();
         let first = self.white.offsets[blocks.start];
-        let mut scale = DVector::zeros(residual.len());
-        let mut outliers = Vec::new();
+        let mut lighter = Vec::new();
         for j in blocks {
-            let (at, rows) = (self.white.offsets[j] - first, self.white.dimension(j));
-            let own = residual.rows(at, rows);
-            let norm = own.norm();
+            let (at, count) = (self.white.offsets[j] - first, self.white.dimension(j));
+            let norm = rows.residual.rows(at, count).norm();
             let weight = self.loss(j).weight(norm / self.sigma_scale);
-            scale.rows_mut(at, rows).fill(weight.sqrt() / self.sigma_scale);
-            if weight < 1.0 && self.exact_curvature {
-                outliers.push((at, own / norm));
+            if weight < 1.0 {
+                lighter.push(Lighter { rows: at..at + count, weight, norm });
             }
         }
-        let mut jacobian = jacobian.clone();
-        jacobian.column_iter_mut().for_each(|mut column| column.component_mul_assign(&scale));
-        let gradient = jacobian.tr_mul(&residual.component_mul(&scale));
-        // What lies along the residual, by outlier.
-        let mut along = DMatrix::zeros(outliers.len(), jacobian.ncols());
-        for (mut along, (at, direction)) in along.row_iter_mut().zip(&outliers) {
-            along.copy_from(&(direction.transpose() * jacobian.rows(*at, direction.len())));
+        let count = rows.residual.len();
+        let are_few = 2 * lighter.iter().map(|l| l.rows.len()).sum::<usize>() <= count;
+        if are_few && (structure.is_dense() || is_tall(count, rows.derivative.scale.len())) {
+            self.part_by_squares(rows, &lighter)
+        } else {
+            self.part_by_rows(rows, &lighter)
         }
-        if self.white.structure.is_dense() {
-            let squares = gram(&jacobian);
-            let curvature = &squares - gram(&along);
-            return Part { gradient, squares: squares.diagonal(), curvature };
-        }
-        let squares = DVector::from_iterator(
-            jacobian.ncols(),
-            jacobian.column_iter().map(|column| column.norm_squared()),
-        );
-        // The rows without it: I - u u' is its own square root.
-        for (along, (at, direction)) in along.row_iter().zip(&outliers) {
-            let mut rows = jacobian.rows_mut(*at, direction.len());
-            rows -= direction * along;
-        }
-        Part { gradient, squares, curvature: root(jacobian) }
     }
+
+    /// From the squares of all rows, and what those of the lighter blocks have less.
+    fn part_by_squares(&self, rows: &Rows, lighter: &[Lighter]) -> Part {
+        let Rows { residual, derivative } = rows;
+        let usual = self.sigma_scale.powi(2).recip();
+        let mut weighted = residual * usual;
+        let (mut less, mut along) = (Vec::new(), Vec::new());
+        for Lighter { rows, weight, norm } in lighter {
+            let own = residual.rows(rows.start, rows.len());
+            weighted.rows_mut(rows.start, rows.len()).iter_mut().for_each(|row| *row *= weight);
+            less.extend(rows.clone().map(|row| (row, ((1.0 - weight) * usual).sqrt())));
+            along.push((rows.start, own * ((weight * usual).sqrt() / norm)));
+        }
+        let gradient = derivative.products(&weighted);
+        let less = derivative.some_rows(&less);
+        let of_less = less.column_iter().map(|column| column.norm_squared());
+        let mut curvature = derivative.squares() * usual;
+        let squares = curvature.diagonal() - DVector::from_iterator(less.ncols(), of_less);
+        curvature -= gram(&less);
+        if self.exact_curvature {
+            curvature -= gram(&derivative.along(&along));
+        }
+        if !self.white.structure.is_dense() {
+            curvature = root_of(curvature, residual.len(), || self.lightened(rows, lighter, true));
+        }
+        Part { gradient, squares, curvature }
+    }
+
+    /// Row by row.
+    fn part_by_rows(&self, rows: &Rows, lighter: &[Lighter]) -> Part {
+        let jacobian = self.lightened(rows, lighter, false);
+        let mut scaled = &rows.residual / self.sigma_scale;
+        lighter.iter().for_each(|l| scaled.rows_mut(l.rows.start, l.rows.len()).scale_mut(l.weight.sqrt()));
+        let gradient = jacobian.tr_mul(&scaled);
+        let squares = jacobian.column_iter().map(|column| column.norm_squared());
+        let squares = DVector::from_iterator(jacobian.ncols(), squares);
+        let jacobian = if self.exact_curvature { self.lightened(rows, lighter, true) } else { jacobian };
+        let curvature = if self.white.structure.is_dense() { gram(&jacobian) } else { root(jacobian) };
+        Part { gradient, squares, curvature }
+    }
+
+    /// The derivative by x, lighter blocks by the root of their weight; where the curvature is asked for and is exact, without what
+    /// lies along their residual: `I - u u'` is its own root.
+    fn lightened(&self, rows: &Rows, lighter: &[Lighter], curved: bool) -> DMatrix<f64> {
+        let mut jacobian = rows.derivative.by_axis() / self.sigma_scale;
+        for Lighter { rows: at, weight, norm } in lighter {
+            let mut own = jacobian.rows_mut(at.start, at.len());
+            own *= weight.sqrt();
+            if curved && self.exact_curvature {
+                let direction = rows.residual.rows(at.start, at.len()) / *norm;
+                let along = direction.transpose() * &own;
+                own -= direction * along;
+            }
+        }
+        jacobian
+    }
+}
+
+/// A block that weighs less than the others.
+struct Lighter {
+    rows: Range<usize>,
+    weight: f64,
+    /// Of its residual.
+    norm: f64,
 }
 
 /// `sum_j E |psi|^2` under the declared noise.

@@ -9,6 +9,7 @@
 use crate::elsewhere::{Part, Weighting};
 use crate::problem::{Linearised, Problem};
 use crate::robust::{RobustCost, curvature};
+use crate::rows::{ByParameter, Derivative, Rows};
 use crate::solver::Curvature;
 use crate::structure::Structure;
 use crate::{CalibrateError, FitConfig};
@@ -82,7 +83,7 @@ pub(crate) struct Point {
     /// Whitened residuals of all blocks, stacked; none of observations that are elsewhere.
     pub residual: DVector<f64>,
     /// Rows and derivative of each group, over its columns; none of observations that are elsewhere.
-    pub groups: Vec<Linearised>,
+    pub groups: Vec<Rows>,
     /// Of observations that are elsewhere: what they add to a cost with this weighting, where that was asked for.
     pub parts: Option<(Weighting, Vec<Part>)>,
 }
@@ -196,8 +197,8 @@ impl<'a> Whitened<'a> {
     }
 
     /// A point with these rows.
-    fn point(&self, x: DVector<f64>, groups: Vec<Linearised>) -> Point {
-        let rows = groups.iter().flat_map(|(residual, _)| residual.iter().copied());
+    fn point(&self, x: DVector<f64>, groups: Vec<Rows>) -> Point {
+        let rows = groups.iter().flat_map(|rows| rows.residual.iter().copied());
         let residual = DVector::from_iterator(self.rows(), rows);
         let norm = |block| residual.rows(self.offsets[block], self.dimension(block)).norm();
         let norms = (0..self.blocks()).map(norm).collect();
@@ -208,9 +209,9 @@ impl<'a> Whitened<'a> {
     pub fn moved(&self, at: Point, x: DVector<f64>) -> Point {
         let step = &x - &at.x;
         let mut groups = at.groups;
-        for (group, (residual, jacobian)) in groups.iter_mut().enumerate() {
+        for (group, rows) in groups.iter_mut().enumerate() {
             let own = self.structure.axes(group).map(|axis| step[axis]);
-            *residual += &*jacobian * DVector::from_iterator(jacobian.ncols(), own);
+            rows.residual += rows.derivative.times(&own.collect::<Vec<f64>>().into());
         }
         self.point(x, groups)
     }
@@ -252,8 +253,9 @@ impl<'a> Whitened<'a> {
     /// The derivative of all residuals by x.
     pub fn jacobian(&self, at: &Point) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.rows(), self.axes.len());
-        for (group, (_, part)) in at.groups.iter().enumerate() {
+        for (group, rows) in at.groups.iter().enumerate() {
             let first = self.offsets[self.structure.groups[group].blocks.start];
+            let part = rows.derivative.by_axis();
             for (axis, column) in self.structure.axes(group).zip(part.column_iter()) {
                 jacobian.view_mut((first, axis), (part.nrows(), 1)).copy_from(&column);
             }
@@ -268,7 +270,39 @@ impl<'a> Whitened<'a> {
     }
 
     /// The rows of one group at parameters `p`, with the columns of its own axes, then those of the shared ones.
-    fn linearised_group(&self, p: &[f64], group: usize) -> Result<Linearised, CalibrateError> {
+    fn linearised_group(&self, p: &[f64], group: usize) -> Result<Rows, CalibrateError> {
+        let columns = &self.structure.groups[group].columns;
+        let axes = self.structure.axes(group).map(|axis| self.axes[axis].scale);
+        let scale = DVector::from_iterator(columns.len(), axes);
+        let straight = self.problem.straight();
+        if let Some(rows) = straight.and_then(|kept| kept.find(group, columns)) {
+            let residual = self.residual_of_group(p, group)?;
+            return Ok(Rows { residual, derivative: Derivative { rows, scale } });
+        }
+        let (residual, matrix) = self.by_parameter(p, group)?;
+        let rows = ByParameter::new(matrix);
+        if let Some(kept) = straight {
+            kept.keep(group, columns, &rows);
+        }
+        Ok(Rows { residual, derivative: Derivative { rows, scale } })
+    }
+
+    /// The residual of one group alone.
+    fn residual_of_group(&self, p: &[f64], group: usize) -> Result<DVector<f64>, CalibrateError> {
+        let blocks = self.structure.groups[group].blocks.clone();
+        let first = self.offsets[blocks.start];
+        let mut stacked = DVector::zeros(self.offsets[blocks.end] - first);
+        for block in blocks {
+            let raw = self.problem.residual(block, p);
+            self.finite(block, raw.as_slice(), "the residual")?;
+            let at = self.offsets[block] - first;
+            whiten(&self.whitener[block], raw.as_slice(), &mut stacked.as_mut_slice()[at..at + raw.len()]);
+        }
+        Ok(stacked)
+    }
+
+    /// The residual of one group, and its derivative by the parameter of each of the group's axes.
+    fn by_parameter(&self, p: &[f64], group: usize) -> Result<Linearised, CalibrateError> {
         let at_group = &self.structure.groups[group];
         let first = self.offsets[at_group.blocks.start];
         let height = self.offsets[at_group.blocks.end] - first;
@@ -276,24 +310,25 @@ impl<'a> Whitened<'a> {
             (DVector::zeros(height), DMatrix::zeros(height, at_group.columns.len()));
         // Of a pool a group knows few of all parameters.
         let asked = |column: usize| at_group.columns.contains(&Some(column));
-        // Where a column is among those that are told, where it goes, and its axis.
+        // Where a column is among those that are told, where it goes, and its parameter.
         let told = self.structure.axes(group).zip(&at_group.columns).enumerate();
-        let told: Vec<(usize, usize, &Axis)> =
-            told.filter_map(|(to, (axis, known))| Some(((*known)?, to * height, &self.axes[axis]))).collect();
+        let told: Vec<(usize, usize, usize)> = told
+            .filter_map(|(to, (axis, known))| Some(((*known)?, to * height, self.axes[axis].index)))
+            .collect();
         let mut done = Ok(());
         let mut put = |block: usize, (raw, full): &Linearised| {
             self.finite(block, raw.as_slice(), "the residual")?;
             let (at, rows) = (self.offsets[block] - first, raw.len());
             let white = &self.whitener[block];
-            whiten(white, raw.as_slice(), 1.0, &mut stacked.as_mut_slice()[at..at + rows]);
+            whiten(white, raw.as_slice(), &mut stacked.as_mut_slice()[at..at + rows]);
             let (full, out) = (full.as_slice(), jacobian.as_mut_slice());
             let suspect = !all_finite(full);
-            for (known, to, axis) in &told {
+            for (known, to, index) in &told {
                 let raw = &full[known * rows..(known + 1) * rows];
                 if suspect && !all_finite(raw) {
-                    return Err(self.not_finite(block, "the derivative", Some(axis.index)));
+                    return Err(self.not_finite(block, "the derivative", Some(*index)));
                 }
-                whiten(white, raw, axis.scale, &mut out[to + at..to + at + rows]);
+                whiten(white, raw, &mut out[to + at..to + at + rows]);
             }
             Ok(())
         };
@@ -361,18 +396,17 @@ fn all_finite(values: &[f64]) -> bool {
     values.iter().fold(true, |all, v| all & v.is_finite())
 }
 
-/// `scale * white * raw`, white lower triangular. Three rows, all that a block of most calibrations has, are written out:
-/// products whose size is not known take several times as long.
-fn whiten(white: &DMatrix<f64>, raw: &[f64], scale: f64, out: &mut [f64]) {
+/// `white * raw`, white lower triangular. Three rows, all that a block of most calibrations has, are written out: products whose
+/// size is not known take several times as long.
+fn whiten(white: &DMatrix<f64>, raw: &[f64], out: &mut [f64]) {
     if let ([x, y, z], [a, b, c], [xx, yx, zx, _, yy, zy, _, _, zz]) = (raw, &mut *out, white.as_slice()) {
-        *a = scale * (xx * x);
-        *b = scale * (yx * x + yy * y);
-        *c = scale * (zx * x + zy * y + zz * z);
+        *a = xx * x;
+        *b = yx * x + yy * y;
+        *c = zx * x + zy * y + zz * z;
         return;
     }
     for (r, out) in out.iter_mut().enumerate() {
-        let sum: f64 = raw[..=r].iter().enumerate().map(|(c, v)| white[(r, c)] * v).sum();
-        *out = scale * sum;
+        *out = raw[..=r].iter().enumerate().map(|(c, v)| white[(r, c)] * v).sum();
     }
 }
 

@@ -54,7 +54,8 @@ pub(crate) fn stretches(
         }
     }
     let count = tried.len();
-    let first = |a: &(f64, (DwellId, usize)), b: &(f64, (DwellId, usize))| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    let first =
+        |a: &(f64, (DwellId, usize)), b: &(f64, (DwellId, usize))| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     if count > WEIGHED {
         tried.select_nth_unstable_by(WEIGHED, first);
         tried.truncate(WEIGHED);

@@ -205,19 +205,25 @@ impl Arrow {
 /// takes a fraction of the time and is as exact as that of a [`super::Curvature::Dense`]. Where columns depend on each other, its diagonal is raised by
 /// what its own rounding may have taken from it (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorem 10.7).
 pub(crate) fn root(m: DMatrix<f64>) -> DMatrix<f64> {
-    if m.nrows() < TALL * m.ncols() {
-        return triangle(m);
-    }
-    let squares = gram(&m);
+    if is_tall(m.nrows(), m.ncols()) { root_of(gram(&m), m.nrows(), || m) } else { triangle(m) }
+}
+
+/// [`root`] of the squares of so many rows; the rows themselves where their squares have none.
+pub(crate) fn root_of(squares: DMatrix<f64>, rows: usize, m: impl FnOnce() -> DMatrix<f64>) -> DMatrix<f64> {
     let raised = || {
         let mut raised = squares.clone();
-        let rounding = m.ncols() as f64 * (2.0 + (m.nrows() as f64).sqrt()) * f64::EPSILON;
+        let rounding = squares.ncols() as f64 * (2.0 + (rows as f64).sqrt()) * f64::EPSILON;
         let up = |square: f64| (square * (1.0 + rounding)).max(f64::MIN_POSITIVE);
-        (0..m.ncols()).for_each(|k| raised[(k, k)] = up(raised[(k, k)]));
+        (0..squares.ncols()).for_each(|k| raised[(k, k)] = up(raised[(k, k)]));
         raised.cholesky()
     };
     let factor = squares.clone().cholesky().or_else(raised);
-    factor.map_or_else(|| triangle(m), |factor| factor.unpack().transpose())
+    factor.map_or_else(|| triangle(m()), |factor| factor.unpack().transpose())
+}
+
+/// Whether a matrix is so tall that its root goes through its squares.
+pub(crate) fn is_tall(rows: usize, columns: usize) -> bool {
+    rows >= TALL * columns
 }
 
 /// From so many rows a column on reflections are most of the time of a fit.

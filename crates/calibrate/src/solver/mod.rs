@@ -15,7 +15,7 @@ mod bounded_qp;
 mod curvature;
 mod levenberg;
 
-pub(crate) use arrow::{Arrow, root};
+pub(crate) use arrow::{Arrow, is_tall, root, root_of};
 pub(crate) use curvature::Curvature;
 pub(crate) use levenberg::{Settings, Solution, minimise};
 

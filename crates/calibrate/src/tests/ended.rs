@@ -1,5 +1,7 @@
 //! A fit with something held, from the one without, against fitting it so.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
 use crate::tests::linear::random_problem;
 use crate::{FitConfig, Objective, fitted_values};
 
