@@ -22,17 +22,12 @@ pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     if columns <= BLOCK {
         return inner(a, a);
     }
-    let transposed = a.transpose();
     let mut product = DMatrix::zeros(columns, columns);
     for from in (0..columns).step_by(BLOCK) {
         let width = BLOCK.min(columns - from);
+        let left = a.columns(from, width).transpose();
         let right = a.columns(from, columns - from);
-        product.view_mut((from, from), (width, columns - from)).gemm(
-            1.0,
-            &transposed.rows(from, width),
-            &right,
-            0.0,
-        );
+        product.view_mut((from, from), (width, columns - from)).gemm(1.0, &left, &right, 0.0);
     }
     product.fill_lower_triangle_with_upper_triangle();
     product

@@ -1,6 +1,7 @@
 //! What cannot be told apart (notes 3 and 4.12, formula 10), and what the data could not have shown (4.1).
 
 use crate::evidence::Metric;
+use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, eigen};
 use crate::special::{Z_80, Z_975};
 use nalgebra::{DMatrix, DVector};
@@ -90,16 +91,15 @@ pub(crate) struct Crossed {
 }
 
 impl Crossed {
-    /// Of columns in the units of the weighing.
-    pub fn of(columns: &[DMatrix<f64>], metric: &Metric) -> Crossed {
-        let rows = columns.first().map_or(0, DMatrix::nrows);
-        let mut stacked = DMatrix::zeros(rows, columns.iter().map(DMatrix::ncols).sum());
+    /// Of sets of columns, times a factor that gives them the units of the weighing.
+    pub fn of(columns: &[&Columns], problem: &Problem, factor: f64, metric: &Metric) -> Crossed {
+        let mut stacked = DMatrix::zeros(problem.rows(), columns.iter().map(|own| own.len()).sum());
         let mut sets = Vec::with_capacity(columns.len());
         let mut at = 0;
         for own in columns {
-            stacked.columns_mut(at, own.ncols()).copy_from(own);
-            sets.push(at..at + own.ncols());
-            at += own.ncols();
+            stacked.columns_mut(at, own.len()).copy_from(&own.dense(&problem.dwells, factor));
+            sets.push(at..at + own.len());
+            at += own.len();
         }
         let all = metric.projection.gram(&metric.whitened(stacked));
         let mut crossed = Crossed { sets, all, reach: Vec::new() };

@@ -201,13 +201,15 @@ fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direct
 /// Dwells that keep their sign together: as the noise seems to repeat.
 pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-    let unit = units(problem);
+    let by_place = weighed.probably(&[Noise::Place, Noise::TrackedAndPlace]);
+    let by_visit = weighed.probably(&[Noise::Visit]);
+    let unit = if by_place || by_visit { units(problem) } else { Vec::new() };
     for (i, d) in problem.dwells.iter().enumerate() {
         let key = if weighed.remembers() {
             (d.id.recording, d.id.dwell / BLOCK)
-        } else if weighed.probably(&[Noise::Place, Noise::TrackedAndPlace]) {
+        } else if by_place {
             (0, unit[i])
-        } else if weighed.probably(&[Noise::Visit]) {
+        } else if by_visit {
             (d.id.recording, unit[i])
         } else {
             (d.id.recording, i)

@@ -1,7 +1,7 @@
 //! Which dwells are visits to the same place, which are too alike to speak for one another, and which of very many weigh.
 
 use crate::config::DiagnosisConfig;
-use crate::problem::Problem;
+use crate::problem::{DwellRow, Problem};
 use armcal_calibrate::{MIN_CAVITIES, measured_together};
 use armcal_core::Observation;
 use rand::{RngExt, SeedableRng};
@@ -24,24 +24,44 @@ pub(crate) fn units(problem: &Problem) -> Vec<usize> {
     // Where places are few, the poses at them are the sample: a ball in one of two sockets says nothing about the
     // socket, everything about the arm.
     let enough = known.len() >= MIN_CAVITIES;
-    let mut leaders: Vec<usize> = Vec::new();
-    let mut unit = Vec::with_capacity(problem.dwells.len());
-    for (i, d) in problem.dwells.iter().enumerate() {
-        if let Some(place) = d.place.as_deref().filter(|_| enough) {
-            unit.push(known[place]);
-            continue;
-        }
-        let alike = |l: &usize| {
-            let other = &problem.dwells[*l].joint_rad;
-            other.iter().zip(&d.joint_rad).all(|(a, b)| (a - b).abs() < ALIKE_RAD)
-        };
-        let at = leaders.iter().position(alike).unwrap_or_else(|| {
-            leaders.push(i);
-            leaders.len() - 1
-        });
-        unit.push(known.len() + at);
+    let mut poses = Alike::within(ALIKE_RAD);
+    let unit = |d: &DwellRow| match d.place.as_deref().filter(|_| enough) {
+        Some(place) => known[place],
+        None => known.len() + poses.group_of(&d.joint_rad),
+    };
+    problem.dwells.iter().map(unit).collect()
+}
+
+/// Poses in groups: each with the first one before it that is alike in every joint, if there is one.
+struct Alike {
+    reach_rad: f64,
+    first: Vec<Vec<f64>>,
+    /// Groups by the cell of their first pose's first two joints, as wide as the reach.
+    cells: BTreeMap<[i64; 2], Vec<usize>>,
+}
+
+impl Alike {
+    fn within(reach_rad: f64) -> Alike {
+        Alike { reach_rad, first: Vec::new(), cells: BTreeMap::new() }
     }
-    unit
+
+    /// The group of the next pose.
+    fn group_of(&mut self, joint_rad: &[f64]) -> usize {
+        let cell = [0, 1].map(|j| joint_rad.get(j).map_or(0, |q| (q / self.reach_rad).floor() as i64));
+        let near = (-1..=1)
+            .flat_map(|i| (-1..=1).map(move |j| [cell[0].saturating_add(i), cell[1].saturating_add(j)]));
+        let near = near.filter_map(|cell| self.cells.get(&cell)).flatten().copied();
+        let is_alike = |group: &usize| {
+            let first = &self.first[*group];
+            let close = |(a, b): (&f64, &f64)| (a - b).abs() < self.reach_rad;
+            first.len() == joint_rad.len() && first.iter().zip(joint_rad).all(close)
+        };
+        near.filter(is_alike).min().unwrap_or_else(|| {
+            self.first.push(joint_rad.to_vec());
+            self.cells.entry(cell).or_default().push(self.first.len() - 1);
+            self.first.len() - 1
+        })
+    }
 }
 
 /// The observations of at most `max_weighed` poses: one drawn from each of as many equal stretches of time, so that every
@@ -69,25 +89,19 @@ pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String
 
 /// The cavity; for a tracked pose the pose itself, where it was visited more than once. One observation of each pose is asked.
 pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
-    let same = |a: &Observation, b: &Observation| {
-        a.joint_rad.len() == b.joint_rad.len()
-            && a.joint_rad.iter().zip(&b.joint_rad).all(|(a, b)| (a - b).abs() < SAME_POSE_RAD)
-    };
-    let mut poses: Vec<(usize, usize)> = Vec::new();
-    let mut member = vec![None; observations.len()];
-    for (i, o) in observations.iter().enumerate().filter(|(_, o)| o.cavity().is_none()) {
-        let known = poses.iter().position(|(first, _)| same(observations[*first], o));
-        let k = known.unwrap_or_else(|| {
-            poses.push((i, 0));
-            poses.len() - 1
-        });
-        poses[k].1 += 1;
-        member[i] = Some(k);
-    }
-    let name = |(i, o): (usize, &&Observation)| match (o.cavity(), member[i]) {
+    let mut poses = Alike::within(SAME_POSE_RAD);
+    let pose = |o: &&Observation| o.cavity().is_none().then(|| poses.group_of(&o.joint_rad));
+    let member: Vec<Option<usize>> = observations.iter().map(pose).collect();
+    let mut visits = vec![0; poses.first.len()];
+    member.iter().flatten().for_each(|k| visits[*k] += 1);
+    let name = |(o, member): (&&Observation, Option<usize>)| match (o.cavity(), member) {
         (Some(cavity), _) => Some(cavity.to_owned()),
-        (None, Some(k)) if poses[k].1 > 1 => Some(format!("pose {}", k + 1)),
+        (None, Some(k)) if visits[k] > 1 => Some(format!("pose {}", k + 1)),
         _ => None,
     };
-    observations.iter().enumerate().map(name).collect()
+    observations.iter().zip(member).map(name).collect()
 }
+
+#[cfg(test)]
+#[path = "tests/places.rs"]
+mod tests;

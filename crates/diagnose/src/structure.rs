@@ -5,7 +5,7 @@ use crate::drivers::standardised_joints;
 use crate::judge::base_fit;
 use crate::problem::Problem;
 use crate::special::{chi2_tail, ln_f_tail};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -103,19 +103,13 @@ fn lack_of_fit(problem: &Problem, e: &DVector<f64>, p_eff: f64) -> Option<LackOf
 /// Moran's I on residual vectors over nearest neighbours in joint space; null by flipping the sign of whole dwells.
 fn moran(problem: &Problem, e: &DVector<f64>, config: &DiagnosisConfig) -> (f64, f64) {
     let n = problem.dwells.len();
-    let z = standardised_joints(problem);
     let mut pairs: Vec<(usize, usize, f64)> = Vec::new();
-    for i in 0..n {
-        let mut near: Vec<(f64, usize)> =
-            (0..n).filter(|j| *j != i).map(|j| ((z.row(i) - z.row(j)).norm_squared(), j)).collect();
-        let k = NEIGHBOURS.min(near.len().saturating_sub(1));
-        if near.len() > k {
-            near.select_nth_unstable_by(k, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        }
-        for (_, j) in near.iter().take(k.max(1)) {
-            let (a, b) = (&problem.dwells[i], &problem.dwells[*j]);
+    let count = NEIGHBOURS.min(n.saturating_sub(2)).max(1);
+    for (i, near) in nearest(&standardised_joints(problem), count).into_iter().enumerate() {
+        for j in near {
+            let (a, b) = (&problem.dwells[i], &problem.dwells[j]);
             let width = a.rows_as_in(b);
-            pairs.push((i, *j, e.rows(a.first_row, width).dot(&e.rows(b.first_row, width))));
+            pairs.push((i, j, e.rows(a.first_row, width).dot(&e.rows(b.first_row, width))));
         }
     }
     let scale = n as f64 / (pairs.len().max(1) as f64 * e.norm_squared().max(1e-300));
@@ -129,6 +123,37 @@ fn moran(problem: &Problem, e: &DVector<f64>, config: &DiagnosisConfig) -> (f64,
         above += usize::from(drawn >= observed);
     }
     (observed * scale, (1.0 + above as f64) / (config.resamplings as f64 + 1.0))
+}
+
+/// So many nearest other rows of each row, the nearest first: outwards along the column that spreads most, until its difference
+/// alone is more than the distance of those found.
+fn nearest(rows: &DMatrix<f64>, count: usize) -> Vec<Vec<usize>> {
+    let spread = |c: &usize| rows.column(*c).max() - rows.column(*c).min();
+    let along = (0..rows.ncols()).max_by(|a, b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
+    let mut order: Vec<usize> = (0..rows.nrows()).collect();
+    let at = |i: usize| rows.get((i, along)).copied().unwrap_or(0.0);
+    order.sort_by(|a, b| at(*a).total_cmp(&at(*b)).then(a.cmp(b)));
+    let columns = rows.transpose();
+    let mut found = vec![Vec::new(); order.len()];
+    for (rank, &i) in order.iter().enumerate() {
+        let mut best: Vec<(f64, usize)> = Vec::with_capacity(count + 1);
+        let (mut before, mut after) =
+            (order[..rank].iter().rev().peekable(), order[rank + 1..].iter().peekable());
+        loop {
+            let gap = |j: Option<&&usize>| j.map_or(f64::INFINITY, |j| (at(**j) - at(i)).abs());
+            let (back, forth) = (gap(before.peek()), gap(after.peek()));
+            let Some(&j) = (if back <= forth { before.next() } else { after.next() }) else { break };
+            if best.len() == count && back.min(forth).powi(2) > best[count - 1].0 {
+                break;
+            }
+            let new = ((columns.column(i) - columns.column(j)).norm_squared(), j);
+            let place = best.partition_point(|b| b.0.total_cmp(&new.0).then(b.1.cmp(&new.1)).is_lt());
+            best.insert(place, new);
+            best.truncate(count);
+        }
+        found[i] = best.into_iter().map(|(_, j)| j).collect();
+    }
+    found
 }
 
 /// Correlation of each dwell with the next of its recording.
@@ -148,4 +173,30 @@ fn lag1(problem: &Problem, e: &DVector<f64>) -> (f64, f64) {
     let lag1 = product / (count.max(1.0) * variance.max(1e-300));
     // Square of a normal variable: two-sided.
     (lag1, chi2_tail(lag1 * lag1 * count, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+    use nalgebra::DMatrix;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_nearest_rows_are_those_that_asking_all_finds() {
+        for (rows, columns) in [(1, 2), (2, 1), (7, 3), (200, 1), (300, 6)] {
+            let mut rng = ChaCha8Rng::seed_from_u64(rows as u64);
+            // Of few values, so that many are as far as one another.
+            let all = DMatrix::from_fn(rows, columns, |_, _| f64::from(rng.random_range(-6..6i32)));
+            for (i, found) in nearest(&all, 6).into_iter().enumerate() {
+                let mut others: Vec<(f64, usize)> = (0..rows)
+                    .filter(|j| *j != i)
+                    .map(|j| ((all.row(i) - all.row(j)).norm_squared(), j))
+                    .collect();
+                others.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                let expected: Vec<usize> = others.into_iter().take(6).map(|(_, j)| j).collect();
+                assert_eq!(found, expected, "row {i} of {rows} x {columns}");
+            }
+        }
+    }
 }

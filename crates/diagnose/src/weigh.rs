@@ -353,7 +353,7 @@ impl Weighed {
 
     /// The same under another noise.
     pub fn crossed(&self, metric: &Metric, problem: &Problem) -> Crossed {
-        let columns = self.entries.iter().map(|e| self.dense(&e.candidate.columns, problem));
-        Crossed::of(&columns.collect::<Vec<_>>(), metric)
+        let columns: Vec<&Columns> = self.entries.iter().map(|e| &e.candidate.columns).collect();
+        Crossed::of(&columns, problem, 1.0 / self.scale, metric)
     }
 }
