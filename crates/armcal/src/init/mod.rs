@@ -11,6 +11,7 @@ mod draft;
 mod evidence;
 mod fields;
 mod files;
+mod frames;
 mod motion;
 mod page;
 mod proposal;

@@ -142,6 +142,12 @@ impl Draft<'_> {
         if let Some(name) = &stream.body {
             self.page.line(&format!("body = {}", quoted(name)), "the topic has several");
         }
+        if let Some(frame) = &stream.frame {
+            self.page.line(
+                &format!("frame = {}", quoted(frame)),
+                "over the transforms between, as the bodies hang on several frames",
+            );
+        }
         let fields = [("position", &stream.position), ("orientation", &stream.orientation)];
         for (key, path) in fields.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?))) {
             self.page.line(&format!("{key} = {}", quoted(path)), "a field of the message");
