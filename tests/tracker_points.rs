@@ -131,6 +131,66 @@ fn times_of_a_tracker_say_which_dwells_it_missed() {
     }
 }
 
+/// `init` takes the file, says of unit and time what its header says, and its pipeline errs as the one written by hand.
+#[test]
+fn a_proposal_takes_the_points_of_a_tracker() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let by_hand = pipeline(folder.path(), ", time = \"Date Time\"");
+    let row = |(time_ns, p): &(i64, [f64; 3])| {
+        let time =
+            chrono::DateTime::from_timestamp_nanos(time_ns - 5_000_000_000).format("%Y-%m-%d %H:%M:%S%.3f");
+        format!("{time};{:.6};{:.6};{:.6}\n", p[0] * 1e-3, p[1] * 1e-3, p[2] * 1e-3)
+    };
+    let rows = timed_mm()[3..].iter().map(row).collect::<String>();
+    let csv = folder.path().join("points.csv");
+    let written = |header: &str| std::fs::write(&csv, format!("{header}\n{rows}")).expect("written");
+    written("Date Time;X [m];Y [m];Z [m]");
+    let [recording, dh] =
+        ["fixtures/paper/normal.mcap", "pipelines/models/right_arm.toml"].map(|p| root().join(p));
+    let out = folder.path().join("proposed.toml");
+    let init = |more: &[&Path]| {
+        let given = [
+            Path::new("init"),
+            &recording,
+            Path::new("--dh"),
+            &dh,
+            Path::new("--out"),
+            &out,
+            Path::new("--force"),
+        ];
+        let output = armcal([&given, more].concat());
+        let said =
+            [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat();
+        (output.status.code(), said)
+    };
+    let points = [Path::new("--points"), &csv];
+    let (code, said) = init(&points);
+    assert!(code == Some(0) && said.contains("--points says where the tip was"), "{said}");
+    let text = std::fs::read_to_string(&out).expect("a proposal");
+    println!("{said}\n{text}");
+    assert!(text.contains("unit = \"m\", sigma_mm = 0.05, time = \"Date Time\" }"), "{text}");
+    assert!(!text.contains("[streams.tip]") && !text.contains("[streams.base]"), "{text}");
+    let by_hand_text =
+        std::fs::read_to_string(&by_hand).expect("a pipeline").replace("csv\", ", "csv\", unit = \"m\", ");
+    std::fs::write(&by_hand, by_hand_text).expect("written");
+    let mm = [&out, &by_hand].map(|pipeline| {
+        let summary = run_pipeline(pipeline, &folder.path().join("out"), &[0, 3]);
+        assert_eq!(number(&summary, "/fit/holdout/n"), 58.0);
+        number(&summary, "/fit/holdout/fitted_mm/mean")
+    });
+    println!("{mm:?} mm");
+    assert!(mm[0] < 1.05 * mm[1], "{mm:?}");
+    // What the header does not say is said; another unit, and another number of files, are refused.
+    written("Date Time;X;Y;Z");
+    let (_, said) = init(&points);
+    assert!(said.contains("which its header does not say: taken as mm"), "{said}");
+    written("Date Time;X [in];Y [in];Z [in]");
+    let (code, said) = init(&points);
+    assert!(code == Some(1) && said.contains("is in `in`: export it in mm"), "{said}");
+    let (code, said) = init(&[points, points].concat());
+    assert!(code == Some(1), "{said}");
+}
+
 /// Four points fit many offsets: asked for, and taken from who knows.
 #[test]
 fn few_times_are_not_guessed() {
