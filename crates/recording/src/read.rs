@@ -79,7 +79,8 @@ impl Recording {
             if !gathered.poses.seen.is_empty() || gathered.messages == 0 || !request.fields.is_empty() {
                 continue;
             }
-            let chain = self.transforms(request.topic, unit)?.chain(frame, body);
+            let trees = self.transforms(&[request.topic], unit)?;
+            let chain = trees.first().map_or(Ok(None), |tree| tree.chain(frame, body));
             let Some(chain) = chain.map_err(|why| poses::no_chain(request, why))? else { continue };
             let (topic, parent, child) = &chain.moving;
             let kind = Kind::Pose { body: Some(child), frame: Some(parent), unit };

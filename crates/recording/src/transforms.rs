@@ -13,6 +13,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Where transforms that other streams leave out are.
 const USUAL: [&str; 2] = ["/tf", "/tf_static"];
+/// More transforms than this are no laboratory's, and looking for ways between them takes for ever.
+const MOST: usize = 1000;
 
 /// Where one child was in one parent.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,36 +54,32 @@ pub struct Transforms {
 }
 
 impl Recording {
-    /// The transforms on a topic, on its `_static` one, and on `/tf` and `/tf_static`, with lengths in `unit`; none where the
-    /// messages of the topic name no bodies.
+    /// For each topic the transforms on it, on its `_static` one, and on `/tf` and `/tf_static`, with lengths in `unit`, in one pass; none
+    /// where the messages of the topic name no bodies.
     ///
     /// # Errors
     /// The recording cannot be read.
-    pub fn transforms(&self, topic: &str, unit: LengthUnit) -> Result<Transforms, RecordingError> {
-        let beside = format!("{topic}_static");
-        let topics: BTreeSet<&str> = [topic, &beside].into_iter().chain(USUAL).collect();
-        let request = |topic| Request {
-            role: "transforms",
-            name: None,
-            topic,
-            kind: Kind::Transforms { unit },
-            fields: Vec::new(),
+    pub fn transforms(&self, topics: &[&str], unit: LengthUnit) -> Result<Vec<Transforms>, RecordingError> {
+        let beside: Vec<String> = topics.iter().map(|topic| format!("{topic}_static")).collect();
+        let all: BTreeSet<&str> =
+            topics.iter().copied().chain(beside.iter().map(String::as_str)).chain(USUAL).collect();
+        let request = |topic| {
+            let kind = Kind::Transforms { unit };
+            Request { role: "transforms", name: None, topic, kind, fields: Vec::new() }
         };
-        let requests: Vec<Request<'_>> =
-            topics.into_iter().map(request).filter(|r| can_read(self, r)).collect();
-        let mut all = Transforms::default();
-        if requests.iter().all(|r| r.topic != topic) {
-            return Ok(all);
+        let requests: Vec<Request<'_>> = all.into_iter().map(request).filter(|r| can_read(self, r)).collect();
+        if !requests.iter().any(|r| topics.contains(&r.topic)) {
+            return Ok(topics.iter().map(|_| Transforms::default()).collect());
         }
-        for (request, gathered) in requests.iter().zip(gather(self, &requests)?) {
-            for (ends, edge) in gathered.edges {
-                match all.edges.get_mut(&ends) {
-                    Some((_, known)) => known.add(&edge),
-                    None => _ = all.edges.insert(ends, (request.topic.to_owned(), edge)),
-                }
-            }
-        }
-        Ok(all)
+        let gathered = gather(self, &requests)?;
+        let on: BTreeMap<&str, Edges> =
+            requests.iter().map(|r| r.topic).zip(gathered.into_iter().map(|g| g.edges)).collect();
+        let tree = |(topic, beside): (&&str, &String)| {
+            let own = on.get(topic).map(|_| [*topic, beside, USUAL[0], USUAL[1]]);
+            let own: BTreeSet<&str> = own.into_iter().flatten().collect();
+            Transforms::of(own.into_iter().filter_map(|topic| Some((topic, on.get(topic)?))))
+        };
+        Ok(topics.iter().zip(&beside).map(tree).collect())
     }
 }
 
@@ -104,6 +102,20 @@ pub struct Chain {
 }
 
 impl Transforms {
+    /// Those of several topics.
+    fn of<'a>(topics: impl Iterator<Item = (&'a str, &'a Edges)>) -> Transforms {
+        let mut all = Transforms::default();
+        for (topic, edges) in topics {
+            for (ends, edge) in edges {
+                match all.edges.get_mut(ends) {
+                    Some((_, known)) => known.add(edge),
+                    None => _ = all.edges.insert(ends.clone(), (topic.to_owned(), edge.clone())),
+                }
+            }
+        }
+        all
+    }
+
     /// The frames that are in no other.
     pub fn roots(&self) -> BTreeSet<&str> {
         let children: BTreeSet<&str> = self.edges.keys().map(|(_, child)| child.as_str()).collect();
@@ -136,6 +148,12 @@ impl Transforms {
         if frame == body || !is_known(frame) || !is_known(body) {
             return Ok(None);
         }
+        if self.edges.len() > MOST {
+            return Err(format!(
+                "has {} transforms, more than {MOST}: name the parent of {body:?} as `frame`",
+                self.edges.len()
+            ));
+        }
         let Some(way) = self.way(frame, body, None) else {
             return Err(format!(
                 "has {body:?} and {frame:?}, but no chain of transforms between them: record the one that is missing (/tf_static \
@@ -143,6 +161,15 @@ impl Transforms {
             ));
         };
         for ends in way.windows(2) {
+            let (one, other) = (&ends[0], &ends[1]);
+            if [(one, other), (other, one)]
+                .iter()
+                .all(|(a, b)| self.edges.contains_key(&((*a).clone(), (*b).clone())))
+            {
+                return Err(format!(
+                    "has {one:?} in {other:?} and {other:?} in {one:?}: a frame has one parent"
+                ));
+            }
             if let Some(other) = self.way(frame, body, Some((&ends[0], &ends[1]))) {
                 return Err(format!(
                     "has two ways from {frame:?} to {body:?}: {} and {}; name the parent of {body:?} as `frame`",
@@ -156,18 +183,21 @@ impl Transforms {
 
     /// The frames of the shortest way between two frames that does not go over one transform.
     fn way(&self, from: &str, to: &str, without: Option<(&str, &str)>) -> Option<Vec<String>> {
+        if self.edges.len() > MOST {
+            return None;
+        }
+        let mut beside: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for (parent, child) in self.edges.keys() {
+            if without.is_none_or(|(a, b)| ![(a, b), (b, a)].contains(&(parent, child))) {
+                beside.entry(parent).or_default().push(child);
+                beside.entry(child).or_default().push(parent);
+            }
+        }
         let mut came_from: BTreeMap<&str, &str> = BTreeMap::from([(from, from)]);
         let mut next = VecDeque::from([from]);
         while let Some(at) = next.pop_front().filter(|at| *at != to) {
-            for (parent, child) in self.edges.keys() {
-                let other = match at {
-                    at if at == parent => child,
-                    at if at == child => parent,
-                    _ => continue,
-                };
-                let is_barred =
-                    without.is_some_and(|(a, b)| [(a, b), (b, a)].contains(&(at, other.as_str())));
-                if !is_barred && !came_from.contains_key(other.as_str()) {
+            for other in beside.get(at).into_iter().flatten() {
+                if !came_from.contains_key(other) {
                     came_from.insert(other, at);
                     next.push_back(other);
                 }

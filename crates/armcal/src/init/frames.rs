@@ -16,14 +16,12 @@ pub fn join(
     let Some(first) = opened.first() else { return Ok(()) };
     let named: BTreeSet<String> =
         bodies.iter().filter(|b| b.position.is_none()).map(|b| b.topic.clone()).collect();
-    let mut trees: BTreeMap<String, Transforms> = BTreeMap::new();
-    for topic in named {
-        let read = first.recording.transforms(&topic, LengthUnit::M);
-        let tree = read.map_err(|source| Error::Recording { recording: first.entry.name(), source })?;
-        trees.insert(topic, tree);
-    }
+    let topics: Vec<&str> = named.iter().map(String::as_str).collect();
+    let read = first.recording.transforms(&topics, LengthUnit::M);
+    let read = read.map_err(|source| Error::Recording { recording: first.entry.name(), source })?;
+    let trees: BTreeMap<&str, Transforms> = topics.into_iter().zip(read).collect();
     let hung = |b: &BodyTopic| -> Option<(String, &Transforms)> {
-        let tree = trees.get(&b.topic).filter(|_| b.position.is_none())?;
+        let tree = trees.get(b.topic.as_str()).filter(|_| b.position.is_none())?;
         Some((b.body.clone().or_else(|| tree.only_child(&b.topic))?, tree))
     };
     let tracked = bodies.iter().filter(|b| !b.topic.ends_with("_static")).filter_map(&hung);

@@ -178,6 +178,12 @@ fn chains_that_say_nothing_are_refused_with_what_to_do() {
     );
     let said = refused("world", "tip", &[("cell", "ball", [0.1, 0.0, 0.0], identity)]);
     assert!(said.contains("has two ways from \"world\" to \"tip\""), "{said}");
+    let said = refused("world", "tip", &[("tip", "ball", [0.1, 0.0, 0.0], identity)]);
+    assert!(said.contains("has \"ball\" in \"tip\" and \"tip\" in \"ball\""), "{said}");
+    let many: Vec<String> = (0..1000).map(|i| format!("f{i}")).collect();
+    let many: Vec<Transform<'_>> =
+        many.iter().map(|f| ("world", f.as_str(), [0.1, 0.0, 0.0], identity)).collect();
+    assert!(refused("world", "tip", &many).contains("has 1006 transforms, more than 1000"));
     let said = refused("robot", "lamp", &[("ceiling", "lamp", [0.1, 0.0, 0.0], identity)]);
     assert!(said.contains("no chain of transforms between them"), "{said}");
     let said = refused("stand", "tip", &[("stand", "world", [0.1, 0.0, 0.0], [0.0; 4])]);

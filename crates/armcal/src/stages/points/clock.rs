@@ -11,8 +11,8 @@ const NEAR: f64 = 0.85;
 
 /// What is written in a column of times, each with its line, as times since its first row [ns].
 ///
-/// All rows are written in one way: seconds, date and time with or without a zone, or the time of a day, which goes on over midnight: the next row is
-/// within half a day of the one before.
+/// All rows are written in one way: seconds, date and time with or without a zone, or the time of a day, which goes on over
+/// midnight: the next row is within half a day of the one before.
 pub fn read(column: &[(u64, &str)]) -> Result<Vec<i64>, String> {
     let dates = DATES
         .iter()
