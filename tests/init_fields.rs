@@ -3,6 +3,7 @@ use armcal_model::{Chain, Frames, Model};
 use armcal_recording::decode::{Plan, Role, Rows};
 use armcal_recording::output::McapOutput;
 use armcal_recording::ros2::{self, Header};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -150,4 +151,84 @@ fn joints_and_tip_inside_messages_of_a_vendor_are_found_by_what_they_do() {
     let (chosen, _) = init("chosen", &recording, &["--joints", "/driver/state:c[]"]);
     let text = std::fs::read_to_string(&chosen).expect("a proposal");
     assert!(text.contains("position = \"c[]\""), "{text}");
+}
+
+/// The paper's upright recording as a tree of transforms: the tip in a tracker's frame, base and table in the room's, and where the
+/// tracker stands in the room as a transform that never changes.
+fn as_transforms(out: &Path) {
+    let tracker = Isometry3::new(Vector3::new(-1.5, 0.7, 1.9), Vector3::new(0.3, -1.1, 2.0));
+    let bytes = std::fs::read(root().join("fixtures/paper/normal.mcap")).expect("recording");
+    let text = ros2::POSE_STAMPED.text.as_bytes();
+    let plan =
+        Plan::compile(Role::Pose, ros2::POSE_STAMPED.name, "ros2msg", text, "cdr", None).expect("known");
+    let mut out = McapOutput::create(out, "ros2").expect("a recording");
+    let nothing = BTreeMap::new();
+    let mut joined = false;
+    for message in mcap::MessageStream::new(&bytes).expect("MCAP") {
+        let message = message.expect("a message");
+        let schema = message.channel.schema.as_ref().expect("a schema");
+        let mut put = |topic: &str, schema: (&str, &str, &[u8]), data: &[u8]| {
+            let id = out.add_channel(topic, Some(schema), "cdr", &nothing).expect("a channel");
+            out.put(id, message.sequence, message.log_time, message.publish_time, data).expect("written");
+        };
+        let transform = ros2::TRANSFORM_STAMPED;
+        let known = (transform.name, "ros2msg", transform.text.as_bytes());
+        let body = message.channel.topic.strip_prefix("/vicon/").and_then(|rest| rest.split('/').next());
+        let Some(body) = body else {
+            put(&message.channel.topic, (&schema.name, &schema.encoding, &schema.data), &message.data);
+            continue;
+        };
+        let mut rows = Rows::new(Role::Pose);
+        plan.decode(&message.data, &mut rows).expect("a pose");
+        let Rows::Pose(rows) = rows else { panic!("poses") };
+        let (row, stamp_ns) = (rows.row(0), rows.stamp_ns[0].expect("a stamp"));
+        let [x, y, z, w] = row.quaternion_xyzw.expect("oriented");
+        let turned = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let seen = Isometry3::from_parts(Translation3::from(Vector3::from(row.position)), turned);
+        let (frame_id, at) =
+            if body == "tip" { ("tracker", tracker.inverse() * seen) } else { ("room", seen) };
+        let written = |frame_id: &str, child: &str, at: &Isometry3<f64>| {
+            let (p, r) = (at.translation.vector, at.rotation.coords);
+            ros2::transform_stamped(Header { stamp_ns, frame_id }, child, p.into(), r.into())
+        };
+        if !std::mem::replace(&mut joined, true) {
+            put("/tf_static", known, &written("room", "tracker", &tracker));
+        }
+        put("/tf", known, &written(frame_id, &format!("seen_{body}"), &at));
+    }
+    out.finish().expect("finished");
+}
+
+/// Bodies of a tree of transforms are compared in its root, whatever they hang on, and err as they did when each had a topic.
+#[test]
+fn bodies_on_different_frames_of_a_tree_are_joined_over_the_transforms_between() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let recording = folder.path().join("tree.mcap");
+    as_transforms(&recording);
+    let [dh, board] =
+        ["models/right_arm.toml", "boards/paper.toml"].map(|p| root().join("pipelines").join(p));
+    let mut errors = Vec::new();
+    for (name, recording) in [("tree", recording), ("topics", root().join("fixtures/paper/normal.mcap"))] {
+        let pipeline = folder.path().join(format!("{name}.toml"));
+        let output = armcal([
+            Path::new("init"),
+            &recording,
+            Path::new("--dh"),
+            &dh,
+            Path::new("--board"),
+            &board,
+            Path::new("--out"),
+            &pipeline,
+        ]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(&pipeline).expect("a proposal");
+        if name == "tree" {
+            println!("{text}");
+            assert!(text.contains("body = \"seen_tip\"") && text.contains("frame = \"room\""), "{text}");
+        }
+        let summary = run_pipeline(&pipeline, &folder.path().join(name), &[0, 3]);
+        errors.push(number(&summary, "/fit/holdout/fitted_mm/mean"));
+    }
+    println!("{errors:?} mm");
+    assert!((errors[0] - errors[1]).abs() < 1e-3 * errors[1], "{errors:?}");
 }

@@ -70,7 +70,8 @@ fn asked(arm: &CalibratedArm, in_base: bool) -> Questions {
     };
     motion.start(Some(&path[0])).expect("a start");
     ask("start", &path[0], Vec::new());
-    let rising = vec![1.0; path[0].len()];
+    let q_len = path[0].len();
+    let rising = vec![1.0; q_len];
     for q in &path[1..] {
         ask("tip", q, pose(motion.tip(q, &Driven::default()).expect("a pose")));
         let driven = Driven { direction: Some(&rising), ..Driven::default() };
@@ -81,6 +82,22 @@ fn asked(arm: &CalibratedArm, in_base: bool) -> Questions {
     motion.go(&path[2]).expect("a move");
     ask("go", &path[2], Vec::new());
     ask("tip", &path[3], pose(motion.tip(&path[3], &Driven::default()).expect("a pose")));
+    // From where it stands a tenth of the way at a time, and back: joints turn, and cross their gaps meanwhile.
+    let [from, to] = [2, 3].map(|k: usize| &path[k]);
+    let share = |share: f64| from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
+    let way: Vec<Vec<f64>> = [0.1, 0.2, 0.3, 0.2, 0.1, 0.05].map(share).to_vec();
+    let times: Vec<f64> = (0..way.len()).map(|k| 0.1 * k as f64).collect();
+    let rows = way.iter().zip(&times).flat_map(|(q, t)| [&[*t][..], q].concat());
+    let given: Vec<f64> = std::iter::once(0.3).chain(rows).collect();
+    let in_gap = |p: &armcal_compensate::SetPoint| {
+        (0..q_len).map(|j| f64::from(p.in_gap.contains(&j))).collect::<Vec<_>>()
+    };
+    let all = motion.path(&way, &times, 0.3).expect("a path");
+    let answer = all.iter().flat_map(|p| {
+        let point = point(p);
+        [&point[..2 * q_len], &in_gap(p), &point[2 * q_len..]].concat()
+    });
+    ask("path", &given, answer.collect());
     motion.start(Some(&path[0])).expect("a start");
     ask("start", &path[0], Vec::new());
     for place in &places {
@@ -129,19 +146,27 @@ fn assert_same(found: &[Vec<f64>], wanted: &[Vec<f64>], what: &str) {
     }
 }
 
-/// `armcal compensate` on the same places: what it writes for each, as the other programs answer.
-fn compensate(name: &str, in_base: bool, folder: &Path) -> Vec<Vec<f64>> {
+/// `armcal compensate` on the places where the nominal arm is at these joints, from where it waits [deg], with times [s] on a path:
+/// what it writes for each, as the other programs answer.
+fn compensate(
+    (name, in_base): (&str, bool),
+    folder: &Path,
+    from_deg: &[f64],
+    path: &[Vec<f64>],
+    times: Option<&[f64]>,
+) -> Vec<Vec<f64>> {
     let arm = arm(name);
     let motion = arm.motion(&Conditions { in_base, ..Conditions::default() }).expect("a motion");
-    let degrees = readings_deg(&arm, 8);
-    let path: Vec<Vec<f64>> = degrees.iter().map(|q| si(&arm, q)).collect();
     let row = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<String>>().join(",");
     let columns = if arm.joint_count() < 6 { "x_m,y_m,z_m" } else { "x_m,y_m,z_m,qx,qy,qz,qw" };
-    let rows: Vec<String> = places(&arm, &motion, &path[1..]).iter().map(|place| row(place)).collect();
+    let columns = columns.to_owned() + if times.is_some() { ",t_s" } else { "" };
+    let mut rows = places(&arm, &motion, path);
+    rows.iter_mut().zip(times.into_iter().flatten()).for_each(|(row, t)| row.push(*t));
+    let rows: Vec<String> = rows.iter().map(|place| row(place)).collect();
     let [targets, out] =
         ["targets.csv", "set-points.csv"].map(|file| folder.join(format!("{name}-{in_base}-{file}")));
     std::fs::write(&targets, format!("{columns}\n{}\n", rows.join("\n"))).expect("targets");
-    let from = format!("--from={}", row(&degrees[0]));
+    let from = format!("--from={}", row(from_deg));
     let frame = if in_base { "--frame=base" } else { "--frame=world" };
     let (model, out_arg) = (model_file(name), format!("--out={}", out.display()));
     let output = armcal([
@@ -178,7 +203,75 @@ fn a_place_gives_the_set_point_that_the_command_line_writes() {
         let places = &answers[answers.len() - 7..];
         let joints = arm.joint_count();
         let placed: Vec<Vec<f64>> = places.iter().map(|answer| answer[..3 * joints].to_vec()).collect();
-        assert_same(&compensate(name, in_base, folder.path()), &placed, name);
+        let degrees = readings_deg(&arm, 8);
+        let path: Vec<Vec<f64>> = degrees[1..].iter().map(|q| si(&arm, q)).collect();
+        assert_same(&compensate((name, in_base), folder.path(), &degrees[0], &path, None), &placed, name);
+    }
+}
+
+/// A path whose joints turn back: through its gaps as the command line goes, whose own inverse kinematics reaches places within
+/// 1 nm; the points inside a gap are those of the time to cross it.
+#[test]
+fn a_path_goes_through_its_gaps_as_the_command_line_does() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let arm = arm("paper-play");
+    let mut motion = arm.motion(&Conditions::default()).expect("a motion");
+    let from_deg = &readings_deg(&arm, 1)[0];
+    let start = si(&arm, from_deg);
+    let times: Vec<f64> = (0..80).map(|k| 0.05 * f64::from(k)).collect();
+    let at =
+        |t: &f64| start.iter().zip([0.3, 0.25, 0.2]).map(|(q, size)| q + size * (1.7 * t).sin()).collect();
+    let nominal: Vec<Vec<f64>> = times.iter().map(at).collect();
+    let wanted = compensate(("paper-play", false), folder.path(), from_deg, &nominal, Some(&times));
+    motion.start(Some(&start)).expect("a start");
+    let before = motion.clone();
+    let path = motion.path(&nominal, &times, 0.4).expect("a path");
+    for (k, (point, wanted)) in path.iter().zip(&wanted).enumerate() {
+        let off = |j: usize| (point.joint_rad[j] - wanted[3 + j]).abs();
+        assert!((0..3).all(|j| off(j) < 2e-8), "{k}: {:?} {wanted:?}", point.joint_rad);
+    }
+    let last = &path[79].joint_rad;
+    assert_eq!(motion.stands_rad().as_ref(), Some(last));
+    // One leap after the other without time to cross, and the same set-points outside the gaps.
+    let leaps = before.clone().path(&nominal, &times, 0.0).expect("a path");
+    let mut step_by_step = before.clone();
+    let (mut inside, mut leapt) = ([0; 3], [0; 3]);
+    for (k, (leap, point)) in leaps.iter().zip(&path).enumerate() {
+        assert_eq!(step_by_step.correct(&nominal[k], Some(times[k])).expect("a point"), *leap);
+        assert!(leap.in_gap.is_empty());
+        for j in 0..3 {
+            let is_in_gap = point.in_gap.contains(&j);
+            inside[j] += usize::from(is_in_gap);
+            assert!(is_in_gap || (point.joint_rad[j] - leap.joint_rad[j]).abs() < 1e-12, "{k} {j}");
+            let step = |q: &dyn Fn(usize) -> f64| q(k) - q(k.saturating_sub(1));
+            let more = step(&|k| leaps[k].joint_rad[j]) - step(&|k| nominal[k][j]);
+            leapt[j] += usize::from(more.abs() > 0.1_f64.to_radians() && k > 0);
+        }
+    }
+    println!("leaps {leapt:?}, points inside a gap {inside:?}");
+    assert!(leapt.iter().all(|n| *n > 0));
+    // Of a crossing of 0.4 s seven or eight points of every 0.05 s are strictly inside.
+    assert!((0..3).all(|j| (7 * leapt[j]..=8 * leapt[j]).contains(&inside[j])), "{leapt:?} {inside:?}");
+    // What it says it reaches is where the model has the tip that is driven along the path.
+    let mut driven = before.clone();
+    for (nominal, point) in nominal.iter().zip(&path) {
+        let tip = driven.tip(&point.joint_rad, &Driven::default()).expect("a tip");
+        let wanted = driven.nominal_tip(nominal).expect("a tip");
+        let off_m = (tip.translation.vector - wanted.translation.vector).norm();
+        assert!((off_m - point.reached.as_ref().expect("reached").after_m).abs() < 1e-12);
+        driven.go(&point.joint_rad).expect("a move");
+    }
+    // What makes no sense changes nothing.
+    let stood = motion.stands_rad();
+    for (nominal, times, crossing_s, words) in [
+        (&nominal[..0], &times[..0], 0.4, "0 points"),
+        (&nominal[..2], &times[..1], 0.4, "2 points and 1 times"),
+        (&nominal[..2], &[1.0, 1.0][..], 0.4, "point 1 is 1, not later"),
+        (&nominal[..2], &times[..2], -1.0, "-1 is no time"),
+        (&[nominal[3].clone(), vec![0.1, f64::NAN, 0.1]][..], &times[..2], 0.4, "joint2 is NaN"),
+    ] {
+        let said = motion.path(nominal, times, crossing_s).expect_err("refused").to_string();
+        assert!(said.contains(words) && motion.stands_rad() == stood, "{said}");
     }
 }
 
@@ -244,6 +337,7 @@ fn the_python_module_gets_the_same_digits() {
             "there is no tip `no such tip`",
             "give a mass in kg",
             "away from it",
+            "not later than the one before",
         ] {
             assert!(said.contains(words), "{words}: {said}");
         }

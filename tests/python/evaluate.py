@@ -17,6 +17,10 @@ for line in sys.stdin:
             point = motion.set_point(given[:3], given[3:] or None)
             answer += point.nominal_rad
         answer += point.joint_rad + point.direction + point.reached
+    elif word == "path":
+        rows = [given[k : k + 1 + len(arm.joints)] for k in range(1, len(given), 1 + len(arm.joints))]
+        for point in motion.path([row[1:] for row in rows], [row[0] for row in rows], given[0]):
+            answer += point.joint_rad + point.direction + point.in_gap + point.reached
     elif word in ("start", "go"):
         getattr(motion, word)(given)
     else:
@@ -36,6 +40,7 @@ for attempt in (
     lambda: motion.tip([0.0]),
     lambda: motion.tip([float("nan")] * len(arm.joints)),
     lambda: motion.set_point([9.0, 0.0, 0.0]),
+    lambda: motion.path([[0.0] * len(arm.joints)] * 2, [1.0, 1.0]),
 ):
     try:
         attempt()

@@ -17,7 +17,7 @@ pub(crate) fn leap_rad(last: [f64; 2], next: [f64; 2]) -> Option<f64> {
     (more.abs() > LEAP_RAD).then_some(more)
 }
 
-/// Spreads every leap between points with times over `crossing_s`. Returns whether there was any.
+/// Spreads every leap between points with times over `crossing_s`, and marks the points inside. Returns whether there was any.
 pub(crate) fn spread(points: &mut [SetPoint], crossing_s: f64) -> bool {
     let leaps = leaps(points);
     let first_s = points.first().and_then(|p| p.target.time_s).unwrap_or(0.0);
@@ -28,7 +28,11 @@ pub(crate) fn spread(points: &mut [SetPoint], crossing_s: f64) -> bool {
         for (i, point) in points.iter_mut().enumerate() {
             let Some(time_s) = point.target.time_s else { continue };
             let leapt = if i < *index { 0.0 } else { *size };
-            point.joint_rad[*joint] += size * minimum_jerk((time_s - from_s) / crossing_s) - leapt;
+            let share = (time_s - from_s) / crossing_s;
+            point.joint_rad[*joint] += size * minimum_jerk(share) - leapt;
+            if share > 0.0 && share < 1.0 && !point.in_gap.contains(joint) {
+                point.in_gap.push(*joint);
+            }
         }
     }
     !leaps.is_empty()

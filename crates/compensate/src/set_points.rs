@@ -97,6 +97,8 @@ pub struct SetPoint {
     pub joint_rad: Vec<f64>,
     /// Direction in which each joint arrives at the corrected set-point.
     pub arrival: Vec<Arrival>,
+    /// Joints that are on their way through their gap here, as they turn back on a path: their links wait.
+    pub in_gap: Vec<usize>,
     /// What both reach; `None` for an approach.
     pub reached: Option<Reached>,
     /// What the user should know.
@@ -154,10 +156,17 @@ impl Compensator<'_> {
         for target in targets {
             out.extend(self.next(target, &mut underway)?);
         }
-        if self.crossing_s > 0.0 && crossing::spread(&mut out, self.crossing_s) {
-            self.predict_again(&mut out, start);
-        }
+        self.cross(&mut out, start, &mut underway);
         Ok(out)
+    }
+
+    /// Spreads the leaps of a path that began after `start` over [`Compensator::crossing_s`], and says again what it reaches; the
+    /// arm then stands at its end.
+    pub fn cross(&self, path: &mut [SetPoint], start: Past, underway: &mut Underway) {
+        if self.crossing_s > 0.0 && crossing::spread(path, self.crossing_s) {
+            underway.corrected = self.predict_again(path, start);
+            underway.last = path.last().cloned();
+        }
     }
 
     /// The set-point of one target from where the arm stands, with the way to it in front where there is one; then it stands
@@ -220,6 +229,7 @@ impl Compensator<'_> {
             nominal_rad: nominal,
             joint_rad: found.joint_rad,
             arrival: found.past.arrival(),
+            in_gap: Vec::new(),
             reached: Some(Reached {
                 before_m: before.0,
                 after_m: found.left_m,
@@ -232,8 +242,8 @@ impl Compensator<'_> {
         Ok(out)
     }
 
-    /// What the calibrated model predicts for set-points that were changed.
-    fn predict_again(&self, points: &mut [SetPoint], start: Past) {
+    /// What the calibrated model predicts for set-points that were changed, and what they leave behind.
+    fn predict_again(&self, points: &mut [SetPoint], start: Past) -> Past {
         let mut past = start;
         for point in points {
             past = past.then(&point.joint_rad);
@@ -245,6 +255,7 @@ impl Compensator<'_> {
                 reached.turn_rad = reached.turn_rad.map(|[before, _]| [before, left_rad]);
             }
         }
+        past
     }
 
     /// That limits and postures, and where the arm waits [rad], are those of this arm.
@@ -343,6 +354,7 @@ fn approach_point(target: &Target, nominal_rad: Vec<f64>, joint_rad: Vec<f64>, b
         nominal_rad,
         joint_rad,
         arrival,
+        in_gap: Vec::new(),
         reached: None,
         warnings: Vec::new(),
     }

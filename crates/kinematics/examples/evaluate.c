@@ -8,6 +8,7 @@
  *   rising Q..                   of the calibrated one, every joint coming from below
  *   correct Q..                  set-point, directions of arrival, errors before and after
  *   place X Y Z [QX QY QZ QW]    nominal joints, set-point, directions, errors
+ *   path S T Q.. T Q.. ..        of each point set-point, directions, in the gap or not, errors; gaps are crossed in S seconds
  */
 #include "armcal_kinematics.h"
 
@@ -39,6 +40,28 @@ static void print(const double *numbers, size_t count)
         printf("%.17g ", numbers[k]);
 }
 
+static int32_t path(armcal_motion *motion, size_t joints, const double *given, size_t count)
+{
+    double nominal[MOST], times[MOST], corrected[MOST], direction[MOST];
+    uint8_t in_gap[MOST];
+    armcal_reached reached[MOST];
+    size_t points = (count - 1) / (joints + 1);
+    for (size_t k = 0; k < points; k++) {
+        times[k] = given[1 + k * (joints + 1)];
+        memcpy(nominal + k * joints, given + 2 + k * (joints + 1), joints * sizeof *nominal);
+    }
+    int32_t code = armcal_motion_path(motion, nominal, times, points, given[0], corrected, direction, in_gap, reached);
+    for (size_t k = 0; code == ARMCAL_OK && k < points; k++) {
+        print(corrected + k * joints, joints);
+        print(direction + k * joints, joints);
+        for (size_t j = 0; j < joints; j++)
+            printf("%d ", in_gap[k * joints + j]);
+        print(&reached[k].before_m, 4);
+    }
+    printf("\n");
+    return code;
+}
+
 static int32_t answer(armcal_motion *motion, size_t joints, const char *word, const double *given, size_t count)
 {
     armcal_pose pose;
@@ -47,6 +70,8 @@ static int32_t answer(armcal_motion *motion, size_t joints, const char *word, co
     int32_t code = ARMCAL_ARGUMENT;
     for (size_t k = 0; k < joints; k++)
         rising[k] = 1.0;
+    if (!strcmp(word, "path") && count > 1 + joints)
+        return path(motion, joints, given, count);
     if (!strcmp(word, "place")) {
         code = armcal_motion_set_point(motion, given, count == 7 ? given + 3 : NULL, NAN, nominal, corrected, direction,
                                        &reached);

@@ -102,7 +102,15 @@ int32_t armcal_motion_correct(armcal_motion *motion, const double *nominal, doub
 int32_t armcal_motion_set_point(armcal_motion *motion, const double position_m[3], const double *quaternion_xyzw,
                                 double time_s, double *nominal, double *corrected, double *direction,
                                 armcal_reached *reached);
-/* What is to be known of the last set-point, a line each; "" where it is nothing. Valid until the next one. */
+/* The set-points of a path of so many points, from where the arm stands: armcal_motion_correct for one after the other, but a
+ * joint that turns back crosses its gap in crossing_s [s] around that moment (0: in one leap), as with `armcal compensate
+ * --crossing`; its link waits meanwhile. The arm then stands at the end; on an error, where it stood.
+ * nominal, corrected, direction: a number a joint for each point, point after point; time_s: of each, rising.
+ * in_gap: a byte a joint for each point, 1 on the way through the gap. reached: one for each point. All outputs may be NULL. */
+int32_t armcal_motion_path(armcal_motion *motion, const double *nominal, const double *time_s, size_t points,
+                           double crossing_s, double *corrected, double *direction, uint8_t *in_gap,
+                           armcal_reached *reached);
+/* What is to be known of the last set-point, a line each, after a path with the number of the point (from 0) in front; "" where it is nothing. Valid until the next one. */
 const char *armcal_motion_warnings(const armcal_motion *motion);
 
 #ifdef __cplusplus

@@ -443,6 +443,46 @@ pub unsafe extern "C" fn armcal_motion_set_point(
     })
 }
 
+/// The set-points of a path.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn armcal_motion_path(
+    motion: *mut MotionHandle,
+    nominal: *const f64,
+    time_s: *const f64,
+    points: usize,
+    crossing_s: f64,
+    corrected: *mut f64,
+    direction: *mut f64,
+    in_gap: *mut u8,
+    reached: *mut CReached,
+) -> Code {
+    // SAFETY: the contract: NULL or a handle.
+    with(unsafe { motion.as_mut() }, |handle| {
+        let joints = handle.joints;
+        let count = points.checked_mul(joints).filter(|n| *n <= isize::MAX as usize / size_of::<f64>());
+        let count =
+            count.ok_or_else(|| KinematicsError::argument("points", format!("{points} are too many")))?;
+        // SAFETY: the contract: a number a joint and a time for each point; NULL or room for what is asked.
+        unsafe {
+            let nominal: Vec<&[f64]> = needed(nominal, count, "nominal")?.chunks_exact(joints).collect();
+            let path = handle.motion.path(&nominal, needed(time_s, points, "time_s")?, crossing_s)?;
+            let mut warnings = Vec::new();
+            for (k, point) in path.iter().enumerate() {
+                let of_point = |at: *mut f64| if at.is_null() { at } else { at.add(k * joints) };
+                let reached = if reached.is_null() { reached } else { reached.add(k) };
+                handle.answer(point, [ptr::null_mut(), of_point(corrected), of_point(direction)], reached);
+                if !in_gap.is_null() {
+                    (0..joints)
+                        .for_each(|j| in_gap.add(k * joints + j).write(u8::from(point.in_gap.contains(&j))));
+                }
+                warnings.extend(point.warnings.iter().map(|words| format!("{k}: {words}")));
+            }
+            handle.warnings = text(&warnings.join("\n"));
+            Ok(())
+        }
+    })
+}
+
 /// What is to be known of the last set-point.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armcal_motion_warnings(motion: *const MotionHandle) -> *const c_char {

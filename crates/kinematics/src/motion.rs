@@ -6,6 +6,9 @@ use armcal_core::{FeatureId, Observation, Pose};
 use armcal_model::Model;
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Longest time in which a joint may be told to cross its gap [s].
+const MOST_CROSSING_S: f64 = 10.0;
+
 /// An arm on its way.
 #[derive(Debug, Clone)]
 pub struct Motion<'a> {
@@ -138,9 +141,46 @@ impl<'a> Motion<'a> {
         last(found)
     }
 
+    /// The set-points of a path: as [`Motion::correct`] one after the other, each with its time [s], but a joint that turns back
+    /// crosses its gap in `crossing_s` around that moment instead of in one leap (0: in one leap), as `armcal compensate` does
+    /// on a path. The arm then stands at the end. Points on the way through a gap name the joint ([`SetPoint::in_gap`]).
+    ///
+    /// # Errors
+    /// No points, times that do not rise, a point out of reach or behind a limit; the arm stands where it stood.
+    pub fn path(
+        &mut self,
+        nominal_rad: &[impl AsRef<[f64]>],
+        time_s: &[f64],
+        crossing_s: f64,
+    ) -> Result<Vec<SetPoint>, KinematicsError> {
+        let wrong = |what, problem: String| Err(KinematicsError::argument(what, problem));
+        if nominal_rad.is_empty() || nominal_rad.len() != time_s.len() {
+            let problem = format!("{} points and {} times were given", nominal_rad.len(), time_s.len());
+            return wrong("path", problem + "; as many as there are points, and one at least, are needed");
+        }
+        let is_late = |i: usize| time_s[i].is_finite() && (i == 0 || time_s[i - 1] < time_s[i]);
+        if let Some(i) = (0..time_s.len()).find(|i| !is_late(*i)) {
+            return wrong(
+                "times",
+                format!("that of point {i} is {}, not later than the one before", time_s[i]),
+            );
+        }
+        if !(0.0..=MOST_CROSSING_S).contains(&crossing_s) {
+            return wrong("crossing", format!("{crossing_s} is no time from 0 to {MOST_CROSSING_S} s"));
+        }
+        let start = self.underway.clone();
+        let timed = nominal_rad.iter().zip(time_s);
+        let points: Result<Vec<SetPoint>, KinematicsError> =
+            timed.map(|(nominal, time_s)| self.correct(nominal.as_ref(), Some(*time_s))).collect();
+        let mut points = points.inspect_err(|_| self.underway = start.clone())?;
+        self.compensator.crossing_s = crossing_s;
+        self.compensator.cross(&mut points, start.past().clone(), &mut self.underway);
+        Ok(points)
+    }
+
     /// The set-point that brings the tip to a place, as `armcal compensate` finds it for one target after the other; then the
     /// arm stands there. Where a joint turns back on a path, its gap is crossed in one leap: to spread it, one has to know what
-    /// comes next.
+    /// comes next ([`Motion::path`]).
     ///
     /// # Errors
     /// A place out of reach or behind a limit, a number that is none; the arm stands where it stood.

@@ -5,11 +5,13 @@ use crate::decode::{Place, Plan, Role, Rows};
 use crate::error::nearest;
 use crate::foreign::{DEFINITION_FROM, inflated};
 use crate::joints::JointTable;
+use crate::occlusion::Seen;
 use crate::open::{RecordingFile, ns};
 use crate::poses::PoseTable;
 use crate::raw::RawChannel;
 use crate::records::Message;
 use crate::sweep::{At, blocks, sweep};
+use crate::transforms::{Edge, Edges};
 use crate::{LengthUnit, Recording, RecordingError};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -36,8 +38,18 @@ pub(crate) struct Request<'a> {
 /// What to read out of the messages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind<'a> {
-    Joints { wanted: &'a [String] },
-    Pose { body: Option<&'a str>, frame: Option<&'a str>, unit: LengthUnit },
+    Joints {
+        wanted: &'a [String],
+    },
+    Pose {
+        body: Option<&'a str>,
+        frame: Option<&'a str>,
+        unit: LengthUnit,
+    },
+    /// Every body in every frame.
+    Transforms {
+        unit: LengthUnit,
+    },
     Scalar,
 }
 
@@ -45,7 +57,7 @@ impl Kind<'_> {
     fn role(&self) -> Role {
         match self {
             Kind::Joints { .. } => Role::Joints,
-            Kind::Pose { .. } => Role::Pose,
+            Kind::Pose { .. } | Kind::Transforms { .. } => Role::Pose,
             Kind::Scalar => Role::Scalar,
         }
     }
@@ -65,6 +77,8 @@ pub(crate) struct Gathered {
     pub stamps: Stamps,
     pub joints: JointTable,
     pub poses: PoseTable,
+    /// Of transforms, what they join.
+    pub edges: Edges,
     /// One number a row.
     pub scalars: Vec<f64>,
 }
@@ -78,6 +92,9 @@ impl Gathered {
             whole.undecodable += part.undecodable;
             whole.first_error = whole.first_error.take().or(part.first_error.take());
             whole.other_bodies.append(&mut part.other_bodies);
+            for (ends, edge) in std::mem::take(&mut part.edges) {
+                add_edge(&mut whole.edges, ends, edge);
+            }
         }
         let each = stretches.into_iter().map(|part| ((part.stamps, part.scalars), (part.joints, part.poses)));
         let ((stamps, scalars), (joints, poses)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) = each.unzip();
@@ -87,6 +104,19 @@ impl Gathered {
         );
         Gathered { stamps, joints, poses, scalars: joined(scalars), ..whole }
     }
+}
+
+fn add_edge(edges: &mut Edges, ends: (String, String), edge: Edge) {
+    match edges.get_mut(&ends) {
+        Some(known) => known.add(&edge),
+        None => _ = edges.insert(ends, edge),
+    }
+}
+
+/// Whether a topic is there that can be read like this.
+pub(crate) fn can_read(recording: &Recording, request: &Request<'_>) -> bool {
+    let mut channels = recording.files.iter().flat_map(|f| f.channels.values());
+    channels.any(|c| c.topic == request.topic && compile(c, request).is_ok())
 }
 
 /// One column of its parts in order, copied once if there are several.
@@ -205,6 +235,8 @@ fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f6
     let (kind, fields) = (request.kind, request.fields.as_slice());
     let body = match kind {
         Kind::Pose { body, .. } => body,
+        // Only messages that name their bodies.
+        Kind::Transforms { .. } => Some(""),
         _ => None,
     };
     let (name, data, encoding) = (&schema.name, &schema.data, &channel.message_encoding);
@@ -213,11 +245,12 @@ fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f6
         _ => Plan::at(kind.role(), name, &schema.encoding, data, encoding, (body, fields)),
     };
     let plan = plan.map_err(|e| e.to_string())?;
+    let plan = if let Kind::Transforms { .. } = kind { plan.every_body() } else { plan };
     let plan = if channel.metadata.contains_key(DEFINITION_FROM) { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
-        Kind::Pose { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),
-        Kind::Pose { unit, .. } => unit.to_m(),
+        Kind::Pose { .. } | Kind::Transforms { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),
+        Kind::Pose { unit, .. } | Kind::Transforms { unit } => unit.to_m(),
         _ => 1.0,
     };
     Ok((plan, to_m))
@@ -244,6 +277,7 @@ impl<'a> Stretch<'a> {
             Kind::Joints { wanted } => gathered.joints.make_room(room, wanted.len()),
             Kind::Pose { .. } => _ = gathered.poses.seen.try_reserve_exact(room),
             Kind::Scalar => _ = gathered.scalars.try_reserve_exact(room),
+            Kind::Transforms { .. } => {}
         }
         Stretch { kind, rows: Rows::new(kind.role()), gathered, sampled: (None, 0) }
     }
@@ -258,13 +292,17 @@ impl<'a> Stretch<'a> {
             gathered.undecodable += 1;
             gathered.first_error.get_or_insert(why);
         }
-        let Gathered { stamps, joints, poses, scalars, .. } = gathered;
+        let Gathered { stamps, joints, poses, scalars, edges, .. } = gathered;
         let mut stamp = |header_ns| stamps.push(header_ns, ns(message.publish_ns), ns(message.log_ns));
         match (&*rows, self.kind) {
             (Rows::Joints(rows), Kind::Joints { wanted }) => {
                 let kept = rows.rows().filter(|row| joints.take(row, wanted));
                 kept.for_each(|row| stamp(row.stamp_ns));
             }
+            (Rows::Pose(rows), Kind::Transforms { .. }) => rows.rows().for_each(|row| {
+                let ends = (row.frame_id.to_owned(), row.body.to_owned());
+                add_edge(edges, ends, Edge::new(Seen::of(&row, target.to_m)));
+            }),
             (Rows::Pose(rows), kind) => rows.rows().for_each(|row| {
                 if let Kind::Pose { frame: Some(frame), .. } = kind
                     && frame != row.frame_id

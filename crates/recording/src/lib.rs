@@ -5,7 +5,8 @@
 //! format, such as rosbag2's database, a copy of its messages) ->
 //! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
 //! `chunk` (inflated and checked, within a `budget`) -> `sweep` (all blocks in parallel, results in file order) ->
-//! `decode` (messages to rows) -> `gather` (rows of a stream) -> `read` (columns: clock, cleaning, units).
+//! `decode` (messages to rows) -> `gather` (rows of a stream; of bodies that hang on others the `transforms`
+//! between) -> `read` (columns: clock, cleaning, units).
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
 //! off or damaged. What is sound is used; what is not is reported with its byte offset and reason. Nothing panics
@@ -56,6 +57,7 @@ mod streams;
 mod sweep;
 mod temperature;
 mod together;
+mod transforms;
 mod url;
 
 pub use bytes::{Access, identity_of, sha256_of};
@@ -72,6 +74,7 @@ pub use report::*;
 pub use streams::{
     Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
 };
+pub use transforms::{Chain, Transforms};
 pub use url::{is_url, list, resolve};
 
 #[cfg(test)]

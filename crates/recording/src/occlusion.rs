@@ -14,6 +14,7 @@
 
 use crate::Occlusion;
 use crate::clean::Kept;
+use crate::decode::PoseRow;
 use armcal_core::robust::percentile;
 
 /// Shortest run of equal poses that can be frozen.
@@ -32,11 +33,20 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
+    /// Of a row with `to_m` metres in its unit.
+    pub fn of(row: &PoseRow<'_>, to_m: f64) -> Seen {
+        Seen {
+            position_m: row.position.map(|x| x * to_m),
+            quaternion_xyzw: row.quaternion_xyzw,
+            flagged: row.occluded,
+        }
+    }
+
     fn is_zero(&self) -> bool {
         self.position_m == [0.0; 3]
     }
 
-    fn has_unit_quaternion(&self) -> bool {
+    pub fn has_unit_quaternion(&self) -> bool {
         self.quaternion_xyzw.is_some_and(|q| (norm(&q) - 1.0).abs() <= NORM_TOLERANCE)
     }
 }

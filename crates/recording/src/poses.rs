@@ -3,7 +3,7 @@
 use crate::clean::Kept;
 use crate::decode::PoseRow;
 use crate::error::nearest;
-use crate::gather::joined;
+use crate::gather::{Request, joined};
 use crate::occlusion::Seen;
 use crate::{LengthUnit, PoseStream, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -27,11 +27,7 @@ pub(crate) struct PoseTable {
 impl PoseTable {
     /// Adds a row with `to_m` metres in its unit.
     pub fn take(&mut self, row: &PoseRow<'_>, to_m: f64) {
-        self.seen.push(Seen {
-            position_m: row.position.map(|x| x * to_m),
-            quaternion_xyzw: row.quaternion_xyzw,
-            flagged: row.occluded,
-        });
+        self.seen.push(Seen::of(row, to_m));
         for (texts, text) in [(&mut self.frames, row.frame_id), (&mut self.bodies, row.body)] {
             // A search compares nothing with nothing by `memcmp`, which may read from a dangling address: 100 ns on AVX-512.
             let nothing = text.is_empty() && texts.first().is_some_and(String::is_empty);
@@ -107,10 +103,18 @@ pub(crate) fn frame_missing(
     present: &BTreeSet<String>,
 ) -> RecordingError {
     let wanted = stream.frame.as_deref().unwrap_or_default();
-    let why = format!(
-        "never has that body in frame {wanted:?} (one transform is read, not a chain of them: a frame that it is a child of)"
-    );
+    let why =
+        format!("never has that body in frame {wanted:?}, and no transform joins that frame to another");
     missing((role, stream), wanted, why, present)
+}
+
+/// The error for a frame that no transforms lead to.
+pub(crate) fn no_chain(request: &Request<'_>, why: String) -> RecordingError {
+    RecordingError::NotDecodable {
+        role: request.role,
+        topic: request.topic.to_owned(),
+        why: format!("it {why}"),
+    }
 }
 
 fn missing(

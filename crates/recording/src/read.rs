@@ -7,12 +7,13 @@ use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::streams::field_of;
 use crate::temperature::{Scale, like_fahrenheit};
 use crate::{
-    Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
+    Chain, Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
     StreamReport, Streams,
 };
 use crate::{joints, poses, together};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 impl Recording {
     /// Reads the wanted streams: one pass over the recording, only wanted channels decoded, chunks in parallel, the
@@ -34,9 +35,10 @@ impl Recording {
         let named = named.into_iter().filter_map(|(role, stream)| Some((role, stream.as_ref()?)));
         named.chain(streams.bodies.values().map(|s| ("bodies", s))).try_for_each(poses::check_config)?;
         let requests = requests(streams);
-        let gathered = gather(self, &requests)?;
+        let mut gathered = gather(self, &requests)?;
+        let chains = self.chains(&requests, &mut gathered)?;
         let read = |((place, request), gathered): ((usize, &Request<'_>), Gathered)| {
-            let mut stage = Reading::new(request, gathered);
+            let mut stage = Reading::new(request, gathered, chains.get(&place));
             let columns = stage.columns(request, place, streams)?;
             Ok((columns, stage.report, stage.warnings))
         };
@@ -62,6 +64,31 @@ impl Recording {
         }
         samples.joints = together::as_one(&streams.joints, joints)?;
         Ok((samples, reports, warnings))
+    }
+
+    /// Where a body never is in the frame that was asked for: the chain of transforms that leads from one to the other, and in
+    /// the place of what was gathered the transform in it that moves.
+    fn chains(
+        &self,
+        requests: &[Request<'_>],
+        gathered: &mut [Gathered],
+    ) -> Result<BTreeMap<usize, Chain>, RecordingError> {
+        let mut chains = BTreeMap::new();
+        for (place, (request, gathered)) in requests.iter().zip(gathered).enumerate() {
+            let Kind::Pose { body: Some(body), frame: Some(frame), unit } = request.kind else { continue };
+            if !gathered.poses.seen.is_empty() || gathered.messages == 0 || !request.fields.is_empty() {
+                continue;
+            }
+            let trees = self.transforms(&[request.topic], unit)?;
+            let chain = trees.first().map_or(Ok(None), |tree| tree.chain(frame, body));
+            let Some(chain) = chain.map_err(|why| poses::no_chain(request, why))? else { continue };
+            let (topic, parent, child) = &chain.moving;
+            let kind = Kind::Pose { body: Some(child), frame: Some(parent), unit };
+            let moving = gather(self, &[Request { topic, kind, ..request.clone() }])?;
+            moving.into_iter().for_each(|moving| *gathered = moving);
+            chains.insert(place, chain);
+        }
+        Ok(chains)
     }
 }
 
@@ -103,15 +130,17 @@ fn pose_request<'a>(role: &'static str, name: Option<&'a str>, s: &'a PoseStream
 }
 
 /// One stream on its way from rows to columns.
-struct Reading {
+struct Reading<'a> {
     role: &'static str,
     gathered: Gathered,
+    /// What joins its rows to the frame and the body that were asked for.
+    chain: Option<&'a Chain>,
     report: StreamReport,
     warnings: Vec<Warning>,
 }
 
-impl Reading {
-    fn new(request: &Request<'_>, gathered: Gathered) -> Reading {
+impl Reading<'_> {
+    fn new<'a>(request: &Request<'_>, gathered: Gathered, chain: Option<&'a Chain>) -> Reading<'a> {
         let report = StreamReport {
             role: request.name.map_or(request.role.to_owned(), |name| format!("{}.{name}", request.role)),
             topic: request.topic.to_owned(),
@@ -132,7 +161,7 @@ impl Reading {
             largest_gap_s: 0.0,
             quantisation_rad: Vec::new(),
         };
-        Reading { role: request.role, gathered, report, warnings: Vec::new() }
+        Reading { role: request.role, gathered, chain, report, warnings: Vec::new() }
     }
 
     /// The columns of the stream of these that stands at `place` among the requests, which begin with the joints.
@@ -203,11 +232,11 @@ impl Reading {
         let role = self.role;
         self.refuse_undecoded(role)?;
         let table = std::mem::take(&mut self.gathered.poses);
-        if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
-            return Err(poses::body_missing(role, stream, &self.gathered.other_bodies));
-        }
         if table.seen.is_empty() && !table.other_frames.is_empty() {
             return Err(poses::frame_missing(role, stream, &table.other_frames));
+        }
+        if self.gathered.messages > 0 && table.seen.is_empty() && stream.body.is_some() {
+            return Err(poses::body_missing(role, stream, &self.gathered.other_bodies));
         }
         poses::check_body(role, stream, &table)?;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
@@ -234,12 +263,19 @@ impl Reading {
         let text =
             "rows have a quaternion, but not all of about unit length: the stream is read as positions only";
         self.counted(Severity::Notice, "orientation-unusable", unoriented, text);
-        Ok(PoseSamples {
+        let samples = PoseSamples {
             frame_id: table.frames.first().cloned().unwrap_or_default(),
             body: stream.body.clone().or_else(|| table.bodies.first().cloned()).unwrap_or_default(),
             time_ns,
             position_m,
             orientation,
+        };
+        let Some(chain) = self.chain else { return Ok(samples) };
+        self.say(Severity::Notice, "transform-chain", chain.told());
+        chain.composed(samples).map_err(|why| RecordingError::NotDecodable {
+            role,
+            topic: stream.topic.clone(),
+            why,
         })
     }
 

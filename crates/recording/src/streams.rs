@@ -193,7 +193,8 @@ pub struct PoseStream {
     /// messages hold several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<String>,
-    /// Frame that the poses are expressed in (`header.frame_id`), required when the body comes in several, as on `/tf`.
+    /// Frame that the poses are expressed in (`header.frame_id`), required when the body comes in several, as on `/tf`; or one that
+    /// transforms join to that, at most one of which changes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<String>,
     /// Where the position is in messages that armcal does not know: the path of a message with x, y, z.

@@ -135,14 +135,18 @@ pub fn recordings_below(path: &Path) -> Vec<PathBuf> {
 fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
     let mut bags: Vec<(PathBuf, Vec<PathBuf>)> = Vec::new();
     for file in files {
-        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
-        let of_bag = folder.join("metadata.yaml").is_file();
+        let bag = bag_of(&file).unwrap_or(&file).to_owned();
         match bags.last_mut() {
-            Some((bag, parts)) if of_bag && *bag == folder => parts.push(file),
-            _ => bags.push((if of_bag { folder } else { file.clone() }, vec![file])),
+            Some((last, parts)) if *last == bag => parts.push(file),
+            _ => bags.push((bag, vec![file])),
         }
     }
     bags.into_iter().map(|(_, parts)| unnamed(parts)).collect()
+}
+
+/// The folder of the bag that a file is a part of, which rosbag2 calls as it was asked to, its parts `NAME_0`, `NAME_1`, ..
+fn bag_of(file: &Path) -> Option<&Path> {
+    file.parent().filter(|folder| folder.join("metadata.yaml").is_file())
 }
 
 fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
@@ -152,7 +156,7 @@ fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
 /// Names without a name after as many of their last folders as it takes to tell them apart.
 fn name_all(entries: &mut [RecordingEntry]) {
     let stem = |entry: &RecordingEntry, depth: usize| -> String {
-        let path = without_ending(&entry.paths[0]);
+        let path = bag_of(&entry.paths[0]).map_or_else(|| without_ending(&entry.paths[0]), Path::to_owned);
         let parts: Vec<String> =
             path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
         parts[parts.len().saturating_sub(depth)..].join("/")

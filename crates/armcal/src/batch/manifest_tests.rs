@@ -27,7 +27,7 @@ fn a_glob_finds_recordings_bags_and_no_results() {
     ]);
     let glob = format!("{}/**/*.mcap", folder.path().display());
     let found = Manifest::of(&[glob], &folder.path().join("campaign")).expect("recordings");
-    assert_eq!(names(&found), ["2026-01/a", "2026-02/a", "b", "bag_0"]);
+    assert_eq!(names(&found), ["2026-01/a", "2026-02/a", "b", "bag"]);
     let sizes: Vec<usize> = found.entries.iter().map(|e| e.paths.len()).collect();
     assert_eq!(sizes, [1, 1, 1, 2]);
 }

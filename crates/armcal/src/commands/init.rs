@@ -30,6 +30,10 @@ pub struct Request {
     /// Board whose cavities the tip sat in.
     #[arg(long, value_name = "FILE")]
     pub board: Option<PathBuf>,
+    /// CSV file in which a laser tracker exported where the tip was, a row a pause; of several recordings once for each, in
+    /// their order.
+    #[arg(long, value_name = "FILE")]
+    pub points: Vec<PathBuf>,
     /// Topic of the joint readings, where several could be it; of a field in a message TOPIC:PATH.
     #[arg(long, value_name = "TOPIC")]
     pub joints: Option<String>,
@@ -50,7 +54,7 @@ pub struct Request {
 /// Proposes, writes, and says what was seen and what was not.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     let given = [&request.urdf, &request.dh, &request.board];
-    given.into_iter().flatten().for_each(|path| input::note(path));
+    given.into_iter().flatten().chain(&request.points).for_each(|path| input::note(path));
     request.inputs.iter().for_each(|path| input::note(Path::new(path)));
     free(&request.out, request.force)?;
     let told = Told {
@@ -64,6 +68,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         inputs: request.inputs.clone(),
         told,
         board: request.board.clone(),
+        points: request.points.clone(),
         out: request.out.clone(),
     };
     let proposal = propose(&asked, &Progress::new())?;

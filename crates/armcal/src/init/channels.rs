@@ -41,6 +41,8 @@ pub struct BodyTopic {
     pub topic: String,
     /// Its name, where the topic has several.
     pub body: Option<String>,
+    /// The frame that it is compared with others in, where they hang on several.
+    pub frame: Option<String>,
     /// Where it is in a message that armcal does not know.
     pub position: Option<String>,
     /// With `position`: how it is turned.

@@ -178,6 +178,7 @@ impl Fields {
         let of = |p: &Point| {
             let all = BodyTopic {
                 topic: topic.to_owned(),
+                frame: None,
                 body: None,
                 position: Some(p.position.clone()),
                 orientation: p.orientation.clone(),

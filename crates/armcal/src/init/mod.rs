@@ -11,8 +11,10 @@ mod draft;
 mod evidence;
 mod fields;
 mod files;
+mod frames;
 mod motion;
 mod page;
+mod points;
 mod proposal;
 mod read;
 mod roles;
@@ -47,6 +49,8 @@ pub struct Asked {
     pub told: Told,
     /// Board file.
     pub board: Option<PathBuf>,
+    /// What a laser tracker exported: a file for each recording, in their order, or none.
+    pub points: Vec<PathBuf>,
     /// Where the pipeline will be.
     pub out: PathBuf,
 }
@@ -58,7 +62,23 @@ pub struct Asked {
 pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     progress.step("opening the recordings");
     let opened = files::open_all(&asked.inputs, &asked.out)?;
-    let channels = channels::look(&opened)?;
+    let points = asked.points.iter().map(|path| points::look(path)).collect::<Result<Vec<_>, Error>>()?;
+    if !points.is_empty() && points.len() != opened.len() {
+        let names: Vec<String> = opened.iter().map(|o| o.entry.name()).collect();
+        let problem = format!(
+            "--points was given {} times for {} recordings ({}): give one file for each, in this order",
+            points.len(),
+            opened.len(),
+            names.join(", ")
+        );
+        return Err(Error::Init { problem });
+    }
+    let mut channels = channels::look(&opened)?;
+    if !points.is_empty() {
+        let seen = std::mem::take(&mut channels.bodies);
+        let why = "--points says where the tip was, in the frame of another sensor";
+        channels.left.extend(seen.iter().map(|body| (body.shown(), why.to_owned())));
+    }
     if channels.joints.is_empty() {
         return Err(no_joints(&channels));
     }
@@ -80,8 +100,8 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let evidence = evidence::gather(&arm, &read);
     let (cast, seats) = roles::cast(&arm, &evidence, board.as_ref());
-    let tracked =
-        cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
+    let tracked = !points.is_empty()
+        || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
     // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
     let sockets = if tracked { None } else { sockets::find(&arm, &read)? };
     if board.is_none() && !tracked && sockets.is_none() {
@@ -98,6 +118,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
         seats,
         board,
         sockets,
+        points,
         warm: &channels.warm,
     };
     if known.sockets.is_some() && known.board.is_none() {

@@ -6,6 +6,7 @@ use super::draft::Draft;
 use super::evidence::Evidence;
 use super::files::Opened;
 use super::page::{Page, quoted};
+use super::points::Points;
 use super::read::AllRead;
 use super::roles::{Cast, Role};
 use super::seats::Seats;
@@ -82,6 +83,8 @@ pub struct Known<'a> {
     pub board: Option<(&'a Path, &'a Board)>,
     /// Sockets without a drawing.
     pub sockets: Option<Sockets>,
+    /// What a laser tracker exported, of each recording or of none.
+    pub points: Vec<Points>,
     /// Numbers called temperatures, by topic and path.
     pub warm: &'a [(String, String)],
 }

@@ -3,6 +3,7 @@
 use super::arm::Arm;
 use super::channels::{BodyTopic, Channels, JointTopic};
 use super::files::Opened;
+use super::frames;
 use crate::error::Error;
 use armcal_core::{Dwell, PoseSamples, Samples};
 use armcal_dwell::{DwellConfig, detect_dwells};
@@ -78,9 +79,10 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
             bodies.push(body.clone());
         }
     }
+    frames::join(&mut bodies, opened, &mut left)?;
     let pose = |b: &BodyTopic| {
-        let BodyTopic { topic, body, position, orientation } = b.clone();
-        PoseStream { topic, body, position, orientation, ..PoseStream::default() }
+        let BodyTopic { topic, body, frame, position, orientation } = b.clone();
+        PoseStream { topic, body, frame, position, orientation, ..PoseStream::default() }
     };
     let field = arm.source.field.as_ref();
     let thermometer = |topic: &String| ScalarStream { topic: topic.clone(), ..ScalarStream::default() };

@@ -69,6 +69,11 @@ def _library():
             ctypes.c_int32,
             [handle, _DOUBLE, _DOUBLE, double] + 3 * [_DOUBLE] + [ctypes.POINTER(_Reached)],
         ),
+        (
+            "motion_path",
+            ctypes.c_int32,
+            [handle, _DOUBLE, _DOUBLE, size, double, _DOUBLE, _DOUBLE, ctypes.POINTER(ctypes.c_uint8), ctypes.POINTER(_Reached)],
+        ),
         ("motion_warnings", text, [handle]),
     ]:
         found = getattr(library, "armcal_" + function)
@@ -113,6 +118,8 @@ class SetPoint(NamedTuple):
     direction: Tuple[float, ...]
     reached: Reached
     warnings: List[str]
+    #: On a path: whether each joint is on its way through its gap, as it turns back; its link waits.
+    in_gap: Tuple[bool, ...] = ()
 
 
 def version() -> str:
@@ -261,10 +268,37 @@ class Motion:
         )
         return self._set_point(nominal, corrected, direction, reached)
 
+    def path(
+        self, nominal_rad: Sequence[Sequence[float]], time_s: Sequence[float], crossing_s: float = 0.4
+    ) -> List[SetPoint]:
+        """``correct`` for every point of a path, with rising times; a joint that turns back crosses its gap in ``crossing_s``
+        around that moment (0: in one leap). Then the arm stands at the end."""
+        count, joints = len(nominal_rad), self._joints
+        flat = [float(number) for point in nominal_rad for number in self._of_joints(point, "joints")]
+        nominal, times = _numbers(flat, count * joints, "joints"), _numbers(time_s, count, "times")
+        corrected, direction = (ctypes.c_double * (count * joints))(), (ctypes.c_double * (count * joints))()
+        in_gap, reached = (ctypes.c_uint8 * (count * joints))(), (_Reached * count)()
+        _checked(
+            _C.armcal_motion_path(self._handle, nominal, times, count, crossing_s, corrected, direction, in_gap, reached)
+        )
+        warnings: List[List[str]] = [[] for _ in range(count)]
+        for line in _C.armcal_motion_warnings(self._handle).decode().splitlines():
+            point, words = line.split(": ", 1)
+            warnings[int(point)].append(words)
+        return [
+            self._laid_out(nominal[at], corrected[at], direction[at], reached[k], warnings[k], tuple(map(bool, in_gap[at])))
+            for k in range(count)
+            for at in [slice(k * joints, (k + 1) * joints)]
+        ]
+
     def _room(self):
         return (ctypes.c_double * self._joints)()
 
     def _set_point(self, nominal, corrected, direction, reached) -> SetPoint:
         warnings = _C.armcal_motion_warnings(self._handle).decode().splitlines()
+        return self._laid_out(nominal, corrected, direction, reached, warnings)
+
+    @staticmethod
+    def _laid_out(nominal, corrected, direction, reached, warnings, in_gap=()) -> SetPoint:
         numbers = Reached(reached.before_m, reached.after_m, reached.before_rad, reached.after_rad)
-        return SetPoint(tuple(nominal), tuple(corrected), tuple(direction), numbers, warnings)
+        return SetPoint(tuple(nominal), tuple(corrected), tuple(direction), numbers, warnings, in_gap)

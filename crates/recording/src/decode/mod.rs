@@ -92,6 +92,8 @@ pub struct Plan {
     /// Whether bodies are told by their places in a list.
     by_place: bool,
     body: Option<Vec<u8>>,
+    /// Whether all bodies of a message are read, each as a row.
+    every_body: bool,
     code: Code,
 }
 
@@ -136,6 +138,7 @@ impl Plan {
             in_millimetres: shape.in_millimetres,
             by_place: shape.by_place,
             body: body.map(|b| b.as_bytes().to_vec()),
+            every_body: false,
             code,
         })
     }
@@ -153,7 +156,7 @@ impl Plan {
         let find = |schema: &str, types: &Types| Ok(((), shapes::at(schema, types, fields)?));
         let ((), _, code) = compile([schema_name, schema_encoding, message_encoding], schema_data, find)?;
         let body = body.map(|b| b.as_bytes().to_vec());
-        Ok(Plan { role, in_millimetres: false, by_place: true, body, code })
+        Ok(Plan { role, in_millimetres: false, by_place: true, body, every_body: false, code })
     }
 
     /// The same plan, which refuses messages that do not end where their definition does: for definitions that did not
@@ -163,6 +166,11 @@ impl Plan {
             code.go_to_the_end();
         }
         self
+    }
+
+    /// The same plan for all the bodies of a message, whichever it was compiled for.
+    pub fn every_body(self) -> Plan {
+        Plan { body: None, every_body: true, ..self }
     }
 
     /// What the plan reads.
@@ -189,7 +197,9 @@ impl Plan {
                 let decoded = self.run(data, &value, &mut sink);
                 sink.finish(decoded)
             }
-            (Role::Pose, Rows::Pose(rows)) => self.decode_pose(data, self.body.as_deref(), rows),
+            (Role::Pose, Rows::Pose(rows)) => {
+                self.decode_pose(data, (self.body.as_deref(), self.every_body), rows)
+            }
             (Role::Scalar, Rows::Scalar(rows)) => {
                 let value = self.json_value(data)?;
                 let mut sink = sink::ScalarSink::new(rows);
@@ -203,16 +213,19 @@ impl Plan {
     /// The bodies named in one message, whichever was asked for: what to suggest when a body is never found.
     pub fn bodies(&self, data: &[u8]) -> Result<Vec<String>, DecodeError> {
         let mut rows = PoseRows::default();
-        match self.decode_pose(data, None, &mut rows) {
-            Ok(()) => Ok(rows.bodies().into_iter().map(str::to_owned).collect()),
-            Err(DecodeError::SeveralBodies { bodies }) => Ok(bodies),
-            Err(error) => Err(error),
-        }
+        self.decode_pose(data, (None, true), &mut rows)?;
+        Ok(rows.bodies().into_iter().map(str::to_owned).collect())
     }
 
-    fn decode_pose(&self, data: &[u8], body: Option<&[u8]>, rows: &mut PoseRows) -> Result<(), DecodeError> {
+    /// `wanted`: one body, and whether rows may be of several.
+    fn decode_pose(
+        &self,
+        data: &[u8],
+        wanted: (Option<&[u8]>, bool),
+        rows: &mut PoseRows,
+    ) -> Result<(), DecodeError> {
         let value = self.json_value(data)?;
-        let mut sink = pose_sink::PoseSink::new(rows, body, self.by_place);
+        let mut sink = pose_sink::PoseSink::new(rows, wanted, self.by_place);
         let decoded = self.run(data, &value, &mut sink);
         sink.finish(decoded)
     }

@@ -15,6 +15,8 @@ pub(super) struct PoseSink<'r, 'm> {
     /// Number of rows before this message.
     start: usize,
     filter: Option<&'m [u8]>,
+    /// Whether each body that comes through the filter makes a row of its own.
+    every: bool,
     /// Whether items have no names but their places.
     by_place: bool,
     items: u32,
@@ -45,12 +47,18 @@ struct Gathered<'m> {
 }
 
 impl<'r, 'm> PoseSink<'r, 'm> {
-    /// `filter` is the body wanted: its name, `subject/name`, or, `by_place`, its place in the list.
-    pub(super) fn new(rows: &'r mut PoseRows, filter: Option<&'m [u8]>, by_place: bool) -> Self {
+    /// `filter` is the body wanted: its name, `subject/name`, or, `by_place`, its place in the list; of others `every` one may be
+    /// wanted.
+    pub(super) fn new(
+        rows: &'r mut PoseRows,
+        (filter, every): (Option<&'m [u8]>, bool),
+        by_place: bool,
+    ) -> Self {
         PoseSink {
             start: rows.len(),
             rows,
             filter,
+            every,
             by_place,
             items: 0,
             by_item: false,
@@ -94,7 +102,7 @@ impl<'r, 'm> PoseSink<'r, 'm> {
     /// Appends a row, if this is the body wanted.
     fn push(&mut self, gathered: &Gathered<'m>) {
         let Some(body) = self.wanted_body(gathered) else { return };
-        if self.rows.len() > self.start && self.rows.body_of_row[self.start] != body {
+        if !self.every && self.rows.len() > self.start && self.rows.body_of_row[self.start] != body {
             for body in [self.rows.body_of_row[self.start], body] {
                 if self.known.insert(body) {
                     self.several.push(body);

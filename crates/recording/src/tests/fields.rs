@@ -3,7 +3,8 @@
 use super::{Style, Track, mcap_bytes, open};
 use crate::foreign::definition_of;
 use crate::ros2::{self, Header};
-use crate::{JointStream, PoseStream, Recording, RecordingError, ScalarStream, Streams};
+use crate::{GaugeStream, JointStream, PoseStream, Recording, RecordingError, ScalarStream, Streams};
+use std::collections::BTreeMap;
 
 const N: u64 = 200;
 
@@ -94,7 +95,7 @@ fn wrong_fields_and_frames_name_what_there_is() {
     assert!(matches!(recording().read(&no_position), Err(RecordingError::Config { role: "tip", .. })));
 }
 
-/// A thermometer inside a message that armcal does not know: by its path; a list is not one number.
+/// A thermometer and a gauge inside a message that armcal does not know: by their paths; a list is not one number.
 #[test]
 fn one_number_is_read_by_its_path() {
     let text = definition_of("sensor_msgs/Temperature").expect("known");
@@ -139,6 +140,17 @@ fn one_number_is_read_by_its_path() {
     let (samples, ..) = read("motor.temperature").expect("readable");
     let temperature = samples.temperature.expect("a thermometer");
     assert_eq!((temperature.time_ns[3], temperature.value[3]), (4_000_000_000, 20.0 + 0.1 * 3.0));
+    let gauge = |path: &str| {
+        let text = format!("topic = \"/state\"\nvalue = {path:?}\nunit = \"mm\"\ndirection = -1\n");
+        let gauge: GaugeStream = toml::from_str(&text).expect("a gauge");
+        let gauges = BTreeMap::from([("dial".to_owned(), gauge)]);
+        recording.read(&Streams { tip: None, gauges, ..streams("data[]", None) })
+    };
+    let (samples, ..) = gauge("load").expect("readable");
+    let dial = &samples.gauges["dial"];
+    // The message has no stamp of its own, the thermometer in it has.
+    assert_eq!((dial.time_ns[3], dial.value[3], dial.value.len()), (4_000_000_007, -9.5e-3, 30));
+    assert!(gauge("lode").expect_err("refused").to_string().contains("did you mean \"load\""));
     for wrong in ["cells[]", "motor.temperatur"] {
         let why = read(wrong).expect_err("refused").to_string();
         assert!(

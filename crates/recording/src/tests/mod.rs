@@ -10,6 +10,7 @@ mod mutation;
 mod output;
 mod ranges;
 mod streams;
+mod transforms;
 
 use crate::{Access, Recording};
 use mcap::records::MessageHeader;

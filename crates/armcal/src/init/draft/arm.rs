@@ -73,7 +73,8 @@ impl Draft<'_> {
     pub fn frames(&mut self) {
         let known = self.known;
         let tip = known.of_role(Role::Tip);
-        let sensor = tip.is_some() || known.markers().any(|(_, _, cast)| cast.sure);
+        let by_points = !known.points.is_empty();
+        let sensor = by_points || tip.is_some() || known.markers().any(|(_, _, cast)| cast.sure);
         self.page.section("[frames.base]");
         if known.of_role(Role::Base).is_some() {
             self.page.line("pose = \"measured\"", "by the body on the base");
@@ -100,12 +101,14 @@ impl Draft<'_> {
         self.page.section("[frames.tip]");
         if is_seated {
             self.page.line("pose = \"given\"", "the body's origin is the tool point: it was in the cavities");
-        } else if !known.arm.is_urdf() && tip.is_none() {
+        } else if !known.arm.is_urdf() && tip.is_none() && !by_points {
             self.page.line("pose = \"given\"", "the last row of the table ends at the tool point");
         } else {
             self.page.line(
                 "pose = \"estimated\"",
-                if tip.is_some() {
+                if by_points {
+                    "where the target sits on the last link"
+                } else if tip.is_some() {
                     "where the body sits on the last link"
                 } else {
                     "where the tool point is on the last link"
@@ -118,6 +121,12 @@ impl Draft<'_> {
                     "where the nominal arm would have it: a start",
                 );
             }
+        }
+        if by_points {
+            self.unseen.push(
+                "whether the tracker was levelled: where it was not, give vertical = \"base\" in [frames]"
+                    .to_owned(),
+            );
         }
         if sensor && !bases.is_empty() && lean(&bases) > LEANS_RAD {
             let lean_deg = lean(&bases).to_degrees();

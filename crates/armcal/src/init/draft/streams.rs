@@ -4,6 +4,7 @@ use super::Draft;
 use crate::init::channels::BodyTopic;
 use crate::init::evidence::Evidence;
 use crate::init::page::{list, number, quoted, relative};
+use crate::init::points::Points;
 use crate::init::read::key;
 use crate::init::roles::Role;
 use crate::init::seats::tilts;
@@ -34,6 +35,9 @@ impl Draft<'_> {
             if recording_name(None, &opened.entry.paths) != read.name {
                 self.page.line(&format!("name = {}", quoted(&read.name)), "");
             }
+            if let Some(points) = known.points.get(at) {
+                self.points(points);
+            }
             let below =
                 known.seats.iter().flat_map(|s| &s.turned).find(|(r, _)| *r == at).map(|(_, tilt)| *tilt);
             if let Some(tilt) = below.or(tilts.get(at).copied().flatten()) {
@@ -51,6 +55,32 @@ impl Draft<'_> {
             "what the arm carried: load_kg = .. under each [[recordings]], where it carried anything"
                 .to_owned(),
         );
+    }
+
+    /// What a laser tracker exported beside a recording.
+    fn points(&mut self, points: &Points) {
+        let file = points.path.display();
+        let unit = match points.unit {
+            Some(LengthUnit::M) => "m",
+            _ => "mm",
+        };
+        let time = points.time.as_ref().map_or(String::new(), |time| format!(", time = {}", quoted(time)));
+        let csv = relative(&points.path, &self.folder);
+        let how = if points.time.is_some() { "by their times" } else { "dwells in their order" };
+        self.page.line(
+            &format!("points = {{ csv = {csv}, unit = \"{unit}\", sigma_mm = 0.05{time} }}"),
+            &format!("given: {} rows, {how}; sigma_mm is assumed", points.rows),
+        );
+        if points.unit.is_none() {
+            self.unsure.push(format!("the unit of {file}, which its header does not say: taken as mm"));
+        }
+        for (column, why) in &points.unread {
+            self.unsure.push(format!("the column {column} of {file}, which is not read as times: {why}"));
+        }
+        if points.time.is_none() && points.unread.is_empty() {
+            self.unseen.push(format!("when the points of {file} were measured: no column is called a time"));
+        }
+        self.unseen.push(format!("how exactly the points of {file} were measured: sigma_mm"));
     }
 
     pub fn streams(&mut self) {
@@ -141,6 +171,12 @@ impl Draft<'_> {
         self.page.line(&format!("topic = {}", quoted(&stream.topic)), &known.cast[body].why);
         if let Some(name) = &stream.body {
             self.page.line(&format!("body = {}", quoted(name)), "the topic has several");
+        }
+        if let Some(frame) = &stream.frame {
+            self.page.line(
+                &format!("frame = {}", quoted(frame)),
+                "over the transforms between, as the bodies hang on several frames",
+            );
         }
         let fields = [("position", &stream.position), ("orientation", &stream.orientation)];
         for (key, path) in fields.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?))) {
