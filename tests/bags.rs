@@ -142,8 +142,9 @@ fn a_pipeline_is_proposed_for_a_database_as_for_mcap() {
     let expected = proposed("mcap");
     assert!(expected.iter().any(|line| line.contains("[streams.joints]")), "{expected:?}");
     for form in ["old", "file", "split"] {
-        // A split bag says that it has two parts.
-        let differ = proposed(form).iter().filter(|line| !expected.contains(line)).count();
-        assert_eq!(differ, 0, "{form}: {:?} {expected:?}", proposed(form));
+        // A split bag says that it has two parts, and after what both are called.
+        let mut differ = proposed(form);
+        differ.retain(|line| !expected.contains(line) && (form != "split" || line != "name = \"normal\""));
+        assert!(differ.is_empty(), "{form}: {differ:?} {expected:?}");
     }
 }

@@ -31,7 +31,8 @@ const READ: [(&str, &str); 22] = [
     ("view", "input"),
     ("simulate", "lab"),
 ];
-const READ_TOO: [(&str, &str); 8] = [
+const READ_TOO: [(&str, &str); 9] = [
+    ("init", "points"),
     ("init", "urdf"),
     ("init", "dh"),
     ("init", "board"),

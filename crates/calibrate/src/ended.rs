@@ -8,6 +8,9 @@ use crate::{CalibrateError, FitConfig};
 use armcal_core::Parameter;
 use nalgebra::DVector;
 
+/// More axes than this have a curvature as large as the rows of their recordings: it is not kept.
+const MOST_AXES: usize = 300;
+
 /// All parameters where a fit ended, and the scale of its residuals in units of the declared noise.
 #[derive(Debug, Clone)]
 pub struct Ended {
@@ -35,7 +38,8 @@ pub fn fitted_values(
     let solved = solve(&white, sigma_scale, config)?;
     let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
     let values = white.parameters_at(&solved.at.x);
-    Ok(Ended { values, sigma_scale: solved.sigma_scale, axes: white.axes, curvature: solved.curvature })
+    let curvature = solved.curvature.filter(|_| white.axes.len() <= MOST_AXES);
+    Ok(Ended { values, sigma_scale: solved.sigma_scale, axes: white.axes, curvature })
 }
 
 impl Ended {

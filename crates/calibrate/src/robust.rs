@@ -6,7 +6,7 @@
 use crate::elsewhere::{Part, Weighting};
 use crate::loss::{Loss, chi_median};
 use crate::products::gram;
-use crate::rows::Rows;
+use crate::rows::{Derivative, Rows};
 use crate::solver::{Arrow, Cost, Curvature, Quadratic, is_tall, root, root_of};
 use crate::structure::Structure;
 use crate::whitened::{Point, Whitened};
@@ -194,38 +194,45 @@ impl RobustCost<'_, '_> {
             curvature -= gram(&derivative.along(&along));
         }
         if !self.white.structure.is_dense() {
-            curvature = root_of(curvature, residual.len(), || self.lightened(rows, lighter, true));
+            curvature = root_of(curvature, residual.len(), || {
+                let mut jacobian = self.lightened(derivative, lighter);
+                self.straighten(&mut jacobian, residual, lighter);
+                jacobian
+            });
         }
         Part { gradient, squares, curvature }
     }
 
     /// Row by row.
-    fn part_by_rows(&self, rows: &Rows, lighter: &[Lighter]) -> Part {
-        let jacobian = self.lightened(rows, lighter, false);
-        let mut scaled = &rows.residual / self.sigma_scale;
+    fn part_by_rows(&self, Rows { residual, derivative }: &Rows, lighter: &[Lighter]) -> Part {
+        let mut jacobian = self.lightened(derivative, lighter);
+        let mut scaled = residual / self.sigma_scale;
         lighter.iter().for_each(|l| scaled.rows_mut(l.rows.start, l.rows.len()).scale_mut(l.weight.sqrt()));
         let gradient = jacobian.tr_mul(&scaled);
         let squares = jacobian.column_iter().map(|column| column.norm_squared());
         let squares = DVector::from_iterator(jacobian.ncols(), squares);
-        let jacobian = if self.exact_curvature { self.lightened(rows, lighter, true) } else { jacobian };
+        self.straighten(&mut jacobian, residual, lighter);
         let curvature = if self.white.structure.is_dense() { gram(&jacobian) } else { root(jacobian) };
         Part { gradient, squares, curvature }
     }
 
-    /// The derivative by x, lighter blocks by the root of their weight; where the curvature is asked for and is exact, without what
-    /// lies along their residual: `I - u u'` is its own root.
-    fn lightened(&self, rows: &Rows, lighter: &[Lighter], curved: bool) -> DMatrix<f64> {
-        let mut jacobian = rows.derivative.by_axis() / self.sigma_scale;
-        for Lighter { rows: at, weight, norm } in lighter {
-            let mut own = jacobian.rows_mut(at.start, at.len());
-            own *= weight.sqrt();
-            if curved && self.exact_curvature {
-                let direction = rows.residual.rows(at.start, at.len()) / *norm;
-                let along = direction.transpose() * &own;
-                own -= direction * along;
-            }
+    /// The derivative by x, each row times the root of its weight.
+    fn lightened(&self, derivative: &Derivative, lighter: &[Lighter]) -> DMatrix<f64> {
+        let mut jacobian = derivative.by_axis() / self.sigma_scale;
+        for Lighter { rows, weight, .. } in lighter {
+            jacobian.rows_mut(rows.start, rows.len()).scale_mut(weight.sqrt());
         }
         jacobian
+    }
+
+    /// Takes what lies along their residual u out of lighter rows, where curvature is exact: `I - u u'` is its own root.
+    fn straighten(&self, jacobian: &mut DMatrix<f64>, residual: &DVector<f64>, lighter: &[Lighter]) {
+        for Lighter { rows, norm, .. } in lighter.iter().filter(|_| self.exact_curvature) {
+            let direction = residual.rows(rows.start, rows.len()) / *norm;
+            let mut own = jacobian.rows_mut(rows.start, rows.len());
+            let along = direction.transpose() * &own;
+            own -= direction * along;
+        }
     }
 }
 

@@ -56,6 +56,7 @@ mod inner;
 mod judge;
 mod knowledge;
 mod lead;
+mod model_refit;
 mod nested;
 mod next;
 mod noise;

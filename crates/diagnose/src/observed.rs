@@ -1,22 +1,15 @@
-//! The outer room: a calibrated model and its observations become a [`Problem`], and accepted effects are refitted.
+//! The outer room: a calibrated model and its observations are diagnosed, and what was found is refitted.
 
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;
 use crate::knowledge::Knowledge;
+use crate::model_refit::{ModelRefit, Seen};
 use crate::places::{places_of_poses, thinned};
-use crate::problem::{Candidate, Problem};
-use crate::rivals::AfterRefit;
-use crate::view::View;
-use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, Refit, diagnose_problem};
-use armcal_calibrate::{
-    Calibration, Ended, FitConfig, HoldoutConfig, ModelProblem, calibrate_beside, fitted_values, gram,
-    linearise,
-};
-use armcal_core::{Observation, Parameter};
+use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, diagnose_problem};
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate_beside};
+use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
-use std::rc::Rc;
+use std::collections::BTreeSet;
 
 /// A fit to so many observations begins with one to a few poses.
 const MANY: usize = 1600;
@@ -61,21 +54,9 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
     let few = few(observations, config);
     let places = places_of_poses(&weighed);
-    let mut refit = ModelRefit {
-        model,
-        values,
-        observations,
-        weighed: &weighed,
-        few: &few,
-        places: &places,
-        session,
-        fit,
-        fits: BTreeMap::new(),
-        last: None,
-        sizes: BTreeMap::new(),
-        knowledge: Knowledge::of(config, joint_names)?,
-        products: RefCell::default(),
-    };
+    let seen = Seen { observations, weighed: &weighed, few: &few, places: &places };
+    let knowledge = Knowledge::of(config, joint_names)?;
+    let mut refit = ModelRefit::new((model, values), seen, session, fit, knowledge);
     let mut diagnosis = diagnose_problem(&mut refit, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
     let refitted = refitted(calibrated, &diagnosis)
@@ -113,191 +94,4 @@ fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
 fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {
     let effects = diagnosis.suggested(calibrated.model.chain().joint_names()).ok()?;
     if effects.is_empty() { None } else { calibrated.with(effects) }
-}
-
-/// Refits the model with accepted effects, each set of effects once: all observations fit, some of them weigh.
-struct ModelRefit<'a> {
-    model: &'a Model,
-    values: Vec<f64>,
-    observations: &'a [Observation],
-    /// Those of them that weigh explanations.
-    weighed: &'a [Observation],
-    /// Of very many those with which a fit to all of them begins.
-    few: &'a [&'a Observation],
-    /// The place of each pose of those that weigh.
-    places: &'a [Option<String>],
-    session: &'a Session,
-    fit: &'a FitConfig,
-    /// Every set of effects fitted so far.
-    fits: BTreeMap<Vec<String>, Rc<Fitted>>,
-    /// The last problem around one of those fits, with candidates at the sizes known so far.
-    last: Option<(Vec<String>, Problem)>,
-    /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
-    sizes: BTreeMap<String, Option<f64>>,
-    knowledge: Knowledge,
-    products: RefCell<BTreeMap<String, Candidate>>,
-}
-
-/// A model with effects, and its parameters fitted to all observations.
-struct Fitted {
-    model: Model,
-    values: Vec<f64>,
-    /// Where the fit ended; none of the model without effects.
-    ended: Option<Ended>,
-}
-
-impl Fitted {
-    /// The model with some of its effects, and its parameters where a fit of it would end as this one's curvature has it; none where
-    /// one of the others does something at nominal.
-    fn nearly(&self, model: Model) -> Option<Fitted> {
-        let others =
-            self.model.effects().iter().filter(|e| model.effects().iter().all(|own| own.spec != e.spec));
-        let mut held = Vec::new();
-        for effect in others {
-            let at = effect.parameters.clone().zip(&self.model.parameters()[effect.parameters.clone()]);
-            let at: Vec<(usize, f64)> = at.map(|(k, p)| (k, p.nominal)).collect();
-            if at[..effect.amplitudes].iter().any(|(_, nominal)| *nominal != 0.0) {
-                return None;
-            }
-            held.extend(at);
-        }
-        let all = self.ended.as_ref()?.with_held(&held)?;
-        let value = |p: &Parameter| Some(all[self.model.index(&p.name)?]);
-        let values = model.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
-        Some(Fitted { model, values, ended: None })
-    }
-}
-
-impl ModelRefit<'_> {
-    fn model_with(&self, names: &[String]) -> Result<Model, DiagnoseError> {
-        let specs = names.iter().map(|name| self.model.effect(name)).collect::<Result<Vec<_>, _>>()?;
-        Ok(self.model.with_effects(&specs, self.session)?)
-    }
-
-    /// The model with effects, and its parameters fitted to all observations.
-    fn fitted(&mut self, names: &[String]) -> Result<Rc<Fitted>, DiagnoseError> {
-        if let Some(fit) = self.fits.get(names) {
-            return Ok(fit.clone());
-        }
-        let model = self.model_with(names)?;
-        let mut values = self.values.clone();
-        values.extend(&model.nominal()[values.len()..]);
-        let mut ended = None;
-        if !names.is_empty() {
-            let fitted = |some: &[&Observation], start: &[f64], sigma_scale: Option<f64>| {
-                let problem = ModelProblem::new(&model, some.iter().copied(), self.fit)?;
-                fitted_values(&problem, start, sigma_scale, self.fit)
-            };
-            let mut sigma_scale = None;
-            if let Some((near, scale)) = self.near_more(names, &model) {
-                (values, sigma_scale) = (near.values, Some(scale));
-            } else if !self.few.is_empty() {
-                let ended = fitted(self.few, &values, None)?;
-                (values, sigma_scale) = (ended.values, Some(ended.sigma_scale));
-            }
-            let all: Vec<&Observation> = self.observations.iter().collect();
-            let of_all = fitted(&all, &values, sigma_scale)?;
-            values.clone_from(&of_all.values);
-            ended = Some(of_all);
-        }
-        let fitted = Rc::new(Fitted { model, values, ended });
-        self.fits.insert(names.to_vec(), fitted.clone());
-        Ok(fitted)
-    }
-
-    /// Where a fit with these effects nearly ends, from the smallest one with more, and the scale of the residuals there.
-    fn near_more(&self, names: &[String], model: &Model) -> Option<(Fitted, f64)> {
-        let has_all = |of: &&Vec<String>| names.iter().all(|name| of.contains(name));
-        let more = self.fits.keys().filter(has_all).min_by_key(|of| of.len())?;
-        let more = &self.fits[more];
-        Some((more.nearly(model.clone())?, more.ended.as_ref()?.sigma_scale))
-    }
-
-    fn view<'v>(&'v self, model: &'v Model, values: &'v [f64]) -> View<'v> {
-        View {
-            model,
-            values,
-            observations: self.weighed,
-            session: self.session,
-            fit: self.fit,
-            sizes: &self.sizes,
-            knowledge: &self.knowledge,
-            places: self.places,
-            products: &self.products,
-        }
-    }
-}
-
-impl Refit for ModelRefit<'_> {
-    fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
-        let names = names(accepted);
-        if let Some((_, problem)) = self.last.as_ref().filter(|(of, _)| *of == names) {
-            return Ok(problem.clone());
-        }
-        let fitted = self.fitted(&names)?;
-        let problem = self.view(&fitted.model, &fitted.values).problem()?;
-        self.last = Some((names, problem.clone()));
-        Ok(problem)
-    }
-
-    fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
-        let base = names(accepted);
-        // All of them together are asked for next, or were.
-        let _ = self.fitted(&names(&[accepted, std::slice::from_ref(own)].concat()));
-        let nearly = match self.fits.get(&base) {
-            Some(_) => None,
-            None => self.near_more(&base, &self.model_with(&base)?),
-        };
-        let fitted = match nearly {
-            Some((nearly, _)) => Rc::new(nearly),
-            None => self.fitted(&base)?,
-        };
-        self.view(&fitted.model, &fitted.values).problem_of(&self.model.effect(&own.spec)?)
-    }
-
-    fn refitted(
-        &mut self,
-        accepted: &[Candidate],
-        keep: &[bool],
-    ) -> Result<Option<AfterRefit>, DiagnoseError> {
-        let fitted = self.fitted(&names(accepted))?;
-        let linear = linearise(&fitted.model, self.weighed, &fitted.values, self.fit)?;
-        let kept = linear.poses.iter().zip(keep).filter(|(_, keep)| **keep);
-        let rows: Vec<usize> = kept.flat_map(|(pose, _)| pose.rows.clone()).collect();
-        let residual = linear.residual.select_rows(&rows);
-        let mut jacobian = linear.jacobian.select_rows(&rows);
-        let mut square = residual.norm_squared();
-        for (mut column, axis) in jacobian.column_iter_mut().zip(&linear.axes) {
-            column /= axis.precision.sqrt();
-            square += axis.precision * axis.offset.powi(2);
-        }
-        Ok(Some(AfterRefit { square, rows: rows.len(), normal: gram(&jacobian) }))
-    }
-
-    fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
-        let [_] = candidate.amplitudes.as_slice() else { return Ok(false) };
-        if candidate.is_group() || self.sizes.contains_key(&candidate.spec) {
-            return Ok(false);
-        }
-        let base = names(accepted);
-        let fitted = self.fitted(&base)?;
-        let with = self.fitted(&names(&[accepted, std::slice::from_ref(candidate)].concat()))?;
-        let own = with.model.effects().iter().find(|e| e.spec.to_string() == candidate.spec);
-        let size = own.map_or(0.0, |e| with.values[e.parameters.start]);
-        let spec = self.model.effect(&candidate.spec)?;
-        let changed = size != 0.0 && self.view(&fitted.model, &fitted.values).bends(&spec, size)?;
-        self.sizes.insert(candidate.spec.clone(), changed.then_some(size));
-        if changed {
-            self.last = None;
-        }
-        Ok(changed)
-    }
-}
-
-/// Names of the effects, members of groups each for itself, in order.
-fn names(accepted: &[Candidate]) -> Vec<String> {
-    let mut names: Vec<String> = accepted.iter().flat_map(|c| c.members()).map(str::to_owned).collect();
-    names.sort();
-    names.dedup();
-    names
 }

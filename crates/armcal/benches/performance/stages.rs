@@ -51,7 +51,7 @@ pub fn section(options: &Options) -> Result<Section> {
          that reads these recordings and fits this model can leave out: inflating the chunks, and an evaluation of the model with its \
          derivatives by every parameter in every dwell, at least one for the fit and one for each of ten turns of the hold-out. \
          A fit takes a few evaluations, the products of their rows, its start and its intervals; a diagnosis fits what it \
-         finds to all poses, again without each name with all turns, and weighs its catalogue on those of `max_weighed` \
+         finds to all poses, again without each name (with all turns only where that is not clear), and weighs its catalogue on those of `max_weighed` \
          beside each of these fits. The system counts time on a processor in ticks of some milliseconds, which shows in the first \
          column.",
     );

@@ -92,7 +92,7 @@ pub struct Offset {
 impl Offset {
     /// The dwell of a time.
     pub fn dwell(&self, time_ns: i64, dwells_ns: &[(i64, i64)]) -> Option<usize> {
-        let at = time_ns + self.ns;
+        let at = time_ns.saturating_add(self.ns);
         let next = dwells_ns.partition_point(|(_, end)| *end < at);
         dwells_ns.get(next).filter(|(start, _)| *start <= at).map(|_| next)
     }
@@ -106,7 +106,8 @@ pub fn offsets(rows_ns: &[i64], dwells_ns: &[(i64, i64)]) -> Vec<Offset> {
     let mut ends: Vec<(i64, bool, usize)> = Vec::with_capacity(2 * rows_ns.len() * dwells_ns.len());
     for row in rows_ns {
         for (dwell, (start, end)) in dwells_ns.iter().enumerate() {
-            ends.extend([(start - row, false, dwell), (end - row, true, dwell)]);
+            let [start, end] = [start, end].map(|time| time.saturating_sub(*row));
+            ends.extend([(start, false, dwell), (end, true, dwell)]);
         }
     }
     ends.sort_unstable();
@@ -127,7 +128,7 @@ pub fn offsets(rows_ns: &[i64], dwells_ns: &[(i64, i64)]) -> Vec<Offset> {
             continue;
         }
         if let Some(from) = began.take() {
-            let within_ns = (at - from) / 2;
+            let within_ns = at.saturating_sub(from) / 2;
             all.push(Offset { ns: from + within_ns, within_ns, dwells: rows_in.len() });
         }
         rows_in.remove(&dwell);
