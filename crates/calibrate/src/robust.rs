@@ -177,12 +177,10 @@ impl RobustCost<'_, '_> {
         let Rows { residual, derivative } = rows;
         let usual = self.sigma_scale.powi(2).recip();
         let mut weighted = residual * usual;
-        let (mut less, mut along) = (Vec::new(), Vec::new());
-        for Lighter { rows, weight, norm } in lighter {
-            let own = residual.rows(rows.start, rows.len());
+        let mut less = Vec::new();
+        for Lighter { rows, weight, .. } in lighter {
             weighted.rows_mut(rows.start, rows.len()).iter_mut().for_each(|row| *row *= weight);
             less.extend(rows.clone().map(|row| (row, ((1.0 - weight) * usual).sqrt())));
-            along.push((rows.start, own * ((weight * usual).sqrt() / norm)));
         }
         let gradient = derivative.products(&weighted);
         let less = derivative.some_rows(&less);
@@ -191,7 +189,11 @@ impl RobustCost<'_, '_> {
         let squares = curvature.diagonal() - DVector::from_iterator(less.ncols(), of_less);
         curvature -= gram(&less);
         if self.exact_curvature {
-            curvature -= gram(&derivative.along(&along));
+            let along = |Lighter { rows, weight, norm }: &Lighter| {
+                let own = residual.rows(rows.start, rows.len());
+                (rows.start, own * ((weight * usual).sqrt() / norm))
+            };
+            curvature -= gram(&derivative.along(&lighter.iter().map(along).collect::<Vec<_>>()));
         }
         if !self.white.structure.is_dense() {
             curvature = root_of(curvature, residual.len(), || {

@@ -50,9 +50,9 @@ struct Fitted {
 }
 
 impl Fitted {
-    /// The model with some of its effects, and its parameters where a fit of it would end as this one's curvature has it; none where
-    /// one of the others does something at nominal.
-    fn nearly(&self, model: Model) -> Option<Fitted> {
+    /// Where a fit of a model with some of its effects would end as this one's curvature has it; none where one of the others does
+    /// something at nominal.
+    fn without_others(&self, model: &Model) -> Option<Vec<f64>> {
         let others =
             self.model.effects().iter().filter(|e| model.effects().iter().all(|own| own.spec != e.spec));
         let mut held = Vec::new();
@@ -66,8 +66,7 @@ impl Fitted {
         }
         let all = self.ended.as_ref()?.with_held(&held)?;
         let value = |p: &Parameter| Some(all[self.model.index(&p.name)?]);
-        let values = model.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
-        Some(Fitted { model, values, ended: None })
+        model.parameters().iter().map(value).collect()
     }
 }
 
@@ -105,7 +104,7 @@ impl<'a> ModelRefit<'a> {
             };
             let mut sigma_scale = None;
             if let Some((near, scale)) = self.near_more(names, &model) {
-                (values, sigma_scale) = (near.values, Some(scale));
+                (values, sigma_scale) = (near, Some(scale));
             } else if !self.seen.few.is_empty() {
                 let ended = fitted(self.seen.few, &values, None)?;
                 (values, sigma_scale) = (ended.values, Some(ended.sigma_scale));
@@ -121,11 +120,11 @@ impl<'a> ModelRefit<'a> {
     }
 
     /// Where a fit with these effects nearly ends, from the smallest one with more, and the scale of the residuals there.
-    fn near_more(&self, names: &[String], model: &Model) -> Option<(Fitted, f64)> {
+    fn near_more(&self, names: &[String], model: &Model) -> Option<(Vec<f64>, f64)> {
         let has_all = |of: &&Vec<String>| names.iter().all(|name| of.contains(name));
         let more = self.fits.keys().filter(has_all).min_by_key(|of| of.len())?;
         let more = &self.fits[more];
-        Some((more.nearly(model.clone())?, more.ended.as_ref()?.sigma_scale))
+        Some((more.without_others(model)?, more.ended.as_ref()?.sigma_scale))
     }
 
     fn view<'v>(&'v self, model: &'v Model, values: &'v [f64]) -> View<'v> {
@@ -157,17 +156,17 @@ impl Refit for ModelRefit<'_> {
 
     fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
         let base = names(accepted);
-        // All of them together are asked for next, or were.
-        let _ = self.fitted(&names(&[accepted, std::slice::from_ref(own)].concat()));
-        let nearly = match self.fits.get(&base) {
-            Some(_) => None,
-            None => self.near_more(&base, &self.model_with(&base)?),
-        };
-        let fitted = match nearly {
-            Some((nearly, _)) => Rc::new(nearly),
-            None => self.fitted(&base)?,
-        };
-        self.view(&fitted.model, &fitted.values).problem_of(&self.model.effect(&own.spec)?)
+        let own_spec = self.model.effect(&own.spec)?;
+        if !self.fits.contains_key(&base) {
+            // All of them together are asked for next, or were.
+            let _ = self.fitted(&names(&[accepted, std::slice::from_ref(own)].concat()));
+            let model = self.model_with(&base)?;
+            if let Some((values, _)) = self.near_more(&base, &model) {
+                return self.view(&model, &values).problem_of(&own_spec);
+            }
+        }
+        let fitted = self.fitted(&base)?;
+        self.view(&fitted.model, &fitted.values).problem_of(&own_spec)
     }
 
     fn refitted(

@@ -93,7 +93,7 @@ impl Gathered {
             whole.first_error = whole.first_error.take().or(part.first_error.take());
             whole.other_bodies.append(&mut part.other_bodies);
             for (ends, edge) in std::mem::take(&mut part.edges) {
-                add_edge(&mut whole.edges, ends, edge);
+                whole.edges.entry(ends).and_modify(|known| known.add(&edge)).or_insert(edge);
             }
         }
         let each = stretches.into_iter().map(|part| ((part.stamps, part.scalars), (part.joints, part.poses)));
@@ -103,13 +103,6 @@ impl Gathered {
             || rayon::join(|| JointTable::of(joints), || PoseTable::of(poses)),
         );
         Gathered { stamps, joints, poses, scalars: joined(scalars), ..whole }
-    }
-}
-
-fn add_edge(edges: &mut Edges, ends: (String, String), edge: Edge) {
-    match edges.get_mut(&ends) {
-        Some(known) => known.add(&edge),
-        None => _ = edges.insert(ends, edge),
     }
 }
 
@@ -301,7 +294,8 @@ impl<'a> Stretch<'a> {
             }
             (Rows::Pose(rows), Kind::Transforms { .. }) => rows.rows().for_each(|row| {
                 let ends = (row.frame_id.to_owned(), row.body.to_owned());
-                add_edge(edges, ends, Edge::new(Seen::of(&row, target.to_m)));
+                let edge = Edge::new(Seen::of(&row, target.to_m));
+                edges.entry(ends).and_modify(|known| known.add(&edge)).or_insert(edge);
             }),
             (Rows::Pose(rows), kind) => rows.rows().for_each(|row| {
                 if let Kind::Pose { frame: Some(frame), .. } = kind

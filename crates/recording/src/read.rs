@@ -7,8 +7,8 @@ use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::streams::field_of;
 use crate::temperature::{Scale, like_fahrenheit};
 use crate::{
-    Chain, Clock, GaugeStream, JointStream, Occlusion, PoseStream, Recording, RecordingError, ScalarStream,
-    StreamReport, Streams,
+    Chain, Clock, GaugeStream, JointStream, LengthUnit, Occlusion, PoseStream, Recording, RecordingError,
+    ScalarStream, StreamReport, Streams, Transforms,
 };
 use crate::{joints, poses, together};
 use armcal_core::{JointSamples, PoseSamples, Samples, ScalarSamples, Severity, Stage, Warning};
@@ -73,22 +73,36 @@ impl Recording {
         requests: &[Request<'_>],
         gathered: &mut [Gathered],
     ) -> Result<BTreeMap<usize, Chain>, RecordingError> {
-        let mut chains = BTreeMap::new();
-        for (place, (request, gathered)) in requests.iter().zip(gathered).enumerate() {
+        // One pass for the tree of all bodies on a topic, and one for all transforms that move.
+        let mut trees: Vec<((&str, LengthUnit), Transforms)> = Vec::new();
+        let mut found: Vec<(usize, LengthUnit, Chain)> = Vec::new();
+        for (place, (request, gathered)) in requests.iter().zip(&*gathered).enumerate() {
             let Kind::Pose { body: Some(body), frame: Some(frame), unit } = request.kind else { continue };
             if !gathered.poses.seen.is_empty() || gathered.messages == 0 || !request.fields.is_empty() {
                 continue;
             }
-            let trees = self.transforms(&[request.topic], unit)?;
-            let chain = trees.first().map_or(Ok(None), |tree| tree.chain(frame, body));
-            let Some(chain) = chain.map_err(|why| poses::no_chain(request, why))? else { continue };
-            let (topic, parent, child) = &chain.moving;
-            let kind = Kind::Pose { body: Some(child), frame: Some(parent), unit };
-            let moving = gather(self, &[Request { topic, kind, ..request.clone() }])?;
-            moving.into_iter().for_each(|moving| *gathered = moving);
-            chains.insert(place, chain);
+            let of = (request.topic, unit);
+            if trees.iter().all(|(known, _)| *known != of) {
+                trees.extend(self.transforms(&[request.topic], unit)?.into_iter().map(|tree| (of, tree)));
+            }
+            let tree = trees.iter().find(|(known, _)| *known == of);
+            let chain = tree.map_or(Ok(None), |(_, tree)| tree.chain(frame, body));
+            let chain = chain.map_err(|why| poses::no_chain(request, why))?;
+            found.extend(chain.map(|chain| (place, unit, chain)));
         }
-        Ok(chains)
+        if found.is_empty() {
+            return Ok(BTreeMap::new());
+        }
+        let mut moving = Vec::new();
+        for (place, unit, chain) in &found {
+            let (topic, parent, child) = &chain.moving;
+            let kind = Kind::Pose { body: Some(child), frame: Some(parent), unit: *unit };
+            moving.push(Request { topic, kind, ..requests[*place].clone() });
+        }
+        for ((place, ..), moving) in found.iter().zip(gather(self, &moving)?) {
+            gathered[*place] = moving;
+        }
+        Ok(found.into_iter().map(|(place, _, chain)| (place, chain)).collect())
     }
 }
 

@@ -107,10 +107,8 @@ impl Transforms {
         let mut all = Transforms::default();
         for (topic, edges) in topics {
             for (ends, edge) in edges {
-                match all.edges.get_mut(ends) {
-                    Some((_, known)) => known.add(edge),
-                    None => _ = all.edges.insert(ends.clone(), (topic.to_owned(), edge.clone())),
-                }
+                let known = all.edges.entry(ends.clone()).and_modify(|(_, known)| known.add(edge));
+                known.or_insert_with(|| (topic.to_owned(), edge.clone()));
             }
         }
         all

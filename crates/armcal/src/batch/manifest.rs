@@ -155,20 +155,21 @@ fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
 
 /// Names without a name after as many of their last folders as it takes to tell them apart.
 fn name_all(entries: &mut [RecordingEntry]) {
-    let stem = |entry: &RecordingEntry, depth: usize| -> String {
-        let path = bag_of(&entry.paths[0]).map_or_else(|| without_ending(&entry.paths[0]), Path::to_owned);
-        let parts: Vec<String> =
-            path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
-        parts[parts.len().saturating_sub(depth)..].join("/")
+    let parts = |entry: &RecordingEntry| -> Vec<String> {
+        let file = &entry.paths[0];
+        let path = bag_of(file).map_or_else(|| without_ending(file), Path::to_owned);
+        path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect()
     };
+    let parts: Vec<Vec<String>> = entries.iter().map(parts).collect();
+    let stem = |parts: &[String], depth: usize| parts[parts.len().saturating_sub(depth)..].join("/");
     let deepest = entries.iter().map(|e| e.paths[0].components().count()).max().unwrap_or(1);
     for depth in 1..=deepest {
         let mut times: BTreeMap<String, usize> = BTreeMap::new();
-        for entry in entries.iter() {
-            *times.entry(entry.name.clone().unwrap_or_else(|| stem(entry, depth))).or_default() += 1;
+        for (entry, parts) in entries.iter().zip(&parts) {
+            *times.entry(entry.name.clone().unwrap_or_else(|| stem(parts, depth))).or_default() += 1;
         }
-        for entry in entries.iter_mut().filter(|e| e.name.is_none()) {
-            let name = stem(entry, depth);
+        for (entry, parts) in entries.iter_mut().zip(&parts).filter(|(e, _)| e.name.is_none()) {
+            let name = stem(parts, depth);
             if times[&name] == 1 {
                 entry.name = Some(name);
             }

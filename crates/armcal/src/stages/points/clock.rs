@@ -141,7 +141,7 @@ pub fn offsets(rows_ns: &[i64], dwells_ns: &[(i64, i64)]) -> Vec<Offset> {
     let apart = lasted.get(lasted.len() / 2).copied().unwrap_or(0);
     let mut kept: Vec<Offset> = Vec::new();
     for offset in all {
-        if kept.iter().all(|k| (k.ns - offset.ns).abs() > apart) {
+        if kept.iter().all(|k| k.ns.abs_diff(offset.ns) > apart.unsigned_abs()) {
             kept.push(offset);
         }
     }

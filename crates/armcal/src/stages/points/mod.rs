@@ -189,7 +189,7 @@ impl Fit<'_> {
             let dwell = |row: &Row| row.point_m.and_then(|_| offset.dwell(row.time_ns, &lasted_ns));
             self.rows.iter().map(dwell).collect()
         };
-        let clock_s = |offset: &Offset| (start_ns + offset.ns) as f64 * 1e-9;
+        let clock_s = |offset: &Offset| start_ns.saturating_add(offset.ns) as f64 * 1e-9;
         if let (None, Some(first)) = (offsets.first(), first) {
             return Err(format!(
                 "with its first point in dwell {first} fewer dwells have one than with another offset of its clock"
