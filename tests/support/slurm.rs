@@ -94,7 +94,8 @@ impl Slurm {
 
     fn configure(&self) {
         let (folder, host) = (self.folder.path().display(), short_hostname());
-        let cpus = std::thread::available_parallelism().map_or(1, usize::from);
+        // Tasks of two processors run two at a time, as on a cluster: the scheduler starts jobs once a second.
+        let cpus = std::thread::available_parallelism().map_or(1, usize::from).max(4);
         let [controller, node] = free_ports();
         for name in ["state", "spool"] {
             std::fs::create_dir(self.path(name)).expect("a folder");
@@ -108,7 +109,7 @@ impl Slurm {
              ProctrackType=proctrack/pgid\nTaskPlugin=task/none\nSelectType=select/cons_tres\n\
              SelectTypeParameters=CR_CPU\nJobAcctGatherType=jobacct_gather/none\n\
              AccountingStorageType=accounting_storage/none\nMailProg=/bin/true\n\
-             SchedulerParameters=sched_interval=1,batch_sched_delay=0\n\
+             SchedulerParameters=sched_interval=1,batch_sched_delay=0\nSlurmdParameters=config_overrides\n\
              NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} State=UNKNOWN\n\
              PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP\n"
         );

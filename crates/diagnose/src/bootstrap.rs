@@ -5,17 +5,16 @@
 //! ```
 //!
 //! (Djogbenou, MacKinnon, Nielsen, QED 1383; Westfall and Young 1993.) With `c_kg = B_k,g' (I - H_gg)^(-1/2) e~_g`
-//! for an orthonormal basis `B_k` of the projected candidate, all scores of all resamplings are one matrix product
-//! `C W`. `B_k = (G - Q Q'G) A^(-1/2)` is never put together: what is asked of it are products with `G` and `Q`. The sign flips come from a counter-based generator, one stream a dataset, so threads do not matter.
+//! for an orthonormal basis `B_k` of the projected candidate, all scores of all resamplings are `C W`, W being [`Signs`].
+//! `B_k = (G - Q Q'G) A^(-1/2)` is never put together: what is asked of it are products with `G` and `Q`.
 
 use crate::config::DiagnosisConfig;
 use crate::problem::{Columns, DwellRow};
 use crate::projection::{Gram, Projection, eigen};
+use crate::signs::Signs;
 use crate::special::ln_f_tail;
 use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 /// Candidates whose scores are drawn in one product.
@@ -147,10 +146,10 @@ pub(crate) fn wild_cluster(
         power[(0, g)] = u.norm_squared();
         rows.iter().zip(u.iter()).for_each(|(row, u)| drawn.u[*row] = *u);
     }
-    let signs = signs(clusters.len(), config);
+    let signs = Signs::new(clusters.len(), config);
     let of_geometry = drawn.of_clusters(&projection.q);
-    let spent = &of_geometry * &signs;
-    let total = power * signs.map(|w| w * w);
+    let spent = signs.times(&of_geometry);
+    let total = signs.squared_times(&power);
     let left: Vec<f64> =
         spent.column_iter().zip(total.iter()).map(|(c, t)| (t - c.norm_squared()).max(1e-12)).collect();
 
@@ -158,7 +157,7 @@ pub(crate) fn wild_cluster(
     // Largest score over candidates of the same rank is enough for the maximum of T.
     let mut top: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     let present: Vec<usize> = (0..candidates.len()).filter(|k| ranks[*k] > 0).collect();
-    // Many small products are one large one.
+    // Many small transforms are one large one.
     for block in present.chunks(BLOCK) {
         let width = block.iter().map(|k| ranks[*k]).sum();
         let mut stacked = DMatrix::zeros(width, clusters.len());
@@ -168,7 +167,7 @@ pub(crate) fn wild_cluster(
             stacked.rows_mut(at, ranks[*k]).copy_from(&own);
             at += ranks[*k];
         }
-        let drawn = stacked * &signs;
+        let drawn = signs.times(&stacked);
         let mut at = 0;
         for &k in block {
             let best = top.entry(ranks[k]).or_insert_with(|| vec![0.0; config.resamplings]);
@@ -221,20 +220,4 @@ fn inflated(projection: &Projection, residual: &DVector<f64>, rows: &[usize]) ->
         *t *= if *h > 1e-12 { (1.0 - h).max(1e-3).powf(-0.5) - 1.0 } else { 0.0 };
     }
     e + vectors * t
-}
-
-/// Rademacher signs, or Webb's six points below 12 clusters.
-fn signs(clusters: usize, config: &DiagnosisConfig) -> DMatrix<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
-    let webb = [1.5f64, 1.0, 0.5].map(f64::sqrt);
-    DMatrix::from_fn(clusters, config.resamplings, |_, _| {
-        if clusters < 12 {
-            let k = rng.random_range(0..6usize);
-            if k < 3 { webb[k] } else { -webb[k - 3] }
-        } else if rng.random::<bool>() {
-            1.0
-        } else {
-            -1.0
-        }
-    })
 }

@@ -56,17 +56,17 @@ pub(crate) struct Likeness {
 
 /// What columns can make in the projected space: the eigenvalues and eigenvectors of their products.
 #[derive(Debug, Clone)]
-pub(crate) struct Reach(DVector<f64>, DMatrix<f64>);
+struct Reach(DVector<f64>, DMatrix<f64>);
 
 impl Reach {
     /// Of columns, by their products.
-    pub fn of(gram: &Gram) -> Reach {
+    fn of(gram: &Gram) -> Reach {
         let (w, v) = eigen(&gram.a, gram.raw.max());
         Reach(w, v)
     }
 
     /// How near these columns come to a signature of this squared length, given their products with it, both projected.
-    pub fn likeness(&self, power: f64, cross: &DVector<f64>, variance: f64) -> Likeness {
+    fn likeness(&self, power: f64, cross: &DVector<f64>, variance: f64) -> Likeness {
         if power <= 0.0 {
             return Likeness { cosine: 1.0, delta: 0.0 };
         }
@@ -77,6 +77,28 @@ impl Reach {
             cosine: (shared / power).clamp(0.0, 1.0).sqrt(),
             delta: (power - shared).max(0.0) / variance,
         }
+    }
+}
+
+/// What columns make at some coefficients, geometry projected out.
+pub(crate) struct Signature {
+    rows: DVector<f64>,
+    spent: DVector<f64>,
+    /// Its squared length.
+    pub power: f64,
+}
+
+impl Signature {
+    /// Of whitened columns, whose products these are.
+    pub fn new(columns: &DMatrix<f64>, gram: &Gram, theta: &DVector<f64>) -> Signature {
+        let power = theta.dot(&(&gram.a * theta)).max(0.0);
+        Signature { rows: columns * theta, spent: &gram.spent * theta, power }
+    }
+
+    /// Compares it with everything that other whitened columns, whose products these are, can do.
+    pub fn likeness(&self, columns: &DMatrix<f64>, gram: &Gram, variance: f64) -> Likeness {
+        let cross = columns.tr_mul(&self.rows) - gram.spent.tr_mul(&self.spent);
+        Reach::of(gram).likeness(self.power, &cross, variance)
     }
 }
 
@@ -108,7 +130,7 @@ impl Crossed {
     }
 
     /// Products of one of them.
-    pub fn gram(&self, k: usize) -> Gram {
+    fn gram(&self, k: usize) -> Gram {
         let Range { start, .. } = self.sets[k];
         let m = self.sets[k].len();
         Gram {

@@ -2,13 +2,12 @@
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
-use crate::curves::{Curve, error_curves};
 use crate::events::moved;
 use crate::judge::{Grade, Judged};
 use crate::lead;
 use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
-use crate::rooms::{Room, Rooms, as_candidate};
+use crate::rooms::{Room, Rooms};
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
 use std::collections::BTreeSet;
@@ -32,28 +31,29 @@ pub(crate) struct Accepted {
     pub instead_of: Vec<String>,
 }
 
-/// Where the search ended.
-#[derive(Debug)]
-pub(crate) struct Search {
-    /// Effects whose names may be told.
-    pub accepted: Vec<Accepted>,
-    /// Effects that show only with the best unlisted shape in the model too.
-    pub tentative: Vec<Accepted>,
-    /// Error curves of joints over their own angle that no name explains, the strongest first.
-    pub curves: Vec<Curve>,
-    /// What remains with the named ones in the model.
-    pub rest: Rc<Room>,
-    /// What remains with the curves in it too.
-    pub with_curves: Rc<Room>,
-    /// Whether anything remains that these data show.
-    pub left_over: bool,
-    /// Whether what remains is so small a part of the first effect that it may be that effect's shape.
-    pub may_be_shape: bool,
+impl Accepted {
+    /// Fall of the squared residual by it beside the others, declared noise = 1.
+    pub fn fall(&self) -> f64 {
+        self.judged.own().score * self.room.weighed.scale.powi(2)
+    }
+
+    /// Whether its answer is what explains most beside the others: nothing else would be taken there.
+    pub fn leads(&self) -> bool {
+        let weighed = &self.room.weighed;
+        let of_answer = |top: usize| {
+            let names = self.judged.set.iter();
+            let group = &weighed.entries[top].candidate;
+            let holds = |k: usize| group.members().any(|m| m == weighed.entries[k].candidate.spec);
+            names.into_iter().any(|k| weighed.one_name(*k, top) || holds(*k))
+        };
+        weighed.ranking().first().is_some_and(|top| of_answer(*top))
+    }
 }
 
 /// A step of the search.
-struct Step {
-    candidate: Candidate,
+pub(crate) struct Step {
+    /// What joins the model.
+    pub candidate: Candidate,
     ln_evidence: f64,
     named_at_once: bool,
     /// ln Bayes factor of the best cell at that point.
@@ -66,74 +66,23 @@ struct Step {
 
 impl Step {
     /// One that was confirmed before.
-    fn known(candidate: Candidate, fall: f64) -> Step {
+    pub fn known(candidate: Candidate, fall: f64) -> Step {
         Step { candidate, ln_evidence: 0.0, named_at_once: true, ln_cell: 0.0, ln_prior: 0.0, fall }
     }
 }
 
-/// Searches; then once more with the unlisted shapes in the model, for effects they may hide.
-pub(crate) fn search(rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Result<Search, DiagnoseError> {
-    let (steps, may_be_shape) = forward(rooms, Vec::new(), &[], config)?;
-    let mut accepted = confirm(rooms, steps, &[], config)?;
-    let mut names = named(&accepted);
-    let mut rest = rooms.with(&names)?;
-    let left_over = something(&rest, config);
-    let (mut tentative, mut curves) = (Vec::new(), Vec::new());
-    if left_over && !may_be_shape {
-        curves = error_curves(rooms, &names, config)?;
-        let mut shapes: Vec<Candidate> = curves.iter().map(|c| c.candidate.clone()).collect();
-        accepted = beside_curves(rooms, accepted, &shapes, &rest, config)?;
-        names = named(&accepted);
-        rest = rooms.with(&names)?;
-        if shapes.is_empty() {
-            let best = rest.weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats);
-            shapes.extend(best.map(|cell| as_candidate(&cell.what, &rest, config)));
-        }
-        if !shapes.is_empty() {
-            let (steps, _) = forward(rooms, known(&names, &rest), &shapes, config)?;
-            if steps.len() > names.len() {
-                tentative = confirm(rooms, steps, &shapes, config)?;
-                tentative.retain(|t| names.iter().all(|n| n.spec != t.candidate.spec));
-            }
-        }
-    }
-    let all: Vec<Candidate> =
-        names.iter().cloned().chain(curves.iter().map(|c| c.candidate.clone())).collect();
-    let with_curves = rooms.with(&all)?;
-    let may_be_shape = left_over && may_be_shape;
-    Ok(Search { accepted, tentative, curves, rest, with_curves, left_over, may_be_shape })
-}
-
-/// The names that stand beside error curves too: what a curve of a joint's own angle explains as well was never that effect.
-fn beside_curves(
-    rooms: &mut Rooms<'_>,
-    accepted: Vec<Accepted>,
-    curves: &[Candidate],
-    rest: &Room,
-    config: &DiagnosisConfig,
-) -> Result<Vec<Accepted>, DiagnoseError> {
-    if curves.is_empty() {
-        return Ok(accepted);
-    }
-    let kept = confirm(rooms, known(&named(&accepted), rest), curves, config)?;
-    if kept.len() == accepted.len() {
-        return Ok(accepted);
-    }
-    let mut steps = named(&accepted);
-    steps.retain(|c| kept.iter().any(|k| k.candidate.spec == c.spec));
-    confirm(rooms, known(&steps, rest), &[], config)
-}
-
-fn named(accepted: &[Accepted]) -> Vec<Candidate> {
+/// Their candidates.
+pub(crate) fn named(accepted: &[Accepted]) -> Vec<Candidate> {
     accepted.iter().map(|a| a.candidate.clone()).collect()
 }
 
-fn known(names: &[Candidate], rest: &Room) -> Vec<Step> {
+/// Steps that were confirmed before, with the problem that they leave.
+pub(crate) fn known(names: &[Candidate], rest: &Room) -> Vec<Step> {
     names.iter().map(|c| Step::known(c.clone(), rest.weighed.metrics[0].projection.rss)).collect()
 }
 
 /// Judges every step among the others and drops the weakest until all may be named. `cells` stay in the base.
-fn confirm(
+pub(crate) fn confirm(
     rooms: &mut Rooms<'_>,
     mut steps: Vec<Step>,
     cells: &[Candidate],
@@ -175,20 +124,6 @@ fn confirm(
     }
 }
 
-/// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
-/// all, the best that has a place and a driver, or the best listed one.
-fn something(room: &Room, config: &DiagnosisConfig) -> bool {
-    let weighed = &room.weighed;
-    if weighed.p_nothing >= config.max_probability_nothing {
-        return false;
-    }
-    let best = weighed.best().map(|b| b.0);
-    let cell = weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats).map(|c| &c.what.columns);
-    let listed = weighed.ranking().first().map(|k| &weighed.entries[*k]);
-    let listed = listed.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
-    best.into_iter().chain(cell).chain(listed).any(|columns| room.predicts_with(columns, config))
-}
-
 /// The entry of a candidate; a scan may have moved to another shape, or an event to a dwell nearby.
 fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
     let exact = weighed.entries.iter().position(|e| e.candidate.spec == candidate.spec);
@@ -204,7 +139,7 @@ fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
 }
 
 /// Accepts the best candidate again and again while it is promising. `cells` stay in the base.
-fn forward(
+pub(crate) fn forward(
     rooms: &mut Rooms<'_>,
     mut steps: Vec<Step>,
     cells: &[Candidate],
@@ -340,4 +275,4 @@ fn all_of(problem: &Problem) -> impl Iterator<Item = &Candidate> {
 
 #[cfg(test)]
 #[path = "tests/forward.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -7,13 +7,15 @@ use crate::diagnosis::{
 };
 use crate::events::together;
 use crate::explain::explanations;
-use crate::forward::{Accepted, Search, search};
+use crate::forward::{Accepted, named};
 use crate::judge::{Grade, Judged};
+use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
-use crate::problem::{Part, Problem};
+use crate::problem::{Candidate, Part, Problem};
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
+use crate::search::{Search, from_nothing, search};
 use crate::structure::structure;
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
@@ -29,6 +31,28 @@ const OVERDECLARED: f64 = 2.0;
 
 /// Diagnoses a problem. `refit` gives it, and gives it again with effects in the base model.
 pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
+    diagnose_beyond(refit, &[], config)
+}
+
+/// The names of a search through a problem of some of the dwells, to begin with in the problem of all.
+pub(crate) fn propose(
+    refit: &mut dyn Refit,
+    config: &DiagnosisConfig,
+) -> Result<Vec<Candidate>, DiagnoseError> {
+    let config = &DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
+    let whole = refit.problem(&[])?;
+    whole.check()?;
+    let Cleaned { keep, problem, weighed } = set_aside(&whole, config);
+    let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
+    Ok(named(&from_nothing(&mut rooms, config)?.accepted))
+}
+
+/// [`diagnose_problem`] with names that were `proposed`.
+pub(crate) fn diagnose_beyond(
+    refit: &mut dyn Refit,
+    proposed: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Diagnosis, DiagnoseError> {
     config.check()?;
     let whole = refit.problem(&[])?;
     whole.check()?;
@@ -36,7 +60,7 @@ pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Resu
     let mut rooms = Rooms::new(refit, keep.clone(), (problem, weighed), config);
     let first = rooms.with(&[])?;
     let top = first.weighed.ranking().first().map(|top| first.judge(*top, config));
-    let mut search = search(&mut rooms, config)?;
+    let mut search = search(&mut rooms, proposed, config)?;
     rivals::settle(&mut search, &mut rooms, config)?;
     Ok(assemble(&whole, &keep, &first, top.as_ref(), &search, config))
 }
@@ -146,16 +170,16 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
 
 /// Pairs of testable entries whose signatures, at typical size, are the same.
 fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<[String; 2]> {
-    let white = weighed.white(problem);
+    let crossed = weighed.crossed(problem);
     let width = |k: usize| weighed.entries[k].candidate.columns.len();
     let mut pairs = Vec::new();
     for k in 0..weighed.entries.len() {
-        if weighed.entries[k].candidate.is_group() || white.gram(k).a.trace() < config.min_delta {
+        if weighed.entries[k].candidate.is_group() || weighed.entries[k].white.a.trace() < config.min_delta {
             continue;
         }
         let theta = DVector::from_element(width(k), 1.0);
         for l in k + 1..weighed.entries.len() {
-            if width(k) == width(l) && white.likeness(k, &theta, l, 1.0).cosine > config.merge_cosine {
+            if width(k) == width(l) && crossed.likeness(k, &theta, l, 1.0).cosine > config.merge_cosine {
                 let name = |i: usize| weighed.entries[i].candidate.spec.clone();
                 pairs.push([name(k), name(l)]);
             }

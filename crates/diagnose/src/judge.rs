@@ -2,19 +2,17 @@
 
 use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
-use crate::confusion::{Crossed, OneStep, Reach, half_width, one_step};
+use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
 use crate::crossval::{Group, by_place, by_recording, by_stretch, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients};
-use crate::grams::each_gram;
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::places::units;
-use crate::problem::{Amplitude, Columns, Problem, Scan};
+use crate::problem::{Amplitude, Problem};
 use crate::projection::Gram;
 use crate::weigh::Weighed;
 use nalgebra::DVector;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Dwells of a block when the noise has memory.
@@ -24,8 +22,6 @@ const MIN_CLUSTERS: usize = 12;
 /// Most clusters that are drawn: of more, neighbours keep their sign together, which says nothing else where they are
 /// independent and no less where they are not.
 const MOST_CLUSTERS: usize = 400;
-/// Most points of one scan in the bootstrap.
-const GATE_POINTS: usize = 80;
 /// Probability not worth a look.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -125,7 +121,7 @@ pub(crate) fn judge(
     config: &DiagnosisConfig,
 ) -> Judged {
     let projection = &weighed.metrics[0].projection;
-    let gram = weighed.white(problem).gram(entry);
+    let gram = weighed.entries[entry].white.clone();
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let metric = weighed.metric_of(&weighed.entries[entry].candidate.columns, problem, config);
@@ -183,19 +179,17 @@ fn impossible(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<
     (0..amplitudes.len()).filter(|k| below(*k)).map(|k| amplitudes[k].name.clone()).collect()
 }
 
-/// Projected directions of all entries, then of every other point of the scans: the maximum runs over all of them.
+/// Projected directions of all entries, then of some points of the scans: the maximum runs over all of them.
 fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direction<'p>> {
-    let entries = weighed.entries.iter().map(|e| &e.candidate.columns);
-    // Neighbours on a grid are nearly the same column: a thinned grid has nearly the same maximum.
-    let thin = |s: &Scan| s.points.len().div_ceil(GATE_POINTS).max(1);
-    let points = problem.scans.iter().flat_map(|s| s.points.iter().step_by(thin(s))).map(|c| &c.columns);
-    let all: Vec<&Columns> = entries.chain(points).collect();
-    let factor = 1.0 / weighed.scale;
-    let mut directions = vec![None; all.len()];
-    each_gram(&all, problem, factor, &weighed.metrics[0], &mut |k, gram| {
-        directions[k] = Some(Direction::new(all[k], factor, gram));
-    });
-    directions.into_iter().flatten().collect()
+    let entries = weighed.entries.iter().map(|e| (&e.candidate.columns, &e.white));
+    let points =
+        problem.scans.iter().zip(&weighed.points).flat_map(|(scan, points)| {
+            points.iter().map(|(point, white)| (&scan.points[*point].columns, white))
+        });
+    entries
+        .chain(points)
+        .map(|(columns, white)| Direction::new(columns, 1.0 / weighed.scale, white))
+        .collect()
 }
 
 /// Dwells that keep their sign together: as the noise seems to repeat.
@@ -236,12 +230,14 @@ fn answer(
     (entry, within_nats): (usize, f64),
     config: &DiagnosisConfig,
 ) -> Vec<usize> {
-    let crossed: Cow<'_, Crossed> = match metric.noise {
-        Noise::White => Cow::Borrowed(weighed.white(problem)),
-        _ => Cow::Owned(weighed.crossed(metric, problem)),
+    let seen = |k: usize| {
+        let columns = metric.whitened(weighed.dense(&weighed.entries[k].candidate.columns, problem));
+        let gram = metric.projection.gram(&columns);
+        (columns, gram)
     };
-    let own = crossed.gram(entry);
+    let (columns, own) = seen(entry);
     let fitted = one_step(&own, 1.0);
+    let signature = Signature::new(&columns, &own, &fitted.estimate);
     let score = fitted.estimate.dot(&own.g);
     let variance = metric.projection.variance_without(score).max(1e-12);
 
@@ -259,12 +255,15 @@ fn answer(
         set.extend(who.filter(|k| *k != entry));
     }
     for k in (0..weighed.entries.len()).filter(|k| *k != entry) {
-        let like = crossed.likeness(entry, &fitted.estimate, k, variance);
         // Alike to the eye is one answer only while the evidence is: where the noise is small, the data tell apart what
         // differs by little, down to the detail of a shape that no formula of the catalogue has exactly.
         let gap = weighed.entries[entry].ln_evidence - weighed.entries[k].ln_evidence;
-        let alike = like.cosine > config.merge_cosine || like.delta < config.min_delta;
-        if alike && gap < within_nats && !set.contains(&k) {
+        if gap >= within_nats || set.contains(&k) {
+            continue;
+        }
+        let (columns, gram) = seen(k);
+        let like = signature.likeness(&columns, &gram, variance);
+        if like.cosine > config.merge_cosine || like.delta < config.min_delta {
             set.push(k);
         }
     }
@@ -306,7 +305,6 @@ fn against_unlisted(
     let own_ln = weighed.entries[entry].ln_evidence;
     let own = metric.whitened(weighed.dense(&weighed.entries[entry].candidate.columns, problem));
     let of_own = projection.gram(&own);
-    let reach = Reach::of(&of_own);
     let mut told = Unlisted { margin: f64::INFINITY, p_other: 0.0, p_same: 0.0, best_other: 0.0 };
     for u in &weighed.unlisted {
         let close = u.ln_evidence > own_ln - config.margin_nats;
@@ -319,11 +317,7 @@ fn against_unlisted(
         let gram = projection.gram(&columns);
         let a = best_amplitude(&gram, projection.rss, projection.dof(), config);
         let (theta, _) = coefficients(&gram, a);
-        let signature = columns * &theta;
-        let spent = &gram.spent * &theta;
-        let cross = own.tr_mul(&signature) - of_own.spent.tr_mul(&spent);
-        let power = (signature.norm_squared() - spent.norm_squared()).max(0.0);
-        let cosine = reach.likeness(power, &cross, 1.0).cosine;
+        let cosine = Signature::new(&columns, &gram, &theta).likeness(&own, &of_own, 1.0).cosine;
         let same = cosine > config.merge_cosine;
         let asked = if same { 0.0 } else { config.margin_nats };
         let detail = 1.0 - cosine * cosine <= config.leftover_share;

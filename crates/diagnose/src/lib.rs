@@ -9,7 +9,7 @@
 //! * `noise`, `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete under every kind of noise;
 //! * `knowledge`: what the user says of the arm decides which of the catalogue are tried;
 //! * `outliers`: accidents are set aside and reported;
-//! * `forward`, `pairs`: one effect after the other while they are promising;
+//! * `search`, `forward`, `pairs`, `fewer`: one effect after the other while they are promising, and no more than needed;
 //! * `judge`: each among the others: `bootstrap` is the gate, `crossval` asks places the fit did not see, `contrasts`
 //!   pairs of visits, `confusion` what is the same to these data;
 //! * `rivals`: names against the next best, each refitted;
@@ -47,6 +47,7 @@ mod events;
 mod evidence;
 mod explain;
 mod expression;
+mod fewer;
 mod forward;
 mod grams;
 mod group;
@@ -74,6 +75,8 @@ mod ripple;
 mod rivals;
 mod rooms;
 mod scans;
+mod search;
+mod signs;
 mod sizes;
 mod special;
 mod stretches;

@@ -83,6 +83,11 @@ impl<'a> ModelRefit<'a> {
         ModelRefit { model, values, seen, session, fit, fits, last, sizes, knowledge, products }
     }
 
+    /// Takes over at which sizes another refit of the same model found that effects act otherwise than at zero.
+    pub fn take_sizes(&mut self, other: ModelRefit<'_>) {
+        self.sizes = other.sizes;
+    }
+
     fn model_with(&self, names: &[String]) -> Result<Model, DiagnoseError> {
         let specs = names.iter().map(|name| self.model.effect(name)).collect::<Result<Vec<_>, _>>()?;
         Ok(self.model.with_effects(&specs, self.session)?)

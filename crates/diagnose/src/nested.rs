@@ -18,8 +18,8 @@ use std::collections::BTreeMap;
 
 /// Folds inside a turn where the hold-out itself cannot be taken once more.
 const INNER_FOLDS: usize = 4;
-/// Resamplings of the bootstrap inside a turn: enough for the gate at one percent.
-const RESAMPLINGS: usize = 199;
+/// Resamplings of the bootstrap where another search decides: enough for the gate at one percent.
+pub(crate) const RESAMPLINGS: usize = 199;
 
 /// Errors on held-out points with effects that were chosen without them.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -2,18 +2,20 @@
 
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;
+use crate::inner::{diagnose_beyond, propose};
 use crate::knowledge::Knowledge;
 use crate::model_refit::{ModelRefit, Seen};
 use crate::places::{places_of_poses, thinned};
-use crate::{DiagnoseError, Diagnosis, DiagnosisConfig, diagnose_problem};
+use crate::{DiagnoseError, Diagnosis, DiagnosisConfig};
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate_beside};
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, Session};
 use std::collections::BTreeSet;
 
-/// A fit to so many observations begins with one to a few poses.
+/// A fit to so many observations begins with one to a few poses, and a search through them with one through these: a few more
+/// than are weighed in every detail.
 const MANY: usize = 1600;
-const FEW: usize = 400;
+const FEW: usize = 480;
 /// Fewest of these to each recording.
 const OF_EACH: usize = 20;
 
@@ -48,6 +50,7 @@ impl Calibrated<'_> {
 /// Diagnoses a calibrated model: which effect do its observations ask for?
 pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
     let Calibrated { calibration, observations, session, fit, .. } = *calibrated;
+    config.check()?;
     let model = &as_fitted(calibrated)?;
     let joint_names = model.chain().joint_names();
     let values = calibration.fit.values();
@@ -55,9 +58,19 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     let few = few(observations, config);
     let places = places_of_poses(&weighed);
     let seen = Seen { observations, weighed: &weighed, few: &few, places: &places };
-    let knowledge = Knowledge::of(config, joint_names)?;
-    let mut refit = ModelRefit::new((model, values), seen, session, fit, knowledge);
-    let mut diagnosis = diagnose_problem(&mut refit, config)?;
+    let knowledge = || Knowledge::of(config, joint_names);
+    let mut refit = ModelRefit::new((model, values.clone()), seen, session, fit, knowledge()?);
+    let mut proposed = Vec::new();
+    if few.len() < weighed.len() && !few.is_empty() {
+        let few: Vec<Observation> = few.iter().copied().cloned().collect();
+        let places = places_of_poses(&few);
+        let seen = Seen { observations: &few, weighed: &few, few: &[], places: &places };
+        let mut scout = ModelRefit::new((model, values), seen, session, fit, knowledge()?);
+        // Where few cannot be fitted, or weighed, all of them may be.
+        proposed = propose(&mut scout, config).unwrap_or_default();
+        refit.take_sizes(scout);
+    }
+    let mut diagnosis = diagnose_beyond(&mut refit, &proposed, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
     let refitted = refitted(calibrated, &diagnosis)
         .map(|found| diagnosis.each_by_its_absence(calibrated, found, config))

@@ -64,7 +64,7 @@ pub(crate) fn candidate_reports(
     groups: &[Group],
     config: &DiagnosisConfig,
 ) -> Vec<CandidateReport> {
-    let (white, projection) = (weighed.white(problem), &weighed.metrics[0].projection);
+    let (crossed, projection) = (weighed.crossed(problem), &weighed.metrics[0].projection);
     let variance = projection.rss / projection.dof();
     let order = weighed.ranking();
     let before = left_out(problem, None, groups, weighed.scale);
@@ -73,8 +73,7 @@ pub(crate) fn candidate_reports(
     for (rank, k) in order.iter().copied().enumerate() {
         let entry = &weighed.entries[k];
         let c = &entry.candidate;
-        let gram = white.gram(k);
-        let fitted = one_step(&gram, 1.0);
+        let fitted = one_step(&entry.white, 1.0);
         let significance = top.map_or(none, |t| t.significance[k]);
         let own_variance = projection.variance_without(significance.score);
         let held = (rank < SHOWN).then(|| {
@@ -83,11 +82,11 @@ pub(crate) fn candidate_reports(
             compare(problem, &before, &after, groups, config)
         });
         let mut same: Vec<String> = c.aliases.clone();
-        let smallest_seen = smallest_seen(&gram, variance, order.len());
+        let smallest_seen = smallest_seen(&entry.white, variance, order.len());
         // What these motions do not show at any size looks like everything and like nothing.
         if rank < SHOWN && smallest_seen.is_finite() {
             let others = order.iter().filter(|l| **l != k).filter(|l| {
-                white.likeness(k, &fitted.estimate, **l, own_variance).cosine > config.merge_cosine
+                crossed.likeness(k, &fitted.estimate, **l, own_variance).cosine > config.merge_cosine
             });
             same.extend(others.map(|l| weighed.entries[*l].candidate.spec.clone()));
         }
@@ -135,18 +134,17 @@ pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival>
 
 /// Entries whose smallest visible size exceeds the typical one.
 pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTestable> {
-    let (white, projection) = (weighed.white(problem), &weighed.metrics[0].projection);
+    let projection = &weighed.metrics[0].projection;
     // What the best explanation leaves is the noise against which sizes are seen.
     let best = weighed.ranking().first().map_or(0.0, |k| {
-        let gram = white.gram(*k);
-        one_step(&gram, 1.0).estimate.dot(&gram.g).max(0.0)
+        let gram = &weighed.entries[*k].white;
+        one_step(gram, 1.0).estimate.dot(&gram.g).max(0.0)
     });
     let variance = projection.variance_without(best);
     let mut all = Vec::new();
-    for (k, entry) in weighed.entries.iter().enumerate().filter(|(_, e)| !e.candidate.is_group()) {
-        let c = &entry.candidate;
-        let gram = white.gram(k);
-        let smallest = smallest_seen(&gram, variance, weighed.entries.len());
+    for entry in weighed.entries.iter().filter(|e| !e.candidate.is_group()) {
+        let (c, gram) = (&entry.candidate, &entry.white);
+        let smallest = smallest_seen(gram, variance, weighed.entries.len());
         if smallest <= 1.0 {
             continue;
         }
@@ -155,7 +153,7 @@ pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTesta
             Some(a) => format!("{:.3} {}", a.unit.to_display(a.typical * factor), a.unit.display_symbol()),
             None => String::new(),
         };
-        let absorbed = one_step(&gram, 1.0).absorbed;
+        let absorbed = one_step(gram, 1.0).absorbed;
         all.push(NotTestable {
             effect: c.spec.clone(),
             smallest_seen: size(smallest),

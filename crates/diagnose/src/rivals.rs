@@ -9,11 +9,12 @@
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
-use crate::forward::{Accepted, Search};
+use crate::forward::Accepted;
 use crate::judge::Grade;
 use crate::noise::Noise;
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms};
+use crate::search::Search;
 use nalgebra::DMatrix;
 
 /// Entries that are no part of the answer and are refitted all the same, the best of them.

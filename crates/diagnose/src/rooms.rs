@@ -20,8 +20,8 @@ use std::sync::Arc;
 /// Family of a shape that joins the base without a name.
 const UNLISTED: &str = "unlisted";
 /// Dwells of all rooms together that are kept for whoever asks next; and of how many rooms at least and at most.
-const LAST_DWELLS: usize = 8000;
-const LAST_ROOMS: [usize; 2] = [2, 16];
+const LAST_DWELLS: usize = 4000;
+const LAST_ROOMS: [usize; 2] = [2, 8];
 
 /// A problem with some effects in its base, weighed; judgements are kept by entry.
 #[derive(Debug, Clone)]

@@ -5,9 +5,11 @@ use crate::config::DiagnosisConfig;
 use crate::confusion::Crossed;
 use crate::crossval::{EFFECT_PRECISION, Group, gain};
 use crate::evidence::{Metric, best_amplitude, coefficients, over_noise};
+use crate::grams::each_gram;
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem};
+use crate::projection::Gram;
 use crate::sizes;
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
@@ -21,6 +23,8 @@ const RESCALE_ABOVE: f64 = 4.0;
 /// Points of a scan weighed under every kind of noise; and of many dwells.
 const SCAN_POINTS: usize = 32;
 const FEW_SCAN_POINTS: usize = 8;
+/// Most points of a scan whose products are kept: neighbours on a grid are nearly the same column.
+const KEPT_POINTS: usize = 80;
 /// Entries of the catalogue, the best under white noise, by which the size of every other kind of noise is chosen.
 const SCOUTS: usize = 32;
 /// Up to so many dwells everything unlisted is weighed under every kind of noise; of more, so many shapes of a family.
@@ -36,6 +40,8 @@ pub(crate) struct Entry {
     pub ln_evidence: f64,
     /// Posterior probability.
     pub probability: f64,
+    /// Products of its columns under white noise.
+    pub white: Gram,
 }
 
 /// One explanation outside the catalogue, weighed.
@@ -62,6 +68,8 @@ pub(crate) struct Weighed {
     pub entries: Vec<Entry>,
     /// How many of them were given without a search; the rest are scans.
     pub given: usize,
+    /// Of each scan some points, enough for its maximum, with the products of their columns under white noise.
+    pub points: Vec<Vec<(usize, Gram)>>,
     /// What is not listed.
     pub unlisted: Vec<Outside>,
     /// Posterior probability of nothing.
@@ -70,8 +78,8 @@ pub(crate) struct Weighed {
     pub p_unlisted: f64,
     /// Posterior probability of correlated noise of each kind, over everything.
     pub p_noise: Vec<(Noise, f64)>,
-    /// Products of all entries under white noise, once somebody asked.
-    white: OnceCell<Crossed>,
+    /// Products of all entries with each other under white noise, once somebody asked.
+    crossed: OnceCell<Crossed>,
 }
 
 /// Weighs a problem, with the noise rescaled where the declaration is far off.
@@ -116,8 +124,8 @@ fn weigh_at(
         ..Terms::all(family.iter().map(|u| &u.columns))
     });
     let terms: Vec<Terms<'_>> = std::iter::once(catalogue).chain(scans).chain(shapes).collect();
-    let (metrics, weighed) = over_metrics(&terms, problem, scale, config);
-    let mut weighed = weighed.into_iter();
+    let (metrics, weighed, white) = over_metrics(&terms, problem, scale, config);
+    let (mut weighed, mut white) = (weighed.into_iter(), white.into_iter());
 
     let null: Vec<f64> = metrics.iter().map(|m| m.ln_weight).collect();
     let ln_null = ln_sum_exp(null.iter().copied());
@@ -128,20 +136,29 @@ fn weigh_at(
     let count = (problem.candidates.len() + problem.scans.len()).max(1) as f64;
     let share = (config.prior_catalogue / count).ln();
     let mut entries = Vec::new();
-    for (candidate, ln) in problem.candidates.iter().zip(weighed.next().unwrap_or_default()) {
+    let listed = weighed.next().unwrap_or_default().into_iter().zip(white.by_ref());
+    for (candidate, (ln, white)) in problem.candidates.iter().zip(listed) {
         let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
         by_metric.push(plus(&ln, share));
-        entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0 });
+        entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0, white });
     }
+    let mut points = Vec::new();
     for (scan, all) in problem.scans.iter().zip(weighed.by_ref().take(problem.scans.len())) {
+        let of_points: Vec<Gram> = white.by_ref().take(scan.points.len()).collect();
         let totals: Vec<f64> = all.iter().map(|ln| ln_sum_exp(ln.iter().copied())).collect();
-        let Some(best) = (0..totals.len()).max_by(|a, b| totals[*a].total_cmp(&totals[*b])) else { continue };
+        let Some(best) = (0..totals.len()).max_by(|a, b| totals[*a].total_cmp(&totals[*b])) else {
+            points.push(Vec::new());
+            continue;
+        };
         let ln_points = (scan.tried.max(totals.len()) as f64).ln();
         let ln_evidence = ln_sum_exp(totals.iter().copied()) - ln_points - ln_null;
         let mixed: Vec<f64> =
             (0..metrics.len()).map(|m| ln_sum_exp(all.iter().map(|ln| ln[m])) - ln_points).collect();
         by_metric.push(plus(&mixed, share));
-        entries.push(Entry { candidate: scan.points[best].clone(), ln_evidence, probability: 0.0 });
+        let (candidate, white) = (scan.points[best].clone(), of_points[best].clone());
+        entries.push(Entry { candidate, ln_evidence, probability: 0.0, white });
+        let every = of_points.len().div_ceil(KEPT_POINTS).max(1);
+        points.push(of_points.into_iter().enumerate().step_by(every).collect());
     }
 
     let mut unlisted = Vec::new();
@@ -168,8 +185,20 @@ fn weigh_at(
     let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
     let given = problem.candidates.len();
-    let white = OnceCell::new();
-    Weighed { scale, metrics, dependences, entries, given, unlisted, p_nothing, p_unlisted, p_noise, white }
+    let crossed = OnceCell::new();
+    Weighed {
+        scale,
+        metrics,
+        dependences,
+        entries,
+        given,
+        points,
+        unlisted,
+        p_nothing,
+        p_unlisted,
+        p_noise,
+        crossed,
+    }
 }
 
 /// Terms of one kind.
@@ -188,17 +217,24 @@ impl<'p> Terms<'p> {
     }
 }
 
-/// The alternatives of the noise, and ln (weight x Bayes factor) of all terms in them: `[kind][term][metric]`.
+/// The alternatives of the noise, ln (weight x Bayes factor) of all terms in them: `[kind][term][metric]`, and the products of
+/// all that is listed under white noise, kind after kind.
 fn over_metrics(
     terms: &[Terms<'_>],
     problem: &Problem,
     scale: f64,
     config: &DiagnosisConfig,
-) -> (Vec<Metric>, Vec<Vec<Vec<f64>>>) {
+) -> (Vec<Metric>, Vec<Vec<Vec<f64>>>, Vec<Gram>) {
     let ours = sizes::white(problem, scale, config);
     let columns: Vec<&Columns> = terms.iter().flat_map(|t| t.columns.iter().copied()).collect();
-    let of_white = over_noise(&columns, problem, scale, std::slice::from_ref(&ours), config);
-    let mut white = of_white.into_iter().map(|ln| ln[0]);
+    let listed = problem.candidates.len() + problem.scans.iter().map(|scan| scan.points.len()).sum::<usize>();
+    let mut grams = vec![Gram::zeros(0, 0); listed];
+    let mut of_white = vec![0.0; columns.len()];
+    each_gram(&columns, problem, 1.0 / scale, &ours, &mut |k, gram| {
+        of_white[k] = ours.ln_weight + ours.ln_bayes(gram, config);
+        grams.get_mut(k).into_iter().for_each(|kept| kept.clone_from(gram));
+    });
+    let mut white = of_white.into_iter();
     let white: Vec<Vec<f64>> = terms.iter().map(|t| white.by_ref().take(t.columns.len()).collect()).collect();
     let (catalogue, ln_catalogue) = (&terms[0].columns, &white[0]);
     let best = promising(ln_catalogue, SCOUTS);
@@ -224,7 +260,7 @@ fn over_metrics(
         all
     };
     let told = terms.iter().zip(white).zip(best).map(told).collect();
-    (metrics, told)
+    (metrics, told, grams)
 }
 
 /// The terms with the largest evidence under white noise, at most so many.
@@ -347,13 +383,10 @@ impl Weighed {
     }
 
     /// Products of all entries with each other under white noise.
-    pub fn white(&self, problem: &Problem) -> &Crossed {
-        self.white.get_or_init(|| self.crossed(&self.metrics[0], problem))
-    }
-
-    /// The same under another noise.
-    pub fn crossed(&self, metric: &Metric, problem: &Problem) -> Crossed {
-        let columns: Vec<&Columns> = self.entries.iter().map(|e| &e.candidate.columns).collect();
-        Crossed::of(&columns, problem, 1.0 / self.scale, metric)
+    pub fn crossed(&self, problem: &Problem) -> &Crossed {
+        self.crossed.get_or_init(|| {
+            let columns: Vec<&Columns> = self.entries.iter().map(|e| &e.candidate.columns).collect();
+            Crossed::of(&columns, problem, 1.0 / self.scale, &self.metrics[0])
+        })
     }
 }

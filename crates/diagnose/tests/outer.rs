@@ -53,9 +53,14 @@ fn poses(n: usize, rng: &mut ChaCha8Rng) -> Vec<Observation> {
 
 /// What an arm with geometry errors and these effects, `times` their typical size, would show.
 fn observed(hidden: &[&str], times: f64, seed: u64) -> (Model, Vec<Observation>) {
+    observed_in(90, hidden, times, seed)
+}
+
+/// The same in so many poses.
+fn observed_in(n: usize, hidden: &[&str], times: f64, seed: u64) -> (Model, Vec<Observation>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let model = model();
-    let mut observations = poses(90, &mut rng);
+    let mut observations = poses(n, &mut rng);
     let session = Session::of(&observations);
     let specs: Vec<EffectSpec> = hidden.iter().map(|h| model.effect(h).unwrap()).collect();
     let truth = model.with_effects(&specs, &session).unwrap();
@@ -111,6 +116,27 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
     assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
     let left = diagnosed(&extended, &after, &observations);
     assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
+}
+
+#[test]
+fn of_thousands_of_poses_all_that_weigh_confirm_what_a_search_through_few_proposed() {
+    let (model, observations) = observed_in(1700, &["backlash:1", "eccentricity:2"], 1.0, 5);
+    let calibration = calibration(&model, &observations);
+    let found = |max_weighed| {
+        let config = DiagnosisConfig { max_weighed, ..config() };
+        let found = with_calibrated(&model, &calibration, &observations, |c| diagnose(c, &config)).unwrap();
+        let mut effects: Vec<(String, f64)> =
+            found.effects.iter().map(|e| (e.name.clone(), e.log_evidence)).collect();
+        effects.sort_by(|a, b| a.0.cmp(&b.0));
+        effects
+    };
+    let (all, few) = (found(1700), found(400));
+    let names = |of: &[(String, f64)]| of.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    assert_eq!((names(&all), names(&few)), (vec!["backlash:1".into(), "eccentricity:2".into()], names(&all)));
+    // Evidence grows with the poses that weigh: those of the proposal were 480.
+    for (all, few) in all.iter().zip(&few) {
+        assert!((3.0..6.0).contains(&(all.1 / few.1)), "{all:?} {few:?}");
+    }
 }
 
 #[test]

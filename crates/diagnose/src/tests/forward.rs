@@ -11,7 +11,7 @@ use crate::weigh::weigh;
 use std::sync::Arc;
 
 /// Half of the cavities: as clear, and a fraction of the time.
-fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem {
+pub(crate) fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem {
     let p = crate::tests::planted(names, free, seed);
     let kept = |d: &crate::DwellRow| d.place.as_ref().is_none_or(|c| c.ends_with(['0', '2', '4', '6', '8']));
     p.without(&p.dwells.iter().map(kept).collect::<Vec<_>>())
@@ -26,7 +26,7 @@ fn names(steps: &[Step]) -> Vec<&str> {
     steps.iter().map(|s| s.candidate.spec.as_str()).collect()
 }
 
-fn strong(p: &Problem, specs: &[&str]) -> Vec<Step> {
+pub(crate) fn strong(p: &Problem, specs: &[&str]) -> Vec<Step> {
     specs.iter().map(|s| Step::known(own(p, s), 1.0)).collect()
 }
 
@@ -91,7 +91,7 @@ fn a_candidate_is_found_by_name_and_else_by_family_and_target() {
 }
 
 /// A room in which only what is given was weighed; `predicts` are the columns of the planted effect.
-fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
+pub(crate) fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
     let mut r = Rc::try_unwrap(room(&p, &config)).expect("the room is ours");
@@ -100,23 +100,6 @@ fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
     r.weighed.entries[0].ln_evidence = entry.1;
     r.weighed.unlisted = unlisted.iter().map(|(s, cell, ln)| outside(&p, s, *cell, *ln, 0.1)).collect();
     r
-}
-
-#[test]
-fn something_is_missing_where_an_explanation_predicts() {
-    let config = quick();
-    let mut r = told(("backlash:1", 50.0), &[]);
-    assert!(something(&r, &config));
-    r.weighed.p_nothing = config.max_probability_nothing;
-    assert!(!something(&r, &config), "nothing may be missing");
-    // Another joint's play predicts nothing; the right one may be the best cell, or the best listed one.
-    assert!(!something(&told(("backlash:2", 50.0), &[]), &config));
-    for (ln, found) in [(2.9, false), (3.0, true), (3.1, true)] {
-        let cell = [("backlash:2", false, 60.0), ("backlash:1", true, ln)];
-        assert_eq!(something(&told(("backlash:2", 1.0), &cell), &config), found, "cell at {ln}");
-        let listed = [("backlash:2", true, 60.0)];
-        assert_eq!(something(&told(("backlash:1", ln), &listed), &config), found, "listed at {ln}");
-    }
 }
 
 #[test]
@@ -302,45 +285,6 @@ fn only_what_has_no_name_at_once_is_tried_at_its_own_size() {
 }
 
 #[test]
-fn a_search_tells_names_curves_and_what_is_left() {
-    let config = quick();
-    let searched = |p: &Problem| in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap();
-    let specs = |of: &[Accepted]| of.iter().map(|a| a.candidate.spec.clone()).collect::<Vec<_>>();
-    let s = searched(&planted(&[], 0, 5));
-    assert!(s.accepted.is_empty() && s.curves.is_empty() && !s.left_over && !s.may_be_shape);
-    let s = searched(&planted(&[("backlash:1", 1.0)], 0, 3));
-    assert_eq!(specs(&s.accepted), ["backlash:1"]);
-    assert!(s.curves.is_empty() && s.tentative.is_empty() && !s.left_over && !s.may_be_shape);
-    // A play, and an error curve of another joint that no name explains.
-    let mut r = arm::rng(8);
-    let poses = arm::design(60, &mut r);
-    let list = arm::catalogue(&poses);
-    let play = list.iter().find(|l| l.spec == "backlash:1").unwrap();
-    let curve = arm::on_joint(2, |p, _, _| 5e-3 * (25.0 * p.q[2]).sin().powi(3));
-    let hidden = [(play.effect.clone(), play.typical.clone()), (curve, vec![])];
-    let s = searched(&arm::problem(&poses, &hidden, arm::Noise::White, &mut r, false));
-    assert_eq!(specs(&s.accepted), ["backlash:1"]);
-    let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
-    assert_eq!(curves, ["joint3 <- q3"]);
-    assert!(s.left_over && !s.may_be_shape);
-    let mean = |r: &Room| r.weighed.metrics[0].projection.rss;
-    assert!(mean(&s.with_curves) < 0.7 * mean(&s.rest), "the curve is in the model");
-}
-
-#[test]
-fn a_name_that_a_curve_explains_as_well_was_never_that_effect() {
-    // A narrow bump over joint 1's own angle: eccentricity and the like have a part of it.
-    let config = quick();
-    let mut r = arm::rng(44);
-    let poses = arm::design(0, &mut r);
-    let bump = arm::on_joint(0, |p, _, _| 9e-3 * (-((p.q[0] - 0.05) / 0.05).powi(2)).exp());
-    let p = arm::problem(&poses, &[(bump, vec![])], arm::Noise::White, &mut r, false);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
-    assert!(s.accepted.is_empty(), "{:?}", s.accepted.iter().map(|a| &a.candidate.spec).collect::<Vec<_>>());
-    assert_eq!(s.curves[0].candidate.spec, "joint1 <- q1");
-}
-
-#[test]
 fn a_point_of_a_scan_is_listed_too() {
     let mut p = planted(&[], 0, 1);
     let point = Candidate { spec: "scale:2,shape=3".into(), ..own(&p, "scale:2") };
@@ -353,36 +297,8 @@ fn a_point_of_a_scan_is_listed_too() {
     assert_eq!(only(&p, "scale:3"), ["scale:3"]);
 }
 
-#[test]
-fn of_names_that_the_data_leave_the_known_one_is_told() {
-    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let config = quick();
-    let a = own(&p, "backlash:1");
-    let mixed = a.columns.dense(&p.dwells, 1.0) + 1e-3 * own(&p, "scale:1").columns.dense(&p.dwells, 1.0);
-    let columns = Columns::Dense(Arc::new(mixed));
-    let twin = Candidate { spec: "twin".into(), family: "twin".into(), columns, ..a };
-    p.candidates.push(twin);
-    let told = |p: &Problem| {
-        let s = in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap();
-        let [one] = &s.accepted[..] else { panic!("one effect was planted") };
-        let name = |k: &usize| one.room.weighed.entries[*k].candidate.spec.clone();
-        let set: Vec<String> = one.judged.set.iter().map(name).collect();
-        (one.candidate.spec.clone(), set, one.instead_of.clone())
-    };
-    let (_, both, others) = told(&p);
-    assert_eq!((both.len(), others.len()), (2, 0), "{both:?}");
-    for (known, other) in [("twin", "backlash:1"), ("backlash:1", "twin")] {
-        let mut p = p.clone();
-        p.candidates.iter_mut().filter(|c| c.spec == known).for_each(|c| c.known = Some("seen".into()));
-        assert_eq!(told(&p), (known.to_string(), vec![known.to_string()], vec![other.to_string()]));
-    }
-    // What is known and does not show is not told for it.
-    p.candidates.iter_mut().filter(|c| c.spec == "scale:2").for_each(|c| c.known = Some("seen".into()));
-    assert_eq!(told(&p).1, both);
-}
-
 /// A listed effect beside twice the size of one that is not.
-fn beside(outside: &str, spec: &str, size: f64) -> Problem {
+pub(crate) fn beside(outside: &str, spec: &str, size: f64) -> Problem {
     let mut r = arm::rng(3);
     let poses = arm::design(30, &mut r);
     let list = arm::catalogue(&poses);
@@ -393,68 +309,10 @@ fn beside(outside: &str, spec: &str, size: f64) -> Problem {
 }
 
 #[test]
-fn what_shows_only_beside_an_unlisted_shape_is_tentative() {
-    let config = quick();
-    let p = beside("bump", "backlash:3", 0.4);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
-    let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
-    let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
-    assert_eq!((curves, tentative), (vec!["joint1 <- q1"], vec!["backlash:3"]));
-    assert!(s.accepted.is_empty() && s.left_over);
-    // Where no joint errs over its own angle the best cell stands for what is not listed.
-    let p = beside("crossed", "zero_drift:1", 0.4);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &config)).unwrap();
-    let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
-    assert_eq!((s.curves.len(), tentative), (0, vec!["zero_drift:1"]));
-}
-
-#[test]
 fn doubtful_steps_are_given_a_few_more() {
     // Play that grows with the angle: plain play is a part of it, without a name. As long as it may be slack of that joint
     // the play of another one says more.
     let (steps, _) = stepped(&beside("worn", "backlash:3", 0.4), Vec::new(), &quick());
     assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
     assert_eq!(names(&steps), ["backlash:3", "backlash:1"]);
-}
-
-#[test]
-fn a_name_falls_to_a_curve_that_says_the_same_and_to_no_other() {
-    let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
-    let config = quick();
-    let beside = |spec: &str| {
-        let curve = Candidate { spec: "curve".into(), family: "unlisted".into(), ..own(&p, spec) };
-        in_rooms(&p, &config, |rooms| {
-            let steps = strong(&p, &["backlash:1", "zero_drift:2"]);
-            let accepted = confirm(rooms, steps, &[], &config).unwrap();
-            let rest = rooms.with(&named(&accepted)).unwrap();
-            let kept = beside_curves(rooms, accepted, &[curve], &rest, &config).unwrap();
-            kept.into_iter().map(|a| (a.candidate.spec, a.room.problem.geometry.ncols())).collect::<Vec<_>>()
-        })
-    };
-    // What stays is judged without the curve again: 21 columns of geometry, and the other effect where there is one.
-    let both = [("backlash:1".to_string(), 22), ("zero_drift:2".to_string(), 22)];
-    assert_eq!(beside("scale:3"), both);
-    assert_eq!(beside("zero_drift:2"), [("backlash:1".to_string(), 21)]);
-}
-
-/// A shape joins the base with the size that the data give it, however far the noise is from the declared one.
-#[test]
-fn a_curve_that_joined_leaves_little_of_its_own_evidence_whatever_the_noise() {
-    let config = quick();
-    let mut r = arm::rng(8);
-    let poses = arm::design(60, &mut r);
-    let curve = arm::on_joint(2, |p, _, _| 5e-3 * (25.0 * p.q[2]).sin().powi(3));
-    let sound = arm::problem(&poses, &[(curve, vec![])], arm::Noise::White, &mut r, false);
-    for declared in [1.0, 15.0] {
-        let p = arm::overconfident(sound.clone(), declared);
-        in_rooms(&p, &config, |rooms| {
-            let bare = rooms.with(&[]).unwrap();
-            let cell = bare.weighed.best_cell().unwrap();
-            assert_eq!(cell.what.name, "joint3 <- q3");
-            let with = rooms.with(&[as_candidate(&cell.what, &bare, &config)]).unwrap();
-            let own = with.weighed.unlisted.iter().filter(|u| u.what.name == cell.what.name);
-            let left = own.map(|u| u.ln_evidence).fold(0.0, f64::max);
-            assert!(left < 0.2 * cell.ln_evidence, "{declared}: {left} of {}", cell.ln_evidence);
-        });
-    }
 }

@@ -21,7 +21,7 @@ fn accepted(p: &Problem, spec: &str) -> Accepted {
 
 fn searched(p: &Problem) -> Search {
     let config = quick();
-    in_rooms(p, &config, |rooms| search(rooms, &config)).unwrap()
+    in_rooms(p, &config, |rooms| search(rooms, &[], &config)).unwrap()
 }
 
 fn codes(all: &[Warning]) -> Vec<&str> {

@@ -4,6 +4,7 @@
 
 use super::{judge as judge_among, *};
 use crate::problem::Candidate;
+use crate::problem::Columns;
 use crate::tests::{entry, outside, own, planted, quick, room};
 use crate::weigh::weigh;
 use armcal_core::DwellId;

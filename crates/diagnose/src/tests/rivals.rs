@@ -52,7 +52,7 @@ impl Refit for Told {
 fn answer(square: &[(&'static str, f64)]) -> (Vec<String>, Grade) {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
-    let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut search = in_rooms(&p, &config, |rooms| crate::search::search(rooms, &[], &config)).unwrap();
     let mut refit = Told {
         linear: LinearRefit::new(p.clone()),
         square: square.iter().copied().collect(),
@@ -96,7 +96,7 @@ fn a_rival_counts_as_its_refit_does() {
 fn found() -> Accepted {
     let config = quick();
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let search = in_rooms(&p, &config, |rooms| crate::search::search(rooms, &[], &config)).unwrap();
     search.accepted[0].clone()
 }
 
@@ -123,7 +123,7 @@ fn what_is_known_is_not_asked_and_where_noise_repeats_only_what_is_no_less_simpl
         let square = square.iter().copied().collect();
         let mut refit = Told { linear: LinearRefit::new(p.clone()), square, asked: Vec::new() };
         let first = (p.clone(), weigh(&p, &config));
-        let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+        let mut search = in_rooms(&p, &config, |rooms| crate::search::search(rooms, &[], &config)).unwrap();
         change(&mut search.accepted[0]);
         let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, &config);
         settle(&mut search, &mut rooms, &config).unwrap();
@@ -173,7 +173,7 @@ fn what_a_refit_puts_far_behind_leaves_the_answer_and_what_it_puts_ahead_takes_t
 fn what_was_found_is_settled_with_everything_else_that_was_found() {
     let p = planted(&[("backlash:1", 1.0), ("zero_drift:3", 1.0)], 0, 3);
     let config = quick();
-    let mut search = in_rooms(&p, &config, |rooms| crate::forward::search(rooms, &config)).unwrap();
+    let mut search = in_rooms(&p, &config, |rooms| crate::search::search(rooms, &[], &config)).unwrap();
     let mut found: Vec<String> = search.accepted.iter().map(|a| a.candidate.spec.clone()).collect();
     found.sort();
     assert_eq!(found, ["backlash:1", "zero_drift:3"]);

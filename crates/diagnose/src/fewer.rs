@@ -1,0 +1,65 @@
+//! Fewer names for the same: what two effects of one joint do, one may do alone.
+//!
+//! A search takes what explains most at each step. Of causes in several joints that may be one family in all of them, which no
+//! single one is, and what it leaves of a cause then gets a name of its own. With what was found elsewhere in the model, each
+//! joint that has several names is asked once more: one takes their place where the model with it is the more probable one.
+
+use crate::DiagnoseError;
+use crate::config::DiagnosisConfig;
+use crate::evidence::Metric;
+use crate::forward::{Accepted, named};
+use crate::noise::Noise;
+use crate::problem::{Candidate, Problem};
+use crate::rooms::Rooms;
+use crate::search::{Found, going_on};
+
+/// The same with one name for several of a target, wherever that says more.
+pub(crate) fn fewer(
+    rooms: &mut Rooms<'_>,
+    found: Found,
+    config: &DiagnosisConfig,
+) -> Result<Found, DiagnoseError> {
+    let mut found = found;
+    while let Some(simpler) = simpler(rooms, &found.accepted, config)? {
+        found = simpler;
+    }
+    Ok(found)
+}
+
+/// With one name for several of the first target for which that says more; none where there is no such target.
+fn simpler(
+    rooms: &mut Rooms<'_>,
+    accepted: &[Accepted],
+    config: &DiagnosisConfig,
+) -> Result<Option<Found>, DiagnoseError> {
+    let names = named(accepted);
+    let mut targets: Vec<&str> = names.iter().map(|c| c.target.as_str()).collect();
+    targets.sort_unstable();
+    targets.dedup();
+    for target in targets {
+        let (own, others): (Vec<Candidate>, Vec<Candidate>) =
+            names.iter().cloned().partition(|c| c.target == target);
+        // What the user knows to act is not traded.
+        if own.len() < 2 || own.iter().any(|c| c.known.is_some()) {
+            continue;
+        }
+        let room = rooms.with(&others)?;
+        let top = room.weighed.ranking().first().map(|top| room.weighed.entries[*top].candidate.clone());
+        let Some(one) = top.filter(|one| one.target == target && !one.is_group()) else { continue };
+        let with_one = [others, vec![one]].concat();
+        let ln_evidence = |of: &Problem| Metric::new(Noise::White, 0.0, of, 1.0).ln_evidence(config);
+        let [before, after] = [&names, &with_one].map(|names| rooms.with(names));
+        if ln_evidence(&after?.problem) <= ln_evidence(&before?.problem) {
+            continue;
+        }
+        let again = going_on(rooms, &with_one, config)?;
+        if again.accepted.len() < names.len() && with_one.len() <= again.accepted.len() {
+            return Ok(Some(again));
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+#[path = "tests/fewer.rs"]
+mod tests;

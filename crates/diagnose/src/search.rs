@@ -1,0 +1,152 @@
+//! The whole search: from nothing or from names that were proposed, then beside the unlisted shapes that may hide effects.
+
+use crate::DiagnoseError;
+use crate::config::DiagnosisConfig;
+use crate::curves::{Curve, error_curves};
+use crate::fewer::fewer;
+use crate::forward::{Accepted, Step, confirm, forward, known, named};
+use crate::problem::Candidate;
+use crate::rooms::{Room, Rooms, as_candidate};
+use std::rc::Rc;
+
+/// Where the search ended.
+#[derive(Debug)]
+pub(crate) struct Search {
+    /// Effects whose names may be told.
+    pub accepted: Vec<Accepted>,
+    /// Effects that show only with the best unlisted shape in the model too.
+    pub tentative: Vec<Accepted>,
+    /// Error curves of joints over their own angle that no name explains, the strongest first.
+    pub curves: Vec<Curve>,
+    /// What remains with the named ones in the model.
+    pub rest: Rc<Room>,
+    /// What remains with the curves in it too.
+    pub with_curves: Rc<Room>,
+    /// Whether anything remains that these data show.
+    pub left_over: bool,
+    /// Whether what remains is so small a part of the first effect that it may be that effect's shape.
+    pub may_be_shape: bool,
+}
+
+/// Names that were confirmed, each beside the others.
+pub(crate) struct Found {
+    /// Those names.
+    pub accepted: Vec<Accepted>,
+    /// Whether what remains is so small a part of the first that it may be its shape.
+    pub may_be_shape: bool,
+}
+
+/// Searches; then once more with the unlisted shapes in the model, for effects they may hide. It begins with names that were
+/// `proposed` where each of them stands here too.
+pub(crate) fn search(
+    rooms: &mut Rooms<'_>,
+    proposed: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Search, DiagnoseError> {
+    let Found { mut accepted, may_be_shape } = match beyond(rooms, proposed, config)? {
+        Some(found) => fewer(rooms, found, config)?,
+        None => from_nothing(rooms, config)?,
+    };
+    let mut names = named(&accepted);
+    let mut rest = rooms.with(&names)?;
+    let left_over = something(&rest, config);
+    let (mut tentative, mut curves) = (Vec::new(), Vec::new());
+    if left_over && !may_be_shape {
+        curves = error_curves(rooms, &names, config)?;
+        let mut shapes: Vec<Candidate> = curves.iter().map(|c| c.candidate.clone()).collect();
+        accepted = beside_curves(rooms, accepted, &shapes, &rest, config)?;
+        names = named(&accepted);
+        rest = rooms.with(&names)?;
+        if shapes.is_empty() {
+            let best = rest.weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats);
+            shapes.extend(best.map(|cell| as_candidate(&cell.what, &rest, config)));
+        }
+        if !shapes.is_empty() {
+            let (steps, _) = forward(rooms, known(&names, &rest), &shapes, config)?;
+            if steps.len() > names.len() {
+                tentative = confirm(rooms, steps, &shapes, config)?;
+                tentative.retain(|t| names.iter().all(|n| n.spec != t.candidate.spec));
+            }
+        }
+    }
+    let all: Vec<Candidate> =
+        names.iter().cloned().chain(curves.iter().map(|c| c.candidate.clone())).collect();
+    let with_curves = rooms.with(&all)?;
+    let may_be_shape = left_over && may_be_shape;
+    Ok(Search { accepted, tentative, curves, rest, with_curves, left_over, may_be_shape })
+}
+
+/// The names that a search finds which begins with none.
+pub(crate) fn from_nothing(rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Result<Found, DiagnoseError> {
+    let (steps, may_be_shape) = forward(rooms, Vec::new(), &[], config)?;
+    let accepted = confirm(rooms, steps, &[], config)?;
+    fewer(rooms, Found { accepted, may_be_shape }, config)
+}
+
+/// The same from names that fewer dwells proposed. None where not all of them are confirmed here, each as the best there is
+/// beside the others: then the steps that led to them would be others.
+fn beyond(
+    rooms: &mut Rooms<'_>,
+    proposed: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Option<Found>, DiagnoseError> {
+    if proposed.is_empty() {
+        return Ok(None);
+    }
+    let found = going_on(rooms, proposed, config)?;
+    let stand = found.accepted.len() >= proposed.len() && found.accepted.iter().all(Accepted::leads);
+    Ok(stand.then_some(found))
+}
+
+/// The names of which these are the first: confirmed, then what they leave.
+pub(crate) fn going_on(
+    rooms: &mut Rooms<'_>,
+    names: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Found, DiagnoseError> {
+    let steps = names.iter().map(|c| Step::known(c.clone(), f64::INFINITY)).collect();
+    let accepted = confirm(rooms, steps, &[], config)?;
+    let known = accepted.iter().map(|a| Step::known(a.candidate.clone(), a.fall())).collect();
+    let (steps, may_be_shape) = forward(rooms, known, &[], config)?;
+    let same = steps.iter().map(|s| &s.candidate.spec).eq(accepted.iter().map(|a| &a.candidate.spec));
+    let accepted = if same { accepted } else { confirm(rooms, steps, &[], config)? };
+    Ok(Found { accepted, may_be_shape })
+}
+
+/// The names that stand beside error curves too: what a curve of a joint's own angle explains as well was never that effect.
+fn beside_curves(
+    rooms: &mut Rooms<'_>,
+    accepted: Vec<Accepted>,
+    curves: &[Candidate],
+    rest: &Room,
+    config: &DiagnosisConfig,
+) -> Result<Vec<Accepted>, DiagnoseError> {
+    if curves.is_empty() {
+        return Ok(accepted);
+    }
+    let kept = confirm(rooms, known(&named(&accepted), rest), curves, config)?;
+    if kept.len() == accepted.len() {
+        return Ok(accepted);
+    }
+    let mut steps = named(&accepted);
+    steps.retain(|c| kept.iter().any(|k| k.candidate.spec == c.spec));
+    confirm(rooms, known(&steps, rest), &[], config)
+}
+
+/// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
+/// all, the best that has a place and a driver, or the best listed one.
+fn something(room: &Room, config: &DiagnosisConfig) -> bool {
+    let weighed = &room.weighed;
+    if weighed.p_nothing >= config.max_probability_nothing {
+        return false;
+    }
+    let best = weighed.best().map(|b| b.0);
+    let cell = weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats).map(|c| &c.what.columns);
+    let listed = weighed.ranking().first().map(|k| &weighed.entries[*k]);
+    let listed = listed.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
+    best.into_iter().chain(cell).chain(listed).any(|columns| room.predicts_with(columns, config))
+}
+
+#[cfg(test)]
+#[path = "tests/search.rs"]
+mod tests;
