@@ -44,12 +44,16 @@ fn simpler(
             continue;
         }
         let room = rooms.with(&others)?;
-        let top = room.weighed.ranking().first().map(|top| room.weighed.entries[*top].candidate.clone());
-        let Some(one) = top.filter(|one| one.target == target && !one.is_group()) else { continue };
-        let with_one = [others, vec![one]].concat();
-        let ln_evidence = |of: &Problem| Metric::new(Noise::White, 0.0, of, 1.0).ln_evidence(config);
-        let [before, after] = [&names, &with_one].map(|names| rooms.with(names));
-        if ln_evidence(&after?.problem) <= ln_evidence(&before?.problem) {
+        let ranked = room.weighed.ranking().into_iter().map(|k| &room.weighed.entries[k].candidate);
+        let Some(one) = ranked.into_iter().find(|c| c.target == target && !c.is_group()) else { continue };
+        let with_one = [others, vec![one.clone()]].concat();
+        let with = |rooms: &mut Rooms<'_>, names: &[Candidate]| {
+            let with = rooms.with(names)?;
+            Ok::<f64, DiagnoseError>(Metric::new(Noise::White, 0.0, &with.problem, 1.0).ln_evidence(config))
+        };
+        let before = with(rooms, &names)? - own.iter().map(|c| ln_tried(&room.problem, c)).sum::<f64>();
+        let after = with(rooms, &with_one)? - ln_tried(&room.problem, one);
+        if after <= before {
             continue;
         }
         let again = going_on(rooms, &with_one, config)?;
@@ -58,6 +62,12 @@ fn simpler(
         }
     }
     Ok(None)
+}
+
+/// ln of how many values of its shape were tried for a name that was searched for: what the choice of one costs.
+fn ln_tried(problem: &Problem, name: &Candidate) -> f64 {
+    let scan = problem.scans.iter().find(|scan| scan.points.iter().any(|point| point.spec == name.spec));
+    scan.map_or(0.0, |scan| (scan.tried.max(1) as f64).ln())
 }
 
 #[cfg(test)]

@@ -140,6 +140,19 @@ fn of_thousands_of_poses_all_that_weigh_confirm_what_a_search_through_few_propos
 }
 
 #[test]
+fn ripples_of_other_periods_in_every_joint_are_not_taken_for_a_make_of_gears() {
+    let hidden = ["eccentricity:1", "periodic:3,frequency=3", "second_harmonic:2"];
+    for seed in 1..=6 {
+        let (model, observations) = observed_in(300, &hidden, 1.0, seed);
+        let calibration = calibration(&model, &observations);
+        let found = diagnosed(&model, &calibration, &observations);
+        let mut names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!((names, found.verdict), (hidden.to_vec(), Verdict::Identified), "seed {seed}");
+    }
+}
+
+#[test]
 fn a_complete_model_misses_nothing() {
     let (model, observations) = observed(&[], 0.0, 2);
     let fit = calibration(&model, &observations);
