@@ -85,7 +85,7 @@ pub(crate) struct Signature {
     rows: DVector<f64>,
     spent: DVector<f64>,
     /// Its squared length.
-    pub power: f64,
+    power: f64,
 }
 
 impl Signature {

@@ -6,9 +6,7 @@
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
-use crate::evidence::Metric;
 use crate::forward::{Accepted, named};
-use crate::noise::Noise;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::Rooms;
 use crate::search::{Found, going_on};
@@ -47,18 +45,14 @@ fn simpler(
         let ranked = room.weighed.ranking().into_iter().map(|k| &room.weighed.entries[k].candidate);
         let Some(one) = ranked.into_iter().find(|c| c.target == target && !c.is_group()) else { continue };
         let with_one = [others, vec![one.clone()]].concat();
-        let with = |rooms: &mut Rooms<'_>, names: &[Candidate]| {
-            let with = rooms.with(names)?;
-            Ok::<f64, DiagnoseError>(Metric::new(Noise::White, 0.0, &with.problem, 1.0).ln_evidence(config))
-        };
-        let before = with(rooms, &names)? - own.iter().map(|c| ln_tried(&room.problem, c)).sum::<f64>();
-        let after = with(rooms, &with_one)? - ln_tried(&room.problem, one);
+        let before = rooms.ln_evidence(&names)? - own.iter().map(|c| ln_tried(&room.problem, c)).sum::<f64>();
+        let after = rooms.ln_evidence(&with_one)? - ln_tried(&room.problem, one);
         if after <= before {
             continue;
         }
-        let again = going_on(rooms, &with_one, config)?;
-        if again.accepted.len() < names.len() && with_one.len() <= again.accepted.len() {
-            return Ok(Some(again));
+        let again = going_on(rooms, &with_one, config)?.filter(|again| again.accepted.len() < names.len());
+        if again.is_some() {
+            return Ok(again);
         }
     }
     Ok(None)

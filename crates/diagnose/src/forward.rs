@@ -41,10 +41,8 @@ impl Accepted {
     pub fn leads(&self) -> bool {
         let weighed = &self.room.weighed;
         let of_answer = |top: usize| {
-            let names = self.judged.set.iter();
-            let group = &weighed.entries[top].candidate;
-            let holds = |k: usize| group.members().any(|m| m == weighed.entries[k].candidate.spec);
-            names.into_iter().any(|k| weighed.one_name(*k, top) || holds(*k))
+            let holds = |k: usize| weighed.entries[top].candidate.holds(&weighed.entries[k].candidate);
+            self.judged.set.iter().any(|k| weighed.one_name(*k, top) || holds(*k))
         };
         weighed.ranking().first().is_some_and(|top| of_answer(*top))
     }

@@ -146,7 +146,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     // What a group of which it is a member says is said of the member too.
     let holds = |l: usize, k: usize| {
         let group = &weighed.entries[l].candidate;
-        group.is_group() && group.members().any(|m| m == weighed.entries[k].candidate.spec)
+        group.is_group() && group.holds(&weighed.entries[k].candidate)
     };
     let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l) || holds(*l, *k));
     let meant = (0..weighed.entries.len()).filter(meant);

@@ -176,6 +176,11 @@ impl Candidate {
         self.spec.split(Candidate::AND)
     }
 
+    /// Whether another one is among them.
+    pub(crate) fn holds(&self, other: &Candidate) -> bool {
+        self.members().any(|member| member == other.spec)
+    }
+
     /// Whether it stands for several effects together.
     pub(crate) fn is_group(&self) -> bool {
         self.spec.contains(Candidate::AND)

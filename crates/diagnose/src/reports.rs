@@ -119,8 +119,9 @@ pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival>
     let own = &weighed.entries[judged.entry];
     let another = |k: &usize| {
         let e = &weighed.entries[*k];
-        let of_it = e.candidate.members().any(|m| m == own.candidate.spec);
-        !of_it && judged.set.iter().all(|s| !weighed.one_name(*s, *k)) && e.ln_evidence > 0.0
+        !e.candidate.holds(&own.candidate)
+            && judged.set.iter().all(|s| !weighed.one_name(*s, *k))
+            && e.ln_evidence > 0.0
     };
     let k = weighed.ranking().into_iter().find(another)?;
     let columns = &weighed.entries[k].candidate.columns;

@@ -91,8 +91,7 @@ impl<'a> Rooms<'a> {
     /// The room with these effects in the base.
     pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<Room>, DiagnoseError> {
         let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
-        let known = self.known.iter().find(|(accepted, _)| *accepted == names);
-        if let Some(room) = known.and_then(|(_, room)| room.upgrade()) {
+        if let Some(room) = self.known(&names) {
             return Ok(room);
         }
         let problem = self.bare(accepted)?;
@@ -101,6 +100,11 @@ impl<'a> Rooms<'a> {
         self.known.retain(|(_, room)| room.strong_count() > 0);
         self.remember(names, &room);
         Ok(room)
+    }
+
+    /// The room with effects of these names, if it still is.
+    fn known(&self, names: &[String]) -> Option<Rc<Room>> {
+        self.known.iter().find(|(accepted, _)| accepted == names).and_then(|(_, room)| room.upgrade())
     }
 
     fn remember(&mut self, accepted: Vec<String>, room: &Rc<Room>) {
@@ -138,6 +142,16 @@ impl<'a> Rooms<'a> {
         let white = Metric::new(Noise::White, 0.0, &problem, 1.0);
         let gram = white.gram(&own.columns.dense(&problem.dwells, 1.0));
         Ok(Some(white.ln_bayes(&gram, self.config)))
+    }
+
+    /// ln evidence of the model with these effects under white noise alone, to compare it with that of others.
+    pub fn ln_evidence(&mut self, accepted: &[Candidate]) -> Result<f64, DiagnoseError> {
+        let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
+        let of = |problem: &Problem, config| Metric::new(Noise::White, 0.0, problem, 1.0).ln_evidence(config);
+        match self.known(&names) {
+            Some(room) => Ok(of(&room.problem, self.config)),
+            None => Ok(of(&self.bare(accepted)?, self.config)),
+        }
     }
 
     /// A problem without the dwells that do not count.

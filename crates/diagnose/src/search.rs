@@ -94,23 +94,25 @@ fn beyond(
         return Ok(None);
     }
     let found = going_on(rooms, proposed, config)?;
-    let stand = found.accepted.len() >= proposed.len() && found.accepted.iter().all(Accepted::leads);
-    Ok(stand.then_some(found))
+    Ok(found.filter(|found| found.accepted.iter().all(Accepted::leads)))
 }
 
-/// The names of which these are the first: confirmed, then what they leave.
+/// The names of which these are the first: confirmed, then what they leave. None where not all of them are confirmed.
 pub(crate) fn going_on(
     rooms: &mut Rooms<'_>,
     names: &[Candidate],
     config: &DiagnosisConfig,
-) -> Result<Found, DiagnoseError> {
+) -> Result<Option<Found>, DiagnoseError> {
     let steps = names.iter().map(|c| Step::known(c.clone(), f64::INFINITY)).collect();
     let accepted = confirm(rooms, steps, &[], config)?;
+    if accepted.len() < names.len() {
+        return Ok(None);
+    }
     let known = accepted.iter().map(|a| Step::known(a.candidate.clone(), a.fall())).collect();
     let (steps, may_be_shape) = forward(rooms, known, &[], config)?;
     let same = steps.iter().map(|s| &s.candidate.spec).eq(accepted.iter().map(|a| &a.candidate.spec));
     let accepted = if same { accepted } else { confirm(rooms, steps, &[], config)? };
-    Ok(Found { accepted, may_be_shape })
+    Ok((accepted.len() >= names.len()).then_some(Found { accepted, may_be_shape }))
 }
 
 /// The names that stand beside error curves too: what a curve of a joint's own angle explains as well was never that effect.

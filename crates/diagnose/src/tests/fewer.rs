@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
+use crate::evidence::Metric;
+use crate::noise::Noise;
 use crate::tests::{entry, in_rooms, own, planted, quick};
 
 /// Names as if a search had ended with them, and those that are left of them.
