@@ -1,8 +1,9 @@
 //! Products of tall matrices.
 
+use matrixmultiply::dgemm;
 use nalgebra::{DMatrix, Dyn, Matrix, Storage};
 
-/// Up to this many columns dot products are faster than a transposed copy.
+/// Up to this many columns dot products are faster.
 const NARROW: usize = 4;
 /// Columns to a block of a product with itself.
 const BLOCK: usize = 96;
@@ -13,7 +14,36 @@ where
     A: Storage<f64, Dyn, Dyn>,
     B: Storage<f64, Dyn, Dyn>,
 {
-    if a.ncols().min(b.ncols()) <= NARROW { a.tr_mul(b) } else { a.transpose() * b }
+    if a.ncols().min(b.ncols()) <= NARROW {
+        return a.tr_mul(b);
+    }
+    assert_eq!(a.nrows(), b.nrows(), "rows of the factors of a'b");
+    let (rows, columns) = (a.ncols(), b.ncols());
+    let mut product = DMatrix::zeros(rows, columns);
+    // A transposed copy, which a product of nalgebra's wants, takes longer than the product where one factor is long.
+    let ((down_a, along_a), (down_b, along_b)) = (a.strides(), b.strides());
+    #[expect(unsafe_code, reason = "no safe interface reads a transposed factor where it is")]
+    // SAFETY: both factors live through the call and have the sizes and strides that they say, of which the inner ones were
+    // found equal; the product is another matrix, of rows x columns, one column behind the other.
+    unsafe {
+        dgemm(
+            rows,
+            a.nrows(),
+            columns,
+            1.0,
+            a.as_ptr(),
+            along_a as isize,
+            down_a as isize,
+            b.as_ptr(),
+            down_b as isize,
+            along_b as isize,
+            0.0,
+            product.as_mut_ptr(),
+            1,
+            rows as isize,
+        );
+    }
+    product
 }
 
 /// `a'a`; where it is large, only the blocks on and above the diagonal are reckoned.
@@ -25,9 +55,8 @@ pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let mut product = DMatrix::zeros(columns, columns);
     for from in (0..columns).step_by(BLOCK) {
         let width = BLOCK.min(columns - from);
-        let left = a.columns(from, width).transpose();
-        let right = a.columns(from, columns - from);
-        product.view_mut((from, from), (width, columns - from)).gemm(1.0, &left, &right, 0.0);
+        let of_block = inner(&a.columns(from, width), &a.columns(from, columns - from));
+        product.view_mut((from, from), of_block.shape()).copy_from(&of_block);
     }
     product.fill_lower_triangle_with_upper_triangle();
     product

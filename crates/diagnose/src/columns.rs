@@ -5,7 +5,7 @@
 //! two a dwell and function, never the rows.
 
 use crate::problem::DwellRow;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixViewMut};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
@@ -152,26 +152,30 @@ impl Columns {
 
     /// The columns, times `factor`. Products are ordered base column by base column.
     pub fn dense(&self, dwells: &[DwellRow], factor: f64) -> DMatrix<f64> {
-        let (base, basis) = match (self, self.factors()) {
-            (_, Some(factors)) => factors,
-            (Columns::Dense(m), _) => return m.as_ref() * factor,
-            (_, None) => return DMatrix::zeros(self.rows(), 0),
-        };
-        let mut out = DMatrix::zeros(base.nrows(), self.len());
+        let mut out = DMatrix::zeros(self.rows(), self.len());
+        self.write(dwells, factor, out.as_view_mut());
+        out
+    }
+
+    /// The same into a place of zeros.
+    pub(crate) fn write(&self, dwells: &[DwellRow], factor: f64, mut out: DMatrixViewMut<'_, f64>) {
+        if let Columns::Dense(own) = self {
+            out.zip_apply(own.as_ref(), |to, from| *to = from * factor);
+        }
+        let Some((base, basis)) = self.factors() else { return };
         for c in 0..base.ncols() {
             for b in 0..basis.ncols() {
                 let mut column = out.column_mut(c * basis.ncols() + b);
-                for (i, dwell) in dwells.iter().enumerate() {
-                    let value = basis[(i, b)] * factor;
+                let (to, base) = (column.as_mut_slice(), base.column(c));
+                for (dwell, value) in dwells.iter().zip(basis.column(b)) {
+                    let value = value * factor;
                     if value != 0.0 {
-                        for row in dwell.range() {
-                            column[row] = base[(row, c)] * value;
-                        }
+                        let own = base.rows(dwell.first_row, dwell.rows);
+                        to[dwell.range()].iter_mut().zip(own.iter()).for_each(|(to, own)| *to = own * value);
                     }
                 }
             }
         }
-        out
     }
 
     /// Whether every number in them is finite.

@@ -4,7 +4,7 @@ use crate::config::DiagnosisConfig;
 use crate::grams::each_gram;
 use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, Projecting, Projection, cholesky_upper, eigen};
+use crate::projection::{Gram, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
 use nalgebra::{DMatrix, DVector};
@@ -60,34 +60,37 @@ impl Metric {
 
 impl Metric {
     pub(crate) fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
-        Metric::by(Projection::new, (noise, amplitude), problem, scale)
-    }
-
-    /// The same by a [rough](Projection::rough) projection.
-    pub(crate) fn rough(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
-        Metric::by(Projection::rough, (noise, amplitude), problem, scale)
-    }
-
-    fn by(projected: Projecting, (noise, amplitude): (Noise, f64), problem: &Problem, scale: f64) -> Metric {
         let whitener = Whitener::new(noise, amplitude, problem);
         let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
         let mut geometry = problem.geometry.clone();
         whitener.apply(&mut residual);
         whitener.apply(&mut geometry);
         let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
-        let projection = projected(geometry / scale, precision, offset, residual.column(0) / scale);
+        let projection = Projection::new(geometry / scale, precision, offset, residual.column(0) / scale);
         Metric { noise, whitener, projection, ln_weight: 0.0 }
     }
 
     /// ln of its prior times the evidence of nothing in it, against white noise.
     pub(crate) fn weighed(self, prior: f64, white: Option<&Metric>, config: &DiagnosisConfig) -> Metric {
-        let (p, nu) = (&self.projection, config.noise_prior_dof);
+        let p = &self.projection;
         let white = white.map_or(p, |m| &m.projection);
-        let ln_weight = prior.ln()
-            - 0.5 * (self.whitener.ln_det + p.ln_det - white.ln_det)
-            - 0.5 * (nu + white.dof()) * ((nu + p.rss) / (nu + white.rss)).ln();
+        let ln_weight = ln_weight(prior, [self.whitener.ln_det, p.ln_det, p.rss], white, config);
         Metric { ln_weight, ..self }
     }
+}
+
+/// ln of the prior of a noise times the evidence of nothing in it, against white noise: from ln of the determinants of its
+/// covariance and of what the geometry's freedom costs in it, and the squared residual that it leaves.
+pub(crate) fn ln_weight(
+    prior: f64,
+    [noise_ln_det, geometry_ln_det, rss]: [f64; 3],
+    white: &Projection,
+    config: &DiagnosisConfig,
+) -> f64 {
+    let nu = config.noise_prior_dof;
+    prior.ln()
+        - 0.5 * (noise_ln_det + geometry_ln_det - white.ln_det)
+        - 0.5 * (nu + white.dof()) * ((nu + rss) / (nu + white.rss)).ln()
 }
 
 /// `ln mean_a B(a)` with

@@ -12,8 +12,9 @@ use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::sync::Arc;
 
-/// Columns put together into one matrix product.
-const BLOCK_COLUMNS: usize = 400;
+/// Numbers of columns that are put together into one matrix product: what a processor keeps near it, and no more at a time
+/// from the allocator than that has at hand.
+const BLOCK_NUMBERS: usize = 1 << 20;
 
 /// Calls `each` with the number and the [`Gram`] of every one of many sets of columns, times `factor`.
 pub(crate) fn each_gram(
@@ -39,21 +40,22 @@ pub(crate) fn each_gram(
         let (events, functions): (Vec<usize>, Vec<usize>) =
             own.into_iter().partition(|k| matches!(terms[*k], Columns::Within { .. }));
         by_dwell.of_events(terms, &events, each);
-        for block in blocks(terms, &functions) {
+        for block in blocks(terms, &functions, problem.dwells.len()) {
             by_dwell.of_functions(terms, block, each);
         }
     }
-    for block in blocks(terms, &rest) {
+    for block in blocks(terms, &rest, problem.rows()) {
         dense(terms, block, problem, factor, metric, each);
     }
 }
 
-/// Runs of these terms of at most [`BLOCK_COLUMNS`] columns, so that the memory of thousands of columns is bounded.
-fn blocks<'k>(terms: &[&Columns], which: &'k [usize]) -> Vec<&'k [usize]> {
+/// Runs of these terms of at most [`BLOCK_NUMBERS`] numbers at so many to a column.
+fn blocks<'k>(terms: &[&Columns], which: &'k [usize], height: usize) -> Vec<&'k [usize]> {
+    let most = BLOCK_NUMBERS / height.max(1);
     let (mut all, mut from) = (Vec::new(), 0);
     while from < which.len() {
         let (mut to, mut width) = (from, 0);
-        while to < which.len() && (to == from || width + terms[which[to]].len() <= BLOCK_COLUMNS) {
+        while to < which.len() && (to == from || width + terms[which[to]].len() <= most) {
             width += terms[which[to]].len();
             to += 1;
         }
@@ -76,12 +78,12 @@ fn dense(
     let mut stacked = DMatrix::zeros(problem.rows(), width);
     let mut at = 0;
     for t in block.iter().map(|k| terms[*k]) {
-        stacked.columns_mut(at, t.len()).copy_from(&t.dense(&problem.dwells, factor));
+        t.write(&problem.dwells, factor, stacked.columns_mut(at, t.len()));
         at += t.len();
     }
     let white = metric.whitened(stacked);
     let projection = &metric.projection;
-    let spent = projection.spent(inner(&projection.q, &white));
+    let spent = inner(&projection.q, &white);
     let score = white.tr_mul(&projection.residual) - spent.tr_mul(&projection.z);
     let mut at = 0;
     for k in block {
@@ -158,8 +160,7 @@ impl<'p> ByDwell<'p> {
         }
         let score = stacked.tr_mul(&self.with_residual);
         // Rows of Q' X, column by column of the base.
-        let spent = |q: &DMatrix<f64>| self.projection.spent(inner(q, &stacked));
-        let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(spent).collect();
+        let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(|q| inner(q, &stacked)).collect();
         let mut at = 0;
         for (k, basis) in block.iter().zip(&functions) {
             let m = basis.ncols();
@@ -206,8 +207,7 @@ impl<'p> ByDwell<'p> {
             let (c, p) = (self.c, self.projection.q.ncols());
             let within = at(on.end) - at(on.start);
             let full = DMatrix::from_column_slice(c, c, &within.as_slice()[..c * c]);
-            let products = DMatrix::from_column_slice(p, c, &within.as_slice()[c * c + c..]);
-            let spent = self.projection.spent(products);
+            let spent = DMatrix::from_column_slice(p, c, &within.as_slice()[c * c + c..]);
             let gram = Gram {
                 raw: full.diagonal(),
                 g: within.rows(c * c, c) - spent.tr_mul(&self.projection.z),
@@ -248,4 +248,4 @@ fn dot_by<const ROWS: usize>(a: &[f64], b: &[f64], products: &mut [f64]) {
 
 #[cfg(test)]
 #[path = "tests/grams.rs"]
-mod tests;
+pub(crate) mod tests;

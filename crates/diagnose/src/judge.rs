@@ -9,10 +9,10 @@ use crate::evidence::{Metric, best_amplitude, coefficients};
 use crate::held_out::HeldOut;
 use crate::noise::Noise;
 use crate::places::units;
-use crate::problem::{Amplitude, Problem};
+use crate::problem::{Amplitude, Columns, Problem};
 use crate::projection::Gram;
 use crate::weigh::Weighed;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// Dwells of a block when the noise has memory.
@@ -129,7 +129,8 @@ pub(crate) fn judge(
     // What came out as no such mechanism can is no better answer than what looks the same.
     let of_shape = weighed.detail_nats(entry, config);
     let within_nats = if impossible.is_empty() { of_shape } else { f64::INFINITY };
-    let set = answer(problem, weighed, metric, (entry, within_nats), config);
+    let own = Seen::of(&weighed.entries[entry].candidate.columns, problem, weighed, metric);
+    let set = answer(problem, weighed, (metric, &own), (entry, within_nats), config);
 
     let columns = &weighed.entries[entry].candidate.columns;
     let effect = columns.dense(&problem.dwells, 1.0);
@@ -145,7 +146,7 @@ pub(crate) fn judge(
     let contrast =
         contrast(problem, &base, &weighed.entries[entry].candidate, &effect, theta, theta_sigma, config);
     let Unlisted { margin, p_other, p_same, best_other } =
-        against_unlisted(problem, weighed, metric, entry, config);
+        against_unlisted(problem, weighed, (metric, &own), entry, config);
     let above_other = weighed.entries[entry].ln_evidence - best_other;
     Judged {
         entry,
@@ -222,23 +223,30 @@ pub(crate) fn independent_groups(problem: &Problem, weighed: &Weighed) -> Vec<Gr
     if weighed.remembers() { by_stretch(problem) } else { by_place(problem) }
 }
 
+/// Columns in the units of the weighing under one noise, and their products.
+struct Seen {
+    columns: DMatrix<f64>,
+    gram: Gram,
+}
+
+impl Seen {
+    fn of(columns: &Columns, problem: &Problem, weighed: &Weighed, metric: &Metric) -> Seen {
+        let columns = metric.whitened(weighed.dense(columns, problem));
+        Seen { gram: metric.projection.gram(&columns), columns }
+    }
+}
+
 /// The set that is one answer: the credible set, and everything whose signature is the same.
 fn answer(
     problem: &Problem,
     weighed: &Weighed,
-    metric: &Metric,
+    (metric, own): (&Metric, &Seen),
     (entry, within_nats): (usize, f64),
     config: &DiagnosisConfig,
 ) -> Vec<usize> {
-    let seen = |k: usize| {
-        let columns = metric.whitened(weighed.dense(&weighed.entries[k].candidate.columns, problem));
-        let gram = metric.projection.gram(&columns);
-        (columns, gram)
-    };
-    let (columns, own) = seen(entry);
-    let fitted = one_step(&own, 1.0);
-    let signature = Signature::new(&columns, &own, &fitted.estimate);
-    let score = fitted.estimate.dot(&own.g);
+    let fitted = one_step(&own.gram, 1.0);
+    let signature = Signature::new(&own.columns, &own.gram, &fitted.estimate);
+    let score = fitted.estimate.dot(&own.gram.g);
     let variance = metric.projection.variance_without(score).max(1e-12);
 
     let total = 1.0 - weighed.p_nothing;
@@ -261,7 +269,8 @@ fn answer(
         if gap >= within_nats || set.contains(&k) {
             continue;
         }
-        let (columns, gram) = seen(k);
+        let Seen { columns, gram } =
+            Seen::of(&weighed.entries[k].candidate.columns, problem, weighed, metric);
         let like = signature.likeness(&columns, &gram, variance);
         if like.cosine > config.merge_cosine || like.delta < config.min_delta {
             set.push(k);
@@ -297,14 +306,12 @@ struct Unlisted {
 fn against_unlisted(
     problem: &Problem,
     weighed: &Weighed,
-    metric: &Metric,
+    (metric, own): (&Metric, &Seen),
     entry: usize,
     config: &DiagnosisConfig,
 ) -> Unlisted {
     let projection = &metric.projection;
     let own_ln = weighed.entries[entry].ln_evidence;
-    let own = metric.whitened(weighed.dense(&weighed.entries[entry].candidate.columns, problem));
-    let of_own = projection.gram(&own);
     let mut told = Unlisted { margin: f64::INFINITY, p_other: 0.0, p_same: 0.0, best_other: 0.0 };
     for u in &weighed.unlisted {
         let close = u.ln_evidence > own_ln - config.margin_nats;
@@ -313,11 +320,10 @@ fn against_unlisted(
             told.best_other = told.best_other.max(u.ln_evidence);
             continue;
         }
-        let columns = metric.whitened(weighed.dense(&u.what.columns, problem));
-        let gram = projection.gram(&columns);
+        let Seen { columns, gram } = Seen::of(&u.what.columns, problem, weighed, metric);
         let a = best_amplitude(&gram, projection.rss, projection.dof(), config);
         let (theta, _) = coefficients(&gram, a);
-        let cosine = Signature::new(&columns, &gram, &theta).likeness(&own, &of_own, 1.0).cosine;
+        let cosine = Signature::new(&columns, &gram, &theta).likeness(&own.columns, &own.gram, 1.0).cosine;
         let same = cosine > config.merge_cosine;
         let asked = if same { 0.0 } else { config.margin_nats };
         let detail = 1.0 - cosine * cosine <= config.leftover_share;

@@ -82,6 +82,7 @@ mod special;
 mod stretches;
 mod structure;
 mod suggestion;
+mod trials;
 mod unexplained;
 mod unknown;
 mod view;

@@ -9,7 +9,7 @@
 //!
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
 //! 2015), which is as orthogonal as Householder's and a matrix product fast. To choose among many kinds and sizes of noise one
-//! factor is enough, and Q itself is not put together: with `R'R = J'J + P`, `Q'g = R'^-1 J'g`.
+//! factor is enough, and Q itself is not put together ([`Rough`]): with `R'R = J'J + P`, `Q'g = R'^-1 J'g`.
 
 use armcal_calibrate::{gram, inner};
 use nalgebra::{DMatrix, DVector};
@@ -17,10 +17,8 @@ use nalgebra::{DMatrix, DVector};
 /// Geometry projected out of one set of whitened rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Projection {
-    /// Data rows of Q, or of the geometry that `back` takes to Q: rows x p.
+    /// Data rows of Q: rows x p.
     pub q: DMatrix<f64>,
-    /// `R'^-1`, where Q was not put together.
-    back: Option<DMatrix<f64>>,
     /// `Q' e_a`.
     pub z: DVector<f64>,
     /// The whitened residual before projection.
@@ -58,9 +56,6 @@ impl Gram {
     }
 }
 
-/// Projects out geometry with its prior's precision and offsets; last the residual.
-pub(crate) type Projecting = fn(DMatrix<f64>, &DVector<f64>, &DVector<f64>, DVector<f64>) -> Projection;
-
 impl Projection {
     /// `geometry` with prior precision `precision` and offsets `offset` in its units; `residual` at that point.
     pub fn new(
@@ -88,40 +83,7 @@ impl Projection {
         let z = data.tr_mul(&residual) + prior.tr_mul(&prior_residual);
         let rss = residual.norm_squared() + prior_residual.norm_squared() - z.norm_squared();
         let effective_parameters = data.norm_squared();
-        Projection { q: data, back: None, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
-    }
-
-    /// The same without Q: a fraction of the work, good to about 1e-6.
-    pub fn rough(
-        geometry: DMatrix<f64>,
-        precision: &DVector<f64>,
-        offset: &DVector<f64>,
-        residual: DVector<f64>,
-    ) -> Projection {
-        let p = geometry.ncols();
-        let precision = precision.map(|v| v.max(1e-12));
-        let factor = cholesky_upper(gram(&geometry) + DMatrix::from_diagonal(&precision));
-        let ln_det = factor.diagonal().iter().zip(&precision).map(|(r, v)| 2.0 * r.ln() - v.ln()).sum();
-        let back = factor
-            .transpose()
-            .solve_lower_triangular(&DMatrix::identity(p, p))
-            .unwrap_or_else(|| DMatrix::identity(p, p));
-        let z = &back * (geometry.tr_mul(&residual) - offset.component_mul(&precision));
-        let prior = offset.component_mul(offset).dot(&precision);
-        let rss = residual.norm_squared() + prior - z.norm_squared();
-        // The trace of J (J'J + P)^-1 J'.
-        let held: f64 = back.column_iter().zip(&precision).map(|(c, v)| v * c.norm_squared()).sum();
-        let effective_parameters = p as f64 - held;
-        let (rss, back) = (rss.max(1e-12), Some(back));
-        Projection { q: geometry, back, z, rss, effective_parameters, ln_det, residual }
-    }
-
-    /// `Q'X`, from the products of [`Projection::q`] with X.
-    pub fn spent(&self, products: DMatrix<f64>) -> DMatrix<f64> {
-        match &self.back {
-            Some(back) => back * products,
-            None => products,
-        }
+        Projection { q: data, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
     }
 
     /// Variance of the residual (declared noise = 1) once something took so much of its square.
@@ -131,7 +93,7 @@ impl Projection {
 
     /// Degrees of freedom left.
     pub fn dof(&self) -> f64 {
-        (self.residual.len() as f64 - self.effective_parameters).max(1.0)
+        dof(self.residual.len(), self.effective_parameters)
     }
 
     /// Data rows of the projected residual.
@@ -155,6 +117,70 @@ impl Projection {
             spent: c,
         }
     }
+}
+
+/// The same without Q, from products alone: a fraction of the work, good to about 1e-6.
+pub(crate) struct Rough {
+    /// `R'^-1`.
+    back: DMatrix<f64>,
+    z: DVector<f64>,
+    /// As of a [`Projection`].
+    pub rss: f64,
+    /// As of a [`Projection`].
+    pub effective_parameters: f64,
+    /// As of a [`Projection`].
+    pub ln_det: f64,
+}
+
+impl Rough {
+    /// From `J'J` of the geometry, `J'e` and `e'e` of the residual, and the prior's precision and offsets.
+    pub fn new(
+        geometry: DMatrix<f64>,
+        (with_residual, residual): (DVector<f64>, f64),
+        precision: &DVector<f64>,
+        offset: &DVector<f64>,
+    ) -> Rough {
+        let p = geometry.ncols();
+        let precision = precision.map(|v| v.max(1e-12));
+        let factor = cholesky_upper(geometry + DMatrix::from_diagonal(&precision));
+        let ln_det = factor.diagonal().iter().zip(&precision).map(|(r, v)| 2.0 * r.ln() - v.ln()).sum();
+        let back = factor
+            .transpose()
+            .solve_lower_triangular(&DMatrix::identity(p, p))
+            .unwrap_or_else(|| DMatrix::identity(p, p));
+        let z = &back * (with_residual - offset.component_mul(&precision));
+        let prior = offset.component_mul(offset).dot(&precision);
+        let rss = (residual + prior - z.norm_squared()).max(1e-12);
+        // The trace of J (J'J + P)^-1 J'.
+        let held: f64 = back.column_iter().zip(&precision).map(|(c, v)| v * c.norm_squared()).sum();
+        Rough { back, z, rss, effective_parameters: p as f64 - held, ln_det }
+    }
+
+    /// Degrees of freedom left of so many rows.
+    pub fn dof(&self, rows: usize) -> f64 {
+        dof(rows, self.effective_parameters)
+    }
+
+    /// Of columns X, from `J'X`, `X'e` and `X'X`.
+    pub fn gram(
+        &self,
+        with_geometry: &DMatrix<f64>,
+        with_residual: &DVector<f64>,
+        square: DMatrix<f64>,
+    ) -> Gram {
+        let spent = &self.back * with_geometry;
+        Gram {
+            raw: square.diagonal(),
+            a: square - spent.tr_mul(&spent),
+            g: with_residual - spent.tr_mul(&self.z),
+            spent,
+        }
+    }
+}
+
+/// Degrees of freedom that so many parameters leave of so many rows.
+fn dof(rows: usize, effective_parameters: f64) -> f64 {
+    (rows as f64 - effective_parameters).max(1.0)
 }
 
 /// Upper Cholesky factor of a positive semi-definite matrix, with a ridge that grows until it exists.

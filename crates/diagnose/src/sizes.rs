@@ -1,11 +1,12 @@
 //! The noises that everything is weighed under: of every kind the size that explains nothing, or one of a few scouts, best.
 //!
-//! Sizes are tried one at a time by a rough projection; only those that are kept are projected in full.
+//! Sizes are tried by [products alone](crate::trials); only those that are kept are projected in full.
 
 use crate::config::DiagnosisConfig;
-use crate::evidence::{Metric, over_noise};
+use crate::evidence::Metric;
 use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
+use crate::trials::{OfKind, Trials};
 
 /// Of many dwells, a kind of noise that puts nothing, and no scout, less than this behind another kind is not asked further
 /// [nats]: of all probability it has less than one part in a thousand million.
@@ -48,26 +49,24 @@ pub(crate) fn metrics(
 ) -> Vec<Metric> {
     let kinds = Noise::available(problem);
     let share = config.prior_correlated_noise / kinds.len().saturating_sub(1).max(1) as f64;
-    let tried = |noise: Noise, amplitude: f64, prior: f64| {
-        let metric = Metric::rough(noise, amplitude, problem, scale).weighed(prior, Some(&white), config);
-        let nothing = metric.ln_weight;
-        (!noise.widens() || nothing > white.ln_weight).then(|| {
-            let of_scouts = over_noise(scouts, problem, scale, &[metric], config).into_iter().flatten();
-            Trial { noise, amplitude, prior, parts: std::iter::once(nothing).chain(of_scouts).collect() }
-        })
+    let stacked = Trials::new(scouts, problem, scale, config);
+    let tried = |kind: &OfKind<'_>, noise, amplitude, prior| {
+        let parts = kind.tried(amplitude, prior, (&white.projection, white.ln_weight))?;
+        Some(Trial { noise, amplitude, prior, parts })
     };
     let parts = std::iter::once(white.ln_weight).chain(ln_scouts).collect();
     let prior = 1.0 - config.prior_correlated_noise;
     let mut trials = vec![Trial { noise: Noise::White, amplitude: 0.0, prior, parts }];
     let sizes = &config.amplitude_scales;
-    for noise in kinds.iter().filter(|noise| **noise != Noise::White) {
-        trials.extend(sizes.iter().filter_map(|size| tried(*noise, *size, share / sizes.len() as f64)));
+    for noise in kinds.iter().copied().filter(|noise| *noise != Noise::White) {
+        let (kind, share) = (stacked.of(noise), share / sizes.len() as f64);
+        trials.extend(sizes.iter().filter_map(|size| tried(&kind, noise, *size, share)));
     }
     let by_nothing = |a: &&Trial, b: &&Trial| a.nothing().total_cmp(&b.nothing());
     let leading = trials.iter().max_by(by_nothing).map_or(Noise::White, |trial| trial.noise);
     let both = |trial: &Trial| Some((trial.noise.and_place(leading, &kinds)?, trial.amplitude));
     let with_places = trials.iter().filter(|trial| both(trial).is_some()).max_by(by_nothing).and_then(both);
-    trials.extend(with_places.and_then(|(noise, size)| tried(noise, size, share)));
+    trials.extend(with_places.and_then(|(noise, size)| tried(&stacked.of(noise), noise, size, share)));
 
     let of = |trial: &Trial| {
         Metric::new(trial.noise, trial.amplitude, problem, scale).weighed(trial.prior, Some(&white), config)

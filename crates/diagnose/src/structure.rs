@@ -4,7 +4,11 @@ use crate::config::DiagnosisConfig;
 use crate::drivers::standardised_joints;
 use crate::judge::base_fit;
 use crate::problem::Problem;
+use crate::projection::Rough;
 use crate::special::{chi2_tail, ln_f_tail};
+use armcal_calibrate::gram;
+use kdtree::KdTree;
+use kdtree::distance::squared_euclidean;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -62,13 +66,10 @@ pub(crate) fn structure(problem: &Problem, config: &DiagnosisConfig) -> Structur
 }
 
 fn effective_parameters(problem: &Problem) -> f64 {
-    let p = crate::projection::Projection::rough(
-        problem.geometry.clone(),
-        &problem.geometry_precision,
-        &problem.geometry_offset,
-        problem.residual.clone(),
-    );
-    p.effective_parameters
+    let (geometry, residual) = (&problem.geometry, &problem.residual);
+    let of_residual = (geometry.tr_mul(residual), residual.norm_squared());
+    let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
+    Rough::new(gram(geometry), of_residual, precision, offset).effective_parameters
 }
 
 /// `F = [(SS_E - SS_PE)/(rows of groups - p)] / [SS_PE/df_PE]`, groups: place, recording, approach, load.
@@ -125,35 +126,30 @@ fn moran(problem: &Problem, e: &DVector<f64>, config: &DiagnosisConfig) -> (f64,
     (observed * scale, (1.0 + above as f64) / (config.resamplings as f64 + 1.0))
 }
 
-/// So many nearest other rows of each row, the nearest first: outwards along the column that spreads most, until its difference
-/// alone is more than the distance of those found.
+/// So many nearest other rows of each row, the nearest first; of those that are as far, the first.
 fn nearest(rows: &DMatrix<f64>, count: usize) -> Vec<Vec<usize>> {
-    let spread = |c: &usize| rows.column(*c).max() - rows.column(*c).min();
-    let along = (0..rows.ncols()).max_by(|a, b| spread(a).total_cmp(&spread(b))).unwrap_or(0);
-    let mut order: Vec<usize> = (0..rows.nrows()).collect();
-    let at = |i: usize| rows.get((i, along)).copied().unwrap_or(0.0);
-    order.sort_by(|a, b| at(*a).total_cmp(&at(*b)).then(a.cmp(b)));
-    let columns = rows.transpose();
-    let mut found = vec![Vec::new(); order.len()];
-    for (rank, &i) in order.iter().enumerate() {
-        let mut best: Vec<(f64, usize)> = Vec::with_capacity(count + 1);
-        let (mut before, mut after) =
-            (order[..rank].iter().rev().peekable(), order[rank + 1..].iter().peekable());
-        loop {
-            let gap = |j: Option<&&usize>| j.map_or(f64::INFINITY, |j| (at(**j) - at(i)).abs());
-            let (back, forth) = (gap(before.peek()), gap(after.peek()));
-            let Some(&j) = (if back <= forth { before.next() } else { after.next() }) else { break };
-            if best.len() == count && back.min(forth).powi(2) > best[count - 1].0 {
+    let points = rows.transpose();
+    let at: Vec<&[f64]> = points.as_slice().chunks_exact(points.nrows().max(1)).collect();
+    let mut tree = KdTree::new(points.nrows());
+    for (i, point) in at.iter().enumerate() {
+        // A row that is not finite is no neighbour, and has none.
+        let _ = tree.add(*point, i);
+    }
+    let near = |i: usize| {
+        let Some(all) = at.get(i).and_then(|point| tree.iter_nearest(point, &squared_euclidean).ok()) else {
+            return Vec::new();
+        };
+        let mut found: Vec<(f64, usize)> = Vec::with_capacity(count + 1);
+        for (square, j) in all.map(|(square, j)| (square, *j)).filter(|(_, j)| *j != i) {
+            if found.len() >= count && square > found[found.len() - 1].0 {
                 break;
             }
-            let new = ((columns.column(i) - columns.column(j)).norm_squared(), j);
-            let place = best.partition_point(|b| b.0.total_cmp(&new.0).then(b.1.cmp(&new.1)).is_lt());
-            best.insert(place, new);
-            best.truncate(count);
+            found.push((square, j));
         }
-        found[i] = best.into_iter().map(|(_, j)| j).collect();
-    }
-    found
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.into_iter().take(count).map(|(_, j)| j).collect()
+    };
+    (0..rows.nrows()).map(near).collect()
 }
 
 /// Correlation of each dwell with the next of its recording.

@@ -276,7 +276,9 @@ fn told(unlisted: &[(&str, bool, f64, f64)], config: &DiagnosisConfig) -> super:
     weighed.entries[own_entry].ln_evidence = 40.0;
     weighed.unlisted =
         unlisted.iter().map(|(s, cell, ln, share)| outside(&p, s, *cell, *ln, *share)).collect();
-    against_unlisted(&p, &weighed, &weighed.metrics[0], own_entry, config)
+    let metric = &weighed.metrics[0];
+    let own = Seen::of(&weighed.entries[own_entry].candidate.columns, &p, &weighed, metric);
+    against_unlisted(&p, &weighed, (metric, &own), own_entry, config)
 }
 
 /// Margin and probability of what else may be.
