@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// Uncompressed bytes in a chunk.
 const CHUNK_BYTES: u64 = 1 << 20;
+/// Of zstd: its own choice, and its fastest.
+const USUAL_LEVEL: u32 = 3;
+const QUICK_LEVEL: u32 = 1;
 /// Written to the header, so that files do not change with the version of the mcap crate.
 const LIBRARY: &str = concat!("armcal/", env!("CARGO_PKG_VERSION"));
 
@@ -22,14 +25,23 @@ pub struct McapOutput {
 impl McapOutput {
     /// Starts an MCAP file with the given profile (`ros2`, or empty).
     pub fn create(path: &Path, profile: &str) -> Result<McapOutput, RecordingError> {
+        McapOutput::at_level(path, profile, USUAL_LEVEL)
+    }
+
+    /// The same for a file of gigabytes that is made again from another one whenever somebody asks. Poses and joints are noise to
+    /// a compressor, which finds as much in them in half the time.
+    pub fn quickly(path: &Path, profile: &str) -> Result<McapOutput, RecordingError> {
+        McapOutput::at_level(path, profile, QUICK_LEVEL)
+    }
+
+    fn at_level(path: &Path, profile: &str, level: u32) -> Result<McapOutput, RecordingError> {
         let file = AtomicFile::create(path)?;
-        // No compression threads: the bytes of the output must not depend on the machine. Poses and joints are noise to a
-        // compressor: it finds as much in them in half the time.
+        // No compression threads: the bytes of the output must not depend on the machine.
         let options = mcap::WriteOptions::new()
             .profile(profile)
             .library(LIBRARY)
             .compression(Some(mcap::Compression::Zstd))
-            .compression_level(1)
+            .compression_level(level)
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES));
         match options.create(BufWriter::new(file)) {

@@ -49,7 +49,7 @@ pub(crate) fn write_results(
     path: &Path,
 ) -> Result<AtomicFile, RecordingError> {
     // Neither `ros2` nor any other profile: those promise one encoding for all channels.
-    let mut out = McapOutput::create(path, "")?;
+    let mut out = McapOutput::quickly(path, "")?;
     for input in inputs {
         copy_messages(input, &mut out)?;
     }
