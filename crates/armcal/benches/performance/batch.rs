@@ -59,11 +59,15 @@ fn threads(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Sec
         ]);
         if threads == 1 {
             let each_s = cost.spent.cpu_s / count as f64;
-            section.bar(Bar {
+            let bar = Bar {
                 what: format!("CPU time of a recording in a batch of {count}, one thread"),
                 limit: format!("<= {CPU_S} s"),
                 measured: format!("{each_s:.3} s"),
                 met: each_s <= CPU_S,
+            };
+            section.bar_of(bar, || {
+                "its stages and its floor are the first column of the table in \"Where the time goes\""
+                    .to_owned()
             });
         }
         if threads == all {
@@ -97,11 +101,15 @@ fn recordings(made: &[PathBuf], folder: &Path, options: &Options, section: &mut 
     section.table(table);
     if let [(few, first), .., (many, last)] = peaks_mib.as_slice() {
         let ratio = last / first;
-        section.bar(Bar {
+        let bar = Bar {
             what: format!("memory of a batch of {many} recordings to one of {few}"),
             limit: format!("flat (<= {FLAT})"),
             measured: format!("{ratio:.2}"),
             met: ratio <= FLAT,
+        };
+        section.bar_of(bar, || {
+            let each_kib = (last - first) * 1024.0 / (many - few) as f64;
+            format!("each recording more takes {each_kib:.0} KiB: {first:.0} MiB of {few} became {last:.0} of {many}")
         });
     }
     Ok(())

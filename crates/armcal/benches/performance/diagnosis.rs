@@ -17,12 +17,16 @@ pub fn section(_: &Options) -> Result<Section> {
     let mut table =
         Table::new(&["hidden", "design", "dwells", "diagnosis [s]", "calibration [s]", "verdict"]);
     for (design, most_s) in [(Design::ThreeTiltsBothWays, 0.25), (Design::FreePoses, 0.8)] {
-        let mut slowest: (f64, usize) = (0.0, 0);
+        let (mut slowest, mut fastest): ((f64, usize, &str), (f64, &str)) =
+            ((0.0, 0, ""), (f64::INFINITY, ""));
         for family in HIDDEN {
             let scenario = Scenario::new(family, design, 1);
             let (answer, _) = one.install(|| quick(&scenario))?;
             if answer.seconds > slowest.0 {
-                slowest = (answer.seconds, answer.dwells);
+                slowest = (answer.seconds, answer.dwells, family);
+            }
+            if answer.seconds < fastest.0 {
+                fastest = (answer.seconds, family);
             }
             table.row([
                 family.to_owned(),
@@ -33,11 +37,18 @@ pub fn section(_: &Options) -> Result<Section> {
                 format!("{:?}", answer.verdict),
             ]);
         }
-        section.bar(Bar {
+        let bar = Bar {
             what: format!("full diagnosis of {} dwells, one core, slowest of {}", slowest.1, HIDDEN.len()),
             limit: format!("<= {most_s} s"),
             measured: format!("{:.2} s", slowest.0),
             met: slowest.0 <= most_s,
+        };
+        section.bar_of(bar, || {
+            let (least_s, least) = fastest;
+            format!(
+                "what hides `{}` is searched for in several rounds; `{least}` takes {least_s:.2} s",
+                slowest.2
+            )
         });
     }
     section.table(table);

@@ -162,11 +162,19 @@ fn judge(name: &str, ours: &Answer, peers: &[Answer], section: &mut Section) -> 
     });
     for peer in peers.iter().filter(|p| p.who.starts_with("scipy")) {
         let ratio = peer.spent.wall_s / ours.spent.wall_s;
-        section.bar(Bar {
+        let bar = Bar {
             what: format!("fit, {name}, faster than {}", peer.who),
             limit: ">= 50".into(),
             measured: format!("{ratio:.0}"),
             met: ratio >= 50.0,
+        };
+        section.bar_of(bar, || {
+            let each_us = peer.spent.wall_s * 1e6 / 50.0 / ours.evaluations as f64;
+            format!(
+                "it leaves {each_us:.0} us for each of armcal's {} evaluations of all dwells, with all that is solved and told after \
+                 them",
+                ours.evaluations
+            )
         });
     }
     Ok(())

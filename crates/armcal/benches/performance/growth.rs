@@ -49,11 +49,23 @@ pub fn section(options: &Options) -> Result<Section> {
             let of_these = |bar: &&(usize, Weighed, f64, f64)| bar.0 == poses && bar.1 == *weighed;
             let Some((_, _, most_s, most_mib)) = BARS.iter().find(of_these) else { continue };
             let memory = if most_mib.is_finite() { format!(", {most_mib} MiB") } else { String::new() };
-            section.bar(Bar {
+            let bar = Bar {
                 what: format!("{poses} poses, 6 axes, 10 folds, {}, one core", weighed.word()),
                 limit: format!("<= {most_s} s{memory}"),
                 measured: format!("{} s, {:.0} MiB", seconds(cost.spent.cpu_s), cost.peak_mib),
                 met: cost.spent.cpu_s <= *most_s && cost.peak_mib <= *most_mib,
+            };
+            section.bar_of(bar, || {
+                let (without, stages) =
+                    (&costs[0], "stages and floor are a column of the table in \"Where the time goes\"");
+                match weighed {
+                    Weighed::None => stages.to_owned(),
+                    _ => format!(
+                        "{stages}; without a diagnosis it is {} s and {:.0} MiB",
+                        seconds(without.spent.cpu_s),
+                        without.peak_mib
+                    ),
+                }
             });
         }
         curve.push((poses, costs));

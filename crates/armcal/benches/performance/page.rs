@@ -62,6 +62,8 @@ pub struct Section {
     /// Diagrams of Mermaid, which the page's readers draw.
     figures: Vec<String>,
     bars: Vec<Bar>,
+    /// Of bars that were missed what they are made of.
+    made_of: Vec<[String; 2]>,
     skipped: Vec<String>,
 }
 
@@ -74,6 +76,7 @@ impl Section {
             tables: Vec::new(),
             figures: Vec::new(),
             bars: Vec::new(),
+            made_of: Vec::new(),
             skipped: Vec::new(),
         }
     }
@@ -96,6 +99,14 @@ impl Section {
     /// A bar and its answer.
     pub fn bar(&mut self, bar: Bar) {
         self.bars.push(bar);
+    }
+
+    /// The same; where it was missed, what stands between it and what was measured.
+    pub fn bar_of(&mut self, bar: Bar, made_of: impl FnOnce() -> String) {
+        if !bar.met {
+            self.made_of.push([bar.what.clone(), made_of()]);
+        }
+        self.bar(bar);
     }
 
     /// What could not be measured.
@@ -145,6 +156,14 @@ pub fn page(sections: &[Section], options: &Options) -> String {
     text += "\n## Bars\n\n";
     text += &bars(sections.iter().flat_map(|s| &s.bars));
     text += "\n";
+    let missed: Vec<&[String; 2]> = sections.iter().flat_map(|s| &s.made_of).collect();
+    if !missed.is_empty() {
+        text += "What stands between bars that were missed and what was measured:\n\n";
+    }
+    for [what, made_of] in &missed {
+        text += &wrapped(&format!("- *{what}*: {made_of}"));
+    }
+    text += if missed.is_empty() { "" } else { "\n" };
     text += &sections.iter().map(Section::text).collect::<Vec<_>>().join("");
     text.trim_end().to_owned() + "\n"
 }

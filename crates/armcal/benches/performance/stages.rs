@@ -15,8 +15,8 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
 /// Poses of the campaigns, and how many of them are weighed.
-const CAMPAIGNS: [(usize, Weighed); 3] =
-    [(2_000, Weighed::Default), (2_000, Weighed::All), (16_811, Weighed::None)];
+const CAMPAIGNS: [(usize, Weighed); 4] =
+    [(2_000, Weighed::Default), (2_000, Weighed::All), (16_811, Weighed::None), (16_811, Weighed::All)];
 const STAGES: [&str; 6] = [
     "reading, clocks, dwells",
     "fit and hold-out",
