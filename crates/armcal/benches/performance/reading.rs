@@ -116,9 +116,9 @@ fn beside_the_walk(
 ) -> String {
     let by_row_ns = |cpu_s: f64| cpu_s * 1e9 / rows as f64;
     let must_s = checked.cpu_s - bare.cpu_s + hashed_s;
-    let hash = if hashed_s > 0.0 { " and the hash" } else { "" };
+    let must = if hashed_s > 0.0 { "the walk, the CRC and the hash" } else { "the walk and the CRC" };
     format!(
-        "decoding, sorting and judging take {:.0} ns of CPU a row; the bar leaves them {:.0} ns beside the walk, the CRC{hash}, without \
+        "decoding, sorting and judging take {:.0} ns of CPU a row; the bar leaves them {:.0} ns beside {must}, without \
          which no reader says that it read what was written: these alone are {:.2}x",
         by_row_ns(ours.cpu_s - checked.cpu_s),
         by_row_ns((limit - 1.0) * bare.cpu_s - must_s).max(0.0),
