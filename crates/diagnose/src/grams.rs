@@ -12,8 +12,8 @@ use armcal_calibrate::inner;
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::sync::Arc;
 
-/// Numbers of columns that are put together into one matrix product: what a processor keeps near it, and no more at a time
-/// from the allocator than that has at hand.
+/// Numbers of columns that are put together into one matrix product: 8 MB, which stay in a processor's caches and need no new
+/// pages from the system for each block.
 const BLOCK_NUMBERS: usize = 1 << 20;
 
 /// Calls `each` with the number and the [`Gram`] of every one of many sets of columns, times `factor`.
