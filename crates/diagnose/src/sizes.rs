@@ -50,9 +50,9 @@ pub(crate) fn metrics(
     let kinds = Noise::available(problem);
     let share = config.prior_correlated_noise / kinds.len().saturating_sub(1).max(1) as f64;
     let stacked = Trials::new(scouts, problem, scale, config);
-    let tried = |kind: &OfKind<'_>, noise, amplitude, prior| {
-        let parts = kind.tried(amplitude, prior, (&white.projection, white.ln_weight))?;
-        Some(Trial { noise, amplitude, prior, parts })
+    let tried = |kind: &OfKind<'_>, amplitude, prior| {
+        let parts = kind.tried(amplitude, prior, &white)?;
+        Some(Trial { noise: kind.noise, amplitude, prior, parts })
     };
     let parts = std::iter::once(white.ln_weight).chain(ln_scouts).collect();
     let prior = 1.0 - config.prior_correlated_noise;
@@ -60,13 +60,13 @@ pub(crate) fn metrics(
     let sizes = &config.amplitude_scales;
     for noise in kinds.iter().copied().filter(|noise| *noise != Noise::White) {
         let (kind, share) = (stacked.of(noise), share / sizes.len() as f64);
-        trials.extend(sizes.iter().filter_map(|size| tried(&kind, noise, *size, share)));
+        trials.extend(sizes.iter().filter_map(|size| tried(&kind, *size, share)));
     }
     let by_nothing = |a: &&Trial, b: &&Trial| a.nothing().total_cmp(&b.nothing());
     let leading = trials.iter().max_by(by_nothing).map_or(Noise::White, |trial| trial.noise);
     let both = |trial: &Trial| Some((trial.noise.and_place(leading, &kinds)?, trial.amplitude));
     let with_places = trials.iter().filter(|trial| both(trial).is_some()).max_by(by_nothing).and_then(both);
-    trials.extend(with_places.and_then(|(noise, size)| tried(&stacked.of(noise), noise, size, share)));
+    trials.extend(with_places.and_then(|(noise, size)| tried(&stacked.of(noise), size, share)));
 
     let of = |trial: &Trial| {
         Metric::new(trial.noise, trial.amplitude, problem, scale).weighed(trial.prior, Some(&white), config)

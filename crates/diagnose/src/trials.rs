@@ -12,10 +12,10 @@
 
 use crate::columns::Columns;
 use crate::config::DiagnosisConfig;
-use crate::evidence::{ln_bayes, ln_weight};
+use crate::evidence::{Metric, ln_bayes, ln_weight};
 use crate::noise::Noise;
 use crate::problem::Problem;
-use crate::projection::{Projection, Rough};
+use crate::projection::Rough;
 use crate::whitener::Whitener;
 use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
@@ -84,14 +84,15 @@ impl<'p> Trials<'p> {
 /// A kind of noise.
 pub(crate) struct OfKind<'t> {
     trials: &'t Trials<'t>,
-    noise: Noise,
+    /// Which.
+    pub noise: Noise,
     along: Option<(DMatrix<f64>, Vec<f64>)>,
 }
 
 impl OfKind<'_> {
     /// ln (weight x evidence) of nothing against `white` noise, then of every scout; none where the noise widens what is
     /// declared and does not even say more of nothing.
-    pub fn tried(&self, amplitude: f64, prior: f64, white: (&Projection, f64)) -> Option<Vec<f64>> {
+    pub fn tried(&self, amplitude: f64, prior: f64, white: &Metric) -> Option<Vec<f64>> {
         let Trials { problem, config, scouts, .. } = self.trials;
         let (products, ln_det) = self.products(amplitude);
         let geometry = problem.geometry.ncols();
@@ -99,8 +100,8 @@ impl OfKind<'_> {
         let with_residual = products.view((0, geometry), (geometry, 1)).column(0).into_owned();
         let of_residual = (with_residual, products[(geometry, geometry)]);
         let rough = Rough::new(square, of_residual, &problem.geometry_precision, &problem.geometry_offset);
-        let nothing = ln_weight(prior, [ln_det, rough.ln_det, rough.rss], white.0, config);
-        if self.noise.widens() && nothing <= white.1 {
+        let nothing = ln_weight(prior, [ln_det, rough.ln_det, rough.rss], &white.projection, config);
+        if self.noise.widens() && nothing <= white.ln_weight {
             return None;
         }
         let dof = rough.dof(problem.rows());

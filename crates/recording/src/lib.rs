@@ -6,7 +6,7 @@
 //! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
 //! `chunk` (inflated and checked, within a `budget`) -> `sweep` (all blocks in parallel, results in file order) ->
 //! `decode` (messages to rows) -> `gather` (rows of a stream; of bodies that hang on others the `transforms`
-//! between) -> `read` (columns: clock, cleaning, units).
+//! between) -> `reading` (columns: clock, cleaning, units). `read` takes all streams of a pipeline through these.
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
 //! off or damaged. What is sound is used; what is not is reported with its byte offset and reason. Nothing panics
@@ -50,6 +50,7 @@ mod poses;
 mod ranges;
 mod raw;
 mod read;
+mod reading;
 mod records;
 mod report;
 pub mod ros2;

@@ -22,7 +22,7 @@ fn a_trial_weighs_as_the_full_projection_under_every_noise() {
         let of_kind = trials.of(kind);
         for amplitude in [0.3, 3.0, 10.0] {
             let metric = Metric::new(kind, amplitude, &problem, 1.3).weighed(0.5, Some(&white), &config);
-            let tried = |ln_white| of_kind.tried(amplitude, 0.5, (&white.projection, ln_white));
+            let tried = |ln_weight| of_kind.tried(amplitude, 0.5, &Metric { ln_weight, ..white.clone() });
             let found = tried(f64::NEG_INFINITY).unwrap();
             let mut expected = vec![metric.ln_weight];
             expected.extend(over_noise(&scouts, &problem, 1.3, &[metric], &config).concat());
