@@ -12,7 +12,7 @@
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
 use crate::elsewhere::{Elsewhere, errors as errors_elsewhere};
-use crate::fit::{Near, fit_near};
+use crate::fit::{Near, fit_near, fit_where_priors};
 use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
@@ -23,7 +23,7 @@ use crate::noise::expected_norm_m;
 use crate::nominal::{self, Nominal};
 use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
 use crate::poses::measured_together;
-use crate::priors::scales_of;
+use crate::priors::{PriorScales, scales_of};
 use crate::remembered::{Looked, look};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
@@ -46,7 +46,7 @@ pub fn calibrate(
 }
 
 /// [`calibrate`] where a calibration of the same arm with fewer effects, on the same observations and hold-out, is at hand:
-/// effects that do nothing at nominal leave the nominal arm and its frames as they are there.
+/// effects that do nothing at nominal leave the nominal arm and its frames as they are there, and the fit begins where that one ended.
 pub fn calibrate_beside(
     other: Option<&Calibration>,
     model: &Model,
@@ -267,7 +267,10 @@ impl Judge<'_> {
                 let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
                 fit_near(&train, near, &free, self.config)?
             }
-            None => fit_problem(&train, &nominal_values, &free, self.config)?,
+            None => match self.beside(&nominal_values, &of_unseen) {
+                Some((start, scales)) => fit_where_priors(&train, (&start, scales), &free, self.config)?,
+                None => fit_problem(&train, &nominal_values, &free, self.config)?,
+            },
         };
         let mut warnings = Vec::new();
         if !unseen.is_empty() {
@@ -334,8 +337,20 @@ impl Judge<'_> {
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
         let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
         let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
-        let prior_scales = scales_of(fit, self.model.parameters());
+        let prior_scales = scales_of(fit.estimates.iter().zip(self.model.parameters()));
         Near { values, sigma_scale: fit.sigma_scale, prior_scales, looked: None }
+    }
+
+    /// Where the fit of the same arm with fewer effects ended, as a start; what this one must not know of is at nominal.
+    fn beside(
+        &self,
+        nominal_values: &[f64],
+        unseen: &dyn Fn(&Parameter) -> bool,
+    ) -> Option<(Vec<f64>, &PriorScales)> {
+        let ended = self.nominal.ended.as_ref().filter(|_| self.config.objective != Objective::Paper)?;
+        let each = self.model.parameters().iter().zip(&ended.values).zip(nominal_values);
+        let values = each.map(|((p, value), nominal)| if unseen(p) { *nominal } else { *value }).collect();
+        Some((values, &ended.prior_scales))
     }
 
     /// All observations where the fit to them ended, for several turns that begin there.

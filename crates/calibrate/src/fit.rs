@@ -6,7 +6,7 @@ use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
 use crate::priors::PriorScales;
 use crate::problem::Problem;
-use crate::remembered::{Looked, Remembered};
+use crate::remembered::{Looked, Remembered, look};
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Cost as _, Curvature, Settings};
 use crate::statistics::{self, Uncertainty};
@@ -17,6 +17,7 @@ use crate::{
 use armcal_core::{Observation, Parameter, Role, Warning};
 use armcal_model::Model;
 use nalgebra::DVector;
+use std::sync::Arc;
 
 /// A step of this many standard deviations of the estimate ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-5;
@@ -30,6 +31,8 @@ const GENEROUS: f64 = 3.0;
 const SCALE_TOLERANCE: f64 = 3e-3;
 /// Rounds of fit and scale.
 const SCALE_ROUNDS: usize = 30;
+/// Derivatives that may stay all the way of a fit near another: that where the other one ended, then that where the first one led.
+const STAYING: usize = 2;
 /// Rounds of fit and noise, and the change of a parameter, in units of its prior, that ends them.
 const NOISE_ROUNDS: usize = 8;
 const NOISE_TOLERANCE: f64 = 1e-3;
@@ -51,6 +54,16 @@ pub fn fit_problem(
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
+    fit_where_priors(problem, (start, &PriorScales::new()), free, config)
+}
+
+/// The same where priors, as far as they are learnt, begin at these scales of the default ones.
+pub(crate) fn fit_where_priors(
+    problem: &dyn Problem,
+    start: (&[f64], &PriorScales),
+    free: &dyn Fn(&Parameter) -> bool,
+    config: &FitConfig,
+) -> Result<Fit, CalibrateError> {
     fit_from(&Remembered::new(problem, None), start, None, free, config)
 }
 
@@ -64,14 +77,19 @@ pub(crate) fn fit_near(
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
     let looked = near.looked.take();
-    let stays = looked.as_ref().filter(|_| !config.every_step);
-    if let Some(about) = stays.and_then(|looked| Remembered::about(problem, looked)) {
-        let fit = fit_from(&about, &near.values, Some(&near), free, config)?;
-        if about.is_straight_to(&fit.values()) {
+    let mut known = looked.clone().filter(|_| !config.every_step);
+    let mut start = near.values.clone();
+    for _ in 0..STAYING {
+        let Some(about) = known.as_ref().and_then(|looked| Remembered::about(problem, looked)) else { break };
+        let fit = fit_from(&about, (&start, &PriorScales::new()), Some(&near), free, config)?;
+        start = fit.values();
+        if about.is_straight_to(&start) {
             return Ok(fit);
         }
+        known = Some(Arc::unwrap_or_clone(look(problem, &start, free, config)?));
     }
-    fit_from(&Remembered::new(problem, looked), &near.values, Some(&near), free, config)
+    let start = (near.values.as_slice(), &PriorScales::new());
+    fit_from(&Remembered::new(problem, looked), start, Some(&near), free, config)
 }
 
 /// Where another fit ended.
@@ -88,13 +106,16 @@ pub(crate) struct Near {
 
 fn fit_from(
     problem: &dyn Problem,
-    start: &[f64],
+    (start, scales): (&[f64], &PriorScales),
     near: Option<&Near>,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
 ) -> Result<Fit, CalibrateError> {
     config.check()?;
-    let declared = Whitened::new(Box::new(problem), start, free, config)?;
+    // Noise that depends on what is found is found with the default priors.
+    let none = PriorScales::new();
+    let scales = if problem.noise_depends() { &none } else { scales };
+    let declared = Whitened::new(priors::scaled(problem, scales), start, free, config)?;
     enough_equations(&declared)?;
     let solved = match near {
         // The first fit that counts is that with the priors which the other one learnt.
@@ -107,7 +128,7 @@ fn fit_from(
     };
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let known = near.map(|n| &n.prior_scales);
-    let learnt = priors::learnt(problem, (&declared, &solved), known, free, config)?;
+    let learnt = priors::learnt(problem, (&declared, &solved, scales), known, free, config)?;
     let of_learnt = |(white, solved): &(Whitened<'_>, Solved)| {
         [priors::said(white), wider::said(problem, white, solved)].into_iter().flatten()
     };

@@ -1,8 +1,21 @@
-//! The nominal arm with its frames placed, carried over from one calibration to another of the same arm.
+//! The nominal arm with its frames placed, and where its fit ended, carried over from one calibration to another of the same arm.
 
 use crate::outcome::Calibration;
+use crate::priors::{PriorScales, scales_of};
 use armcal_model::Model;
 use std::collections::BTreeMap;
+
+/// Scales of learnt priors are carried over so many times as wide: from there they are learnt as from the default ones, which are
+/// the widest. What a fit without an effect had to explain by the arm may be narrower with it, or wider.
+const FROM_ABOVE: f64 = 3.0;
+
+/// Where a fit ended.
+#[derive(Debug, Clone)]
+pub(crate) struct Ended {
+    pub values: Vec<f64>,
+    /// From which priors are learnt.
+    pub prior_scales: PriorScales,
+}
 
 /// Parameters that give the nominal errors, where they are known.
 #[derive(Debug, Default)]
@@ -11,6 +24,8 @@ pub(crate) struct Nominal {
     pub of_all: Option<Vec<f64>>,
     /// In each turn of the hold-out.
     pub turns: Vec<Vec<f64>>,
+    /// Of the fit itself.
+    pub ended: Option<Ended>,
 }
 
 /// Those of another calibration for a model that has its parameters and more effects; none where one of these does something
@@ -37,7 +52,13 @@ pub(crate) fn of_turns(other: &Calibration, model: &Model) -> Option<Nominal> {
     let carried = |values: &Vec<f64>| -> Vec<f64> {
         at.iter().zip(parameters).map(|(at, p)| at.map_or(p.nominal, |k| values[k])).collect()
     };
+    let fitted: Vec<f64> = other.fit.values();
+    let learnt = at.iter().zip(parameters).filter_map(|(at, p)| Some((&other.fit.estimates[(*at)?], p)));
+    let mut prior_scales = scales_of(learnt);
+    prior_scales.values_mut().for_each(|scale| *scale = (*scale * FROM_ABOVE).min(1.0));
+    let ended = Ended { values: carried(&fitted), prior_scales };
     Some(Nominal {
+        ended: Some(ended),
         of_all: Some(carried(&other.nominal_values)),
         turns: other.turn_nominal_values.iter().map(carried).collect(),
     })

@@ -12,7 +12,7 @@
 //! is the widest it becomes. Bounds that the arm goes beyond are [`crate::wider`]'s matter.
 
 use crate::fit::{Solved, solve};
-use crate::outcome::{Estimate, Fit};
+use crate::outcome::Estimate;
 use crate::problem::{Problem, Told, as_beneath};
 use crate::rows::Kept;
 use crate::statistics::posterior;
@@ -65,12 +65,12 @@ impl Problem for WithPriors<'_> {
 /// Scale of each kind of prior, as a share of the default one.
 pub(crate) type PriorScales = BTreeMap<ParameterKind, f64>;
 
-/// The scales that a fit learnt of the default priors of `parameters`.
-pub(crate) fn scales_of(fit: &Fit, parameters: &[Parameter]) -> PriorScales {
+/// The scales that a fit learnt: of each of its estimates beside the same parameter with its default prior.
+pub(crate) fn scales_of<'a>(fit: impl Iterator<Item = (&'a Estimate, &'a Parameter)>) -> PriorScales {
     let scale = |(e, default): (&Estimate, &Parameter)| {
         Some((default.assumed?, e.parameter.prior_sigma? / default.prior_sigma?))
     };
-    fit.estimates.iter().zip(parameters).filter(|(e, _)| e.parameter.free).filter_map(scale).collect()
+    fit.filter(|(e, _)| e.parameter.free).filter_map(scale).collect()
 }
 
 /// Whether [`learnt`] fits with scales that another fit learnt, whatever the fit with the default priors is.
@@ -83,11 +83,24 @@ fn are_learnt(white: &Whitened<'_>, config: &FitConfig) -> bool {
     config.learn_priors && config.objective != Objective::Paper && white.axes.iter().any(is_assumed)
 }
 
-/// A fit with priors as narrow as the data ask for, from the fit with the default ones and from the scales that a fit to
-/// nearly the same data learnt; none where all are declared.
+/// A problem with its priors, as far as nobody declared them, at scales of the default ones.
+pub(crate) fn scaled<'a>(problem: &'a dyn Problem, scales: &PriorScales) -> Box<dyn Problem + 'a> {
+    if scales.is_empty() {
+        return Box::new(problem);
+    }
+    let mut parameters = problem.parameters().to_vec();
+    for p in &mut parameters {
+        let scale = p.assumed.and_then(|kind| scales.get(&kind));
+        p.prior_sigma = p.prior_sigma.map(|sigma| sigma * scale.unwrap_or(&1.0));
+    }
+    Box::new(WithPriors { problem, parameters })
+}
+
+/// A fit with priors as narrow as the data ask for, from a fit with priors at some scales of the default ones and from the scales
+/// that a fit to nearly the same data learnt; none where all are declared.
 pub(crate) fn learnt<'a>(
     problem: &'a dyn Problem,
-    (white, solved): (&Whitened<'_>, &Solved),
+    (white, solved, begun): (&Whitened<'_>, &Solved, &PriorScales),
     near: Option<&PriorScales>,
     free: &dyn Fn(&Parameter) -> bool,
     config: &FitConfig,
@@ -102,7 +115,7 @@ pub(crate) fn learnt<'a>(
         let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
         let next = match proposed.take() {
             Some(scales) => scales,
-            None => rescaled(&scales, white, solved)?,
+            None => rescaled(if scales.is_empty() { begun } else { &scales }, white, solved)?,
         };
         let kept = |(kind, scale): (&ParameterKind, &f64)| {
             scales.get(kind).is_some_and(|old| (scale / old - 1.0).abs() < TOLERANCE)
@@ -111,13 +124,8 @@ pub(crate) fn learnt<'a>(
             break;
         }
         scales = next;
-        let mut parameters = problem.parameters().to_vec();
-        for p in &mut parameters {
-            let scale = p.assumed.and_then(|kind| scales.get(&kind));
-            p.prior_sigma = p.prior_sigma.map(|sigma| sigma * scale.unwrap_or(&1.0));
-        }
         let start = white.parameters_at(&solved.at.x);
-        let again = Whitened::new(Box::new(WithPriors { problem, parameters }), &start, free, config)?;
+        let again = Whitened::new(scaled(problem, &scales), &start, free, config)?;
         let mut better = solve(&again, Some(solved.sigma_scale), config)?;
         better.iterations += solved.iterations;
         latest = Some((again, better));

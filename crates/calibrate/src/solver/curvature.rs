@@ -1,6 +1,7 @@
 //! The matrix of a quadratic model: dense, or in the shape of an arrow where groups have unknowns of their own.
 
 use super::arrow::Arrow;
+use super::blocked::{cholesky, inverse};
 use crate::covariance::Covariance;
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +34,7 @@ impl Curvature {
         let Curvature::Dense(h) = self else { return self.arrow()?.solve_free(right, held) };
         let free: Vec<usize> = (0..right.len()).filter(|&i| !held[i]).collect();
         let block = DMatrix::from_fn(free.len(), free.len(), |r, c| h[(free[r], free[c])]);
-        let solution = block.cholesky()?.solve(&DVector::from_fn(free.len(), |r, _| right[free[r]]));
+        let solution = cholesky(block)?.solve(&DVector::from_fn(free.len(), |r, _| right[free[r]]));
         let mut all = DVector::zeros(right.len());
         free.iter().zip(solution.iter()).for_each(|(&i, value)| all[i] = *value);
         Some(all)
@@ -46,7 +47,7 @@ impl Curvature {
             Curvature::Dense(h) => {
                 let mut sum = h * data;
                 (0..by.len()).for_each(|k| sum[(k, k)] += by[k]);
-                sum.cholesky().map(|factor| factor.inverse().into())
+                Some(inverse(&cholesky(sum)?)?.into())
             }
             Curvature::Arrow(arrow) => arrow.damped(by).inverse(data),
         }

@@ -11,6 +11,7 @@
 //! ms by the bounded LM, which stopped 2.6e-3 above the minimum.
 
 mod arrow;
+mod blocked;
 mod bounded_qp;
 mod curvature;
 mod levenberg;

@@ -121,7 +121,7 @@ fn from_the_scales_of_other_data_a_fit_comes_to_its_own() {
     let near = Near {
         values: fit.values(),
         sigma_scale: fit.sigma_scale,
-        prior_scales: scales_of(&fit, &all.parameters),
+        prior_scales: scales_of(fit.estimates.iter().zip(&all.parameters)),
         looked: None,
     };
     let turn = fit_near(&own, near, &|p| p.free, &config()).unwrap();
