@@ -1,13 +1,12 @@
-use crate::support::{number, real_recordings, root, run_pipeline, shipped};
+use crate::support::{number, real_recordings, root, run_as_shipped, run_pipeline, shipped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Runs a shipped pipeline on real recordings: the folder of these, and the summary. Exit code 3 is allowed: on every
-/// one of these robots geometry is not adequate, and saying so is right.
+/// A shipped pipeline on real recordings: the folder of these, and the summary. On every one of these robots geometry is not
+/// adequate, and saying so is right.
 fn run(pipeline: &str) -> Option<(PathBuf, Value)> {
     let real = real_recordings()?;
-    let out = tempfile::tempdir().expect("temporary folder");
-    let summary = run_pipeline(&root().join("pipelines").join(pipeline), out.path(), &[0, 3]);
+    let summary = run_as_shipped(pipeline);
     let [nominal, fitted] = held_out_mm(&summary);
     println!("{pipeline}: held out {nominal:.3} -> {fitted:.3} mm");
     Some((real, summary))
@@ -47,8 +46,7 @@ fn panda_unit_1_without_a_camera() {
 /// placement left out; armcal, which also has the 50 mm between the sockets to keep, may be a tenth off either.
 #[test]
 fn panda_unit_4_from_the_fixtures_without_a_camera() {
-    let out = tempfile::tempdir().expect("temporary folder");
-    let summary = run_pipeline(&root().join("pipelines/mukca-panda4.toml"), out.path(), &[0, 3]);
+    let summary = run_as_shipped("mukca-panda4.toml");
     let rms = |side: &str| number(&summary, &format!("/fit/holdout/{side}_mm/rms"));
     println!("mukca-panda4.toml: held out {:.3} -> {:.3} mm rms", rms("nominal"), rms("fitted"));
     assert!((rms("nominal") / 3.90 - 1.0).abs() < 0.1, "{} mm rms", rms("nominal"));
