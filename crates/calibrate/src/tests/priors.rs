@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use crate::fit::{Near, fit_near};
+use crate::fit::{Near, fit_near, fit_where_priors};
 use crate::priors::scales_of;
 use crate::problem::{Linearised, Problem};
 use crate::{FitConfig, Objective, Scale, fit_problem};
@@ -128,6 +128,28 @@ fn from_the_scales_of_other_data_a_fit_comes_to_its_own() {
     let (found, alone) = (turn.estimates[0].parameter.prior_sigma.unwrap(), learnt(&own, &config())[0]);
     assert!((found / alone - 1.0).abs() < 0.02, "{found} and {alone}");
     assert!(found > 1.5 * fit.estimates[0].parameter.prior_sigma.unwrap());
+}
+
+/// Priors that begin between the default ones and those that the data ask for are learnt to the same widths, and said; at the default
+/// ones too, where the data ask for no narrower.
+#[test]
+fn from_above_priors_are_learnt_alike_wherever_they_begin() {
+    for (spread_m, wider) in [(3e-4, 3.0), (3e-4, 10.0), (9e-3, 1.0)] {
+        let all = problem(&[(ParameterKind::Length, spread_m), (ParameterKind::JointZero, 1e-3)], 30, 7);
+        let alone = fit_problem(&all, &[0.0; 60], &|p| p.free, &config()).unwrap();
+        let mut scales = scales_of(alone.estimates.iter().zip(&all.parameters));
+        assert_eq!(scales.len(), 2);
+        scales.values_mut().for_each(|scale| *scale = (*scale * wider).min(1.0));
+        let begun = fit_where_priors(&all, (&alone.values(), &scales), &|p| p.free, &config()).unwrap();
+        for (a, b) in alone.estimates.iter().zip(&begun.estimates) {
+            let [alone, begun] = [a, b].map(|e| e.parameter.prior_sigma.unwrap());
+            assert!((begun / alone - 1.0).abs() < 0.02, "{begun} and {alone}");
+            assert!((a.value - b.value).abs() < 0.01 * a.sigma, "{}", a.parameter.name);
+        }
+        let codes = [&alone, &begun].map(|fit| fit.warnings.iter().map(|w| w.code).collect::<Vec<_>>());
+        assert_eq!(codes[0], codes[1]);
+        assert!(codes[0].contains(&"priors-learnt"), "{codes:?}");
+    }
 }
 
 /// An arm of which one length is 6 mm off: a millimetre more than anybody assumed.
