@@ -20,10 +20,10 @@ use crate::model_problem::{
     ModelProblem, describe, not_recording_by_recording, position_covariance_m2, whitened,
 };
 use crate::noise::expected_norm_m;
-use crate::nominal::{self, Nominal};
-use crate::outcome::{Calibration, Estimate, Fit, Residual, SideErrors};
+use crate::nominal::{self, Nominal, Start};
+use crate::outcome::{Calibration, Fit, Residual, SideErrors};
 use crate::poses::measured_together;
-use crate::priors::{PriorScales, scales_of};
+use crate::priors::scales_of;
 use crate::remembered::{Looked, look};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
@@ -267,8 +267,11 @@ impl Judge<'_> {
                 let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
                 fit_near(&train, near, &free, self.config)?
             }
-            None => match self.beside(&nominal_values, &of_unseen) {
-                Some((start, scales)) => fit_where_priors(&train, (&start, scales), &free, self.config)?,
+            None => match self.nominal.start.as_ref().filter(|_| self.config.objective != Objective::Paper) {
+                Some(Start { values, prior_scales }) => {
+                    let values = self.without(&of_unseen, values, &nominal_values);
+                    fit_where_priors(&train, (&values, prior_scales), &free, self.config)?
+                }
                 None => fit_problem(&train, &nominal_values, &free, self.config)?,
             },
         };
@@ -335,22 +338,20 @@ impl Predicted {
 impl Judge<'_> {
     /// Where a fit ended, as a start; what the turn must not know of is at nominal.
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
-        let start = |(e, nominal): (&Estimate, &f64)| if unseen(&e.parameter) { *nominal } else { e.value };
-        let values = fit.estimates.iter().zip(nominal_values).map(start).collect();
+        let values = self.without(unseen, &fit.values(), nominal_values);
         let prior_scales = scales_of(fit.estimates.iter().zip(self.model.parameters()));
         Near { values, sigma_scale: fit.sigma_scale, prior_scales, looked: None }
     }
 
-    /// Where the fit of the same arm with fewer effects ended, as a start; what this one must not know of is at nominal.
-    fn beside(
+    /// Parameters, those that are `unseen` at nominal.
+    fn without(
         &self,
-        nominal_values: &[f64],
         unseen: &dyn Fn(&Parameter) -> bool,
-    ) -> Option<(Vec<f64>, &PriorScales)> {
-        let ended = self.nominal.ended.as_ref().filter(|_| self.config.objective != Objective::Paper)?;
-        let each = self.model.parameters().iter().zip(&ended.values).zip(nominal_values);
-        let values = each.map(|((p, value), nominal)| if unseen(p) { *nominal } else { *value }).collect();
-        Some((values, &ended.prior_scales))
+        values: &[f64],
+        nominal_values: &[f64],
+    ) -> Vec<f64> {
+        let each = self.model.parameters().iter().zip(values).zip(nominal_values);
+        each.map(|((p, value), nominal)| if unseen(p) { *nominal } else { *value }).collect()
     }
 
     /// All observations where the fit to them ended, for several turns that begin there.

@@ -31,8 +31,6 @@ const GENEROUS: f64 = 3.0;
 const SCALE_TOLERANCE: f64 = 3e-3;
 /// Rounds of fit and scale.
 const SCALE_ROUNDS: usize = 30;
-/// Derivatives that may stay all the way of a fit near another: that where the other one ended, then that where the first one led.
-const STAYING: usize = 2;
 /// Rounds of fit and noise, and the change of a parameter, in units of its prior, that ends them.
 const NOISE_ROUNDS: usize = 8;
 const NOISE_TOLERANCE: f64 = 1e-3;
@@ -79,14 +77,17 @@ pub(crate) fn fit_near(
     let looked = near.looked.take();
     let mut known = looked.clone().filter(|_| !config.every_step);
     let mut start = near.values.clone();
-    for _ in 0..STAYING {
+    // A derivative that stays all the way: that where the other fit ended, then that where the first one led.
+    for is_renewed in [false, true] {
+        if is_renewed {
+            known = Some(Arc::unwrap_or_clone(look(problem, &start, free, config)?));
+        }
         let Some(about) = known.as_ref().and_then(|looked| Remembered::about(problem, looked)) else { break };
         let fit = fit_from(&about, (&start, &PriorScales::new()), Some(&near), free, config)?;
         start = fit.values();
         if about.is_straight_to(&start) {
             return Ok(fit);
         }
-        known = Some(Arc::unwrap_or_clone(look(problem, &start, free, config)?));
     }
     let start = (near.values.as_slice(), &PriorScales::new());
     fit_from(&Remembered::new(problem, looked), start, Some(&near), free, config)

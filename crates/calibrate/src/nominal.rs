@@ -9,23 +9,23 @@ use std::collections::BTreeMap;
 /// the widest. What a fit without an effect had to explain by the arm may be narrower with it, or wider.
 const FROM_ABOVE: f64 = 3.0;
 
-/// Where a fit ended.
-#[derive(Debug, Clone)]
-pub(crate) struct Ended {
+/// Where a fit may begin.
+#[derive(Debug)]
+pub(crate) struct Start {
     pub values: Vec<f64>,
-    /// From which priors are learnt.
+    /// Of the default priors, from which they are learnt.
     pub prior_scales: PriorScales,
 }
 
-/// Parameters that give the nominal errors, where they are known.
+/// Parameters that give the nominal errors, and where the fit begins, as far as they are known.
 #[derive(Debug, Default)]
 pub(crate) struct Nominal {
     /// On all observations.
     pub of_all: Option<Vec<f64>>,
     /// In each turn of the hold-out.
     pub turns: Vec<Vec<f64>>,
-    /// Of the fit itself.
-    pub ended: Option<Ended>,
+    /// Where the fit without the added effects ended.
+    pub start: Option<Start>,
 }
 
 /// Those of another calibration for a model that has its parameters and more effects; none where one of these does something
@@ -52,13 +52,11 @@ pub(crate) fn of_turns(other: &Calibration, model: &Model) -> Option<Nominal> {
     let carried = |values: &Vec<f64>| -> Vec<f64> {
         at.iter().zip(parameters).map(|(at, p)| at.map_or(p.nominal, |k| values[k])).collect()
     };
-    let fitted: Vec<f64> = other.fit.values();
     let learnt = at.iter().zip(parameters).filter_map(|(at, p)| Some((&other.fit.estimates[(*at)?], p)));
     let mut prior_scales = scales_of(learnt);
     prior_scales.values_mut().for_each(|scale| *scale = (*scale * FROM_ABOVE).min(1.0));
-    let ended = Ended { values: carried(&fitted), prior_scales };
     Some(Nominal {
-        ended: Some(ended),
+        start: Some(Start { values: carried(&other.fit.values()), prior_scales }),
         of_all: Some(carried(&other.nominal_values)),
         turns: other.turn_nominal_values.iter().map(carried).collect(),
     })
