@@ -5,6 +5,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::refits::add_refits;
 use crate::setup::{self, Inputs};
+use crate::stages::associated::Associated;
 use crate::stages::measures::Measures;
 use crate::stages::observe::Observed;
 use crate::stages::{frames, observe, perceive};
@@ -97,6 +98,7 @@ pub fn settle(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error
         seen,
         changes: Vec::new(),
         most_rounds: MAX_ROUNDS,
+        known: Associated::default(),
     };
     let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
     progress.step("checking the setup");
@@ -117,12 +119,13 @@ fn without_setup(source: Error, inputs: &Inputs) -> Error {
 
 /// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
 pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, Error> {
-    let Inputs { pipeline, chain, board, seen, changes, .. } = inputs;
+    let Inputs { pipeline, chain, board, seen, changes, known, .. } = inputs;
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
     frames::change_nominals(&mut geometry, changes)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
-    let mut places = observe::associate_all(pipeline, board, &geometry, &geometry.nominal(), false, seen)?;
+    let mut places =
+        observe::associate_all(pipeline, board, &geometry, &geometry.nominal(), false, (seen, known))?;
     let measures = Measures::of(pipeline, seen);
     let near = match measures.is_empty() {
         true => Vec::new(),
@@ -145,7 +148,7 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
         let mut next = None;
         if rounds < inputs.most_rounds {
             let values = calibration.fit.values();
-            let again = observe::associate_all(pipeline, board, &model, &values, true, seen)?;
+            let again = observe::associate_all(pipeline, board, &model, &values, true, (seen, known))?;
             let closing = measures.closing(&model, &calibration, &near);
             let settled = observe::same_places(&again, &places) && closing == measured;
             next = (!settled).then_some((again, closing));

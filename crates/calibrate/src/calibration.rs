@@ -24,10 +24,10 @@ use crate::nominal::{self, Nominal, Start};
 use crate::outcome::{Calibration, Fit, Residual, SideErrors};
 use crate::poses::measured_together;
 use crate::priors::scales_of;
-use crate::remembered::{Looked, look};
+use crate::remembered::{Looked, look, stays};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
-use armcal_model::Model;
+use armcal_model::{Model, ModelResidual};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -109,9 +109,9 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     // derivative of that is exact enough for it.
     let near = match judge.config.objective {
         Objective::Paper => None,
-        _ => Some((&last, judge.look(&last, holdout.turns.len())?)),
+        _ => Some(judge.look(&last, holdout.turns.len())?),
     };
-    let near = near.as_ref().map(|(last, looked)| (*last, looked.as_deref()));
+    let near = near.as_ref();
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
     let turns: Vec<Result<Turn, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
@@ -219,6 +219,15 @@ fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
     (0..last.fit.estimates.len()).map(|k| if free(&k) { largest(k) } else { 1.0 }).collect()
 }
 
+/// The fit to all observations, for turns that begin where it ended.
+struct All<'a> {
+    last: &'a Turn,
+    /// All observations there, for several turns.
+    looked: Option<Arc<Looked>>,
+    /// The same at the nominal arm in its frames, where no turn knows these and the observations are very many.
+    frames: Option<Arc<Looked>>,
+}
+
 /// Observations that can be fitted without some of them, and the error of each.
 struct Judge<'a> {
     model: &'a Model,
@@ -230,12 +239,12 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// Fits without the observations `held`, from nominal or from the turn `near` that saw them too. Where the nominal arm and
-    /// its frames are known they are not looked for.
+    /// Fits without the observations `held`, from nominal or from where the fit ended that saw them too. Where the nominal arm
+    /// and its frames are known they are not looked for.
     fn turn(
         &self,
         (held, nominal): (&[usize], Option<&Vec<f64>>),
-        near: Option<(&Turn, Option<&Looked>)>,
+        near: Option<&All<'_>>,
     ) -> Result<Turn, CalibrateError> {
         let places = |is_held: bool| -> Vec<usize> {
             let all = 0..self.observations.len();
@@ -255,16 +264,20 @@ impl Judge<'_> {
         let unseen = self.frames_only_in(&test, &train);
         let names: BTreeSet<&str> = unseen.iter().map(String::as_str).collect();
         let of_unseen = |p: &Parameter| names.contains(frames::frame_of(p));
+        let same = near.and_then(|_| self.blocks_of(&train, &seen));
         let mut nominal_values = match (nominal, near) {
             (Some(known), _) => known.clone(),
-            (None, Some((near, _))) => frames::fit_on_fewer(&train, &near.nominal_values, self.config)?,
+            (None, Some(near)) => {
+                let frames = near.frames.as_ref().zip(same.as_ref()).map(|(all, same)| all.of(same));
+                frames::fit_on_fewer(&train, &near.last.nominal_values, frames.as_ref(), self.config)?
+            }
             (None, None) => frames::fit_on(&train, self.config)?,
         };
         let free = |p: &Parameter| p.free && !of_unseen(p);
         let mut fit = match near {
-            Some((near, looked)) => {
-                let looked = looked.and_then(|looked| self.looked_at(looked, &seen, &train));
-                let near = Near { looked, ..self.near(&near.fit, &nominal_values, &of_unseen) };
+            Some(near) => {
+                let looked = near.looked.as_ref().zip(same.as_ref()).map(|(all, same)| all.of(same));
+                let near = Near { looked, ..self.near(&near.last.fit, &nominal_values, &of_unseen) };
                 fit_near(&train, near, &free, self.config)?
             }
             None => match self.nominal.start.as_ref().filter(|_| self.config.objective != Objective::Paper) {
@@ -291,9 +304,9 @@ impl Judge<'_> {
     /// These observations as a turn predicts them.
     fn residuals(&self, of: &[usize], turn: &Turn, held_out: bool) -> Result<Vec<Residual>, CalibrateError> {
         let (values, nominal_values) = (&turn.values, &turn.nominal_values);
-        let here = |&i: &usize| Predicted::of(self.model, &self.observations[i], values, nominal_values);
+        let here = || of.iter().map(|i| &self.observations[*i]).collect::<Vec<_>>();
         let predicted = match self.elsewhere {
-            None => of.iter().map(here).collect::<Result<Vec<_>, _>>()?,
+            None => Predicted::all(self.model, &here(), values, nominal_values)?,
             Some(who) => errors_elsewhere(who, of, values, nominal_values)?,
         };
         let residual =
@@ -316,22 +329,31 @@ pub(crate) struct Predicted {
 }
 
 impl Predicted {
-    pub fn of(
+    /// Of every one of these observations, in their order.
+    pub fn all(
         model: &Model,
-        o: &Observation,
+        observations: &[&Observation],
         values: &[f64],
         nominal_values: &[f64],
-    ) -> Result<Predicted, CalibrateError> {
-        let covariance = position_covariance_m2(model, values, o);
-        let fitted = model.residual(values, o);
-        let whitened = whitened(&fitted, &covariance)
-            .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
-        Ok(Predicted {
-            nominal_m: model.residual(nominal_values, o).position_m,
-            fitted_m: fitted.position_m,
-            whitened,
-            expected_norm_m: expected_norm_m(&covariance),
-        })
+    ) -> Result<Vec<Predicted>, CalibrateError> {
+        let residuals = |p: &[f64]| {
+            let mut all = Vec::with_capacity(observations.len());
+            model.residuals(p, observations, false, &mut |_, residual| all.push(residual));
+            all
+        };
+        let both = residuals(values).into_iter().zip(residuals(nominal_values));
+        let one = |(o, (fitted, nominal)): (&&Observation, (ModelResidual, ModelResidual))| {
+            let covariance = position_covariance_m2(model, values, o);
+            let whitened = whitened(&fitted, &covariance)
+                .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
+            Ok(Predicted {
+                nominal_m: nominal.position_m,
+                fitted_m: fitted.position_m,
+                whitened,
+                expected_norm_m: expected_norm_m(&covariance),
+            })
+        };
+        observations.iter().zip(both).map(one).collect()
     }
 }
 
@@ -354,24 +376,28 @@ impl Judge<'_> {
         each.map(|((p, value), nominal)| if unseen(p) { *nominal } else { *value }).collect()
     }
 
-    /// All observations where the fit to them ended, for several turns that begin there.
-    fn look(&self, last: &Turn, turns: usize) -> Result<Option<Arc<Looked>>, CalibrateError> {
+    /// All observations where the fit to them ended, as turns that begin there will ask of it.
+    fn look<'t>(&self, last: &'t Turn, turns: usize) -> Result<All<'t>, CalibrateError> {
         if turns < 2 || self.elsewhere.is_some() {
-            return Ok(None);
+            return Ok(All { last, looked: None, frames: None });
         }
         let problem = ModelProblem::new(self.model, self.observations, self.config)?;
-        look(&problem, &last.values, &|p| p.free, self.config).map(Some)
+        let looked = look(&problem, &last.values, &|p| p.free, self.config)?;
+        let frames = match self.nominal.turns.len() == turns || !stays(&problem) {
+            true => None,
+            false => frames::look(&problem, &last.nominal_values, self.config)?,
+        };
+        Ok(All { last, looked: Some(looked), frames })
     }
 
-    /// What is known of all observations, of a problem with those at these places; none where its blocks are others.
-    fn looked_at(&self, all: &Looked, places: &[usize], train: &ModelProblem<'_>) -> Option<Looked> {
+    /// The blocks among those of all that a problem with the observations at these places has; none where its blocks are others.
+    fn blocks_of(&self, train: &ModelProblem<'_>, places: &[usize]) -> Option<Vec<usize>> {
         let blocks = measured_together(self.observations);
         let of = |run: &Range<usize>| {
             let block = blocks.binary_search_by_key(&places[run.start], |block| block.start).ok()?;
             (blocks[block].len() == run.len()).then_some(block)
         };
-        let same: Option<Vec<usize>> = train.runs().iter().map(of).collect();
-        same.map(|same| all.of(&same))
+        train.runs().iter().map(of).collect()
     }
 
     /// Estimated frames (and what else a recording of a pool has for itself, unless it was measured) that `test` says

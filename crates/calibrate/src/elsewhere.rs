@@ -213,11 +213,9 @@ pub fn answer(
     }
     let told = match &request.question {
         Question::Sums(evaluation) => evaluation.sums(model, &own, config).map(Numbers::Sums),
-        Question::Errors { values, nominal_values } => own
-            .into_iter()
-            .map(|o| Predicted::of(model, o, values, nominal_values))
-            .collect::<Result<_, _>>()
-            .map(Numbers::Errors),
+        Question::Errors { values, nominal_values } => {
+            Predicted::all(model, &own, values, nominal_values).map(Numbers::Errors)
+        }
     };
     Some(Answer(told.map_err(|e| e.to_string())))
 }

@@ -6,14 +6,16 @@
 //! turns off. What remains is left to the solver, over these parameters alone.
 
 use crate::model_problem::ModelProblem;
-use crate::problem::Problem as _;
+use crate::problem::Problem;
+use crate::remembered::{self, Looked, Remembered};
 use crate::rigid_fit::{Pair, rigid_fit, weights_of};
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig, Objective, fit};
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Role};
-use armcal_model::Model;
+use armcal_model::{Model, ModelResidual};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Rounds of the alternation, and the change [m, rad] below which it ends: the solver, which goes on from there, closes in on the
 /// minimum much faster.
@@ -62,10 +64,25 @@ pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<V
     fit_some(problem, problem.model().nominal(), config, &|p| touched.contains(frame_of(p)))
 }
 
+/// A problem where its frames ended, as fits of them to most of its observations will ask of it; none where no frame is free.
+pub(crate) fn look(
+    problem: &ModelProblem<'_>,
+    values: &[f64],
+    config: &FitConfig,
+) -> Result<Option<Arc<Looked>>, CalibrateError> {
+    let touched = touched(problem);
+    let free = |p: &Parameter| is_free(p) && touched.contains(frame_of(p));
+    let any = problem.parameters().iter().any(free);
+    any.then(|| remembered::look(problem, values, &free, config)).transpose()
+}
+
 /// [`fit_on`] from where the frames of more observations ended, those among them: to the same minimum, only the way is shorter.
+/// Of very many, first with the derivative where that was `looked` at: errors of a nominal arm are large, so that what it changes
+/// on the way counts, and the last steps are exact.
 pub(crate) fn fit_on_fewer(
     problem: &ModelProblem<'_>,
     of_more: &[f64],
+    looked: Option<&Looked>,
     config: &FitConfig,
 ) -> Result<Vec<f64>, CalibrateError> {
     let touched = touched(problem);
@@ -73,7 +90,16 @@ pub(crate) fn fit_on_fewer(
     let mut start = problem.model().nominal();
     let known = problem.parameters().iter().zip(of_more).zip(&mut start).filter(|((p, _), _)| free(p));
     known.for_each(|((_, value), start)| *start = *value);
-    solved(problem, start, config, &free)
+    let looked = looked.filter(|_| !config.every_step);
+    let roughly = match looked.and_then(|looked| Remembered::about(problem, looked)) {
+        Some(about) => Some(solved(&about, (&start, None), config, &free)?),
+        None => None,
+    };
+    let from = match &roughly {
+        Some((near, sigma_scale)) => (near, Some(*sigma_scale)),
+        None => (&start, None),
+    };
+    Ok(solved(problem, from, config, &free)?.0)
 }
 
 fn touched(problem: &ModelProblem<'_>) -> BTreeSet<String> {
@@ -90,36 +116,38 @@ pub(crate) fn fit_some(
     let free = |p: &Parameter| is_free(p) && which(p);
     let start = aligned(problem, config, start, &free);
     if let Some(most_m) = config.give_up_above_m {
-        let error_m = |o: &&Observation| problem.model().residual(&start, o).position_m.norm();
-        let observations = problem.observations();
-        let mean_m = observations.iter().map(error_m).sum::<f64>() / observations.len().max(1) as f64;
+        let (mut sum_m, observations) = (0.0, problem.observations());
+        let mut add = |_: &Observation, residual: ModelResidual| sum_m += residual.position_m.norm();
+        problem.model().residuals(&start, observations, false, &mut add);
+        let mean_m = sum_m / observations.len().max(1) as f64;
         if mean_m > most_m {
             return Err(CalibrateError::GivenUp { mean_m });
         }
     }
-    solved(problem, start, config, &free)
+    Ok(solved(problem, (&start, None), config, &free)?.0)
 }
 
 fn is_free(p: &Parameter) -> bool {
     p.free && p.role == Role::EstimatedFrame
 }
 
-/// The frames `free` where the solver ends with them, the others at `start`.
+/// The frames `free` where the solver ends with them, the others at the start; with the scale of the residuals in units of the
+/// declared noise, which the start comes with where it is known roughly.
 fn solved(
-    problem: &ModelProblem<'_>,
-    start: Vec<f64>,
+    problem: &dyn Problem,
+    (start, sigma_scale): (&Vec<f64>, Option<f64>),
     config: &FitConfig,
     free: &dyn Fn(&Parameter) -> bool,
-) -> Result<Vec<f64>, CalibrateError> {
+) -> Result<(Vec<f64>, f64), CalibrateError> {
     config.check()?;
     if problem.blocks() == 0 || !problem.parameters().iter().any(free) {
-        return Ok(start);
+        return Ok((start.clone(), sigma_scale.unwrap_or(1.0)));
     }
-    let white = Whitened::new(Box::new(problem), &start, free, config)?;
+    let white = Whitened::new(Box::new(problem), start, free, config)?;
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
-    let solved = fit::solve(&white, None, &FitConfig { objective, ..config.clone() })?;
-    Ok(white.parameters_at(&solved.at.x))
+    let solved = fit::solve(&white, sigma_scale, &FitConfig { objective, ..config.clone() })?;
+    Ok((white.parameters_at(&solved.at.x), solved.sigma_scale))
 }
 
 /// The alternation on all observations; what a recording has copies of then on its own ones.

@@ -236,6 +236,12 @@ impl<'a> ModelProblem<'a> {
     fn of_block(&self, block: usize) -> &[&'a Observation] {
         &self.observations[self.blocks[block].clone()]
     }
+
+    /// The observations of neighbouring blocks; none of no blocks.
+    fn of_blocks(&self, blocks: &Range<usize>) -> Option<&[&'a Observation]> {
+        let (first, last) = (self.blocks.get(blocks.start)?, self.blocks.get(blocks.end.checked_sub(1)?)?);
+        self.observations.get(first.start..last.end)
+    }
 }
 
 /// d orientation of a feature in world axes / d joint reading, by central differences.
@@ -293,11 +299,24 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64> {
-        let rows = self
-            .of_block(block)
-            .iter()
-            .flat_map(|o| self.model.residual(p, o).rows().take(self.rows(o)).collect::<Vec<f64>>());
-        DVector::from_vec(rows.collect())
+        let mut residual = Vec::new();
+        self.residual_each(block..block + 1, p, &mut |_, rows| residual.extend_from_slice(rows));
+        DVector::from_vec(residual)
+    }
+
+    fn residual_each(&self, blocks: Range<usize>, p: &[f64], each: &mut dyn FnMut(usize, &[f64])) {
+        let Some(of_blocks) = self.of_blocks(&blocks) else { return };
+        let (mut block, mut seen, mut rows) = (blocks.start, 0, Vec::new());
+        let mut of = |o: &Observation, residual: ModelResidual| {
+            rows.extend(residual.rows().take(self.rows(o)));
+            seen += 1;
+            if seen == self.blocks[block].len() {
+                each(block, &rows);
+                rows.clear();
+                (block, seen) = (block + 1, 0);
+            }
+        };
+        self.model.residuals(p, of_blocks, self.use_orientation, &mut of);
     }
 
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised {
@@ -309,10 +328,7 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
-        let Some(first) = self.blocks.get(blocks.start).filter(|_| !blocks.is_empty()) else {
-            return;
-        };
-        let of_blocks = first.start..self.blocks[blocks.end - 1].end;
+        let Some(of_blocks) = self.of_blocks(&blocks) else { return };
         let (mut block, mut parts) = (blocks.start, Vec::new());
         let mut of = |o: &Observation, residual: ModelResidual, jacobian: DMatrix<f64>| {
             parts.push(self.used(o, (residual, jacobian)));
@@ -321,7 +337,7 @@ impl Problem for ModelProblem<'_> {
                 block += 1;
             }
         };
-        for run in self.alike(&self.observations[of_blocks]) {
+        for run in self.alike(of_blocks) {
             let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
             model.residuals_with_jacobians(&p, run, (asked, self.use_orientation), &mut of);
         }

@@ -58,6 +58,10 @@ pub trait Problem: Sync {
     }
     /// Measured minus predicted at parameters `p`.
     fn residual(&self, block: usize, p: &[f64]) -> DVector<f64>;
+    /// Calls `each` with the rows of [`Problem::residual`] of these blocks, in order.
+    fn residual_each(&self, blocks: Range<usize>, p: &[f64], each: &mut dyn FnMut(usize, &[f64])) {
+        blocks.for_each(|block| each(block, self.residual(block, p).as_slice()));
+    }
     /// The same with its derivative, one column for each parameter that the block knows ([`Problem::known`]);
     /// fixed ones may be zero.
     fn linearised(&self, block: usize, p: &[f64]) -> Linearised;
@@ -112,6 +116,15 @@ macro_rules! as_beneath {
 
         fn residual(&$self, block: usize, p: &[f64]) -> nalgebra::DVector<f64> {
             $beneath.residual(block, p)
+        }
+
+        fn residual_each(
+            &$self,
+            blocks: std::ops::Range<usize>,
+            p: &[f64],
+            each: &mut dyn FnMut(usize, &[f64]),
+        ) {
+            $beneath.residual_each(blocks, p, each);
         }
 
         fn linearised(&$self, block: usize, p: &[f64]) -> $crate::problem::Linearised {

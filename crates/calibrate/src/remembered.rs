@@ -67,6 +67,11 @@ const MANY_BLOCKS: usize = 1_000;
 /// standard deviations.
 const STRAIGHT: f64 = 1e-4;
 
+/// Whether a problem has so many blocks that the derivative stays in fits without some of them.
+pub(crate) fn stays(problem: &dyn Problem) -> bool {
+    problem.blocks() >= MANY_BLOCKS
+}
+
 /// A problem at these parameters, as fits of the parameters `free` will ask of it.
 pub(crate) fn look(
     problem: &dyn Problem,
@@ -94,7 +99,7 @@ impl<'a> Remembered<'a> {
             looked.blocks.iter().map(|block| block.get().cloned()).collect::<Option<_>>()?;
         let mut remembered = Remembered::new(problem, Some(looked.clone()));
         let looked = remembered.at(&looked.p);
-        let many = blocks.len() >= MANY_BLOCKS && blocks.len() == problem.blocks();
+        let many = stays(problem) && blocks.len() == problem.blocks();
         many.then(|| {
             let kept = Kept::of(problem.known().len().max(1));
             remembered.about = Some(About { looked, blocks, kept });
@@ -109,16 +114,17 @@ impl<'a> Remembered<'a> {
         let step: Vec<f64> = p.iter().zip(&looked.p).map(|(to, from)| to - from).collect();
         let groups = self.problem.known();
         let (mut beside, mut along) = (0.0, 0.0);
-        for (block, known) in blocks.iter().enumerate() {
-            let (residual, derivative) = &known.linearised;
+        self.problem.residual_each(0..blocks.len(), p, &mut |block, now| {
+            let (residual, derivative) = &blocks[block].linearised;
             let own = match groups.iter().find(|group| group.blocks.contains(&block)) {
                 Some(group) => group.parameters.iter().map(|k| step[*k]).collect(),
                 None => step.clone(),
             };
             let moved = derivative * DVector::from_vec(own);
-            beside += (self.problem.residual(block, p) - residual - &moved).norm_squared();
+            let both = now.iter().zip(residual.iter()).zip(moved.iter());
+            beside += both.map(|((now, then), moved)| (now - then - moved).powi(2)).sum::<f64>();
             along += moved.norm_squared();
-        }
+        });
         2.0 * beside.sqrt() <= STRAIGHT * along.sqrt()
     }
 
@@ -141,10 +147,10 @@ impl Problem for Remembered<'_> {
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
         if let Some(about) = self.about.as_ref().filter(|about| about.looked.p != p) {
-            for block in blocks {
+            self.problem.residual_each(blocks, p, &mut |block, rows| {
                 let derivative = about.blocks[block].linearised.1.clone();
-                each(block, Cow::Owned((self.problem.residual(block, p), derivative)));
-            }
+                each(block, Cow::Owned((DVector::from_column_slice(rows), derivative)));
+            });
             return;
         }
         let looked = self.at(p);

@@ -242,12 +242,14 @@ impl<'a> Whitened<'a> {
     /// Norms of the position residuals [m].
     pub fn distance_norms(&self, x: &DVector<f64>) -> Result<Vec<f64>, CalibrateError> {
         let p = self.parameters_at(x);
-        let norm = |block| {
-            let raw = self.problem.residual(block, &p);
-            self.finite(block, raw.as_slice(), "the residual")?;
-            Ok(raw.rows(0, raw.len().min(3)).norm())
-        };
-        (0..self.blocks()).map(norm).collect()
+        let (mut norms, mut done) = (Vec::with_capacity(self.blocks()), Ok(()));
+        self.problem.residual_each(0..self.blocks(), &p, &mut |block, raw| {
+            if done.is_ok() {
+                done = self.finite(block, raw, "the residual");
+                norms.push(raw.iter().take(3).map(|v| v * v).sum::<f64>().sqrt());
+            }
+        });
+        done.map(|()| norms)
     }
 
     /// The derivative of all residuals by x.
@@ -292,12 +294,15 @@ impl<'a> Whitened<'a> {
         let blocks = self.structure.groups[group].blocks.clone();
         let first = self.offsets[blocks.start];
         let mut stacked = DVector::zeros(self.offsets[blocks.end] - first);
-        for block in blocks {
-            let raw = self.problem.residual(block, p);
-            self.finite(block, raw.as_slice(), "the residual")?;
-            let at = self.offsets[block] - first;
-            whiten(&self.whitener[block], raw.as_slice(), &mut stacked.as_mut_slice()[at..at + raw.len()]);
-        }
+        let mut done = Ok(());
+        self.problem.residual_each(blocks, p, &mut |block, raw| {
+            if done.is_ok() {
+                done = self.finite(block, raw, "the residual");
+                let at = self.offsets[block] - first;
+                whiten(&self.whitener[block], raw, &mut stacked.as_mut_slice()[at..at + raw.len()]);
+            }
+        });
+        done?;
         Ok(stacked)
     }
 

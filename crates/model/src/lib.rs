@@ -30,6 +30,7 @@ mod residual;
 mod rigid;
 mod segment;
 mod skeleton;
+mod still;
 mod tree;
 mod twist;
 mod urdf;

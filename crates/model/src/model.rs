@@ -4,6 +4,7 @@ mod carried;
 mod features;
 mod linearisation;
 mod measurement;
+mod predicting;
 mod prediction;
 mod scopes;
 

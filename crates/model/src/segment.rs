@@ -1,21 +1,16 @@
 //! One piece of the tree from the world to what is measured: a few parameters, at most one joint, one small transform.
 //!
 //! This is the only place where kinematic formulas stand. They are generic over the scalar, so the
-//! derivative of a segment with respect to each of its parameters and its joint comes from the same
-//! lines that predict.
+//! derivative of a segment with respect to each of its parameters comes from the same lines that predict.
 
 use crate::rigid::{Rigid, Scalar, product, rotation_of_vector};
+use crate::still::{Still, StillMoving};
 use crate::twist::Twists;
-use nalgebra::{Matrix3, SVector, Vector3};
-use num_dual::DualSVec64;
-use std::array;
+use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
 /// Most parameters one segment has (x, y, z, rx, ry, rz of an origin).
 pub(crate) const MAX_PARAMETERS: usize = 6;
-
-/// A dual number that differentiates by all quantities of a segment at once.
-type Lanes = DualSVec64<MAX_PARAMETERS>;
 
 /// How a joint moves its segment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +48,7 @@ impl Joint {
     }
 
     /// Where the joint is at a reading.
-    pub fn at<D: Scalar>(&self, reading: D) -> D {
+    pub fn at(&self, reading: f64) -> f64 {
         match self.mimic {
             None => reading,
             Some(mimic) => reading * mimic.ratio + mimic.offset,
@@ -150,42 +145,44 @@ pub(crate) struct LinearisedSegment {
     pub motions: Twists<MAX_PARAMETERS>,
 }
 
+/// What is constant of a segment, before and behind the motion of its joint.
+pub(crate) struct Parts<D: Scalar> {
+    /// None where the joint moves its start.
+    pub before: Option<Rigid<D>>,
+    /// From where the joint moves to the end.
+    pub behind: Rigid<D>,
+}
+
+impl<D: Scalar> Parts<D> {
+    /// Both together.
+    pub fn whole(self) -> Rigid<D> {
+        self.before.map_or(self.behind, |before| before.then(&self.behind))
+    }
+}
+
 impl Segment {
     /// The transform from the frame before the segment to the one after it, predicted.
     ///
     /// `p` is the whole parameter vector and `joints` the whole joint vector; a joint that is missing is NaN.
     pub fn transform(&self, p: &[f64], joints: &[f64]) -> Rigid<f64> {
-        self.local(&p[self.parameters.clone()], self.reading(joints))
+        Still::of(self, p).transform(joints)
     }
 
-    /// [`Segment::transform`] and its derivatives, in one pass.
+    /// [`Segment::transform`] and its derivatives.
     pub fn linearised(&self, p: &[f64], joints: &[f64]) -> LinearisedSegment {
-        let own = &p[self.parameters.clone()];
-        let mut lanes = [Lanes::from(0.0); MAX_PARAMETERS];
-        for (k, (lane, &value)) in lanes.iter_mut().zip(own).enumerate() {
-            *lane = Lanes::from(value).derivative(k);
-        }
-        // Only a segment with at most five parameters has a joint: there is a lane left for it.
-        let q = Lanes::from(self.reading(joints));
-        let q = if self.joint.is_some() { q.derivative(own.len()) } else { q };
-        LinearisedSegment::from(&self.local(&lanes[..own.len()], q))
+        StillMoving::of(self, p).linearised(joints)
     }
 
     /// What is constant before and behind the motion of its joint: `transform = before * motion * behind`.
     pub fn parted(&self, p: &[f64]) -> (Rigid<f64>, Rigid<f64>) {
-        let own = &p[self.parameters.clone()];
-        match (&self.geometry, self.joint) {
-            (Geometry::ModifiedDh { hayati }, Some(_)) => {
-                let behind = with_beta(modified_dh(own[0], own[1], 0.0, 0.0), own, *hayati);
-                (modified_dh(0.0, 0.0, own[2], own[3]), behind)
-            }
-            (Geometry::StandardDh { .. }, Some(_)) => (Rigid::identity(), self.local(own, 0.0)),
-            (Geometry::Axis(_), _) => (Rigid::identity(), Rigid::identity()),
-            _ => (self.local(own, 0.0), Rigid::identity()),
+        let parts = self.parts(&p[self.parameters.clone()]);
+        match self.joint {
+            Some(_) => (parts.before.unwrap_or_else(Rigid::identity), parts.behind),
+            None => (parts.whole(), Rigid::identity()),
         }
     }
 
-    /// The axis that its joint turns about or slides along.
+    /// The axis that its joint turns about or slides along; of length one.
     pub fn axis(&self) -> Vector3<f64> {
         match &self.geometry {
             Geometry::Axis(axis) => *axis,
@@ -193,59 +190,23 @@ impl Segment {
         }
     }
 
-    fn reading(&self, joints: &[f64]) -> f64 {
-        match self.joint {
-            Some(joint) => joints.get(joint.index).copied().unwrap_or(f64::NAN),
-            None => 0.0,
-        }
-    }
-
-    fn local<D: Scalar>(&self, own: &[D], reading: D) -> Rigid<D> {
-        let motion = self.joint.map(|joint| joint.motion);
-        let q = self.joint.map_or(reading, |joint| joint.at(reading));
+    /// Its formula, at these values of its parameters.
+    pub fn parts<D: Scalar>(&self, own: &[D]) -> Parts<D> {
+        let o = D::from(0.0);
         match &self.geometry {
             Geometry::StandardDh { hayati } => {
-                let (theta, d) = joined(own, q, motion);
-                with_beta(standard_dh(theta, d, own[2], own[3]), own, *hayati)
+                let behind = with_beta(standard_dh(own[0], own[1], own[2], own[3]), own, *hayati);
+                Parts { before: None, behind }
             }
             Geometry::ModifiedDh { hayati } => {
-                let (theta, d) = joined(own, q, motion);
-                with_beta(modified_dh(theta, d, own[2], own[3]), own, *hayati)
+                let behind = with_beta(modified_dh(own[0], own[1], o, o), own, *hayati);
+                Parts { before: Some(modified_dh(o, o, own[2], own[3])), behind }
             }
-            Geometry::Origin { nominal, freedom } => origin(nominal, *freedom, own),
-            Geometry::Axis(axis) => moved(&axis.map(D::from), q, motion),
+            Geometry::Origin { nominal, freedom } => {
+                Parts { before: None, behind: origin(nominal, *freedom, own) }
+            }
+            Geometry::Axis(_) => Parts { before: None, behind: Rigid::identity() },
         }
-    }
-}
-
-impl From<&Rigid<Lanes>> for LinearisedSegment {
-    fn from(dual: &Rigid<Lanes>) -> LinearisedSegment {
-        let transform = Rigid {
-            rotation: dual.rotation.map(|entry| entry.re),
-            translation_m: dual.translation_m.map(|entry| entry.re),
-        };
-        // Of dR R' = [w]x, the entry below the diagonal for each axis.
-        let rate = |i: usize, j: usize| {
-            let term = |k: usize| lanes(&dual.rotation[(i, k)]) * transform.rotation[(j, k)];
-            term(0) + term(1) + term(2)
-        };
-        let rotation_rad = [rate(2, 1), rate(0, 2), rate(1, 0)];
-        let translation_m = array::from_fn(|axis| lanes(&dual.translation_m[axis]));
-        LinearisedSegment { transform, motions: Twists { translation_m, rotation_rad } }
-    }
-}
-
-/// The derivatives of an entry; one that depends on nothing has none.
-fn lanes(entry: &Lanes) -> SVector<f64, MAX_PARAMETERS> {
-    entry.eps.0.unwrap_or_default()
-}
-
-/// `theta` and `d` of a DH row with the joint value added to the one that moves.
-fn joined<D: Scalar>(own: &[D], q: D, motion: Option<Motion>) -> (D, D) {
-    match motion {
-        Some(Motion::Revolute) => (own[0] + q, own[1]),
-        Some(Motion::Prismatic) => (own[0], own[1] + q),
-        None => (own[0], own[1]),
     }
 }
 
@@ -305,11 +266,14 @@ fn origin<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid
     }
 }
 
-/// About or along an axis.
-pub(crate) fn moved<D: Scalar>(axis: &Vector3<D>, q: D, motion: Option<Motion>) -> Rigid<D> {
+/// About or along an axis of length one: Rodrigues' formula.
+pub(crate) fn moved(axis: &Vector3<f64>, q: f64, motion: Motion) -> Rigid<f64> {
     match motion {
-        Some(Motion::Prismatic) => Rigid { translation_m: axis * q, ..Rigid::identity() },
-        Some(Motion::Revolute) => Rigid { rotation: rotation_of_vector(&(axis * q)), ..Rigid::identity() },
-        None => Rigid::identity(),
+        Motion::Prismatic => Rigid { translation_m: axis * q, ..Rigid::identity() },
+        Motion::Revolute => {
+            let (sine, cosine) = q.sin_cos();
+            let across = axis.cross_matrix() * sine + axis * axis.transpose() * (1.0 - cosine);
+            Rigid { rotation: Matrix3::identity() * cosine + across, ..Rigid::identity() }
+        }
     }
 }

@@ -7,7 +7,8 @@
 
 use crate::rigid::Rigid;
 use crate::segment::{LinearisedSegment, Segment};
-use crate::twist::{Twist, Twists};
+use crate::still::{Still, StillMoving};
+use crate::twist::Twist;
 use nalgebra::Vector3;
 use std::borrow::Cow;
 
@@ -68,56 +69,93 @@ impl Tree {
     ) -> (Rigid<f64>, Vec<(usize, Twist)>) {
         let (mut at, mut moving) = (Rigid::identity(), Vec::new());
         for segment in route.iter().map(|id| &self.0[*id]) {
-            let before = at;
-            at = before.then(&segment.transform(p, joints));
-            let Some(joint) = segment.joint else { continue };
-            let motions = segment.linearised(p, joints).motions.turned(&before.rotation);
-            moving.push((joint.index, segment.parameters.len(), motions, at.translation_m));
+            let (before, still) = (at, Still::of(segment, p));
+            let transform = still.transform(joints);
+            at = before.then(&transform);
+            let (Some(joint), Some(twist)) = (segment.joint, still.by_joint(&transform.translation_m)) else {
+                continue;
+            };
+            moving.push((joint.index, twist.turned(&before.rotation), at.translation_m));
         }
-        let twist = |(index, last, mut motions, end_m): (usize, usize, Twists<_>, _)| {
-            motions.shift(&(at.translation_m - end_m));
-            (index, motions.by(last))
-        };
+        let twist =
+            |(index, twist, end_m): (usize, Twist, _)| (index, twist.shifted(&(at.translation_m - end_m)));
         (at, moving.into_iter().map(twist).collect())
     }
 }
 
-/// A tree at or about one parameter vector. Segments that no joint moves are alike in every pose: they are worked out once.
+/// A tree at or about one parameter vector: what is alike in every pose is worked out once.
 pub(crate) struct TreeAt<'a> {
     tree: &'a Tree,
     p: Cow<'a, [f64]>,
-    segments: Vec<Still>,
+    segments: Vec<Known>,
 }
 
 /// What is known of a segment before its pose.
-enum Still {
-    /// All of it: no joint moves it.
+enum Known {
+    /// All of it: no joint moves it, and only where it ends is asked.
+    Placed(Rigid<f64>),
+    /// The same with how its parameters move it.
     Linearised(Box<LinearisedSegment>),
-    /// Nothing, and how its parameters and its joint move its end is asked of it.
-    Asked,
-    /// Nothing, and only where it ends is asked.
-    Unasked,
+    /// All but its joint, and only where it ends is asked.
+    Still(Still),
+    /// All but its joint; how its parameters and its joint move its end is asked too.
+    Moving(Box<StillMoving>),
 }
 
 impl<'a> TreeAt<'a> {
     /// Where only some parameters are `asked` for, what others and joints move may be missing.
     pub fn of(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>, asked: Option<&Asked<'_>>) -> TreeAt<'a> {
-        let p = p.into();
-        let still = |segment: &Segment| match segment.joint {
-            None => Still::Linearised(segment.linearised(&p, &[]).into()),
-            Some(_) if asked.is_none_or(|asked| segment.parameters.clone().any(asked)) => Still::Asked,
-            Some(_) => Still::Unasked,
+        let known = |segment: &Segment, p: &[f64]| match segment.joint {
+            None => Known::Linearised(segment.linearised(p, &[]).into()),
+            Some(_) if asked.is_none_or(|asked| segment.parameters.clone().any(asked)) => {
+                Known::Moving(StillMoving::of(segment, p).into())
+            }
+            Some(_) => Known::Still(Still::of(segment, p)),
         };
-        let segments = tree.0.iter().map(still).collect();
+        TreeAt::known(tree, p.into(), known)
+    }
+
+    /// Where nothing but places is asked for: for [`TreeAt::follow`].
+    pub fn predicting(tree: &'a Tree, p: impl Into<Cow<'a, [f64]>>) -> TreeAt<'a> {
+        let known = |segment: &Segment, p: &[f64]| match segment.joint {
+            None => Known::Placed(segment.transform(p, &[])),
+            Some(_) => Known::Still(Still::of(segment, p)),
+        };
+        TreeAt::known(tree, p.into(), known)
+    }
+
+    fn known(tree: &'a Tree, p: Cow<'a, [f64]>, known: impl Fn(&Segment, &[f64]) -> Known) -> TreeAt<'a> {
+        let segments = tree.0.iter().map(|segment| known(segment, &p)).collect();
         TreeAt { tree, p, segments }
+    }
+
+    /// What is known of a segment, where these parameters leave its own alone.
+    fn at(&self, id: SegmentId, p: &[f64]) -> Option<&Known> {
+        let own = self.tree.0[id].parameters.clone();
+        (p[own.clone()] == self.p[own]).then(|| &self.segments[id])
+    }
+
+    /// Where a segment ends in its start, with parameters of the pose's own.
+    fn transform(&self, id: SegmentId, p: &[f64], joints: &[f64]) -> Rigid<f64> {
+        match self.at(id, p) {
+            Some(Known::Placed(transform)) => *transform,
+            Some(Known::Linearised(linearised)) => linearised.transform,
+            Some(Known::Still(still)) => still.transform(joints),
+            Some(Known::Moving(moving)) => moving.transform(joints),
+            None => self.tree.0[id].transform(p, joints),
+        }
+    }
+
+    /// The end of a route, with parameters of the pose's own.
+    pub fn follow(&self, route: &[SegmentId], p: &[f64], joints: &[f64]) -> Rigid<f64> {
+        let along = |before: Rigid<f64>, id: &SegmentId| before.then(&self.transform(*id, p, joints));
+        route.iter().fold(Rigid::identity(), along)
     }
 
     /// A point of the frame at the end of a route, in the one before it.
     pub fn point(&self, route: &[SegmentId], joints: &[f64], point_m: Vector3<f64>) -> Vector3<f64> {
-        let before = |point_m: Vector3<f64>, id: &SegmentId| match &self.segments[*id] {
-            Still::Linearised(still) => still.transform.point(&point_m),
-            _ => self.tree.0[*id].transform(&self.p, joints).point(&point_m),
-        };
+        let before =
+            |point_m: Vector3<f64>, id: &SegmentId| self.transform(*id, &self.p, joints).point(&point_m);
         route.iter().rev().fold(point_m, before)
     }
 
@@ -126,23 +164,26 @@ impl<'a> TreeAt<'a> {
         self.with(route, &self.p, joints)
     }
 
-    /// The same with parameters of the pose's own: a segment whose parameters it leaves alone is as it was.
+    /// The same with parameters of the pose's own.
     pub fn with(&self, route: &[SegmentId], p: &[f64], joints: &[f64]) -> LinearisedFeature {
         let mut at = Rigid::identity();
         let mut motions = Vec::with_capacity(route.len());
         for &id in route {
             let segment = &self.tree.0[id];
-            let own = segment.parameters.clone();
-            let moved;
-            let linearised = match &self.segments[id] {
-                Still::Linearised(still) if p[own.clone()] == self.p[own] => still,
-                Still::Unasked => {
-                    at = at.then(&segment.transform(p, joints));
+            let own;
+            let linearised = match self.at(id, p) {
+                Some(Known::Linearised(linearised)) => linearised,
+                Some(Known::Still(still)) => {
+                    at = at.then(&still.transform(joints));
                     continue;
                 }
-                _ => {
-                    moved = segment.linearised(p, joints);
-                    &moved
+                Some(Known::Moving(moving)) => {
+                    own = moving.linearised(joints);
+                    &own
+                }
+                Some(Known::Placed(_)) | None => {
+                    own = segment.linearised(p, joints);
+                    &own
                 }
             };
             let before = at;

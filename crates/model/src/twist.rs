@@ -18,6 +18,16 @@ impl Twist {
         Twist { translation_m: Vector3::zeros(), rotation_rad: Vector3::zeros() }
     }
 
+    /// The same motion in the axes that `rotation` turns its own into.
+    pub fn turned(&self, rotation: &Matrix3<f64>) -> Twist {
+        Twist { translation_m: rotation * self.translation_m, rotation_rad: rotation * self.rotation_rad }
+    }
+
+    /// Of a point `arm_m` away that turns with the frame: `v + w x arm`.
+    pub fn shifted(&self, arm_m: &Vector3<f64>) -> Twist {
+        Twist { translation_m: self.translation_m + self.rotation_rad.cross(arm_m), ..*self }
+    }
+
     /// `factor` of it.
     pub fn times(&self, factor: f64) -> Twist {
         Twist { translation_m: self.translation_m * factor, rotation_rad: self.rotation_rad * factor }
@@ -56,6 +66,25 @@ impl<const N: usize> Twists<N> {
         *x += wy * arm_m.z - wz * arm_m.y;
         *y += wz * arm_m.x - wx * arm_m.z;
         *z += wx * arm_m.y - wy * arm_m.x;
+    }
+
+    /// Adds other motions of the same frame, in the same axes.
+    #[inline]
+    pub fn add(&mut self, other: &Twists<N>) {
+        let add = |own: &mut [SVector<f64, N>; 3], other: &[SVector<f64, N>; 3]| {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own += other);
+        };
+        add(&mut self.translation_m, &other.translation_m);
+        add(&mut self.rotation_rad, &other.rotation_rad);
+    }
+
+    /// Sets the motion per unit of quantity `k`.
+    #[inline]
+    pub fn set(&mut self, k: usize, motion: &Twist) {
+        for axis in 0..3 {
+            self.translation_m[axis][k] = motion.translation_m[axis];
+            self.rotation_rad[axis][k] = motion.rotation_rad[axis];
+        }
     }
 
     /// The motion per unit of quantity `k`.

@@ -29,6 +29,7 @@ pub use roles::{Cast, Role};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::setup::Inputs;
+use crate::stages::associated::Associated;
 use crate::stages::perceive;
 use crate::story;
 use armcal_calibrate::HoldoutConfig;
@@ -185,7 +186,8 @@ fn size_sockets(known: &mut Known<'_>) -> Result<(), Error> {
     let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Progress::silent(), &mut drop)?;
     if let Some(sockets) = &mut known.sockets {
         let board = Some(sockets.board.clone());
-        sockets.sized(&Inputs { pipeline, chain, board, seen, changes: Vec::new(), most_rounds: 2 });
+        let (changes, most_rounds, known) = (Vec::new(), 2, Associated::default());
+        sockets.sized(&Inputs { pipeline, chain, board, seen, changes, most_rounds, known });
     }
     Ok(())
 }

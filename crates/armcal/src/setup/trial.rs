@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::pipeline::Pipeline;
+use crate::stages::associated::Associated;
 use crate::stages::perceive::Seen;
 use crate::story::{self, Fitted};
 use armcal_calibrate::{HoldoutConfig, Objective};
@@ -36,6 +37,8 @@ pub struct Inputs {
     pub changes: Vec<Change>,
     /// Rounds of association and fit at most.
     pub most_rounds: usize,
+    /// Associations that need not be made again.
+    pub known: Associated,
 }
 
 /// A change to the nominal values of the parameters that match a pattern.
@@ -133,6 +136,7 @@ impl Inputs {
         inputs.pipeline.effects.retain(|effect| effect.kind != CURVE);
         inputs.pipeline.fit.max_iterations = inputs.pipeline.fit.max_iterations.min(MOST_ITERATIONS);
         inputs.most_rounds = inputs.most_rounds.min(MOST_ROUNDS);
+        inputs.known = Associated::nothing_yet(inputs.seen.len());
         let total: usize = inputs.seen.iter().map(|s| s.dwells.len()).sum();
         let share = MOST_DWELLS as f64 / total.max(1) as f64;
         if share < 1.0 {

@@ -1,5 +1,6 @@
 //! The stages of the story that join two crates.
 
+pub mod associated;
 pub mod doubts;
 pub mod effort;
 pub mod frames;

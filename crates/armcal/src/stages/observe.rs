@@ -2,11 +2,12 @@
 
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
+use crate::stages::associated::{Asked, Associated};
 use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, DwellId, FeatureId, Observation, Reference, Rejection, TipMeasurement};
 use armcal_dwell::Moment;
 use armcal_model::Model;
-use armcal_table::{Association, Board, BoardStart, DwellTip, Place, associate};
+use armcal_table::{Association, Board, BoardStart, DwellTip, Place};
 use nalgebra::{Matrix3, Vector3};
 
 /// Fewer dwells than parameters of a three-axis arm calibrate nothing.
@@ -23,14 +24,14 @@ pub struct Observed {
 /// Associates the dwells of every recording to the board; `None` where there is no table.
 ///
 /// `p` are the model's parameters that predict the tips; `boards_fitted` says whether they place the boards even where the
-/// pipeline leaves that to be estimated.
+/// pipeline leaves that to be estimated. What is `known` is not made again.
 pub fn associate_all(
     pipeline: &Pipeline,
     board: Option<&Board>,
     model: &Model,
     p: &[f64],
     boards_fitted: bool,
-    seen: &[Seen],
+    (seen, known): (&[Seen], &Associated),
 ) -> Result<Vec<Option<Association>>, Error> {
     let (Some(board), Some(table)) = (board, &pipeline.table) else {
         return Ok(seen.iter().map(|_| None).collect());
@@ -40,13 +41,14 @@ pub fn associate_all(
         .map(|(recording, seen)| {
             let (alone, own) = model.in_recording(recording, p);
             let tips: Vec<DwellTip> = seen.dwells.iter().map(|d| dwell_tip(alone, &own, d)).collect();
-            let known = table.pose != BoardPose::Estimated || boards_fitted;
+            let placed = table.pose != BoardPose::Estimated || boards_fitted;
             let start = match model.board_in_world(p, recording) {
-                Some(pose) if known => BoardStart::Known(pose),
+                Some(pose) if placed => BoardStart::Known(pose),
                 _ => BoardStart::Unknown,
             };
             let in_recording = |source| Error::Association { recording: seen.name.clone(), source };
-            associate(board, &tips, &start, &table.association).map(Some).map_err(in_recording)
+            let asked = Asked { board: board.clone(), tips, start, config: table.association.clone() };
+            known.of(recording, asked).map(Some).map_err(in_recording)
         })
         .collect()
 }

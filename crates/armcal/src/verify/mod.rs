@@ -11,6 +11,7 @@ mod told;
 use crate::error::Error;
 use crate::pipeline::{BoardPose, Pipeline};
 use crate::progress::Progress;
+use crate::stages::associated::Associated;
 use crate::stages::measures::Measures;
 use crate::stages::past::{Placed, place};
 use crate::stages::perceive::Seen;
@@ -166,7 +167,14 @@ impl Surroundings<'_> {
 
     fn associate(&self, placed: &Placed, boards_fitted: bool) -> Result<Vec<Option<Association>>, Error> {
         let p = &placed.calibrated;
-        observe::associate_all(self.pipeline, self.board, &placed.model, p, boards_fitted, self.seen)
+        observe::associate_all(
+            self.pipeline,
+            self.board,
+            &placed.model,
+            p,
+            boards_fitted,
+            (self.seen, &Associated::default()),
+        )
     }
 
     fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {

@@ -192,15 +192,20 @@ impl Effects {
         Effects::new(placed, self.session.clone(), model, count)
     }
 
-    /// A feature of the deformed arm, predicted.
-    pub fn evaluate(&self, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Evaluated {
+    /// The tree before a pose deforms it, for [`Effects::evaluate`].
+    pub fn predicting(&self, p: &[f64]) -> TreeAt<'_> {
+        TreeAt::predicting(&self.tree, self.extended(p))
+    }
+
+    /// A feature of the deformed arm, predicted; `tree` is that of [`Effects::predicting`].
+    pub fn evaluate(&self, tree: &TreeAt<'_>, p: &[f64], feature: FeatureId, x: &Drivers<'_>) -> Evaluated {
         let (p, q, in_board_m) = self.deformed(p, x);
-        let mut tip = self.tree.follow(&self.routes[feature.0], &p, &q);
+        let mut tip = tree.follow(&self.routes[feature.0], &p, &q);
         tip.translation_m += self.seen_m(&p, x, &tip.translation_m);
         Evaluated { tip, in_board_m }
     }
 
-    /// The tree before a pose deforms it.
+    /// The same, for [`Effects::linearise`].
     pub fn tree_at(&self, p: &[f64]) -> TreeAt<'_> {
         TreeAt::of(&self.tree, self.extended(p), None)
     }

@@ -172,7 +172,9 @@ impl Model {
         }
         let at = match &self.effects {
             None => self.tree.follow(self.route(feature), p, &o.joint_rad),
-            Some(effects) => effects.evaluate(p, feature, &effects.drivers(self, o)).tip,
+            Some(effects) => {
+                effects.evaluate(&effects.predicting(p), p, feature, &effects.drivers(self, o)).tip
+            }
         };
         Pose::from(&at)
     }

@@ -79,8 +79,7 @@ impl<'a> Linearisation<'a> {
         }
         let board = self.model.board_under(o).zip(self.boards.get(&o.dwell.recording));
         let measured_m = measured_m(o, board.map(|(_, at)| &at.transform), &in_board_m);
-        let mut residual = Sides::with_point(measured_m, predicted).residual(o);
-        residual.rotation_rad = residual.rotation_rad.filter(|_| self.turns);
+        let residual = Sides::with_point(measured_m, predicted).residual(o, self.turns);
         let mut jacobian = DMatrix::zeros(residual.len(), self.model.parameters.len());
         for (column, twist) in &columns {
             add_to_column(&mut jacobian, 0, *column, &-twist.translation_m);

@@ -37,12 +37,13 @@ impl Sides {
     /// Where the tip should be [m]. Of a distance between two arms that is where the other tip is.
     pub fn measured_m(&self, o: &Observation) -> Vector3<f64> {
         match o.is_scalar() && !o.is_joined() {
-            true => self.predicted.translation_m + self.residual(o).position_m,
+            true => self.predicted.translation_m + self.residual(o, false).position_m,
             false => self.other.translation_m,
         }
     }
 
-    pub fn residual(&self, o: &Observation) -> ModelResidual {
+    /// The residual; a rotation only where `turns` are asked for.
+    pub fn residual(&self, o: &Observation, turns: bool) -> ModelResidual {
         let gap_m = self.other.translation_m - self.predicted.translation_m;
         let scalar = |along: Vector3<f64>, error_m: f64| ModelResidual {
             position_m: along * error_m,
@@ -59,7 +60,7 @@ impl Sides {
                 let along: Vector3<f64> = self.other.rotation.column(2).into();
                 scalar(along, self.expected_m + along.dot(&gap_m))
             }
-            Reference::Tracked { orientation: Some(measured), .. } => {
+            Reference::Tracked { orientation: Some(measured), .. } if turns => {
                 let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
                 let rotation_rad = Some(rotation_error_rad(measured, &predicted));
                 ModelResidual { position_m: gap_m, rotation_rad, along: None }
@@ -78,7 +79,7 @@ impl Sides {
         of_other: &[(usize, Twist)],
         (parameters, length): (usize, Option<usize>),
     ) -> (ModelResidual, DMatrix<f64>) {
-        let residual = self.residual(o);
+        let residual = self.residual(o, true);
         let mut gap = DMatrix::zeros(3, parameters);
         of_tip.iter().for_each(|(k, twist)| add_to_column(&mut gap, 0, *k, &-twist.translation_m));
         of_other.iter().for_each(|(k, twist)| add_to_column(&mut gap, 0, *k, &twist.translation_m));

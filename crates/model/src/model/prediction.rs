@@ -3,11 +3,12 @@
 use super::Model;
 use super::linearisation::Linearisation;
 use super::measurement::Sides;
+use super::predicting::Predicting;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::rigid::Rigid;
 use crate::segment::Segment;
 use crate::tree::Asked;
-use armcal_core::{Against, FeatureId, Observation, Pose};
+use armcal_core::{Against, Observation, Pose};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};
 
 impl Model {
@@ -41,7 +42,25 @@ impl Model {
     /// `measured - predicted`: 3 rows of position [m], and 3 of rotation [rad] if the observation has an orientation; of a
     /// distance or a height one.
     pub fn residual(&self, p: &[f64], o: &Observation) -> ModelResidual {
-        self.sides(p, o).residual(o)
+        self.sides(p, o).residual(o, true)
+    }
+
+    /// Calls `each` with the [`Model::residual`] of every one of many observations at the same parameters, in their order: what
+    /// is alike for all of them that follow each other in a recording is worked out once. Rows of orientation are missing where
+    /// no `turns` are asked for.
+    pub fn residuals(
+        &self,
+        p: &[f64],
+        observations: &[&Observation],
+        turns: bool,
+        each: &mut dyn FnMut(&Observation, ModelResidual),
+    ) {
+        let all_alike = self.scopes.is_none();
+        for alike in observations.chunk_by(|a, b| all_alike || a.dwell.recording == b.dwell.recording) {
+            let (model, p) = self.in_recording(alike[0].dwell.recording, p);
+            let at = Predicting::of(model, &p, alike);
+            alike.iter().for_each(|o| each(o, at.residual(o, turns)));
+        }
     }
 
     /// The residual and d residual / d p: its rows, one column for every parameter, free or not. Exact.
@@ -116,24 +135,9 @@ impl Model {
     }
 
     fn sides(&self, p: &[f64], o: &Observation) -> Sides {
-        if let Some((model, p)) = self.seen(p, o) {
-            return model.sides(&p, o);
-        }
-        let drivers = self.effects.as_ref().map(|effects| effects.drivers(self, o));
-        let at = |feature: FeatureId| match (&self.effects, &drivers) {
-            (Some(effects), Some(drivers)) => {
-                let at = effects.evaluate(p, feature, drivers);
-                (at.tip, at.in_board_m)
-            }
-            _ => (self.tree.follow(self.route(feature), p, &o.joint_rad), seated_m(o)),
-        };
-        let (predicted, in_board_m) = at(o.feature);
-        match self.other(p, o, &|feature| at(feature).0) {
-            Some(other) => Sides { other, predicted, expected_m: self.expected_m(p, o) },
-            None => {
-                let board = self.board_under(o).map(|board| board.transform(p, &[]));
-                Sides::with_point(measured_m(o, board.as_ref(), &in_board_m), predicted)
-            }
+        match self.seen(p, o) {
+            Some((model, p)) => model.sides(&p, o),
+            None => Predicting::of(self, p, &[o]).sides(o),
         }
     }
 

@@ -5,7 +5,6 @@ use super::{limits, motion_of};
 use crate::ModelError;
 use crate::rigid::Rigid;
 use crate::segment::{Body, Mimic, moved};
-use nalgebra::Vector3;
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -172,8 +171,8 @@ impl<'a, 'x> Branches<'a, 'x> {
         let origin = Rigid::from(&self.reader.origin(joint, &subject)?);
         let value = limits(joint).map_or(0.0, |[low, high]| 0f64.clamp(low, high));
         let motion = motion_of(joint.attribute("type").unwrap_or_default());
-        let axis = motion.map_or(Ok(Vector3::zeros()), |_| self.reader.axis(joint, &subject))?;
-        Ok(origin.then(&moved(&axis, value, motion)))
+        let Some(motion) = motion else { return Ok(origin) };
+        Ok(origin.then(&moved(&self.reader.axis(joint, &subject)?, value, motion)))
     }
 }
 

@@ -37,9 +37,30 @@ const HOVER_SCATTER_M: f64 = 0.002;
 pub(super) struct Emission<'a> {
     problem: &'a Problem<'a>,
     sigma_m: f64,
+    /// Of a tip that scatters as those that the sensor saw: nearly all do.
+    usual: Scatter,
     hover_m: std::ops::Range<f64>,
     with_hover: bool,
     ln_out: f64,
+}
+
+/// How a tip scatters about its cavity, per axis [m], and the logarithms of the densities where it does not.
+#[derive(Clone, Copy)]
+struct Scatter {
+    seat_m: f64,
+    hover_m: f64,
+    ln_seat: f64,
+    ln_hover: f64,
+}
+
+impl Scatter {
+    fn of(sigma_m: f64, extra_sigma_m: f64, range_m: f64) -> Scatter {
+        let seat_m = sigma_m.hypot(extra_sigma_m);
+        let hover_m = seat_m.hypot(HOVER_SCATTER_M);
+        let ln_seat = SEAT_SHARE.ln() - 1.5 * TAU.ln() - 3.0 * seat_m.ln();
+        let ln_hover = HOVER_SHARE.ln() - TAU.ln() - 2.0 * hover_m.ln() - range_m.ln();
+        Scatter { seat_m, hover_m, ln_seat, ln_hover }
+    }
 }
 
 impl<'a> Emission<'a> {
@@ -47,13 +68,21 @@ impl<'a> Emission<'a> {
     pub fn new(problem: &'a Problem<'a>, sigma_m: f64, with_hover: bool) -> Emission<'a> {
         let hover_m = problem.config.hover_min_mm * 1e-3..problem.config.hover_max_mm * 1e-3;
         let ln_out = (OUT_SHARE / problem.layout.volume_m3).ln();
-        Emission { problem, sigma_m, with_hover, ln_out, hover_m }
+        let usual = Scatter::of(sigma_m, 0.0, hover_m.end - hover_m.start);
+        Emission { problem, sigma_m, usual, with_hover, ln_out, hover_m }
+    }
+
+    fn scatter(&self, i: usize) -> Scatter {
+        match self.problem.extra_sigma_m[i] {
+            0.0 => self.usual,
+            extra => Scatter::of(self.sigma_m, extra, self.hover_m.end - self.hover_m.start),
+        }
     }
 
     /// Scatter of dwell `i` about its cavity when it is seated, and when it hovers, per axis [m].
     pub fn sigmas_m(&self, i: usize) -> (f64, f64) {
-        let seat = self.sigma_m.hypot(self.problem.extra_sigma_m[i]);
-        (seat, seat.hypot(HOVER_SCATTER_M))
+        let Scatter { seat_m, hover_m, .. } = self.scatter(i);
+        (seat_m, hover_m)
     }
 
     /// Fills `states` with what the tip of dwell `i` may be and the logarithm of its density, shares
@@ -61,10 +90,7 @@ impl<'a> Emission<'a> {
     /// could rescue are left out.
     pub fn at(&self, i: usize, aligned_m: &Vector3<f64>, states: &mut Vec<(State, f64)>) {
         states.clear();
-        let (sigma_m, hover_sigma_m) = self.sigmas_m(i);
-        let ln_seat = SEAT_SHARE.ln() - 1.5 * TAU.ln() - 3.0 * sigma_m.ln();
-        let range_m = self.hover_m.end - self.hover_m.start;
-        let ln_hover = HOVER_SHARE.ln() - TAU.ln() - 2.0 * hover_sigma_m.ln() - range_m.ln();
+        let Scatter { seat_m: sigma_m, hover_m: hover_sigma_m, ln_seat, ln_hover } = self.scatter(i);
         let mut below = false;
         for &k in self.problem.layout.near(aligned_m) {
             let k = k as usize;
