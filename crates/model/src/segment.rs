@@ -272,6 +272,16 @@ pub(crate) fn moved(axis: &Vector3<f64>, q: f64, motion: Motion) -> Rigid<f64> {
         Motion::Prismatic => Rigid { translation_m: axis * q, ..Rigid::identity() },
         Motion::Revolute => {
             let (sine, cosine) = q.sin_cos();
+            // Rows of DH turn about z, and there are as many of these as poses.
+            if *axis == Vector3::z() {
+                #[rustfmt::skip]
+                let rotation = Matrix3::new(
+                    cosine, -sine,   0.0,
+                    sine,    cosine, 0.0,
+                    0.0,     0.0,    cosine + (1.0 - cosine),
+                );
+                return Rigid { rotation, ..Rigid::identity() };
+            }
             let across = axis.cross_matrix() * sine + axis * axis.transpose() * (1.0 - cosine);
             Rigid { rotation: Matrix3::identity() * cosine + across, ..Rigid::identity() }
         }

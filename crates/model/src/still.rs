@@ -47,6 +47,14 @@ impl Still {
         before.map_or(behind, |before| before.then(&behind))
     }
 
+    /// A point of the frame at its end, in its start.
+    pub fn point(&self, joints: &[f64], point_m: &Vector3<f64>) -> Vector3<f64> {
+        let Parts { before, behind } = &self.parts;
+        let behind_m = behind.point(point_m);
+        let moved_m = self.motion(joints).map_or(behind_m, |motion| motion.point(&behind_m));
+        before.map_or(moved_m, |before| before.point(&moved_m))
+    }
+
     /// The motion of its joint; a reading that is missing is NaN.
     fn motion(&self, joints: &[f64]) -> Option<Rigid<f64>> {
         let (joint, axis) = self.joint.as_ref()?;
@@ -89,7 +97,12 @@ impl StillMoving {
         self.still.transform(joints)
     }
 
-    /// The same and how that end moves.
+    /// A point of the frame at its end, in its start.
+    pub fn point(&self, joints: &[f64], point_m: &Vector3<f64>) -> Vector3<f64> {
+        self.still.point(joints, point_m)
+    }
+
+    /// Where its end is in its start, and how that end moves.
     pub fn linearised(&self, joints: &[f64]) -> LinearisedSegment {
         let transform = self.still.transform(joints);
         let Some(motion) = self.still.motion(joints) else {

@@ -154,8 +154,12 @@ impl<'a> TreeAt<'a> {
 
     /// A point of the frame at the end of a route, in the one before it.
     pub fn point(&self, route: &[SegmentId], joints: &[f64], point_m: Vector3<f64>) -> Vector3<f64> {
-        let before =
-            |point_m: Vector3<f64>, id: &SegmentId| self.transform(*id, &self.p, joints).point(&point_m);
+        let before = |point_m: Vector3<f64>, id: &SegmentId| match &self.segments[*id] {
+            Known::Placed(transform) => transform.point(&point_m),
+            Known::Linearised(linearised) => linearised.transform.point(&point_m),
+            Known::Still(still) => still.point(joints, &point_m),
+            Known::Moving(moving) => moving.point(joints, &point_m),
+        };
         route.iter().rev().fold(point_m, before)
     }
 
