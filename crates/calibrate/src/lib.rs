@@ -21,6 +21,7 @@
 //! * observations that shards hold, each asked for the sums of its recordings: `elsewhere`, [`calibrate_elsewhere`];
 //! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
+mod alignment;
 mod calibration;
 mod config;
 mod covariance;

@@ -152,15 +152,6 @@ impl<'a> ModelProblem<'a> {
         self.model
     }
 
-    /// Runs of observations that are all seen by the same model and parameters.
-    pub(crate) fn alike<'o>(
-        &self,
-        observations: &'o [&'a Observation],
-    ) -> impl Iterator<Item = &'o [&'a Observation]> + use<'a, 'o> {
-        let all = observations.first().is_none_or(|o| self.model.known_in(o.dwell.recording).is_none());
-        observations.chunk_by(move |a, b| all || a.dwell.recording == b.dwell.recording)
-    }
-
     /// The rows of an observation that are used.
     fn rows(&self, o: &Observation) -> usize {
         let is_known = |(_, sigma_rad): (_, f64)| self.use_orientation && sigma_rad > 0.0;
@@ -337,7 +328,7 @@ impl Problem for ModelProblem<'_> {
                 block += 1;
             }
         };
-        for run in self.alike(of_blocks) {
+        for run in self.model.alike(of_blocks) {
             let (model, p) = self.model.in_recording(run[0].dwell.recording, p);
             model.residuals_with_jacobians(&p, run, (asked, self.use_orientation), &mut of);
         }
@@ -385,7 +376,7 @@ impl Problem for ModelProblem<'_> {
         let (mut known, mut end) = (Vec::new(), 0);
         // The blocks of a recording hold its observations, and no others.
         let block = |observation: usize| self.blocks.partition_point(|run| run.start < observation);
-        for run in self.alike(&self.observations) {
+        for run in self.model.alike(&self.observations) {
             let blocks = block(end)..block(end + run.len());
             end += run.len();
             let parameters = run.first().and_then(|o| self.model.known_in(o.dwell.recording));

@@ -16,6 +16,7 @@ use crate::{CalibrateError, FitConfig};
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Standard deviation [m, rad, ...] of the ridge on a free parameter about which nothing is known: it moves a length
@@ -242,14 +243,10 @@ impl<'a> Whitened<'a> {
     /// Norms of the position residuals [m].
     pub fn distance_norms(&self, x: &DVector<f64>) -> Result<Vec<f64>, CalibrateError> {
         let p = self.parameters_at(x);
-        let (mut norms, mut done) = (Vec::with_capacity(self.blocks()), Ok(()));
-        self.problem.residual_each(0..self.blocks(), &p, &mut |block, raw| {
-            if done.is_ok() {
-                done = self.finite(block, raw, "the residual");
-                norms.push(raw.iter().take(3).map(|v| v * v).sum::<f64>().sqrt());
-            }
-        });
-        done.map(|()| norms)
+        let mut norms = Vec::with_capacity(self.blocks());
+        let mut add = |_, raw: &[f64]| norms.push(raw.iter().take(3).map(|v| v * v).sum::<f64>().sqrt());
+        self.residual_each(0..self.blocks(), &p, &mut add)?;
+        Ok(norms)
     }
 
     /// The derivative of all residuals by x.
@@ -294,16 +291,30 @@ impl<'a> Whitened<'a> {
         let blocks = self.structure.groups[group].blocks.clone();
         let first = self.offsets[blocks.start];
         let mut stacked = DVector::zeros(self.offsets[blocks.end] - first);
+        self.residual_each(blocks, p, &mut |block, raw| {
+            let at = self.offsets[block] - first;
+            whiten(&self.whitener[block], raw, &mut stacked.as_mut_slice()[at..at + raw.len()]);
+        })?;
+        Ok(stacked)
+    }
+
+    /// The residuals of these blocks, not whitened, as far as they are finite.
+    fn residual_each(
+        &self,
+        blocks: Range<usize>,
+        p: &[f64],
+        each: &mut dyn FnMut(usize, &[f64]),
+    ) -> Result<(), CalibrateError> {
         let mut done = Ok(());
         self.problem.residual_each(blocks, p, &mut |block, raw| {
             if done.is_ok() {
                 done = self.finite(block, raw, "the residual");
-                let at = self.offsets[block] - first;
-                whiten(&self.whitener[block], raw, &mut stacked.as_mut_slice()[at..at + raw.len()]);
+            }
+            if done.is_ok() {
+                each(block, raw);
             }
         });
-        done?;
-        Ok(stacked)
+        done
     }
 
     /// The residual of one group, and its derivative by the parameter of each of the group's axes.

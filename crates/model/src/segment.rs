@@ -272,7 +272,7 @@ pub(crate) fn moved(axis: &Vector3<f64>, q: f64, motion: Motion) -> Rigid<f64> {
         Motion::Prismatic => Rigid { translation_m: axis * q, ..Rigid::identity() },
         Motion::Revolute => {
             let (sine, cosine) = q.sin_cos();
-            // Rows of DH turn about z, and there are as many of these as poses.
+            // Rows of DH turn about z, and there are as many of these as poses: what the formula gives, without its products.
             if *axis == Vector3::z() {
                 #[rustfmt::skip]
                 let rotation = Matrix3::new(

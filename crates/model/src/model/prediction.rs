@@ -55,8 +55,7 @@ impl Model {
         turns: bool,
         each: &mut dyn FnMut(&Observation, ModelResidual),
     ) {
-        let all_alike = self.scopes.is_none();
-        for alike in observations.chunk_by(|a, b| all_alike || a.dwell.recording == b.dwell.recording) {
+        for alike in self.alike(observations) {
             let (model, p) = self.in_recording(alike[0].dwell.recording, p);
             let at = Predicting::of(model, &p, alike);
             alike.iter().for_each(|o| each(o, at.residual(o, turns)));
@@ -73,8 +72,8 @@ impl Model {
     }
 
     /// Calls `each` with the [`Model::residual_with_jacobian`] of every one of many observations at the same parameters, in
-    /// their order: what is alike for all of them is worked out once, where no recording has parameters of its own, and
-    /// columns of parameters that are not `asked` for may be zero, and rows of orientation are missing where no `turns` are.
+    /// their order: what is alike for all of them that follow each other in a recording is worked out once. Columns of
+    /// parameters that are not `asked` for may be zero, and rows of orientation are missing where no `turns` are.
     pub fn residuals_with_jacobians(
         &self,
         p: &[f64],
@@ -82,17 +81,15 @@ impl Model {
         (asked, turns): (&Asked<'_>, bool),
         each: &mut dyn FnMut(&Observation, ModelResidual, DMatrix<f64>),
     ) {
-        if self.scopes.is_some() {
-            for o in observations {
-                let (residual, jacobian) = self.residual_with_jacobian(p, o);
-                each(o, residual, jacobian);
+        for alike in self.alike(observations) {
+            let recording = alike[0].dwell.recording;
+            let ((model, p), known) = (self.in_recording(recording, p), self.known_in(recording));
+            let asked = |own: usize| asked(known.map_or(own, |known| known[own]));
+            let at = Linearisation::of(model, &p, alike, &asked, turns);
+            for o in alike {
+                let (residual, jacobian) = at.residual_with_jacobian(o);
+                each(o, residual, if known.is_some() { self.by_all(&jacobian, o) } else { jacobian });
             }
-            return;
-        }
-        let at = Linearisation::of(self, p, observations, asked, turns);
-        for o in observations {
-            let (residual, jacobian) = at.residual_with_jacobian(o);
-            each(o, residual, jacobian);
         }
     }
 

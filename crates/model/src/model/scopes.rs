@@ -135,6 +135,15 @@ impl Model {
         }
     }
 
+    /// Runs of observations that are all seen by the same model and parameters ([`Model::in_recording`]).
+    pub fn alike<'a, 'o>(
+        &self,
+        observations: &'o [&'a Observation],
+    ) -> impl Iterator<Item = &'o [&'a Observation]> + use<'a, 'o> {
+        let all = self.scopes.is_none();
+        observations.chunk_by(move |a, b| all || a.dwell.recording == b.dwell.recording)
+    }
+
     /// Index in the vector of all that each parameter has which a recording knows ([`Model::in_recording`]); `None` where
     /// every recording knows all.
     pub fn known_in(&self, recording: usize) -> Option<&[usize]> {

@@ -46,9 +46,9 @@ pub(super) struct Emission<'a> {
 
 /// How a tip scatters about its cavity, per axis [m], and the logarithms of the densities where it does not.
 #[derive(Clone, Copy)]
-struct Scatter {
-    seat_m: f64,
-    hover_m: f64,
+pub(super) struct Scatter {
+    pub seat_m: f64,
+    pub hover_m: f64,
     ln_seat: f64,
     ln_hover: f64,
 }
@@ -72,17 +72,12 @@ impl<'a> Emission<'a> {
         Emission { problem, sigma_m, usual, with_hover, ln_out, hover_m }
     }
 
-    fn scatter(&self, i: usize) -> Scatter {
+    /// Scatter of dwell `i` about its cavity when it is seated, and when it hovers.
+    pub fn scatter(&self, i: usize) -> Scatter {
         match self.problem.extra_sigma_m[i] {
             0.0 => self.usual,
             extra => Scatter::of(self.sigma_m, extra, self.hover_m.end - self.hover_m.start),
         }
-    }
-
-    /// Scatter of dwell `i` about its cavity when it is seated, and when it hovers, per axis [m].
-    pub fn sigmas_m(&self, i: usize) -> (f64, f64) {
-        let Scatter { seat_m, hover_m, .. } = self.scatter(i);
-        (seat_m, hover_m)
     }
 
     /// Fills `states` with what the tip of dwell `i` may be and the logarithm of its density, shares

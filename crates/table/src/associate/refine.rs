@@ -1,7 +1,7 @@
 //! From a rough alignment to the best one near it: expectation maximisation with falling scatter, over the
 //! board's pose (where free), the field, and the scatter of tips about cavities.
 
-use super::emission::{Emission, State};
+use super::emission::{Emission, Scatter, State};
 use super::field::{Field, Pull};
 use super::problem::Problem;
 use super::rigid::{Match, fit_rigid, on_a_line};
@@ -139,7 +139,7 @@ fn maximise(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>], 
     let emission = Emission::new(problem, sigma_m, true);
     let mut pulls = Vec::with_capacity(problem.tips_m.len());
     for (i, tip) in problem.tips_m.iter().enumerate() {
-        let (seat_sigma_m, hover_sigma_m) = emission.sigmas_m(i);
+        let Scatter { seat_m: seat_sigma_m, hover_m: hover_sigma_m, .. } = emission.scatter(i);
         let (mut lateral, mut normal) = (0.0, 0.0);
         let (mut to_lateral_m, mut to_normal_m) = (Vector3::zeros(), 0.0);
         for &(state, p) in states[i].iter().filter(|s| s.1 > 1e-3) {
