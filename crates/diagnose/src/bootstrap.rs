@@ -54,22 +54,7 @@ impl<'a> Direction<'a> {
     /// Column g: `B_g' u_g`; `spent` has `Q_g' u_g`.
     fn contributions(&self, drawn: &Drawn<'_>, spent: &DMatrix<f64>) -> DMatrix<f64> {
         let (columns, factor) = self.columns;
-        let own = match columns.factors() {
-            Some((base, basis)) => {
-                let (with, m) = (drawn.of_dwells(base), basis.ncols());
-                let mut own = DMatrix::zeros(base.ncols() * m, drawn.clusters.len());
-                for (mut column, dwells) in own.column_iter_mut().zip(drawn.clusters) {
-                    for (k, value) in column.iter_mut().enumerate() {
-                        *value = dwells.iter().map(|d| with[(*d, k / m)] * basis[(*d, k % m)]).sum();
-                    }
-                }
-                own
-            }
-            None => match columns {
-                Columns::Dense(m) => drawn.of_clusters(m),
-                _ => DMatrix::zeros(columns.len(), drawn.clusters.len()),
-            },
-        };
+        let own = drawn.of(columns);
         self.root.tr_mul(&own) * factor - self.spent.tr_mul(spent)
     }
 }
@@ -83,6 +68,32 @@ struct Drawn<'a> {
 }
 
 impl Drawn<'_> {
+    /// What columns say of `u` cluster by cluster: m x clusters.
+    fn of(&self, columns: &Columns) -> DMatrix<f64> {
+        let clusters = self.clusters.len();
+        let mut of_all = DMatrix::zeros(columns.len(), clusters);
+        match (columns, columns.factors()) {
+            (_, Some((base, basis))) => {
+                let (with, m) = (self.of_dwells(base), basis.ncols());
+                for (mut column, dwells) in of_all.column_iter_mut().zip(self.clusters) {
+                    for (k, value) in column.iter_mut().enumerate() {
+                        *value = dwells.iter().map(|d| with[(*d, k / m)] * basis[(*d, k % m)]).sum();
+                    }
+                }
+            }
+            (Columns::Together(parts), None) => {
+                let mut at = 0;
+                for part in parts {
+                    of_all.rows_mut(at, part.len()).copy_from(&self.of(part));
+                    at += part.len();
+                }
+            }
+            // As they are.
+            (_, None) => of_all.copy_from(&self.of_clusters(&columns.dense(self.dwells, 1.0))),
+        }
+        of_all
+    }
+
     /// What columns say of `u` dwell by dwell: dwells x m.
     fn of_dwells(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut with = DMatrix::zeros(self.dwells.len(), columns.ncols());

@@ -50,6 +50,8 @@ pub enum Columns {
         /// The places of those in which it acts.
         on: Range<usize>,
     },
+    /// Those of several, side by side.
+    Together(Vec<Columns>),
 }
 
 impl Columns {
@@ -60,6 +62,7 @@ impl Columns {
             Columns::Product { base, basis, .. } => base.ncols() * basis.ncols(),
             Columns::Wave { base, .. } => 2 * base.ncols(),
             Columns::Within { base, .. } => base.ncols(),
+            Columns::Together(parts) => parts.iter().map(Columns::len).sum(),
         }
     }
 
@@ -75,13 +78,14 @@ impl Columns {
             | Columns::Product { base, .. }
             | Columns::Wave { base, .. }
             | Columns::Within { base, .. } => base.nrows(),
+            Columns::Together(parts) => parts.first().map_or(0, Columns::rows),
         }
     }
 
     /// The base of a product.
     pub(crate) fn base(&self) -> Option<&Arc<DMatrix<f64>>> {
         match self {
-            Columns::Dense(_) => None,
+            Columns::Dense(_) | Columns::Together(_) => None,
             Columns::Product { base, .. } | Columns::Wave { base, .. } | Columns::Within { base, .. } => {
                 Some(base)
             }
@@ -91,7 +95,7 @@ impl Columns {
     /// Of a product its base, and the functions at the dwells (dwells x m).
     pub(crate) fn factors(&self) -> Option<(&Arc<DMatrix<f64>>, Functions<'_>)> {
         match self {
-            Columns::Dense(_) => None,
+            Columns::Dense(_) | Columns::Together(_) => None,
             Columns::Product { base, basis, size } if *size == 1.0 => Some((base, Cow::Borrowed(basis))),
             Columns::Product { base, basis, size } => Some((base, Cow::Owned(basis.as_ref() * *size))),
             Columns::Wave { base, angle_rad, per_turn, sizes } => {
@@ -162,6 +166,13 @@ impl Columns {
         if let Columns::Dense(own) = self {
             out.zip_apply(own.as_ref(), |to, from| *to = from * factor);
         }
+        if let Columns::Together(parts) = self {
+            let mut at = 0;
+            for part in parts {
+                part.write(dwells, factor, out.columns_mut(at, part.len()));
+                at += part.len();
+            }
+        }
         let Some((base, basis)) = self.factors() else { return };
         for c in 0..base.ncols() {
             for b in 0..basis.ncols() {
@@ -183,6 +194,7 @@ impl Columns {
         let finite = |m: &DMatrix<f64>| m.iter().all(|v| v.is_finite());
         match (self, self.factors()) {
             (Columns::Dense(m), _) => finite(m),
+            (Columns::Together(parts), _) => parts.iter().all(Columns::is_finite),
             (_, Some((base, basis))) => finite(base) && finite(&basis),
             (_, None) => true,
         }
@@ -194,8 +206,7 @@ impl Columns {
         match self {
             Columns::Dense(m) => Columns::Dense(Arc::new(m.select_rows(rows))),
             Columns::Product { base, basis, size } => {
-                let basis = Arc::new(basis.select_rows(kept));
-                Columns::Product { base: cut.of(base, rows), basis, size: *size }
+                Columns::Product { base: cut.of(base, rows), basis: cut.functions(basis, kept), size: *size }
             }
             Columns::Wave { base, angle_rad, per_turn, sizes } => Columns::Wave {
                 base: cut.of(base, rows),
@@ -205,6 +216,9 @@ impl Columns {
             },
             Columns::Within { base, places, on } => {
                 Columns::Within { base: cut.of(base, rows), places: cut.places(places, kept), on: on.clone() }
+            }
+            Columns::Together(parts) => {
+                Columns::Together(parts.iter().map(|part| part.select(kept, rows, cut)).collect())
             }
         }
     }
@@ -249,11 +263,23 @@ fn waves(angle_rad: &[f64], per_turn: f64) -> Vec<[f64; 2]> {
 #[derive(Default)]
 pub(crate) struct Cut {
     bases: Vec<[Arc<DMatrix<f64>>; 2]>,
+    functions: Vec<[Arc<DMatrix<f64>>; 2]>,
     numbers: Vec<[Arc<Vec<f64>>; 2]>,
     places: Vec<[Arc<Vec<usize>>; 2]>,
 }
 
 impl Cut {
+    /// Forgets all but functions at the dwells that somebody else still has: another fit of the same dwells shares them.
+    pub fn of_another_fit(&mut self) {
+        let mut functions = std::mem::take(&mut self.functions);
+        functions.retain(|[all, _]| Arc::strong_count(all) > 1);
+        *self = Cut { functions, ..Cut::default() };
+    }
+
+    fn functions(&mut self, all: &Arc<DMatrix<f64>>, kept: &[usize]) -> Arc<DMatrix<f64>> {
+        once(&mut self.functions, all, |m| m.select_rows(kept))
+    }
+
     /// A base with these rows alone.
     pub fn of(&mut self, base: &Arc<DMatrix<f64>>, rows: &[usize]) -> Arc<DMatrix<f64>> {
         once(&mut self.bases, base, |m| m.select_rows(rows))

@@ -3,8 +3,7 @@
 use crate::columns::Functions;
 use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
-use nalgebra::{DMatrix, DVector, DVectorView};
-use std::sync::Arc;
+use nalgebra::{DVector, DVectorView};
 
 /// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
 const OF_A_MAKE: [&str; 8] = [
@@ -25,13 +24,13 @@ const WEIGHED: usize = 12;
 const ONE_FREQUENCY: f64 = 0.5;
 
 /// The candidates, and for gears of one make all joints together: each joint alone may be hidden by the others.
-pub(crate) fn with_groups(mut all: Vec<Candidate>, dwells: &[DwellRow]) -> Vec<Candidate> {
+pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
     for family in OF_A_MAKE {
         let members: Vec<&Candidate> = all.iter().filter(|c| c.family == family).collect();
         if members.len() < 2 {
             continue;
         }
-        let group = grouped(&members, dwells);
+        let group = grouped(&members);
         all.push(group);
     }
     all
@@ -54,8 +53,7 @@ pub(crate) fn one_frequency(scans: &[Scan], dwells: &[DwellRow], residual: &DVec
     };
     let mut tried: Vec<(f64, Vec<&Point<'_>>)> = finest.iter().filter_map(|p| at(p.frequency)).collect();
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let group =
-        |members: Vec<&Point<'_>>| grouped(&members.iter().map(|p| p.candidate).collect::<Vec<_>>(), dwells);
+    let group = |members: Vec<&Point<'_>>| grouped(&members.iter().map(|p| p.candidate).collect::<Vec<_>>());
     let points: Vec<Candidate> = tried.into_iter().take(WEIGHED).map(|(_, members)| group(members)).collect();
     (!points.is_empty()).then(|| Scan {
         name: format!("{PERIODIC} of one frequency at all joints"),
@@ -108,18 +106,13 @@ fn frequency(point: &Candidate) -> Option<f64> {
 }
 
 /// All of them as one, each with amplitudes of its own.
-fn grouped(members: &[&Candidate], dwells: &[DwellRow]) -> Candidate {
-    let columns: Vec<DVector<f64>> = members
-        .iter()
-        .map(|c| c.columns.dense(dwells, 1.0))
-        .flat_map(|own| own.column_iter().map(|column| column.into_owned()).collect::<Vec<_>>())
-        .collect();
+fn grouped(members: &[&Candidate]) -> Candidate {
     Candidate {
         spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
         target: "all joints".to_owned(),
         known: None,
         amplitudes: members.iter().flat_map(|c| named(c)).collect(),
-        columns: Columns::Dense(Arc::new(DMatrix::from_columns(&columns))),
+        columns: Columns::Together(members.iter().map(|c| c.columns.clone()).collect()),
         ..members[0].clone()
     }
 }

@@ -3,12 +3,13 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
-    BeforeAfter, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, UnknownReport, Verdict,
+    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, NotTestable,
+    UnknownReport, Verdict,
 };
 use crate::events::together;
 use crate::explain::explanations;
 use crate::forward::{Accepted, named};
-use crate::judge::{Grade, Judged};
+use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
 use crate::problem::{Candidate, Part, Problem};
@@ -16,11 +17,11 @@ use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
 use crate::search::{Search, from_nothing, search};
-use crate::structure::structure;
+use crate::structure::{Structure, structure};
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
 use crate::{DiagnoseError, next, rivals};
-use armcal_core::{Severity, Stage, Warning, listed};
+use armcal_core::{DwellId, Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DVector;
 
@@ -42,7 +43,7 @@ pub(crate) fn propose(
     let config = &DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
     let whole = refit.problem(&[])?;
     whole.check()?;
-    let Cleaned { keep, problem, weighed } = set_aside(&whole, config);
+    let Cleaned { keep, problem, weighed, .. } = set_aside(whole, config);
     let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
     Ok(named(&from_nothing(&mut rooms, config)?.accepted))
 }
@@ -56,63 +57,88 @@ pub(crate) fn diagnose_beyond(
     config.check()?;
     let whole = refit.problem(&[])?;
     whole.check()?;
-    let Cleaned { keep, problem, weighed } = set_aside(&whole, config);
-    let mut rooms = Rooms::new(refit, keep.clone(), (problem, weighed), config);
-    let first = rooms.with(&[])?;
-    let top = first.weighed.ranking().first().map(|top| first.judge(*top, config));
+    let Cleaned { keep, aside, problem, weighed } = set_aside(whole, config);
+    let dwells = keep.len();
+    let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
+    // A room of many poses takes much memory: this one is done with before others come.
+    let before = Before::of(rooms.with(&[])?.as_ref(), config);
     let mut search = search(&mut rooms, proposed, config)?;
     rivals::settle(&mut search, &mut rooms, config)?;
-    Ok(assemble(&whole, &keep, &first, top.as_ref(), &search, config))
+    Ok(assemble(before, (dwells, aside), &search, config))
+}
+
+/// What is told of the model without effects.
+struct Before {
+    p_nothing: f64,
+    /// Of the best entry.
+    p_adjusted: f64,
+    tried_unlisted: usize,
+    candidates: Vec<CandidateReport>,
+    cannot_tell_apart: Vec<[String; 2]>,
+    not_testable: Vec<NotTestable>,
+    structure: Structure,
+    floor_mm: f64,
+    error_mm: f64,
+}
+
+impl Before {
+    fn of(room: &Room, config: &DiagnosisConfig) -> Before {
+        let Room { problem, weighed, .. } = room;
+        let top = weighed.ranking().first().map(|top| room.judge(*top, config));
+        let top = top.as_ref();
+        Before {
+            p_nothing: weighed.p_nothing,
+            p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
+            tried_unlisted: weighed.unlisted.len(),
+            candidates: candidate_reports(problem, weighed, top, &by_place(problem), config),
+            cannot_tell_apart: confused(problem, weighed, config),
+            not_testable: not_testable(problem, weighed),
+            structure: structure(problem, config),
+            floor_mm: floor_mm(problem),
+            error_mm: error_mm(problem, weighed),
+        }
+    }
 }
 
 fn assemble(
-    whole: &Problem,
-    keep: &[bool],
-    first: &Room,
-    top: Option<&Judged>,
+    before: Before,
+    (dwells, aside): (usize, Vec<DwellId>),
     search: &Search,
     config: &DiagnosisConfig,
 ) -> Diagnosis {
-    let (problem, weighed) = (&first.problem, &first.weighed);
     let effects: Vec<FoundEffect> = search.accepted.iter().map(|a| found_effect(a, config)).collect();
     let verdict = if search.left_over { Verdict::Unknown } else { Verdict::NothingMissing };
-    let rest = &search.rest;
+    let (rest, with_curves) = (&search.rest, &search.with_curves);
     let mut unlisted: Vec<UnknownReport> = search.curves.iter().map(|c| c.report.clone()).collect();
     if search.left_over && unlisted.is_empty() {
         unlisted.extend(unknown_report(&rest.problem, &rest.weighed, config));
     }
-    let probability = if search.left_over { 1.0 - weighed.p_nothing } else { weighed.p_nothing };
-    let mean = |p: &Problem, w: &Weighed| {
-        let errors = errors_m(p, &left_out(p, None, &by_place(p), w.scale));
-        errors.iter().map(|e| e.sum_m).sum::<f64>() / errors.iter().map(|e| e.count).sum::<f64>().max(1.0)
-            * 1e3
-    };
-    let noise = noise(&search.with_curves.weighed);
-    let set_aside: Vec<_> = whole.dwells.iter().zip(keep).filter(|(_, k)| !**k).map(|(d, _)| d.id).collect();
+    let probability = if search.left_over { 1.0 - before.p_nothing } else { before.p_nothing };
+    let noise = noise(&with_curves.weighed);
     let mut diagnosis = Diagnosis {
         verdict,
         names: Vec::new(),
         probability: Some(probability),
-        p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
-        candidates: candidate_reports(problem, weighed, top, &by_place(problem), config),
-        cannot_tell_apart: confused(problem, weighed, config),
-        not_testable: not_testable(problem, weighed),
+        p_adjusted: before.p_adjusted,
+        candidates: before.candidates,
+        cannot_tell_apart: before.cannot_tell_apart,
+        not_testable: before.not_testable,
         record_next: Vec::new(),
-        structure: structure(problem, config),
-        p_nothing: weighed.p_nothing,
-        tried_unlisted: weighed.unlisted.len(),
+        structure: before.structure,
+        p_nothing: before.p_nothing,
+        tried_unlisted: before.tried_unlisted,
         rest_may_be_shape: search.may_be_shape,
-        floor_mm: floor_mm(problem),
+        floor_mm: before.floor_mm,
         judged: JudgedOn::Linearised,
         unexplained: None,
         refitted: None,
         holdout_mm: BeforeAfter {
-            before: mean(problem, weighed),
-            after: mean(&search.with_curves.problem, &search.with_curves.weighed),
+            before: before.error_mm,
+            after: error_mm(&with_curves.problem, &with_curves.weighed),
         },
-        warnings: warnings(&noise, &set_aside, whole.dwells.len(), search, config),
+        warnings: warnings(&noise, &aside, dwells, search, config),
         noise,
-        set_aside,
+        set_aside: aside,
         tentative: search.tentative.iter().map(|a| found_effect(a, config)).collect(),
         effects,
         unknown: unlisted.first().cloned(),
@@ -121,9 +147,16 @@ fn assemble(
         nested: None,
     };
     diagnosis.name_again();
-    diagnosis.record_next = next::record_next(problem, &diagnosis);
+    // The dwells are the same in all rooms.
+    diagnosis.record_next = next::record_next(&rest.problem, &diagnosis);
     diagnosis.explanations = explanations(&diagnosis, config);
     diagnosis
+}
+
+/// Mean error of places that the fit did not see [mm].
+fn error_mm(problem: &Problem, weighed: &Weighed) -> f64 {
+    let errors = errors_m(problem, &left_out(problem, None, &by_place(problem), weighed.scale));
+    errors.iter().map(|e| e.sum_m).sum::<f64>() / errors.iter().map(|e| e.count).sum::<f64>().max(1.0) * 1e3
 }
 
 /// Mean error that the declared noise alone gives [mm].
@@ -198,7 +231,7 @@ fn noise(rest: &Weighed) -> NoiseReport {
 
 fn warnings(
     noise: &NoiseReport,
-    set_aside: &[armcal_core::DwellId],
+    set_aside: &[DwellId],
     dwells: usize,
     search: &Search,
     config: &DiagnosisConfig,
@@ -297,7 +330,7 @@ fn one_load(problem: &Problem) -> bool {
 }
 
 /// Dwells whose arrival direction an accepted direction effect contradicts.
-fn direction_suspects(a: &Accepted) -> Vec<armcal_core::DwellId> {
+fn direction_suspects(a: &Accepted) -> Vec<DwellId> {
     let (problem, weighed) = (&a.room.problem, &a.room.weighed);
     let projection = &weighed.metrics[0].projection;
     let columns = a.candidate.columns.dense(&problem.dwells, 1.0 / weighed.scale);

@@ -21,8 +21,6 @@ pub(crate) struct ModelRefit<'a> {
     fit: &'a FitConfig,
     /// Every set of effects fitted so far.
     fits: BTreeMap<Vec<String>, Rc<Fitted>>,
-    /// The last problem around one of those fits, with candidates at the sizes known so far.
-    last: Option<(Vec<String>, Problem)>,
     /// Size at which a candidate was refitted; `None` where it acts in proportion to its size.
     sizes: BTreeMap<String, Option<f64>>,
     pub knowledge: Knowledge,
@@ -79,8 +77,8 @@ impl<'a> ModelRefit<'a> {
         fit: &'a FitConfig,
         knowledge: Knowledge,
     ) -> ModelRefit<'a> {
-        let (fits, last, sizes, products) = Default::default();
-        ModelRefit { model, values, seen, session, fit, fits, last, sizes, knowledge, products }
+        let (fits, sizes, products) = Default::default();
+        ModelRefit { model, values, seen, session, fit, fits, sizes, knowledge, products }
     }
 
     /// Takes over at which sizes another refit of the same model found that effects act otherwise than at zero.
@@ -149,14 +147,8 @@ impl<'a> ModelRefit<'a> {
 
 impl Refit for ModelRefit<'_> {
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
-        let names = names(accepted);
-        if let Some((_, problem)) = self.last.as_ref().filter(|(of, _)| *of == names) {
-            return Ok(problem.clone());
-        }
-        let fitted = self.fitted(&names)?;
-        let problem = self.view(&fitted.model, &fitted.values).problem()?;
-        self.last = Some((names, problem.clone()));
-        Ok(problem)
+        let fitted = self.fitted(&names(accepted))?;
+        self.view(&fitted.model, &fitted.values).problem()
     }
 
     fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
@@ -206,9 +198,6 @@ impl Refit for ModelRefit<'_> {
         let spec = self.model.effect(&candidate.spec)?;
         let changed = size != 0.0 && self.view(&fitted.model, &fitted.values).bends(&spec, size)?;
         self.sizes.insert(candidate.spec.clone(), changed.then_some(size));
-        if changed {
-            self.last = None;
-        }
         Ok(changed)
     }
 }

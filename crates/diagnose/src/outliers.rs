@@ -6,6 +6,7 @@ use crate::drivers::standardised_joints;
 use crate::problem::{Columns, DwellRow, Problem};
 use crate::special::chi2_tail;
 use crate::weigh::{Entry, Weighed, weigh};
+use armcal_core::DwellId;
 use armcal_core::robust::median;
 use armcal_model::Toggle;
 use nalgebra::DVector;
@@ -30,6 +31,8 @@ const KEPT_VARIANCE: f64 = 0.5;
 pub(crate) struct Cleaned {
     /// Which dwells of the whole problem are kept.
     pub keep: Vec<bool>,
+    /// The others.
+    pub aside: Vec<DwellId>,
     /// The problem of these.
     pub problem: Problem,
     /// How it weighs.
@@ -37,14 +40,14 @@ pub(crate) struct Cleaned {
 }
 
 /// Sets dwells aside in rounds, each with the explanations that the dwells before it did not spoil.
-pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
+pub(crate) fn set_aside(whole: Problem, config: &DiagnosisConfig) -> Cleaned {
     let mut keep = vec![true; whole.dwells.len()];
     let mut problem = whole.clone();
     let mut weighed = weigh(&problem, config);
     for _ in 0..ROUNDS {
         let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
         let found = suspects(&problem, &weighed, config);
-        let found = accidents(whole, &keep, found.into_iter().map(|i| kept[i]).collect());
+        let found = accidents(&whole, &keep, found.into_iter().map(|i| kept[i]).collect());
         if found.is_empty() {
             break;
         }
@@ -52,7 +55,8 @@ pub(crate) fn set_aside(whole: &Problem, config: &DiagnosisConfig) -> Cleaned {
         problem = whole.without(&keep);
         weighed = weigh(&problem, config);
     }
-    Cleaned { keep, problem, weighed }
+    let aside = whole.dwells.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(d, _)| d.id).collect();
+    Cleaned { keep, aside, problem, weighed }
 }
 
 /// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a

@@ -318,6 +318,11 @@ impl Problem {
 
     /// The same problem without some dwells (`keep[i]` false).
     pub fn without(&self, keep: &[bool]) -> Problem {
+        self.cut_to(keep, &mut Cut::default())
+    }
+
+    /// The same, sharing with other problems of these dwells what was cut for them.
+    pub(crate) fn cut_to(&self, keep: &[bool], cut: &mut Cut) -> Problem {
         let kept: Vec<usize> = (0..self.dwells.len()).filter(|i| keep[*i]).collect();
         let rows: Vec<usize> = kept.iter().flat_map(|i| self.dwells[*i].range()).collect();
         let mut at = 0;
@@ -326,9 +331,8 @@ impl Problem {
             at += dwell.rows;
             dwell
         });
-        let mut cut = Cut::default();
         let mut candidate =
-            |c: &Candidate| Candidate { columns: c.columns.select(&kept, &rows, &mut cut), ..c.clone() };
+            |c: &Candidate| Candidate { columns: c.columns.select(&kept, &rows, cut), ..c.clone() };
         let candidates = self.candidates.iter().map(&mut candidate).collect();
         let scan = |s: &Scan| Scan { points: s.points.iter().map(&mut candidate).collect(), ..s.clone() };
         let scans = self.scans.iter().map(scan).collect();

@@ -3,6 +3,7 @@
 use crate::DiagnoseError;
 use crate::bootstrap::Significance;
 use crate::cells::{Dependences, Unlisted};
+use crate::columns::Cut;
 use crate::config::DiagnosisConfig;
 use crate::evidence::Metric;
 use crate::judge::{Judged, independent_groups, judge, significance};
@@ -64,6 +65,8 @@ impl Room {
 pub(crate) struct Rooms<'a> {
     refit: &'a mut dyn Refit,
     keep: Vec<bool>,
+    /// What problems of these dwells share.
+    cut: Cut,
     config: &'a DiagnosisConfig,
     /// The dwells are the same in all.
     dependences: Arc<Dependences>,
@@ -83,14 +86,15 @@ impl<'a> Rooms<'a> {
     ) -> Rooms<'a> {
         let room = Rc::new(Room::new(first.0, first.1));
         let dependences = room.weighed.dependences.clone();
-        let mut rooms = Rooms { refit, keep, config, dependences, known: Vec::new(), last: VecDeque::new() };
+        let (cut, known, last) = Default::default();
+        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last };
         rooms.remember(Vec::new(), &room);
         rooms
     }
 
     /// The room with these effects in the base.
     pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<Room>, DiagnoseError> {
-        let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
+        let names = names(accepted);
         if let Some(room) = self.known(&names) {
             return Ok(room);
         }
@@ -146,26 +150,34 @@ impl<'a> Rooms<'a> {
 
     /// ln evidence of the model with these effects under white noise alone, to compare it with that of others.
     pub fn ln_evidence(&mut self, accepted: &[Candidate]) -> Result<f64, DiagnoseError> {
-        let names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
         let of = |problem: &Problem, config| Metric::new(Noise::White, 0.0, problem, 1.0).ln_evidence(config);
-        match self.known(&names) {
+        match self.known(&names(accepted)) {
             Some(room) => Ok(of(&room.problem, self.config)),
             None => Ok(of(&self.bare(accepted)?, self.config)),
         }
     }
 
     /// A problem without the dwells that do not count.
-    fn kept(&self, problem: Problem) -> Result<Problem, DiagnoseError> {
+    fn kept(&mut self, problem: Problem) -> Result<Problem, DiagnoseError> {
         problem.check()?;
-        Ok(if self.keep.iter().all(|k| *k) { problem } else { problem.without(&self.keep) })
+        if self.keep.iter().all(|k| *k) {
+            return Ok(problem);
+        }
+        self.cut.of_another_fit();
+        Ok(problem.cut_to(&self.keep, &mut self.cut))
     }
 
     /// The problem alone.
     fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
             accepted.iter().cloned().partition(|c| c.family == UNLISTED);
-        let mut problem = self.refit.problem(&named)?;
-        problem = self.kept(problem)?;
+        let mut problem = match self.known(&names(&named)) {
+            Some(room) => room.problem.clone(),
+            None => {
+                let problem = self.refit.problem(&named)?;
+                self.kept(problem)?
+            }
+        };
         for shape in &shapes {
             // The dwells are the same in all rooms, so a shape's columns fit as they are.
             let columns = shape.columns.dense(&problem.dwells, 1.0);
@@ -173,6 +185,13 @@ impl<'a> Rooms<'a> {
         }
         Ok(problem)
     }
+}
+
+/// What a base with these is known by, in whatever order they came.
+fn names(accepted: &[Candidate]) -> Vec<String> {
+    let mut names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
+    names.sort_unstable();
+    names
 }
 
 /// An unlisted shape as something that can join the base, with the freedom these data give it.

@@ -42,7 +42,7 @@ impl View<'_> {
         let channels = self.channels(&base);
         let (candidates, mut scans) = self.candidates_and_scans(&specs, &channels, &base)?;
         let mut problem = self.of(&base, candidates);
-        problem.candidates = with_groups(problem.candidates, &problem.dwells);
+        problem.candidates = with_groups(problem.candidates);
         scans.extend(one_frequency(&scans, &problem.dwells, &base.residual));
         Ok(Problem { scans, channels, ..problem })
     }

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
+use crate::columns::Cut;
 use crate::noise::Noise;
+use crate::problem::Candidate;
 use crate::tests::planted;
 
 /// Columns of every form: a product of a base of two columns, waves, events that begin, end and never act, and dense ones.
@@ -22,15 +24,17 @@ pub(crate) fn forms(problem: &Problem) -> Vec<Columns> {
         sizes: [0.3, -1.2],
     };
     let within = |on| Columns::Within { base: base.clone(), places: places.clone(), on };
+    let dense = Arc::new(DMatrix::from_fn(rows, 2, |i, k| ((i * i + k) as f64).cos()));
     vec![
         Columns::Product { base: base.clone(), basis, size: 0.8 },
         wave(4.0),
         within(5..n),
-        Columns::Dense(Arc::new(DMatrix::from_fn(rows, 2, |i, k| ((i * i + k) as f64).cos()))),
+        Columns::Dense(dense.clone()),
         within(9..31),
         wave(23.5),
         within(0..0),
         within(n - 1..n),
+        Columns::Together(vec![wave(3.0), within(0..n), Columns::Dense(dense.clone()), wave(11.0)]),
     ]
 }
 
@@ -71,4 +75,29 @@ fn what_is_left_of_products_without_some_dwells_is_what_is_left_of_their_columns
         let found = columns.select(&kept, &rows, &mut cut).dense(&fewer.dwells, 1.0);
         assert_eq!(found, expected);
     }
+}
+
+#[test]
+fn what_dwells_are_cut_from_is_as_before_and_functions_are_cut_once_for_all_fits() {
+    let mut problem = planted(&[("backlash:1", 1.0)], 0, 3);
+    let like = problem.candidates[0].clone();
+    problem.candidates =
+        forms(&problem).into_iter().map(|columns| Candidate { columns, ..like.clone() }).collect();
+    let keep: Vec<bool> = (0..problem.dwells.len()).map(|i| i % 5 != 2).collect();
+    let rows: Vec<usize> =
+        problem.dwells.iter().zip(&keep).filter(|(_, keep)| **keep).flat_map(|(d, _)| d.range()).collect();
+    let mut cut = Cut::default();
+    let mut bases = Vec::new();
+    for _ in 0..2 {
+        cut.of_another_fit();
+        let kept = problem.cut_to(&keep, &mut cut);
+        for (whole, own) in problem.candidates.iter().zip(&kept.candidates) {
+            let expected = whole.columns.dense(&problem.dwells, 0.7).select_rows(&rows);
+            assert_eq!(own.columns.dense(&kept.dwells, 0.7), expected);
+        }
+        let Columns::Product { base, basis, .. } = &kept.candidates[0].columns else { panic!("a product") };
+        bases.push((base.clone(), basis.clone()));
+    }
+    assert!(Arc::ptr_eq(&bases[0].1, &bases[1].1), "functions are those of the dwells");
+    assert!(!Arc::ptr_eq(&bases[0].0, &bases[1].0), "a base is that of a fit");
 }

@@ -30,10 +30,8 @@ fn codes(all: &[Warning]) -> Vec<&str> {
 
 fn assembled(p: &Problem, search: &Search) -> Diagnosis {
     let config = quick();
-    let first = room(p, &config);
-    let top = first.judge(first.weighed.ranking()[0], &config);
-    let keep = vec![true; p.dwells.len()];
-    assemble(p, &keep, &first, Some(&top), search, &config)
+    let before = Before::of(&room(p, &config), &config);
+    assemble(before, (p.dwells.len(), Vec::new()), search, &config)
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn push(problem: &mut Problem, dwell: usize, by_m: Vector3<f64>) {
 }
 
 fn aside(problem: &Problem) -> Vec<usize> {
-    let keep = set_aside(problem, &config()).keep;
+    let keep = set_aside(problem.clone(), &config()).keep;
     (0..keep.len()).filter(|i| !keep[*i]).collect()
 }
 

@@ -386,6 +386,16 @@ pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
+fn scale(columns: &mut Columns, factor: f64) {
+    match columns {
+        Columns::Dense(m) => *m = Arc::new(m.as_ref() * factor),
+        Columns::Product { size, .. } => *size *= factor,
+        Columns::Wave { sizes, .. } => sizes.iter_mut().for_each(|size| *size *= factor),
+        Columns::Within { base, .. } => *base = Arc::new(base.as_ref() * factor),
+        Columns::Together(parts) => parts.iter_mut().for_each(|part| scale(part, factor)),
+    }
+}
+
 /// The same problem with the noise declared `factor` times too small.
 pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
     p.residual *= factor;
@@ -394,14 +404,8 @@ pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
         d.displaced *= factor;
         d.parts.iter_mut().for_each(|part| part.metres /= factor);
     }
-    let scale = |c: &mut Columns| match c {
-        Columns::Dense(m) => *m = Arc::new(m.as_ref() * factor),
-        Columns::Product { size, .. } => *size *= factor,
-        Columns::Wave { sizes, .. } => sizes.iter_mut().for_each(|size| *size *= factor),
-        Columns::Within { base, .. } => *base = Arc::new(base.as_ref() * factor),
-    };
-    p.candidates.iter_mut().for_each(|c| scale(&mut c.columns));
-    p.scans.iter_mut().flat_map(|s| &mut s.points).for_each(|c| scale(&mut c.columns));
+    p.candidates.iter_mut().for_each(|c| scale(&mut c.columns, factor));
+    p.scans.iter_mut().flat_map(|s| &mut s.points).for_each(|c| scale(&mut c.columns, factor));
     p.channels.iter_mut().for_each(|c| c.columns = Arc::new(c.columns.as_ref() * factor));
     p
 }
