@@ -36,7 +36,7 @@ pub(crate) struct Trials<'p> {
     scouts: Vec<Range<usize>>,
 }
 
-/// Rows of everything, of one kind or another.
+/// Everything that is tried: all its rows, or of each dwell what lies along a direction.
 struct Rows {
     /// The geometry, and the residual behind it.
     base: DMatrix<f64>,
@@ -80,7 +80,7 @@ impl<'p> Trials<'p> {
         let white = Products {
             base: gram(&rows.base),
             with_scouts: inner(&rows.base, &rows.scouts),
-            scouts: ranges.iter().map(|own| rows.square(own, None)).collect(),
+            scouts: ranges.iter().map(|own| square(&rows.scouts, own, None)).collect(),
         };
         Trials { problem, config, rows, white, scouts: ranges }
     }
@@ -109,15 +109,13 @@ impl<'p> Trials<'p> {
     }
 }
 
-impl Rows {
-    /// Products of a scout with itself, each row weighted.
-    fn square(&self, own: &Range<usize>, weights: Option<&[f64]>) -> DMatrix<f64> {
-        let columns = self.scouts.columns(own.start, own.len());
-        let Some(weights) = weights else { return columns.tr_mul(&columns) };
-        let mut weighted = columns.into_owned();
-        scale_rows(&mut weighted, weights);
-        columns.tr_mul(&weighted)
-    }
+/// Products of some of these columns with each other, each row weighted.
+fn square(columns: &DMatrix<f64>, own: &Range<usize>, weights: Option<&[f64]>) -> DMatrix<f64> {
+    let columns = columns.columns(own.start, own.len());
+    let Some(weights) = weights else { return columns.tr_mul(&columns) };
+    let mut weighted = columns.into_owned();
+    scale_rows(&mut weighted, weights);
+    columns.tr_mul(&weighted)
 }
 
 fn scale_rows(columns: &mut DMatrix<f64>, factors: &[f64]) {
@@ -201,15 +199,14 @@ impl OfKind<'_> {
         match sized {
             Sized::Shares(along, noise, shares) => {
                 let of_white = scouts.iter().zip(&white.scouts);
-                let squares = of_white.map(|(own, square)| square - along.square(own, Some(shares)));
+                let squares = of_white.map(|(own, all)| all - square(&along.scouts, own, Some(shares)));
                 (&white.with_scouts - inner(noise, &along.scouts), squares.collect())
             }
             Sized::Whitened(whitener, base) => {
                 let mut of_noise = rows.scouts.clone();
                 whitener.apply(&mut of_noise);
-                let of_noise = Rows { base: DMatrix::zeros(0, 0), scouts: of_noise };
-                let squares = scouts.iter().map(|own| of_noise.square(own, None));
-                (inner(base, &of_noise.scouts), squares.collect())
+                let squares = scouts.iter().map(|own| square(&of_noise, own, None));
+                (inner(base, &of_noise), squares.collect())
             }
         }
     }
