@@ -70,8 +70,10 @@ struct Drawn<'a> {
 impl Drawn<'_> {
     /// What columns say of `u` cluster by cluster: m x clusters.
     fn of(&self, columns: &Columns) -> DMatrix<f64> {
-        let clusters = self.clusters.len();
-        let mut of_all = DMatrix::zeros(columns.len(), clusters);
+        if let Columns::Dense(own) = columns {
+            return self.of_clusters(own);
+        }
+        let mut of_all = DMatrix::zeros(columns.len(), self.clusters.len());
         match (columns, columns.factors()) {
             (_, Some((base, basis))) => {
                 let (with, m) = (self.of_dwells(base), basis.ncols());
@@ -88,7 +90,6 @@ impl Drawn<'_> {
                     at += part.len();
                 }
             }
-            // As they are.
             (_, None) => of_all.copy_from(&self.of_clusters(&columns.dense(self.dwells, 1.0))),
         }
         of_all

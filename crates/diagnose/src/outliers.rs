@@ -42,21 +42,20 @@ pub(crate) struct Cleaned {
 /// Sets dwells aside in rounds, each with the explanations that the dwells before it did not spoil.
 pub(crate) fn set_aside(whole: Problem, config: &DiagnosisConfig) -> Cleaned {
     let mut keep = vec![true; whole.dwells.len()];
-    let mut problem = whole.clone();
-    let mut weighed = weigh(&problem, config);
+    let mut cut = None;
+    let mut weighed = weigh(&whole, config);
     for _ in 0..ROUNDS {
         let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
-        let found = suspects(&problem, &weighed, config);
+        let found = suspects(cut.as_ref().unwrap_or(&whole), &weighed, config);
         let found = accidents(&whole, &keep, found.into_iter().map(|i| kept[i]).collect());
         if found.is_empty() {
             break;
         }
         found.iter().for_each(|i| keep[*i] = false);
-        problem = whole.without(&keep);
-        weighed = weigh(&problem, config);
+        weighed = weigh(cut.insert(whole.without(&keep)), config);
     }
     let aside = whole.dwells.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(d, _)| d.id).collect();
-    Cleaned { keep, aside, problem, weighed }
+    Cleaned { keep, aside, problem: cut.unwrap_or(whole), weighed }
 }
 
 /// Dwells whose residual, predicted without them, is as rare as `outlier_sigma` under every explanation at hand, what a

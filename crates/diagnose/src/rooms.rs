@@ -150,11 +150,8 @@ impl<'a> Rooms<'a> {
 
     /// ln evidence of the model with these effects under white noise alone, to compare it with that of others.
     pub fn ln_evidence(&mut self, accepted: &[Candidate]) -> Result<f64, DiagnoseError> {
-        let of = |problem: &Problem, config| Metric::new(Noise::White, 0.0, problem, 1.0).ln_evidence(config);
-        match self.known(&names(accepted)) {
-            Some(room) => Ok(of(&room.problem, self.config)),
-            None => Ok(of(&self.bare(accepted)?, self.config)),
-        }
+        let problem = self.bare(accepted)?;
+        Ok(Metric::new(Noise::White, 0.0, &problem, 1.0).ln_evidence(self.config))
     }
 
     /// A problem without the dwells that do not count.
