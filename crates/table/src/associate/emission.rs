@@ -96,7 +96,9 @@ impl<'a> Emission<'a> {
             let share = if self.with_hover { hover_share(gap.z, &self.hover_m) } else { 0.0 };
             if share > 0.0 {
                 let ln = ln_hover - 0.5 * beside / (hover_sigma_m * hover_sigma_m);
-                states.push((State::Hover(k), ln + share.ln()));
+                // Of most that hover the share is all, and its logarithm nothing.
+                let ln_share = if share < 1.0 { share.ln() } else { 0.0 };
+                states.push((State::Hover(k), ln + ln_share));
             }
             let half = 0.5 * self.problem.layout.spacing_m;
             below |= self.with_hover && gap.z < -self.hover_m.start && beside < half * half;

@@ -13,6 +13,8 @@ const TRIES: usize = 160;
 const DISTINCT_M: f64 = 0.004;
 /// A second plane this much less likely than the first (as a logarithm) is not pursued.
 const WORTH_LN: f64 = 12.0;
+/// Sums of logarithms are rounded.
+const ROUNDED_LN: f64 = 1e-6;
 /// Places beside a cavity by less than this share of the spacing take part.
 const BESIDE: f64 = 0.5;
 /// Heights further from the board than this have nothing to do with it [m].
@@ -29,20 +31,28 @@ struct Height {
 /// Corrections `a + b vx + c vy` that bring the seated tips of an alignment to the height of their cavities;
 /// the best first, a second where it is nearly as good.
 pub(super) fn planes(problem: &Problem, field: &Field) -> Vec<[f64; 3]> {
-    let heights: Vec<Height> =
-        problem.sites.iter().filter_map(|s| height(problem, field, &s.at_m, s.weight)).collect();
+    let heights = heights(problem, field);
     let n = heights.len();
     let flat = heights.iter().map(|h| [-h.over_m, 0.0, 0.0]);
     let tilted = (0..if n < 3 { 0 } else { TRIES }).filter_map(|i| {
         // Co-prime strides visit many different triplets without chance.
         through(&heights[i % n], &heights[(i * 7 + n / 3) % n], &heights[(i * 13 + 2 * n / 3) % n])
     });
-    let mut scored: Vec<(f64, [f64; 3])> =
-        flat.chain(tilted).map(|p| (score(problem, &heights, &p), p)).collect();
+    let (mut scored, mut top) = (Vec::new(), f64::NEG_INFINITY);
+    for plane in flat.chain(tilted) {
+        if let Some(score) = score(problem, &heights, &plane, top - WORTH_LN) {
+            top = f64::max(top, score);
+            scored.push((score, plane));
+        }
+    }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let Some(&(top, best)) = scored.first() else { return vec![[0.0; 3]] };
     let second = scored.iter().find(|(s, p)| (p[0] - best[0]).abs() > DISTINCT_M && top - s < WORTH_LN);
     [Some(best), second.map(|s| s.1)].into_iter().flatten().collect()
+}
+
+fn heights(problem: &Problem, field: &Field) -> Vec<Height> {
+    problem.sites.iter().filter_map(|s| height(problem, field, &s.at_m, s.weight)).collect()
 }
 
 fn height(problem: &Problem, field: &Field, at_m: &Vector3<f64>, weight: f64) -> Option<Height> {
@@ -60,7 +70,9 @@ fn through(a: &Height, b: &Height, c: &Height) -> Option<[f64; 3]> {
     planes.iter().all(|v| v.is_finite()).then(|| planes.into())
 }
 
-fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3]) -> f64 {
+/// ln likelihood of heights with a plane; none where it is less than `least`, which is asked height by height: most planes are
+/// nowhere near.
+fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3], least: f64) -> Option<f64> {
     let hover_m = problem.config.hover_min_mm * 1e-3..problem.config.hover_max_mm * 1e-3;
     let seat = 0.55 / (SIGMA_M * std::f64::consts::TAU.sqrt());
     let hover = 0.25 / (hover_m.end - hover_m.start);
@@ -71,8 +83,49 @@ fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3]) -> f64 {
         let aside = if z < -hover_m.start { 0.01 * out } else { out };
         seat * (-0.5 * (z / SIGMA_M).powi(2)).exp() + above + aside
     };
-    let fit: f64 = heights.iter().map(|h| h.weight * density(h).ln()).sum();
     let prior = &problem.prior;
     let slopes = (plane[1].powi(2) + plane[2].powi(2)) / prior.slope.powi(2);
-    fit - 0.5 * (slopes + (plane[0] / prior.offset_m).powi(2))
+    let far = 0.5 * (slopes + (plane[0] / prior.offset_m).powi(2));
+    let (mut fit, most) = (0.0, (seat + hover + out).ln());
+    let mut to_come = heights.iter().map(|h| h.weight).sum::<f64>();
+    for h in heights {
+        fit += h.weight * density(h).ln();
+        to_come -= h.weight;
+        if fit + to_come * most - far < least - ROUNDED_LN {
+            return None;
+        }
+    }
+    Some(fit - far)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::planted::{Plan, Planted, paper, rng};
+    use super::*;
+    use crate::AssociationConfig;
+    use crate::associate::BoardStart;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn a_plane_is_dropped_only_where_all_heights_say_less_than_was_asked(
+            seed in 0_u64..1000, plane in prop::array::uniform3(-0.02..0.02), share in 0.0..2.0f64
+        ) {
+            let mut rng = rng(seed);
+            let plan = Plan::random(&mut rng, &paper(), Some(0.01));
+            let planted = Planted::new(&mut rng, paper(), &plan);
+            let config = AssociationConfig::default();
+            let problem = Problem::new(&planted.board, &planted.tips, &BoardStart::Unknown, &config);
+            let field = Field::none(planted.world_from_board.inverse(), Vector3::zeros());
+            let heights = heights(&problem, &field);
+            prop_assume!(!heights.is_empty());
+            let of_all = score(&problem, &heights, &plane, f64::NEG_INFINITY).expect("nothing was asked");
+            let least = share * of_all;
+            match score(&problem, &heights, &plane, least) {
+                Some(score) => prop_assert_eq!(score, of_all),
+                None => prop_assert!(of_all < least),
+            }
+        }
+    }
 }

@@ -23,6 +23,8 @@ pub(super) struct Layout {
     pub points_m: Vec<Vector3<f64>>,
     /// Smallest distance between two cavities.
     pub spacing_m: f64,
+    /// Height of the lowest cavity and of the highest.
+    pub heights_m: [f64; 2],
     /// Volume in which a dwell that belongs to no cavity may lie.
     pub volume_m3: f64,
     neighbours: Vec<Vec<bool>>,
@@ -67,6 +69,7 @@ impl Layout {
         Layout {
             names: cavities.iter().map(|c| c.name.clone()).collect(),
             spacing_m: if smallest_m.is_finite() { smallest_m } else { LONE_SPACING_M },
+            heights_m: [bound(2, f64::min, f64::INFINITY), bound(2, f64::max, f64::NEG_INFINITY)],
             volume_m3: (width_m + 0.1) * (depth_m + 0.1) * 0.3,
             points_m,
             neighbours,

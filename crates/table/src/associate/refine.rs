@@ -47,8 +47,9 @@ pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Settl
     let mut normal_known = !problem.free_pose || problem.layout.len() > 2;
     let fall = (tip_sigma_m(problem) / sigma_m).min(1.0).powf(1.0 / FALLING as f64);
     let mut least_m = sigma_m;
+    let mut soft = vec![Vec::new(); problem.tips_m.len()];
     for step in 0..FALLING {
-        let (soft, _) = expect(problem, &field, sigma_m, normal_known);
+        expect(problem, &field, sigma_m, normal_known, &mut soft);
         if problem.free_pose {
             normal_known = !on_a_line(seats(problem, &field, &soft).into_iter().map(|m| (m.0, m.2)));
             if step % POSE_EVERY == POSE_EVERY - 1 {
@@ -59,7 +60,7 @@ pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Settl
         least_m *= fall;
         sigma_m = scatter(problem, &field, &soft).max(least_m).min(problem.sigma_cap_m());
     }
-    let (_, ln_likelihood) = expect(problem, &field, sigma_m, normal_known);
+    let ln_likelihood = expect(problem, &field, sigma_m, normal_known, &mut soft);
     let ln_posterior = ln_likelihood + ln_prior(problem, &field, sigma_m);
     Settled { field, sigma_m, normal_known, ln_posterior }
 }
@@ -108,21 +109,20 @@ pub(super) fn seats(problem: &Problem, field: &Field, states: &[Vec<(State, f64)
     matches
 }
 
-/// What each dwell may be, one by one, and the logarithm of the likelihood of all.
+/// Fills `soft` with what each dwell may be, one by one; the logarithm of the likelihood of all.
 fn expect(
     problem: &Problem,
     field: &Field,
     sigma_m: f64,
     normal_known: bool,
-) -> (Vec<Vec<(State, f64)>>, f64) {
+    soft: &mut [Vec<(State, f64)>],
+) -> f64 {
     let mut ln_likelihood = 0.0;
     let emission = Emission::new(problem, sigma_m, normal_known);
     let ln_choice = (problem.layout.len() as f64).ln();
-    let mut soft = Vec::with_capacity(problem.tips_m.len());
-    for (i, tip) in problem.tips_m.iter().enumerate() {
-        let mut states = Vec::with_capacity(9);
-        emission.at(i, &field.aligned_m(tip), &mut states);
-        for (state, ln) in &mut states {
+    for ((i, tip), states) in problem.tips_m.iter().enumerate().zip(soft) {
+        emission.at(i, &field.aligned_m(tip), states);
+        for (state, ln) in &mut *states {
             *ln -= state.cavity().map_or(0.0, |_| ln_choice);
         }
         let top = states.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
@@ -130,9 +130,8 @@ fn expect(
         let total: f64 = states.iter().map(|s| s.1).sum();
         states.iter_mut().for_each(|s| s.1 /= total);
         ln_likelihood += problem.weight[i] * (total.ln() + top);
-        soft.push(states);
     }
-    (soft, ln_likelihood)
+    ln_likelihood
 }
 
 fn maximise(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>], sigma_m: f64) {

@@ -15,6 +15,8 @@ const KEEP: usize = 48;
 const LOOK: usize = 6000;
 /// Alignments with less than this share of the best one's support are not kept.
 const WORTH: f64 = 0.5;
+/// Sums of support are rounded.
+const ROUNDED: f64 = 1.0 - 1e-9;
 /// A place further from every cavity than this share of their spacing does not support an alignment.
 const REACH: f64 = 0.4;
 /// Steps of the grid [m], [rad], and how many standard deviations it spans.
@@ -101,15 +103,32 @@ pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
     let up = Unit::new_normalize(Vector3::from(problem.config.normal_in_world));
     let mut poses = by_triplets(problem, &up);
     poses.extend(by_pairs(problem, &up));
-    let sites = &problem.sites;
-    let score = |board_from_world: &Pose| -> f64 {
-        let at = |s: &Site| board_from_world.transform_point(&s.at_m.into()).coords;
-        sites.iter().map(|s| s.weight * support(problem, &at(s), true).1).sum()
-    };
-    let scored = poses.into_iter().map(|pose| (score(&pose), pose)).collect();
+    let (mut scored, mut highest) = (Vec::new(), 0.0);
+    for pose in poses {
+        if let Some(score) = support_of_all(problem, &pose, WORTH * highest) {
+            highest = f64::max(highest, score);
+            scored.push((score, pose));
+        }
+    }
     let n = problem.layout.len() as f64;
     let centre_m = problem.layout.points_m.iter().sum::<Vector3<f64>>() / n;
     different(problem, scored, |pose| Field::none(*pose, centre_m), true)
+}
+
+/// How much all places support an alignment; none where that is less than `least`, which is asked place by place: most
+/// alignments are nowhere near.
+pub(super) fn support_of_all(problem: &Problem, board_from_world: &Pose, least: f64) -> Option<f64> {
+    let (rotation, shift) =
+        (board_from_world.rotation.to_rotation_matrix(), &board_from_world.translation.vector);
+    let (mut score, mut to_come) = (0.0, problem.sites.iter().map(|s| s.weight).sum::<f64>());
+    for site in &problem.sites {
+        score += site.weight * support(problem, &(rotation * site.at_m + shift), true).1;
+        to_come -= site.weight;
+        if score + to_come < ROUNDED * least {
+            return None;
+        }
+    }
+    Some(score)
 }
 
 /// How many places an alignment brings to a cavity, seen along the board's normal.
@@ -120,10 +139,14 @@ pub(super) fn supporters(problem: &Problem, field: &Field) -> usize {
 
 /// The cavity that supports a place, and how much, from 0 to 1.
 fn support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64) {
+    let reach_m = REACH * problem.layout.spacing_m;
+    let [low_m, high_m] = problem.layout.heights_m;
+    if in_space && (at_m.z > high_m + reach_m || at_m.z < low_m - reach_m) {
+        return (u32::MAX, 0.0);
+    }
     let Some(&k) = problem.layout.near(at_m).first() else { return (u32::MAX, 0.0) };
     let gap = at_m - problem.layout.points_m[k as usize];
     let square = if in_space { gap.norm_squared() } else { gap.x * gap.x + gap.y * gap.y };
-    let reach_m = REACH * problem.layout.spacing_m;
     let support = 1.0 - square / (reach_m * reach_m);
     if support > 0.0 { (k, support) } else { (u32::MAX, 0.0) }
 }
@@ -157,6 +180,8 @@ fn different<T>(
 fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
     let pairs = Pairs::of(&problem.layout.points_m);
     let (cavities, sites) = (&problem.layout.points_m, &problem.sites);
+    let apart_m = |i: usize| cavities.iter().map(move |other| (other - cavities[i]).norm());
+    let apart_m: &Vec<Vec<f64>> = &(0..cavities.len()).map(|i| apart_m(i).collect()).collect();
     let cos_limit = problem.config.max_normal_deg.min(180.0).to_radians().cos();
     let far_m = 1.5 * problem.layout.spacing_m;
     let mut poses = Vec::new();
@@ -170,16 +195,14 @@ fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
         }
         let Some(in_world) = frame(&a, &b, &c) else { continue };
         let before = poses.len();
+        let [of_ac, of_bc] = [ac, bc].map(|distance_m| tolerance(problem, distance_m));
+        // As far from each cavity as c is from a.
+        let like_ac =
+            |i: usize| (0..cavities.len()).filter(move |k| *k != i && (apart_m[i][*k] - ac).abs() < of_ac);
+        let thirds: Vec<Vec<usize>> = (0..cavities.len()).map(|i| like_ac(i).collect()).collect();
         for &(_, i, j) in pairs.like(ab, tolerance(problem, ab)) {
-            for (k, third) in cavities.iter().enumerate() {
-                let fits = k != i
-                    && k != j
-                    && ((third - cavities[i]).norm() - ac).abs() < tolerance(problem, ac)
-                    && ((third - cavities[j]).norm() - bc).abs() < tolerance(problem, bc);
-                if !fits {
-                    continue;
-                }
-                if let Some(on_board) = frame(&cavities[i], &cavities[j], third) {
+            for &k in thirds[i].iter().filter(|k| **k != j && (apart_m[j][**k] - bc).abs() < of_bc) {
+                if let Some(on_board) = frame(&cavities[i], &cavities[j], &cavities[k]) {
                     let world_from_board = in_world * on_board.inverse();
                     if (world_from_board.rotation * Vector3::z()).dot(up) >= cos_limit {
                         poses.push(world_from_board.inverse());

@@ -1,6 +1,6 @@
 //! Planted recordings: is every dwell right, or reported as unsure?
 
-mod planted;
+pub(super) mod planted;
 
 use super::*;
 use crate::{Assignment, Place};
@@ -256,6 +256,32 @@ fn numbers_that_are_none_and_recordings_that_are_empty_are_no_panic() {
     let config = AssociationConfig { visiting_order: order, ..AssociationConfig::default() };
     let error = associate(&paper(), &planted.tips, &BoardStart::Unknown, &config).unwrap_err().to_string();
     assert!(error.contains("did you mean `circle01`?"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn an_alignment_has_the_support_of_all_places_or_less_than_was_asked(
+        seed in 0_u64..1000, shift in prop::array::uniform3(-0.02..0.02), turn in prop::array::uniform3(-0.1..0.1),
+        least in 0.0..60.0
+    ) {
+        let mut rng = rng(seed);
+        let random = Plan::random(&mut rng, &paper(), Some(0.005));
+        let planted = Planted::new(&mut rng, paper(), &random);
+        let config = AssociationConfig::default();
+        let problem = Problem::new(&planted.board, &planted.tips, &BoardStart::Unknown, &config);
+        let board_from_world = Pose::new(Vector3::from(shift), Vector3::from(turn)) * planted.world_from_board.inverse();
+        // A place counts one less the square of its distance from the nearest cavity, in two fifths of their spacing.
+        let counts = |site: &problem::Site| {
+            let apart_m = problem.layout.nearest(&(board_from_world * nalgebra::Point3::from(site.at_m)).coords).1;
+            site.weight * (1.0 - (apart_m / (0.4 * problem.layout.spacing_m)).powi(2)).max(0.0)
+        };
+        let of_all: f64 = problem.sites.iter().map(counts).sum();
+        match search::support_of_all(&problem, &board_from_world, least) {
+            Some(support) => prop_assert!((support - of_all).abs() < 1e-9, "{} {}", support, of_all),
+            None => prop_assert!(of_all < least, "{of_all} {least}"),
+        }
+    }
 }
 
 proptest! {
