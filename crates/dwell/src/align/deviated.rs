@@ -3,13 +3,21 @@
 use armcal_core::JointSamples;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 use super::profile::SpeedProfile;
-use super::scale::Scale;
+use super::scale::{Scale, Track};
 use super::{PlacedArm, Streams};
 
 /// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
 const TRIED_ROWS: f64 = 5.0;
+
+/// From one grid point of such a profile to the next, in half-widths: between the points of twice that, what a cubic misses of the
+/// speed moves a clock by ten microseconds.
+const FINE_STEP: f64 = 0.05;
+/// How far around the times it is for a path under other parameters is predicted, in half-widths of the kernel: one for the
+/// kernel, and one for what these parameters move the clock by.
+const PATH_WIDTHS: f64 = 2.0;
 
 /// Motion of a joint [rad] (prismatic: [m]) up to which the tip is where it was, whatever the uncertain parameters.
 const RESTING_RAD: f64 = 1e-4;
@@ -26,6 +34,12 @@ pub(crate) struct Deviations {
     moved: Vec<Moved>,
 }
 
+/// The part of the robot's track around some times.
+pub(crate) struct Near {
+    track: Track,
+    joint_rows: Vec<usize>,
+}
+
 /// The tip in one pose of the arm.
 struct Moved {
     tip_m: Vector3<f64>,
@@ -35,12 +49,28 @@ struct Moved {
 
 impl Streams<'_> {
     /// The speeds that the model with these parameters predicts.
-    pub(super) fn robot_speeds(&self, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
+    pub(super) fn robot_speeds<'s>(&self, scale: &'s Scale, parameters: &[f64]) -> Cow<'s, SpeedProfile> {
         if parameters.iter().all(|p| *p == 0.0) {
-            return scale.robot.clone();
+            return Cow::Borrowed(&scale.robot);
         }
         let path_m = predicted(self.joints, &self.joint_rows, &*self.arm.with(parameters));
-        scale.like_robot(self.robot.speeds_of(&path_m, scale.h_s))
+        Cow::Owned(scale.like_robot(self.robot.speeds_of(&path_m, scale.h_s, scale.robot.step_s())))
+    }
+
+    /// The part of the robot's track that speeds at these times on its clock [s] come from.
+    pub(super) fn near(&self, scale: &Scale, at_s: impl Iterator<Item = f64>) -> Near {
+        let all: Vec<usize> = (0..self.robot.time_s.len()).collect();
+        let reached = reached(&self.robot.time_s, &all, PATH_WIDTHS * scale.h_s, at_s);
+        let runs =
+            reached.chunk_by(|a, b| a.0 + 1 == b.0).map(|run| run.iter().map(|(_, row)| *row).collect());
+        let (track, rows) = self.robot.of_runs(runs);
+        Near { track, joint_rows: rows.into_iter().map(|row| self.joint_rows[row]).collect() }
+    }
+
+    /// The speeds there that the model with these parameters predicts.
+    pub(super) fn speeds_near(&self, near: &Near, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
+        let path_m = predicted(self.joints, &near.joint_rows, &*self.arm.with(parameters));
+        scale.like_robot(near.track.speeds_of(&path_m, scale.h_s, FINE_STEP * scale.h_s))
     }
 
     /// What each uncertain parameter does to the speeds at some times on the robot's clock [s]; none where there are no such
@@ -54,8 +84,9 @@ impl Streams<'_> {
         if so_far.is_empty() {
             return None;
         }
-        let rows = around(&self.robot.time_s, &self.robot.thinned(scale.h_s / TRIED_ROWS), scale.h_s, at_s);
-        let joint_rows: Vec<usize> = rows.iter().map(|row| self.joint_rows[*row]).collect();
+        let thinned = self.robot.thinned(scale.h_s / TRIED_ROWS);
+        let reached = reached(&self.robot.time_s, &thinned, scale.h_s, at_s);
+        let joint_rows: Vec<usize> = reached.iter().map(|(_, row)| self.joint_rows[*row]).collect();
         let (moved, of_row) = where_moved(self.joints, &joint_rows);
         let arm = self.arm.with(so_far);
         let at = |row: &usize| {
@@ -63,7 +94,7 @@ impl Streams<'_> {
             let tip_m = arm.motions_m(&self.joints.row_rad(*row), &mut by_m);
             Moved { tip_m, by_m }
         };
-        let time_s = rows.iter().map(|row| self.robot.time_s[*row]);
+        let time_s = reached.iter().map(|(_, row)| self.robot.time_s[*row]);
         Some(Deviations {
             so_far: so_far.to_vec(),
             h_s: scale.h_s,
@@ -130,15 +161,16 @@ pub(super) fn predicted(joints: &JointSamples, rows: &[usize], arm: &dyn PlacedA
     rows.par_iter().map_init(Vec::new, tip_m).collect()
 }
 
-/// The rows that a kernel of half-width `h_s` at any of the times reaches.
-fn around(time_s: &[f64], rows: &[usize], h_s: f64, at_s: impl Iterator<Item = f64>) -> Vec<usize> {
+/// Of some rows those that a kernel of half-width `h_s` at any of the times reaches, each with its place among them.
+fn reached(time_s: &[f64], rows: &[usize], h_s: f64, at_s: impl Iterator<Item = f64>) -> Vec<(usize, usize)> {
     let mut reached = vec![false; rows.len()];
     for t_s in at_s {
         let first = rows.partition_point(|row| time_s[*row] <= t_s - h_s).saturating_sub(1);
         let after = rows[first..].iter().take_while(|row| time_s[**row] < t_s + h_s).count();
         reached.iter_mut().skip(first).take(after + 1).for_each(|reached| *reached = true);
     }
-    rows.iter().zip(reached).filter(|(_, reached)| *reached).map(|(row, _)| *row).collect()
+    let reached = rows.iter().copied().enumerate().zip(reached);
+    reached.filter(|(_, reached)| *reached).map(|(row, _)| row).collect()
 }
 
 /// Of some rows those at which the arm is not where it was at the one before them, and which of these every row is as.

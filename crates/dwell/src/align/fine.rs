@@ -57,7 +57,8 @@ pub(crate) struct Row {
 pub(crate) struct Problem<'a> {
     robot: &'a SpeedProfile,
     points: &'a [Point],
-    reference_s: f64,
+    /// Of each point its time were its clock never set [s], and how far that lies from the reference in units of `half_s`.
+    times: Vec<[f64; 2]>,
     /// Time from the reference to the far end of the recording [s].
     pub half_s: f64,
     /// The drift, where it is not estimated.
@@ -72,7 +73,11 @@ impl<'a> Problem<'a> {
         fixed_drift: Option<f64>,
     ) -> Problem<'a> {
         let half_s = points.iter().map(|p| (p.t_s - reference_s).abs()).fold(1e-3, f64::max);
-        Problem { robot, points, reference_s, half_s, fixed_drift }
+        let time = |p: &Point| {
+            let t_s = p.t_s - p.late_s;
+            [t_s, (t_s - reference_s) / half_s]
+        };
+        Problem { robot, points, times: points.iter().map(time).collect(), half_s, fixed_drift }
     }
 
     /// Iterates from the start to offset [s], drift in seconds at the far end of the recording, gain and level;
@@ -94,7 +99,7 @@ impl<'a> Problem<'a> {
 
     /// Times of the points on the robot's clock at a state [s].
     pub(crate) fn robot_times_s(&self, state: &Vector4<f64>) -> impl Iterator<Item = f64> {
-        self.points.iter().map(|point| self.robot_s(state, point))
+        self.times.iter().map(|times| robot_s(state, times))
     }
 
     /// Gauss-Newton on Huber's cost with a fixed limit, steps halved until the cost falls.
@@ -124,8 +129,8 @@ impl<'a> Problem<'a> {
     /// Straight line of measured against predicted.
     fn first_gain(&self, state: &Vector4<f64>) -> Option<(f64, f64)> {
         let (mut n, mut m, mut p, mut mp, mut pp) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for point in self.points {
-            if let Some((predicted, _)) = self.robot.at(self.robot_s(state, point)) {
+        for (point, times) in self.points.iter().zip(&self.times) {
+            if let Some((predicted, _)) = self.robot.at(robot_s(state, times)) {
                 n += 1.0;
                 m += point.measured;
                 p += predicted;
@@ -137,24 +142,16 @@ impl<'a> Problem<'a> {
         (gain.is_finite() && gain > 0.0).then_some((gain, (m - gain * p) / n))
     }
 
-    fn robot_s(&self, state: &Vector4<f64>, point: &Point) -> f64 {
-        let t_s = point.t_s - point.late_s;
-        t_s - state.x - state.y * (t_s - self.reference_s) / self.half_s
-    }
-
     fn rows(&self, state: &Vector4<f64>, limit: f64) -> impl Iterator<Item = Row> {
         let state = *state;
-        self.points.iter().filter_map(move |point| {
-            let robot_s = self.robot_s(&state, point);
+        self.points.iter().zip(&self.times).filter_map(move |(point, times)| {
+            let robot_s = robot_s(&state, times);
             let (p, rate) = self.robot.at(robot_s)?;
             let by_offset = -state.z * rate;
-            let far = match self.fixed_drift {
-                Some(_) => 0.0,
-                None => (point.t_s - self.reference_s) / self.half_s,
-            };
+            let far = if self.fixed_drift.is_some() { 0.0 } else { times[1] };
             let jacobian = Vector4::new(by_offset, by_offset * far, p, 1.0);
             let residual = point.measured - state.z * p - state.w;
-            let weight = (limit / residual.abs()).min(1.0);
+            let weight = if residual.abs() > limit { limit / residual.abs() } else { 1.0 };
             Some(Row { point: *point, residual, jacobian, weight, robot_s })
         })
     }
@@ -172,17 +169,26 @@ impl<'a> Problem<'a> {
         let (mut loss, mut rows) = (0.0, 0.0);
         for r in self.rows(state, limit) {
             let weighted = r.weight * r.jacobian;
-            normal += weighted * r.jacobian.transpose();
+            // The lower half, which is all that a symmetric matrix has.
+            for (k, weighted) in weighted.iter().enumerate() {
+                (k..4).for_each(|l| normal[(l, k)] += weighted * r.jacobian[l]);
+            }
             gradient += r.residual * weighted;
             let size = r.residual.abs();
             loss += if size <= limit { 0.5 * size * size } else { limit * (size - 0.5 * limit) };
             rows += 1.0;
         }
+        normal.fill_upper_triangle_with_lower_triangle();
         if self.fixed_drift.is_some() {
             normal[(1, 1)] = 1.0;
         }
         Sums { normal, gradient, cost: loss / f64::max(rows, 1.0) }
     }
+}
+
+/// The time of a point on the robot's clock [s].
+fn robot_s(state: &Vector4<f64>, [t_s, far]: &[f64; 2]) -> f64 {
+    t_s - state.x - state.y * far
 }
 
 /// Normal equations of all rows, and the mean of Huber's loss: the number of rows that find a counterpart changes with the

@@ -4,6 +4,7 @@
 //! looked up once, and a lag is a sum of products. Sums over several runs of points add up, each run at a lag of its own.
 
 use super::profile::SpeedProfile;
+use nalgebra::{DVector, DVectorView};
 
 /// Steps of the sensor's profile from one point to the next. At 0.4 half-widths of the kernel from each other, points
 /// still tell all that the smoothed speed holds.
@@ -93,6 +94,10 @@ pub(crate) fn sums(
         let first_s = robot_s(run[0].0);
         let at = |k: usize| robot.at(first_s + (k as i64 - lags.most) as f64 * lags.step_s).map(|at| at.0);
         let predicted: Vec<Option<f64>> = (0..run.len() + count - 1).map(at).collect();
+        if let Some(predicted) = predicted.iter().copied().collect::<Option<Vec<f64>>>() {
+            add_all(run, &predicted, &mut sums);
+            continue;
+        }
         for (lag, sums) in sums.iter_mut().enumerate() {
             for ((_, x), y) in run.iter().zip(&predicted[count - 1 - lag..]) {
                 if let Some(y) = y {
@@ -102,4 +107,63 @@ pub(crate) fn sums(
         }
     }
     sums
+}
+
+/// Adds the sums of a run at every lag where all that is asked of the robot is known: a product at each, and running sums.
+fn add_all(run: &[(f64, f64)], predicted: &[f64], sums: &mut [Sums]) {
+    let measured = DVector::from_iterator(run.len(), run.iter().map(|point| point.1));
+    let (x, xx) = (measured.sum(), measured.norm_squared());
+    let until = |of: fn(f64) -> f64| {
+        let mut sum = 0.0;
+        let sums = predicted.iter().map(|y| {
+            sum += of(*y);
+            sum
+        });
+        std::iter::once(0.0).chain(sums).collect::<Vec<f64>>()
+    };
+    let (y, yy) = (until(|y| y), until(|y| y * y));
+    for (from, sums) in (0..sums.len()).rev().zip(sums) {
+        let to = from + run.len();
+        let own = DVectorView::from_slice(&predicted[from..to], run.len());
+        let n = run.len() as f64;
+        sums.add(&Sums { n, x, y: y[to] - y[from], xx, yy: yy[to] - yy[from], xy: measured.dot(&own) });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn sums_at_every_lag_are_those_of_its_pairs(
+            rate in 0.5..4.0f64, broken in any::<bool>(), from_s in 1.0..3.0f64, most_s in 0.05..0.8f64
+        ) {
+            let time_s: Vec<f64> =
+                (0..800).map(|i| f64::from(i) * 0.01 + if broken && i >= 300 { 1.0 } else { 0.0 }).collect();
+            let at = |t: &f64| Vector3::new((rate * t).sin(), (0.7 * rate * t).cos(), 0.3 * t);
+            let position_m: Vec<Vector3<f64>> = time_s.iter().map(at).collect();
+            let unbroken = if broken { vec![0..300, 300..800] } else { std::iter::once(0..800).collect() };
+            let robot = SpeedProfile::new(&time_s, &position_m, &unbroken, 0.1, 0.01);
+            let lags = Lags::within(&robot, most_s);
+            let point = |k: i32| (from_s + f64::from(k) * lags.step_s, (f64::from(k) * 0.3).sin());
+            let points: Vec<(f64, f64)> = (0..60).map(point).collect();
+            for (k, found) in sums(&points, &robot, |t_s| t_s, lags).iter().enumerate() {
+                let later_s = (k as i64 - lags.most) as f64 * lags.step_s;
+                let mut own = Sums::default();
+                for (t_s, x) in &points {
+                    if let Some((y, _)) = robot.at(t_s - later_s) {
+                        own.push(*x, y);
+                    }
+                }
+                let numbers = |s: &Sums| [s.n, s.x, s.y, s.xx, s.yy, s.xy];
+                for (a, b) in numbers(found).iter().zip(numbers(&own)) {
+                    prop_assert!((a - b).abs() < 1e-6, "{:?} {:?}", found, own);
+                }
+            }
+        }
+    }
 }

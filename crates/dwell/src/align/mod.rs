@@ -17,6 +17,7 @@ mod warnings;
 use armcal_core::robust::percentile;
 use armcal_core::{JointSamples, PoseSamples, Warning};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
@@ -318,11 +319,18 @@ impl<'a> Streams<'a> {
         mut parameters: Vec<f64>,
         fixed: Option<f64>,
     ) -> Option<Fine> {
-        let mut last = None;
+        let (mut last, mut near) = (None, None);
         for _ in 0..MODEL_ROUNDS {
-            let robot = self.robot_speeds(scale, &parameters);
+            // From the second round on the clock hardly moves.
+            let robot = match &near {
+                None => self.robot_speeds(scale, &parameters),
+                Some(near) => Cow::Owned(self.speeds_near(near, scale, &parameters)),
+            };
             let problem = Problem::new(&robot, movements, self.reference_s, fixed);
             let Some(state) = problem.solve(start) else { break };
+            if near.is_none() {
+                near = Some(self.near(scale, problem.robot_times_s(&state)));
+            }
             let deviations = self.deviations(scale, &parameters, problem.robot_times_s(&state));
             let Some(step) = Step::of(&problem, &state, deviations.as_ref()) else { break };
             let by = parameters.iter().zip(&step.parameters).map(|(was, is)| (is - was).abs());

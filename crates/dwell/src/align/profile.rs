@@ -15,6 +15,8 @@ use std::ops::Range;
 pub(crate) struct SpeedProfile {
     stretches: Vec<Stretch>,
     step_s: f64,
+    /// Grid points in a second [1/s].
+    per_s: f64,
 }
 
 #[derive(Clone)]
@@ -39,13 +41,13 @@ impl SpeedProfile {
                 path.speeds(half_width_s, step_s)
             })
             .collect();
-        SpeedProfile { stretches, step_s }
+        SpeedProfile { stretches, step_s, per_s: 1.0 / step_s }
     }
 
     /// Speed [m/s] and its rate of change [m/s^2] at a time; none where the stream is broken.
     pub(crate) fn at(&self, t_s: f64) -> Option<(f64, f64)> {
         let stretch = &self.stretches[self.stretches.partition_point(|s| s.start_s <= t_s).checked_sub(1)?];
-        let u = (t_s - stretch.start_s) / self.step_s;
+        let u = (t_s - stretch.start_s) * self.per_s;
         let i = u as usize;
         let v = &stretch.speed_m_s;
         if i == 0 || i + 2 >= v.len() {
@@ -56,7 +58,7 @@ impl SpeedProfile {
         let (k1, k2, k3) = (0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d, 0.5 * (d - a) + 1.5 * (b - c));
         let x = u - i as f64;
         let value = b + x * (k1 + x * (k2 + x * k3));
-        Some((value, (k1 + x * (2.0 * k2 + x * 3.0 * k3)) / self.step_s))
+        Some((value, (k1 + x * (2.0 * k2 + x * 3.0 * k3)) * self.per_s))
     }
 
     /// Time from one grid point to the next [s].
@@ -83,7 +85,7 @@ impl SpeedProfile {
             .stretches
             .iter()
             .map(|s| Stretch { start_s: s.start_s, speed_m_s: s.speed_m_s.iter().map(of).collect() });
-        SpeedProfile { stretches: stretches.collect(), step_s: self.step_s }
+        SpeedProfile { stretches: stretches.collect(), ..*self }
     }
 
     /// The `p`-quantile of the speeds [m/s]; NaN when there are none.

@@ -20,6 +20,9 @@ const MOST_MOVEMENTS: f64 = 50.0;
 /// whose smoothed speed is not zero.
 const MOVING_SHARE: f64 = 0.15;
 
+/// From one grid point of a profile to the next, in half-widths of the kernel.
+const GRID_STEP: f64 = 0.1;
+
 /// A path in seconds since an origin, and where it is unbroken.
 pub(crate) struct Track {
     pub time_s: Vec<f64>,
@@ -47,8 +50,8 @@ impl Track {
     }
 
     /// The same stamps on another path without more breaks, as speeds.
-    pub(crate) fn speeds_of(&self, position_m: &[Vector3<f64>], h_s: f64) -> SpeedProfile {
-        SpeedProfile::new(&self.time_s, position_m, &self.unbroken, h_s, 0.1 * h_s)
+    pub(crate) fn speeds_of(&self, position_m: &[Vector3<f64>], h_s: f64, step_s: f64) -> SpeedProfile {
+        SpeedProfile::new(&self.time_s, position_m, &self.unbroken, h_s, step_s)
     }
 
     /// Position of the row nearest to a time, where one lies within two periods.
@@ -75,8 +78,24 @@ impl Track {
         kept
     }
 
+    /// Some rows of the path in runs between which it is not known, as a path of its own, broken where this one is; and which
+    /// rows those are.
+    pub(crate) fn of_runs(&self, runs: impl Iterator<Item = Vec<usize>>) -> (Track, Vec<usize>) {
+        let (mut rows, mut unbroken) = (Vec::new(), Vec::new());
+        let stretch = |row: &usize| self.unbroken.partition_point(|stretch| stretch.end <= *row);
+        for run in runs {
+            for part in run.chunk_by(|a, b| stretch(a) == stretch(b)) {
+                unbroken.push(rows.len()..rows.len() + part.len());
+                rows.extend_from_slice(part);
+            }
+        }
+        let time_s = rows.iter().map(|row| self.time_s[*row]).collect();
+        let position_m = rows.iter().map(|row| self.position_m[*row]).collect();
+        (Track { time_s, position_m, unbroken, period_s: self.period_s }, rows)
+    }
+
     pub(crate) fn speeds(&self, h_s: f64) -> SpeedProfile {
-        self.speeds_of(&self.position_m, h_s)
+        self.speeds_of(&self.position_m, h_s, GRID_STEP * h_s)
     }
 }
 
@@ -126,7 +145,7 @@ impl Scale {
         }
         let moving_above = (MOVING_SHARE * measured).max(0.5 * least);
         let points = sensor.points(1);
-        let moving_s = 0.1 * h_s * points.iter().filter(|p| p.1 > moving_above).count() as f64;
+        let moving_s = GRID_STEP * h_s * points.iter().filter(|p| p.1 > moving_above).count() as f64;
         if moving_s < config.min_motion_s {
             return Err(DwellError::NoMotion {
                 seen: format!(
