@@ -52,8 +52,10 @@ pub struct Row {
 }
 
 impl Row {
-    /// Takes the names of its quantities from those of other rows: thousands of rows have few names.
+    /// Takes the names of its quantities from those of other rows, and no more room than it needs: thousands of rows have few
+    /// names.
     pub fn share_names(&mut self, names: &mut BTreeSet<Arc<str>>) {
+        self.quantities.shrink_to_fit();
         for q in &mut self.quantities {
             match names.get(&q.name) {
                 Some(known) => q.name = known.clone(),

@@ -8,8 +8,10 @@ use armcal_calibrate::Estimate;
 use armcal_core::{Dwell, DwellId, Observation};
 use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
+use polars::polars_utils::compression::ZstdLevel;
 use polars::prelude::{
-    Column, DataFrame, KeyValueMetadata, NamedFrom, ParquetWriter, PolarsError, PolarsResult, Series,
+    Column, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter, PolarsError,
+    PolarsResult, Series,
 };
 use std::collections::BTreeMap;
 
@@ -214,6 +216,9 @@ fn parquet(columns: Vec<Column>, mark: String) -> PolarsResult<Vec<u8>> {
     let metadata = KeyValueMetadata::from_static(vec![("schema".into(), mark)]);
     ParquetWriter::new(&mut bytes)
         .with_key_value_metadata(Some(metadata))
+        // Small tables of many columns: compressing takes megabytes for each that is encoded at a time, and more at higher levels.
+        .set_parallel(false)
+        .with_compression(ParquetCompression::Zstd(Some(ZstdLevel::try_new(1)?)))
         .finish(&mut DataFrame::new_infer_height(columns)?)?;
     Ok(bytes)
 }

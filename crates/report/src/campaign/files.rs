@@ -99,6 +99,8 @@ impl<'a> File<'a> {
 /// A page or table that cannot be made, a file that cannot be written.
 pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let [html, json, parquet] = campaign_files(folder);
+    // What takes most memory comes before anything else is held.
+    let table = columns(campaign).encode("campaign.parquet")?;
     let staged = vec![
         {
             let page = CampaignPage::of(campaign)?;
@@ -108,7 +110,7 @@ pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>
             serde_json::to_writer_pretty(&mut *out, &File::of(campaign))?;
             out.write_all(b"\n")
         })?,
-        stage(&parquet, &columns(campaign).encode("campaign.parquet")?)?,
+        stage(&parquet, &table)?,
     ];
     commit_all(staged)
 }
