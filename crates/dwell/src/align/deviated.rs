@@ -12,12 +12,12 @@ use super::{PlacedArm, Streams};
 /// Rows of the joint stream per half-width of the kernel that the uncertain parameters are tried on.
 const TRIED_ROWS: f64 = 5.0;
 
-/// From one grid point of such a profile to the next, in half-widths: between the points of twice that, what a cubic misses of the
-/// speed moves a clock by ten microseconds.
-const FINE_STEP: f64 = 0.05;
-/// How far around the times it is for a path under other parameters is predicted, in half-widths of the kernel: one for the
-/// kernel, and one for what these parameters move the clock by.
+/// How far around the times it is for a path is predicted anew, in half-widths of the kernel: one for the kernel, and one for what
+/// the parameters move the clock by.
 const PATH_WIDTHS: f64 = 2.0;
+/// From one grid point of its speeds to the next, in half-widths: what a cubic misses of the speed between points twice as far
+/// from each other moves a clock by ten microseconds and more where the kernel is long.
+const FINE_STEP: f64 = 0.05;
 
 /// Motion of a joint [rad] (prismatic: [m]) up to which the tip is where it was, whatever the uncertain parameters.
 const RESTING_RAD: f64 = 1e-4;
@@ -59,7 +59,7 @@ impl Streams<'_> {
 
     /// The part of the robot's track that speeds at these times on its clock [s] come from.
     pub(super) fn near(&self, scale: &Scale, at_s: impl Iterator<Item = f64>) -> Near {
-        let all: Vec<usize> = (0..self.robot.time_s.len()).collect();
+        let all = self.robot.thinned(0.0);
         let reached = reached(&self.robot.time_s, &all, PATH_WIDTHS * scale.h_s, at_s);
         let runs =
             reached.chunk_by(|a, b| a.0 + 1 == b.0).map(|run| run.iter().map(|(_, row)| *row).collect());

@@ -321,14 +321,15 @@ impl<'a> Streams<'a> {
     ) -> Option<Fine> {
         let (mut last, mut near) = (None, None);
         for _ in 0..MODEL_ROUNDS {
-            // From the second round on the clock hardly moves.
+            // From the second round on the clock hardly moves, and what is left of it to find is finer than the first grid.
+            let coarse = near.is_none();
             let robot = match &near {
                 None => self.robot_speeds(scale, &parameters),
                 Some(near) => Cow::Owned(self.speeds_near(near, scale, &parameters)),
             };
             let problem = Problem::new(&robot, movements, self.reference_s, fixed);
             let Some(state) = problem.solve(start) else { break };
-            if near.is_none() {
+            if coarse {
                 near = Some(self.near(scale, problem.robot_times_s(&state)));
             }
             let deviations = self.deviations(scale, &parameters, problem.robot_times_s(&state));
@@ -338,7 +339,7 @@ impl<'a> Streams<'a> {
             parameters.clone_from(&step.parameters);
             start = step.to;
             last = Some(step);
-            if settled {
+            if settled && !coarse {
                 break;
             }
         }

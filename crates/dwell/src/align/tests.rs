@@ -95,6 +95,22 @@ fn of_a_long_recording_pieces_tell_the_clocks() {
 }
 
 #[test]
+fn where_nothing_scatters_a_clock_is_right_to_a_fifth_of_a_microsecond() {
+    let error_s = |seed| {
+        let (mut r, s) = session(seed);
+        let (offset_s, drift) = (0.0137 * seed as f64, 4e-5);
+        let wrong = arm(&mut r);
+        let joints = s.encoders(&mut r, 400.0, 1e-8, 0.0);
+        let tip = s.tip_of(&mut r, &wrong, 170.0, 1e-8, offset_s, drift);
+        let (found, _) = align(&joints, &tip);
+        pull(&found, &tip, offset_s, drift, 0.5, s.end_s()) * found.sigma_s(tip.time_ns[tip.len() / 2])
+    };
+    let errors_s: Vec<f64> = (30..42).map(error_s).collect();
+    let rms_s = (errors_s.iter().map(|e| e * e).sum::<f64>() / errors_s.len() as f64).sqrt();
+    assert!(rms_s < 2e-7, "{rms_s} {errors_s:?}");
+}
+
+#[test]
 fn a_clock_set_in_a_long_recording_is_noticed_where_it_was() {
     for (seed, by_s) in [(70, 0.03_f64), (72, 0.2)] {
         let mut r = Random::new(seed);
