@@ -53,24 +53,33 @@ impl Streams<'_> {
         if parameters.iter().all(|p| *p == 0.0) {
             return Cow::Borrowed(&scale.robot);
         }
-        let path_m = predicted(self.joints, &self.joint_rows, &*self.arm.with(parameters));
-        Cow::Owned(scale.like_robot(self.robot.speeds_of(&path_m, scale.h_s, scale.robot.step_s())))
+        let step_s = scale.robot.step_s();
+        Cow::Owned(self.speeds((&self.robot, &self.joint_rows), scale, parameters, step_s))
     }
 
     /// The part of the robot's track that speeds at these times on its clock [s] come from.
     pub(super) fn near(&self, scale: &Scale, at_s: impl Iterator<Item = f64>) -> Near {
         let all = self.robot.thinned(0.0);
         let reached = reached(&self.robot.time_s, &all, PATH_WIDTHS * scale.h_s, at_s);
-        let runs =
-            reached.chunk_by(|a, b| a.0 + 1 == b.0).map(|run| run.iter().map(|(_, row)| *row).collect());
-        let (track, rows) = self.robot.of_runs(runs);
+        let (track, rows) = self.robot.of_runs(&reached);
         Near { track, joint_rows: rows.into_iter().map(|row| self.joint_rows[row]).collect() }
     }
 
     /// The speeds there that the model with these parameters predicts.
     pub(super) fn speeds_near(&self, near: &Near, scale: &Scale, parameters: &[f64]) -> SpeedProfile {
-        let path_m = predicted(self.joints, &near.joint_rows, &*self.arm.with(parameters));
-        scale.like_robot(near.track.speeds_of(&path_m, scale.h_s, FINE_STEP * scale.h_s))
+        self.speeds((&near.track, &near.joint_rows), scale, parameters, FINE_STEP * scale.h_s)
+    }
+
+    /// Speeds along a track, of which these are the rows in the joint stream.
+    fn speeds(
+        &self,
+        (track, joint_rows): (&Track, &[usize]),
+        scale: &Scale,
+        parameters: &[f64],
+        step_s: f64,
+    ) -> SpeedProfile {
+        let path_m = predicted(self.joints, joint_rows, &*self.arm.with(parameters));
+        scale.like_robot(track.speeds_of(&path_m, scale.h_s, step_s))
     }
 
     /// What each uncertain parameter does to the speeds at some times on the robot's clock [s]; none where there are no such
@@ -85,8 +94,8 @@ impl Streams<'_> {
             return None;
         }
         let thinned = self.robot.thinned(scale.h_s / TRIED_ROWS);
-        let reached = reached(&self.robot.time_s, &thinned, scale.h_s, at_s);
-        let joint_rows: Vec<usize> = reached.iter().map(|(_, row)| self.joint_rows[*row]).collect();
+        let rows = reached(&self.robot.time_s, &thinned, scale.h_s, at_s).concat();
+        let joint_rows: Vec<usize> = rows.iter().map(|row| self.joint_rows[*row]).collect();
         let (moved, of_row) = where_moved(self.joints, &joint_rows);
         let arm = self.arm.with(so_far);
         let at = |row: &usize| {
@@ -94,7 +103,7 @@ impl Streams<'_> {
             let tip_m = arm.motions_m(&self.joints.row_rad(*row), &mut by_m);
             Moved { tip_m, by_m }
         };
-        let time_s = reached.iter().map(|(_, row)| self.robot.time_s[*row]);
+        let time_s = rows.iter().map(|row| self.robot.time_s[*row]);
         Some(Deviations {
             so_far: so_far.to_vec(),
             h_s: scale.h_s,
@@ -161,16 +170,25 @@ pub(super) fn predicted(joints: &JointSamples, rows: &[usize], arm: &dyn PlacedA
     rows.par_iter().map_init(Vec::new, tip_m).collect()
 }
 
-/// Of some rows those that a kernel of half-width `h_s` at any of the times reaches, each with its place among them.
-fn reached(time_s: &[f64], rows: &[usize], h_s: f64, at_s: impl Iterator<Item = f64>) -> Vec<(usize, usize)> {
+/// Of some rows those that a kernel of half-width `h_s` at any of the times reaches, in runs without others between them.
+fn reached<'r>(
+    time_s: &[f64],
+    rows: &'r [usize],
+    h_s: f64,
+    at_s: impl Iterator<Item = f64>,
+) -> Vec<&'r [usize]> {
     let mut reached = vec![false; rows.len()];
     for t_s in at_s {
         let first = rows.partition_point(|row| time_s[*row] <= t_s - h_s).saturating_sub(1);
         let after = rows[first..].iter().take_while(|row| time_s[**row] < t_s + h_s).count();
         reached.iter_mut().skip(first).take(after + 1).for_each(|reached| *reached = true);
     }
-    let reached = rows.iter().copied().enumerate().zip(reached);
-    reached.filter(|(_, reached)| *reached).map(|(row, _)| row).collect()
+    let mut end = 0;
+    let runs = reached.chunk_by(|a, b| a == b).map(|run| {
+        end += run.len();
+        (run[0], &rows[end - run.len()..end])
+    });
+    runs.filter(|(reached, _)| *reached).map(|(_, rows)| rows).collect()
 }
 
 /// Of some rows those at which the arm is not where it was at the one before them, and which of these every row is as.

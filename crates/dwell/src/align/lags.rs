@@ -93,41 +93,38 @@ pub(crate) fn sums(
     for run in points.chunk_by(on_grid) {
         let first_s = robot_s(run[0].0);
         let at = |k: usize| robot.at(first_s + (k as i64 - lags.most) as f64 * lags.step_s).map(|at| at.0);
+        // What is not known counts as nothing.
         let predicted: Vec<Option<f64>> = (0..run.len() + count - 1).map(at).collect();
-        if let Some(predicted) = predicted.iter().copied().collect::<Option<Vec<f64>>>() {
-            add_all(run, &predicted, &mut sums);
-            continue;
-        }
-        for (lag, sums) in sums.iter_mut().enumerate() {
-            for ((_, x), y) in run.iter().zip(&predicted[count - 1 - lag..]) {
-                if let Some(y) = y {
-                    sums.push(*x, *y);
-                }
-            }
+        let known: Vec<f64> = predicted.iter().map(|y| f64::from(y.is_some())).collect();
+        let predicted: Vec<f64> = predicted.into_iter().map(Option::unwrap_or_default).collect();
+        let [n, y, yy] = [until(&known, |one| one), until(&predicted, |y| y), until(&predicted, |y| y * y)];
+        let measured = DVector::from_iterator(run.len(), run.iter().map(|point| point.1));
+        let squares = measured.map(|x| x * x);
+        for (from, sums) in (0..count).rev().zip(&mut sums) {
+            let to = from + run.len();
+            let [known, predicted] =
+                [&known, &predicted].map(|of| DVectorView::from_slice(&of[from..to], run.len()));
+            sums.add(&Sums {
+                n: n[to] - n[from],
+                x: measured.dot(&known),
+                y: y[to] - y[from],
+                xx: squares.dot(&known),
+                yy: yy[to] - yy[from],
+                xy: measured.dot(&predicted),
+            });
         }
     }
     sums
 }
 
-/// Adds the sums of a run at every lag where all that is asked of the robot is known: a product at each, and running sums.
-fn add_all(run: &[(f64, f64)], predicted: &[f64], sums: &mut [Sums]) {
-    let measured = DVector::from_iterator(run.len(), run.iter().map(|point| point.1));
-    let (x, xx) = (measured.sum(), measured.norm_squared());
-    let until = |of: fn(f64) -> f64| {
-        let mut sum = 0.0;
-        let sums = predicted.iter().map(|y| {
-            sum += of(*y);
-            sum
-        });
-        std::iter::once(0.0).chain(sums).collect::<Vec<f64>>()
-    };
-    let (y, yy) = (until(|y| y), until(|y| y * y));
-    for (from, sums) in (0..sums.len()).rev().zip(sums) {
-        let to = from + run.len();
-        let own = DVectorView::from_slice(&predicted[from..to], run.len());
-        let n = run.len() as f64;
-        sums.add(&Sums { n, x, y: y[to] - y[from], xx, yy: yy[to] - yy[from], xy: measured.dot(&own) });
-    }
+/// Running sums: of the numbers before each, and of all.
+fn until(numbers: &[f64], of: fn(f64) -> f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums = numbers.iter().map(|number| {
+        sum += of(*number);
+        sum
+    });
+    std::iter::once(0.0).chain(sums).collect()
 }
 
 #[cfg(test)]

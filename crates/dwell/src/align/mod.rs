@@ -320,18 +320,15 @@ impl<'a> Streams<'a> {
         fixed: Option<f64>,
     ) -> Option<Fine> {
         let (mut last, mut near) = (None, None);
-        for _ in 0..MODEL_ROUNDS {
+        for round in 0..MODEL_ROUNDS {
             // From the second round on the clock hardly moves, and what is left of it to find is finer than the first grid.
-            let coarse = near.is_none();
             let robot = match &near {
                 None => self.robot_speeds(scale, &parameters),
                 Some(near) => Cow::Owned(self.speeds_near(near, scale, &parameters)),
             };
             let problem = Problem::new(&robot, movements, self.reference_s, fixed);
             let Some(state) = problem.solve(start) else { break };
-            if coarse {
-                near = Some(self.near(scale, problem.robot_times_s(&state)));
-            }
+            near.get_or_insert_with(|| self.near(scale, problem.robot_times_s(&state)));
             let deviations = self.deviations(scale, &parameters, problem.robot_times_s(&state));
             let Some(step) = Step::of(&problem, &state, deviations.as_ref()) else { break };
             let by = parameters.iter().zip(&step.parameters).map(|(was, is)| (is - was).abs());
@@ -339,7 +336,7 @@ impl<'a> Streams<'a> {
             parameters.clone_from(&step.parameters);
             start = step.to;
             last = Some(step);
-            if settled && !coarse {
+            if settled && round > 0 {
                 break;
             }
         }

@@ -80,7 +80,7 @@ impl Track {
 
     /// Some rows of the path in runs between which it is not known, as a path of its own, broken where this one is; and which
     /// rows those are.
-    pub(crate) fn of_runs(&self, runs: impl Iterator<Item = Vec<usize>>) -> (Track, Vec<usize>) {
+    pub(crate) fn of_runs(&self, runs: &[&[usize]]) -> (Track, Vec<usize>) {
         let (mut rows, mut unbroken) = (Vec::new(), Vec::new());
         let stretch = |row: &usize| self.unbroken.partition_point(|stretch| stretch.end <= *row);
         for run in runs {

@@ -1,5 +1,6 @@
 //! The plane of seated tips among heights: hovering tips are above it, nothing is below it.
 
+use super::at_least::sum_of_at_least;
 use super::emission::hover_share;
 use super::field::Field;
 use super::problem::Problem;
@@ -13,8 +14,6 @@ const TRIES: usize = 160;
 const DISTINCT_M: f64 = 0.004;
 /// A second plane this much less likely than the first (as a logarithm) is not pursued.
 const WORTH_LN: f64 = 12.0;
-/// Sums of logarithms are rounded.
-const ROUNDED_LN: f64 = 1e-6;
 /// Places beside a cavity by less than this share of the spacing take part.
 const BESIDE: f64 = 0.5;
 /// Heights further from the board than this have nothing to do with it [m].
@@ -70,8 +69,7 @@ fn through(a: &Height, b: &Height, c: &Height) -> Option<[f64; 3]> {
     planes.iter().all(|v| v.is_finite()).then(|| planes.into())
 }
 
-/// ln likelihood of heights with a plane; none where it is less than `least`, which is asked height by height: most planes are
-/// nowhere near.
+/// ln likelihood of heights with a plane; none where it is less than `least`.
 fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3], least: f64) -> Option<f64> {
     let hover_m = problem.config.hover_min_mm * 1e-3..problem.config.hover_max_mm * 1e-3;
     let seat = 0.55 / (SIGMA_M * std::f64::consts::TAU.sqrt());
@@ -86,16 +84,10 @@ fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3], least: f64) ->
     let prior = &problem.prior;
     let slopes = (plane[1].powi(2) + plane[2].powi(2)) / prior.slope.powi(2);
     let far = 0.5 * (slopes + (plane[0] / prior.offset_m).powi(2));
-    let (mut fit, most) = (0.0, (seat + hover + out).ln());
-    let mut to_come = heights.iter().map(|h| h.weight).sum::<f64>();
-    for h in heights {
-        fit += h.weight * density(h).ln();
-        to_come -= h.weight;
-        if fit + to_come * most - far < least - ROUNDED_LN {
-            return None;
-        }
-    }
-    Some(fit - far)
+    let (whole, most) = (heights.iter().map(|h| h.weight).sum(), (seat + hover + out).ln());
+    let fit =
+        sum_of_at_least(least + far, (whole, most), heights.iter().map(|h| (h.weight, density(h).ln())));
+    Some(fit? - far)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! 5. [`verdict`]: explanations are weighed by their posterior probability; a dwell that they do not agree
 //!    on is ambiguous, and a board that no explanation fits is an error.
 
+mod at_least;
 mod emission;
 mod field;
 mod heights;

@@ -22,6 +22,8 @@ pub(super) struct Problem<'a> {
     /// Scatter of a tip beyond that of the others, per axis: the sensor missed it [m].
     pub extra_sigma_m: Vec<f64>,
     pub sites: Vec<Site>,
+    /// The weight of all of them.
+    pub sites_weight: f64,
     /// Probability that a dwell is in the cavity of the one before it, as a first guess.
     pub stay: f64,
     /// Cavities in the configured order of visits, as indices into the layout.
@@ -81,6 +83,7 @@ impl<'a> Problem<'a> {
             tips_m,
             index,
             weight,
+            sites_weight: sites.iter().map(|s| s.weight).sum(),
             sites,
             free_pose,
         }

@@ -4,6 +4,7 @@
 //! pose: triplets and pairs of places matched with triplets and pairs of cavities by their distances.
 //! Places are drawn by a low-discrepancy sequence (Roberts 2018), the same for the same input.
 
+use super::at_least::sum_of_at_least;
 use super::field::Field;
 use super::problem::{Problem, Site};
 use armcal_core::Pose;
@@ -15,8 +16,6 @@ const KEEP: usize = 48;
 const LOOK: usize = 6000;
 /// Alignments with less than this share of the best one's support are not kept.
 const WORTH: f64 = 0.5;
-/// Sums of support are rounded.
-const ROUNDED: f64 = 1.0 - 1e-9;
 /// A place further from every cavity than this share of their spacing does not support an alignment.
 const REACH: f64 = 0.4;
 /// Steps of the grid [m], [rad], and how many standard deviations it spans.
@@ -115,20 +114,12 @@ pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
     different(problem, scored, |pose| Field::none(*pose, centre_m), true)
 }
 
-/// How much all places support an alignment; none where that is less than `least`, which is asked place by place: most
-/// alignments are nowhere near.
+/// How much all places support an alignment; none where that is less than `least`.
 pub(super) fn support_of_all(problem: &Problem, board_from_world: &Pose, least: f64) -> Option<f64> {
     let (rotation, shift) =
         (board_from_world.rotation.to_rotation_matrix(), &board_from_world.translation.vector);
-    let (mut score, mut to_come) = (0.0, problem.sites.iter().map(|s| s.weight).sum::<f64>());
-    for site in &problem.sites {
-        score += site.weight * support(problem, &(rotation * site.at_m + shift), true).1;
-        to_come -= site.weight;
-        if score + to_come < ROUNDED * least {
-            return None;
-        }
-    }
-    Some(score)
+    let of = |site: &Site| (site.weight, support(problem, &(rotation * site.at_m + shift), true).1);
+    sum_of_at_least(least, (problem.sites_weight, 1.0), problem.sites.iter().map(of))
 }
 
 /// How many places an alignment brings to a cavity, seen along the board's normal.
@@ -180,8 +171,7 @@ fn different<T>(
 fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
     let pairs = Pairs::of(&problem.layout.points_m);
     let (cavities, sites) = (&problem.layout.points_m, &problem.sites);
-    let apart_m = |i: usize| cavities.iter().map(move |other| (other - cavities[i]).norm());
-    let apart_m: &Vec<Vec<f64>> = &(0..cavities.len()).map(|i| apart_m(i).collect()).collect();
+    let apart_m = &pairs.apart_m;
     let cos_limit = problem.config.max_normal_deg.min(180.0).to_radians().cos();
     let far_m = 1.5 * problem.layout.spacing_m;
     let mut poses = Vec::new();
@@ -250,22 +240,30 @@ fn tolerance(problem: &Problem, distance_m: f64) -> f64 {
     STRETCH * distance_m + SLACK * problem.layout.spacing_m
 }
 
-/// Ordered pairs of cavities by their distance.
-struct Pairs(Vec<(f64, usize, usize)>);
+/// Distances of cavities.
+struct Pairs {
+    /// From each to each.
+    apart_m: Vec<Vec<f64>>,
+    /// Ordered pairs by their distance.
+    by_distance: Vec<(f64, usize, usize)>,
+}
 
 impl Pairs {
     fn of(points: &[Vector3<f64>]) -> Pairs {
+        let from = |a: &Vector3<f64>| points.iter().map(|b| (a - b).norm()).collect();
+        let apart_m: Vec<Vec<f64>> = points.iter().map(from).collect();
         let all = (0..points.len()).flat_map(|i| (0..points.len()).map(move |j| (i, j)));
-        let mut pairs: Vec<(f64, usize, usize)> =
-            all.filter(|(i, j)| i != j).map(|(i, j)| ((points[i] - points[j]).norm(), i, j)).collect();
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-        Pairs(pairs)
+        let mut by_distance: Vec<(f64, usize, usize)> =
+            all.filter(|(i, j)| i != j).map(|(i, j)| (apart_m[i][j], i, j)).collect();
+        by_distance.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        Pairs { apart_m, by_distance }
     }
 
     fn like(&self, distance_m: f64, tolerance_m: f64) -> &[(f64, usize, usize)] {
-        let from = self.0.partition_point(|p| p.0 < distance_m - tolerance_m);
-        let to = self.0.partition_point(|p| p.0 <= distance_m + tolerance_m);
-        &self.0[from..to.max(from)]
+        let pairs = &self.by_distance;
+        let from = pairs.partition_point(|p| p.0 < distance_m - tolerance_m);
+        let to = pairs.partition_point(|p| p.0 <= distance_m + tolerance_m);
+        &pairs[from..to.max(from)]
     }
 }
 
