@@ -28,6 +28,7 @@
 
 mod absence;
 mod bootstrap;
+mod by_dwell;
 mod cells;
 mod channels;
 mod columns;

@@ -125,6 +125,22 @@ fn assert_whitens(noise: Noise, b: f64, p: &Problem, c: DMatrix<f64>) {
     assert!(error < 1e-9, "{noise:?} {error}");
     let ln_det = 2.0 * c.cholesky().unwrap().l().diagonal().iter().map(|v| v.ln()).sum::<f64>();
     assert!((whitener.ln_det - ln_det).abs() < 1e-8, "{noise:?}: {} {ln_det}", whitener.ln_det);
+    let mut transposed = DMatrix::identity(p.rows(), p.rows());
+    whitener.apply_transposed(&mut transposed);
+    assert!((transposed - w.transpose()).amax() < 1e-9, "{noise:?}: transposed");
+    // Its form, of every pair of unit columns.
+    let form = whitener.form(&p.dwells);
+    let mut filtered = DMatrix::identity(p.rows(), p.rows());
+    form.filter(&mut filtered);
+    let mut squares = filtered.tr_mul(&filtered);
+    for share in &form.shares {
+        let mut taken = DMatrix::zeros(p.rows(), share.of_dwell[0].ncols());
+        for (d, own) in share.dwells.iter().zip(&share.of_dwell) {
+            taken.rows_mut(p.dwells[*d].first_row, own.nrows()).copy_from(own);
+        }
+        squares -= &taken * taken.transpose();
+    }
+    assert!((squares - w.tr_mul(&w)).amax() < 1e-9, "{noise:?}: form");
 }
 
 #[test]

@@ -16,6 +16,10 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+mod form;
+
+pub(crate) use form::{Form, Shares};
+
 /// Correlation length of the short memory [dwells].
 const MEMORY_DWELLS: f64 = 3.0;
 
@@ -82,14 +86,19 @@ impl Whitener {
         Whitener { kind: Kind::Then(all.into_iter().map(|one| one.kind).collect()), ln_det }
     }
 
-    /// Whether rows of a dwell are whitened by themselves, and the same in every column.
-    pub fn keeps_dwells_apart(&self) -> bool {
-        self.kind.keeps_dwells_apart()
-    }
-
     /// Whitens columns in place.
     pub fn apply(&self, columns: &mut DMatrix<f64>) {
         self.kind.apply(columns);
+    }
+
+    /// Columns times its transpose, in place.
+    pub fn apply_transposed(&self, columns: &mut DMatrix<f64>) {
+        self.kind.apply_transposed(columns);
+    }
+
+    /// Whether it leaves rows as they are.
+    pub fn is_plain(&self) -> bool {
+        matches!(&self.kind, Kind::Then(all) if all.is_empty())
     }
 }
 
@@ -129,22 +138,46 @@ impl Kind {
             Kind::Rows(factors) => {
                 columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
             }
-            Kind::Memory(filters) => innovations(filters, columns),
+            Kind::Memory(filters) => walked(filters.iter(), columns, |f, state, number| {
+                let predicted = f.decay * *state;
+                let innovation = f.scale * *number - f.load * predicted;
+                *state = predicted + f.gain * innovation;
+                *number = innovation * f.weight;
+            }),
+        }
+    }
+
+    /// Of those that are no filter the transpose is the same again.
+    fn apply_transposed(&self, columns: &mut DMatrix<f64>) {
+        match self {
+            Kind::Groups(..) | Kind::Dwells(_) | Kind::Rows(_) => self.apply(columns),
+            Kind::Then(all) => all.iter().rev().for_each(|one| one.apply_transposed(columns)),
+            Kind::Memory(filters) => walked(filters.iter().rev(), columns, |f, state, number| {
+                let innovation = f.weight * *number + f.gain * *state;
+                *number = f.scale * innovation;
+                *state = f.decay * (*state - f.load * innovation);
+            }),
         }
     }
 }
 
-/// Walks the filters over each column: what each row says that the rows before it did not.
-fn innovations(filters: &[Filter], columns: &mut DMatrix<f64>) {
-    let axes = filters.iter().map(|f| f.axis + 1).max().unwrap_or(0);
-    let mut state = vec![0.0; axes];
-    for mut column in columns.column_iter_mut() {
-        state.fill(0.0);
-        for f in filters {
-            let predicted = f.decay * state[f.axis];
-            let innovation = f.scale * column[f.row] - f.load * predicted;
-            state[f.axis] = predicted + f.gain * innovation;
-            column[f.row] = innovation * f.weight;
+/// Columns that are walked side by side: each waits for the row before.
+const ABREAST: usize = 8;
+
+/// Walks filters over each column, with a state along each axis: `step` takes the state and the row's number on.
+fn walked<'f>(
+    filters: impl Iterator<Item = &'f Filter> + Clone,
+    columns: &mut DMatrix<f64>,
+    step: impl Fn(&Filter, &mut f64, &mut f64),
+) {
+    let axes = filters.clone().map(|f| f.axis + 1).max().unwrap_or(0);
+    let rows = columns.nrows();
+    let mut states = vec![[0.0; ABREAST]; axes];
+    for some in columns.as_mut_slice().chunks_mut(ABREAST * rows.max(1)) {
+        states.fill([0.0; ABREAST]);
+        for f in filters.clone() {
+            let numbers = some[f.row..].iter_mut().step_by(rows);
+            states[f.axis].iter_mut().zip(numbers).for_each(|(state, number)| step(f, state, number));
         }
     }
 }

@@ -40,12 +40,14 @@ pub(crate) fn forms(problem: &Problem) -> Vec<Columns> {
 
 #[test]
 fn products_weigh_as_what_they_stand_for_under_every_noise() {
-    let problem = planted(&[("backlash:1", 1.0)], 0, 3);
+    let mut problem = planted(&[("backlash:1", 1.0)], 0, 3);
+    problem.dwells.iter_mut().step_by(3).for_each(|d| d.parts[0].tracked = true);
     let forms = forms(&problem);
     let terms: Vec<&Columns> = forms.iter().collect();
-    let mut kinds: Vec<Noise> = Vec::new();
-    for kind in Noise::available(&problem) {
-        let metric = Metric::new(kind, 0.7, &problem, 1.3);
+    let mut kinds: Vec<Noise> = Noise::available(&problem);
+    kinds.extend([Noise::SensorAndPlace, Noise::TrackedAndPlace]);
+    for kind in &kinds {
+        let metric = Metric::new(*kind, 0.7, &problem, 1.3);
         let mut seen = 0;
         each_gram(&terms, &problem, 1.0 / 1.3, &metric, &mut |k, found| {
             let whole = metric.gram(&terms[k].dense(&problem.dwells, 1.0 / 1.3));
@@ -57,9 +59,10 @@ fn products_weigh_as_what_they_stand_for_under_every_noise() {
             seen += 1;
         });
         assert_eq!(seen, terms.len(), "each once");
-        kinds.push(kind);
     }
-    assert!(kinds.contains(&Noise::Memory) && kinds.contains(&Noise::Slack(0)), "{kinds:?}");
+    for kind in [Noise::Place, Noise::Visit, Noise::Memory, Noise::Sensor, Noise::Slack(0)] {
+        assert!(kinds.contains(&kind), "{kinds:?}");
+    }
 }
 
 #[test]
