@@ -9,7 +9,7 @@
 use crate::compare::compare_heldout;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
-use crate::error_places::{DwellError, error_places};
+use crate::error_places::{DwellError, error_places, single_dwells};
 use crate::explain::explanations;
 use crate::next::lead;
 use armcal_calibrate::Calibration;
@@ -131,12 +131,15 @@ impl Diagnosis {
                 expected_m: r.expected_norm_m,
             })
             .collect();
+        let single = single_dwells(&errors, config.floor_factor);
+        // Where single dwells are all of it, what the others look like says nothing of it.
+        let scatter = self.noise.correlated().filter(|_| single.is_none());
         let unexplained = Unexplained {
             error_mm: error_mm(settled),
             floor_mm: settled.noise_floor_m * 1e3,
             times_floor: settled.times_floor(),
-            places: error_places(&errors, joint_names),
-            scatter: self.noise.correlated().map(|(kind, _)| kind.to_owned()),
+            places: single.map_or_else(|| error_places(&errors, joint_names), |single| vec![single]),
+            scatter: scatter.map(|(kind, _)| kind.to_owned()),
             tried: Tried { listed: self.candidates.len(), unlisted: self.tried_unlisted, refitted: refuted },
         };
         self.warnings.extend(unexplained.warning(self.verdict, times_floor, config));

@@ -1,6 +1,6 @@
 //! In which dwells errors are largest: the place in a session that a person would look at first.
 
-use armcal_core::{DwellId, Observation};
+use armcal_core::{DwellId, Observation, listed};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,6 +12,10 @@ const FACTOR: f64 = 1.5;
 const SIGMAS: f64 = 5.0;
 /// Places named at most.
 const MOST: usize = 2;
+/// A dwell whose error is so many times what noise would give is gross: of three coordinates noise alone does that once in 10^13.
+const GROSS: f64 = 5.0;
+/// So many of the dwells may be gross and still be single ones.
+const FEW: f64 = 0.1;
 
 /// Dwells in which the error is larger than elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,11 +41,16 @@ pub(crate) struct DwellError<'a> {
     pub expected_m: f64,
 }
 
+impl DwellError<'_> {
+    fn ln_times_noise(&self) -> f64 {
+        (self.error_m.max(1e-12) / self.expected_m.max(1e-12)).ln()
+    }
+}
+
 /// Where the errors are largest against what noise would give, the clearest place first. Dwells with larger noise are
 /// no places: errors are compared in units of their own expectation, as logarithms, so that no single one decides.
 pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) -> Vec<ErrorPlace> {
-    let log: Vec<f64> =
-        errors.iter().map(|e| (e.error_m.max(1e-12) / e.expected_m.max(1e-12)).ln()).collect();
+    let log: Vec<f64> = errors.iter().map(DwellError::ln_times_noise).collect();
     let mut found: Vec<(f64, ErrorPlace)> = Vec::new();
     for (place, members) in groups(errors, joint_names) {
         let (inside, outside): (Vec<usize>, Vec<usize>) =
@@ -56,18 +65,52 @@ pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) ->
         if sigmas < SIGMAS || (mean_in - mean_out).exp() < FACTOR {
             continue;
         }
-        let mean_mm =
-            |of: &[usize]| of.iter().map(|i| errors[*i].error_m).sum::<f64>() / of.len() as f64 * 1e3;
-        let (error_mm, elsewhere_mm) = (mean_mm(&inside), mean_mm(&outside));
-        let (times_noise, elsewhere_times_noise) = (mean_in.exp(), mean_out.exp());
-        let dwells = inside.iter().map(|i| errors[*i].observation.dwell).collect::<BTreeSet<_>>().len();
-        found.push((
-            sigmas,
-            ErrorPlace { place, dwells, error_mm, elsewhere_mm, times_noise, elsewhere_times_noise },
-        ));
+        found.push((sigmas, ErrorPlace::of(place, errors, (&inside, &outside))));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().take(MOST).map(|(_, place)| place).collect()
+}
+
+/// The few gross dwells for which alone the mean error is not within `floor_factor` of what noise would give; none where it is, or
+/// where that of the others is not either.
+pub(crate) fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<ErrorPlace> {
+    let dwells_of = |of: &mut dyn Iterator<Item = &DwellError<'_>>| {
+        of.map(|e| e.observation.dwell).collect::<BTreeSet<DwellId>>()
+    };
+    let all = dwells_of(&mut errors.iter());
+    let gross = dwells_of(&mut errors.iter().filter(|e| e.error_m > GROSS * e.expected_m));
+    if gross.is_empty() || gross.len() as f64 > FEW * all.len() as f64 {
+        return None;
+    }
+    let (inside, outside): (Vec<usize>, Vec<usize>) =
+        (0..errors.len()).partition(|i| gross.contains(&errors[*i].observation.dwell));
+    let every: Vec<usize> = (0..errors.len()).collect();
+    let at_floor = |of: &[usize]| {
+        let sum = |value: fn(&DwellError<'_>) -> f64| of.iter().map(|i| value(&errors[*i])).sum::<f64>();
+        sum(|e| e.error_m) <= floor_factor * sum(|e| e.expected_m)
+    };
+    let for_them_alone = at_floor(&outside) && !at_floor(&every);
+    let names: Vec<String> = gross.iter().map(ToString::to_string).collect();
+    for_them_alone.then(|| ErrorPlace::of(listed(&names), errors, (&inside, &outside)))
+}
+
+impl ErrorPlace {
+    /// Of the errors on either side.
+    fn of(place: String, errors: &[DwellError<'_>], (inside, outside): (&[usize], &[usize])) -> ErrorPlace {
+        let mean = |of: &[usize], value: fn(&DwellError<'_>) -> f64| {
+            of.iter().map(|i| value(&errors[*i])).sum::<f64>() / of.len() as f64
+        };
+        let mean_mm = |of: &[usize]| mean(of, |e| e.error_m) * 1e3;
+        let times = |of: &[usize]| mean(of, |e| e.ln_times_noise()).exp();
+        ErrorPlace {
+            place,
+            dwells: inside.iter().map(|i| errors[*i].observation.dwell).collect::<BTreeSet<_>>().len(),
+            error_mm: mean_mm(inside),
+            elsewhere_mm: mean_mm(outside),
+            times_noise: times(inside),
+            elsewhere_times_noise: times(outside),
+        }
+    }
 }
 
 /// Every group of dwells that has a name: recordings, seated or tracked, halves and ends of the time, thirds of each
@@ -179,6 +222,36 @@ mod tests {
 
         let up = |i, o: &Observation| spread(i) * if o.arrival[0].sign() > 0.0 { 4.0 } else { 1.0 };
         assert!(places(&all, up)[0].place.ends_with("arriving upwards"));
+    }
+
+    #[test]
+    fn single_dwells_are_told_where_all_others_are_at_the_floor_and_they_are_few() {
+        let all = observations(120);
+        let single = |gross: &[usize], elsewhere_m: f64| {
+            let of = |(i, observation)| {
+                let error_m = if gross.contains(&i) { 5e-3 } else { elsewhere_m };
+                DwellError { observation, error_m, expected_m: 1e-4 }
+            };
+            single_dwells(&all.iter().enumerate().map(of).collect::<Vec<_>>(), 1.5)
+        };
+        let place = single(&[17, 18], 1.1e-4).expect("two of 120");
+        let little = [DwellError { observation: &all[0], error_m: 6e-4, expected_m: 1e-4 }];
+        let rest =
+            all[1..].iter().map(|observation| DwellError { observation, error_m: 1e-4, expected_m: 1e-4 });
+        let with_little: Vec<DwellError<'_>> = little.into_iter().chain(rest).collect();
+        assert_eq!(single_dwells(&with_little, 1.5), None, "all of it is at the floor");
+        assert_eq!((place.place.as_str(), place.dwells), ("recording 0 dwell 6, recording 2 dwell 5", 2));
+        assert!((place.error_mm - 5.0).abs() < 1e-9 && (place.elsewhere_mm - 0.11).abs() < 1e-9);
+        assert!((place.times_noise - 50.0).abs() < 1e-9 && (place.elsewhere_times_noise - 1.1).abs() < 1e-9);
+        assert_eq!(single(&[17], 1.6e-4), None, "the others err too");
+        assert_eq!(single(&[], 1e-4), None);
+        let twelve: Vec<usize> = (0..12).collect();
+        assert!(single(&twelve, 1e-4).is_some(), "a tenth");
+        assert_eq!(
+            single(&[&twelve[..], &[40]].concat(), 1e-4),
+            None,
+            "more than a tenth are no single ones"
+        );
     }
 
     #[test]

@@ -6,13 +6,13 @@ use crate::diagnosis::{
     BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, NotTestable,
     UnknownReport, Verdict,
 };
-use crate::events::together;
+use crate::events::{stretch, together};
 use crate::explain::explanations;
 use crate::forward::{Accepted, named};
 use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
-use crate::problem::{Candidate, Part, Problem};
+use crate::problem::{Candidate, DwellRow, Part, Problem};
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
@@ -29,6 +29,8 @@ use nalgebra::DVector;
 const SIGMA_RATIO: f64 = 1.4;
 /// So is noise that much below it.
 const OVERDECLARED: f64 = 2.0;
+/// Families that displace what is measured, whatever the joints do.
+const SHIFTS: [&str; 3] = ["tool_shift", "frame_shift", "marker_shift"];
 
 /// Diagnoses a problem. `refit` gives it, and gives it again with effects in the base model.
 pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {
@@ -173,7 +175,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     let (judged, weighed) = (&a.judged, &a.room.weighed);
     let name = |k: &usize| weighed.entries[*k].candidate.spec.clone();
     let mut set: Vec<String> = judged.set.iter().map(name).collect();
-    if a.grade == Grade::OrUnlisted {
+    if a.grade == Grade::OrUnlisted || seen_by_the_sensor_alone(a) {
         set.push(NOT_LISTED.to_string());
     }
     // What a group of which it is a member says is said of the member too.
@@ -299,6 +301,14 @@ fn warnings(
             );
             add(Severity::Notice, "negative-size", a.candidate.spec.clone(), message);
         }
+        if seen_by_the_sensor_alone(a) {
+            let message = format!(
+                "{}: the position sensor alone saw it, and all was as before when it ended: markers that were swapped, hidden or \
+                 knocked meanwhile displace as much; look at the sensor's own recording of these dwells",
+                a.candidate.spec
+            );
+            add(Severity::Notice, "event-or-sensor", a.candidate.spec.clone(), message);
+        }
         if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
             let message = format!(
                 "{}: something changed between dwells; a load that is not declared, another tool or another arm in a recording \
@@ -322,6 +332,18 @@ fn warnings(
         }
     }
     all
+}
+
+/// Whether something was displaced in some dwells and not after them, and no cavity held the tip in any of these: a fault of the
+/// sensor displaces the same.
+fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
+    let dwells = &a.room.problem.dwells;
+    let shifted = SHIFTS.contains(&a.candidate.family.as_str());
+    let during = stretch(&a.candidate.spec).filter(|_| shifted);
+    during.is_some_and(|(first, last)| {
+        let within = |d: &&DwellRow| (first..=DwellId { dwell: last, ..first }).contains(&d.id);
+        dwells.iter().filter(within).flat_map(|d| &d.parts).all(|part| part.tracked)
+    })
 }
 
 /// Whether all dwells are declared to bear the same load.

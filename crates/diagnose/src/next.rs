@@ -37,10 +37,13 @@ pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names:
     let beside = if d.refitted.is_some() { "with what was found in the model " } else { "" };
     if let Some(unexplained) = &d.unexplained {
         first.extend(unexplained.places.iter().map(|p| {
+            let errors = match p.dwells {
+                1 => "its error is".to_owned(),
+                more => format!("the errors of these {more} dwells are"),
+            };
             format!(
-                "look first at {}: {beside}the errors of these {} dwells are {:.1} times what the declared noise gives, those of the \
-                 others {:.1} times",
-                p.place, p.dwells, p.times_noise, p.elsewhere_times_noise
+                "look first at {}: {beside}{errors} {:.1} times what the declared noise gives, those of the others {:.1} times",
+                p.place, p.times_noise, p.elsewhere_times_noise
             )
         }));
     }

@@ -44,8 +44,9 @@ impl Unexplained {
             .places
             .iter()
             .map(|p| {
+                let plural = if p.dwells == 1 { "" } else { "s" };
                 format!(
-                    "{} ({} dwells, {:.3} mm, {:.1} times; elsewhere {:.3} mm, {:.1} times)",
+                    "{} ({} dwell{plural}, {:.3} mm, {:.1} times; elsewhere {:.3} mm, {:.1} times)",
                     p.place, p.dwells, p.error_mm, p.times_noise, p.elsewhere_mm, p.elsewhere_times_noise
                 )
             })
