@@ -20,7 +20,7 @@ const FEW: f64 = 0.1;
 /// Dwells in which the error is larger than elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorPlace {
-    /// Which: `recording 2` (by its index), `shoulder from 10 to 25 deg`.
+    /// Which: `recording 2` (by its index), `shoulder from 10 to 25 deg`, `recording 1 dwell 96, recording 1 dwell 97`.
     pub place: String,
     /// How many dwells that are.
     pub dwells: usize,

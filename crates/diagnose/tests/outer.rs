@@ -119,6 +119,38 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
 }
 
 #[test]
+fn a_shift_that_ends_again_may_be_the_sensors_where_it_alone_saw_it() {
+    let doubt = "something not listed";
+    for seed in 1..4 {
+        let (model, mut observations) = observed(&[], 0.0, seed);
+        let sound = observations.clone();
+        let displace = |o: &mut Observation| {
+            let Reference::Tracked { position_m, .. } = &mut o.reference else { panic!("tracked") };
+            *position_m += Vector3::new(3e-3, -2e-3, 1e-3);
+        };
+        observations[30..42].iter_mut().for_each(displace);
+        let d = diagnosed(&model, &calibration(&model, &observations), &observations);
+        assert_eq!(d.verdict, Verdict::Ambiguous, "{:?}", d.names);
+        let [shift] = d.effects.as_slice() else { panic!("{:?}", d.names) };
+        assert!(shift.name.starts_with("frame_shift@0.30-4"), "{:?}", d.names);
+        assert!(shift.set.iter().any(|name| name == doubt), "{:?}", shift.set);
+        let told = |d: &Diagnosis| d.warnings.iter().any(|w| w.code == "event-or-sensor");
+        assert!(told(&d), "{:?}", d.warnings);
+
+        // What stays is no passing fault.
+        let mut observations = sound;
+        observations[45..].iter_mut().for_each(displace);
+        let d = diagnosed(&model, &calibration(&model, &observations), &observations);
+        assert!(d.names.iter().any(|name| name.starts_with("frame_shift@0.4")), "{:?}", d.names);
+        assert!(
+            !told(&d) && d.effects.iter().all(|e| e.set.iter().all(|name| name != doubt)),
+            "{:?}",
+            d.names
+        );
+    }
+}
+
+#[test]
 fn of_thousands_of_poses_all_that_weigh_confirm_what_a_search_through_few_proposed() {
     let (model, observations) = observed_in(1700, &["backlash:1", "eccentricity:2"], 1.0, 5);
     let calibration = calibration(&model, &observations);

@@ -322,6 +322,23 @@ fn an_unlisted_shape_is_told_where_there_is_one_and_noise_does_not_explain_it() 
 }
 
 #[test]
+fn single_dwells_that_err_are_told_and_no_scatter_beside_them() {
+    let mut c = erring(1.0, 1.0);
+    c.residuals.iter_mut().take(2).for_each(|r| r.fitted_m *= 30.0);
+    c.holdout.fitted = of_residuals(&c);
+    let mut d = found(NothingMissing);
+    d.noise.kinds = vec![("repeated at every place".to_owned(), 0.99)];
+    let d = concluded(d, &c, None);
+    let sentence = d.unexplained.as_ref().unwrap().sentence();
+    let told = "largest against their noise in recording 0 dwell 0, recording 0 dwell 1 (2 dwells, 30.000 mm, 30.0 times; elsewhere \
+                1.000 mm, 1.0 times); ";
+    assert!(sentence.contains(told), "{sentence}");
+    assert!(
+        d.record_next[0].starts_with("look first at recording 0 dwell 0, recording 0 dwell 1: the errors")
+    );
+}
+
+#[test]
 fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     let mut c = erring(2.0, 2.0);
     c.residuals.iter_mut().skip(N / 2).for_each(|r| r.fitted_m *= 3.0);
