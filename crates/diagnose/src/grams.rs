@@ -35,14 +35,16 @@ pub(crate) fn each_gram(
             },
         }
     }
-    let on_rows = (!of_bases.is_empty()).then(|| OnRows::of(metric, problem));
-    for ((base, own), on_rows) in of_bases.into_iter().zip(on_rows.iter().cycle()) {
-        let by_dwell = ByDwell::of(base.as_ref() * factor, on_rows);
-        let is_event = |k: &usize| by_dwell.is_sum() && matches!(terms[*k], Columns::Within { .. });
-        let (events, functions): (Vec<usize>, Vec<usize>) = own.into_iter().partition(is_event);
-        by_dwell.of_events(terms, &events, each);
-        for block in blocks(terms, &functions, by_dwell.height()) {
-            by_dwell.of_functions(terms, block, each);
+    if !of_bases.is_empty() {
+        let on_rows = OnRows::of(metric, problem);
+        for (base, own) in of_bases {
+            let by_dwell = ByDwell::of(base.as_ref() * factor, &on_rows);
+            let is_event = |k: &usize| by_dwell.is_sum() && matches!(terms[*k], Columns::Within { .. });
+            let (events, functions): (Vec<usize>, Vec<usize>) = own.into_iter().partition(is_event);
+            by_dwell.of_events(terms, &events, each);
+            for block in blocks(terms, &functions, by_dwell.height()) {
+                by_dwell.of_functions(terms, block, each);
+            }
         }
     }
     for block in blocks(terms, &rest, problem.rows()) {

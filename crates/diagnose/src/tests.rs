@@ -96,13 +96,14 @@ pub(crate) fn own(p: &Problem, spec: &str) -> crate::Candidate {
 /// The covariance behind a whitener, written out.
 fn dense(noise: Noise, b: f64, p: &Problem) -> DMatrix<f64> {
     let n = p.dwells.len();
-    let mut k = DMatrix::identity(p.rows(), p.rows());
+    let mut k: DMatrix<f64> = DMatrix::identity(p.rows(), p.rows());
     for i in 0..n {
         for j in 0..n {
             let (a, c) = (&p.dwells[i], &p.dwells[j]);
+            let same_place = a.place.is_some() && a.place == c.place;
             let value = match noise {
-                Noise::Place => f64::from(a.place == c.place),
-                Noise::Visit => f64::from(a.place == c.place && a.id.recording == c.id.recording),
+                Noise::Place => f64::from(same_place),
+                Noise::Visit => f64::from(same_place && a.id.recording == c.id.recording),
                 Noise::Memory if a.id.recording == c.id.recording => {
                     (-(a.id.dwell.abs_diff(c.id.dwell) as f64) / 3.0).exp()
                 }
@@ -113,7 +114,10 @@ fn dense(noise: Noise, b: f64, p: &Problem) -> DMatrix<f64> {
             }
         }
     }
-    k / (1.0 + b * b)
+    // A dwell without a place has no error of one.
+    let placed = |i: usize| noise == Noise::Memory || p.dwells[i / 3].place.is_some();
+    let unit = |i: usize| if placed(i) { (1.0 + b * b).sqrt() } else { 1.0 };
+    DMatrix::from_fn(p.rows(), p.rows(), |i, j| k[(i, j)] / (unit(i) * unit(j)))
 }
 
 /// That a whitener is an inverse root of this covariance, and knows its determinant.
@@ -145,7 +149,9 @@ fn assert_whitens(noise: Noise, b: f64, p: &Problem, c: DMatrix<f64>) {
 
 #[test]
 fn whiteners_are_inverse_roots_of_their_covariance() {
-    let p = small(1);
+    let mut p = small(1);
+    // Some dwells are at no place.
+    p.dwells.iter_mut().step_by(4).for_each(|d| d.place = None);
     for noise in [Noise::Place, Noise::Visit, Noise::Memory] {
         let c = dense(noise, 1.7, &p);
         assert_whitens(noise, 1.7, &p, c);

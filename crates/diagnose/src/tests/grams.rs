@@ -41,7 +41,10 @@ pub(crate) fn forms(problem: &Problem) -> Vec<Columns> {
 #[test]
 fn products_weigh_as_what_they_stand_for_under_every_noise() {
     let mut problem = planted(&[("backlash:1", 1.0)], 0, 3);
-    problem.dwells.iter_mut().step_by(3).for_each(|d| d.parts[0].tracked = true);
+    problem.dwells.iter_mut().step_by(3).for_each(|d| {
+        d.parts[0].tracked = true;
+        d.place = None;
+    });
     let forms = forms(&problem);
     let terms: Vec<&Columns> = forms.iter().collect();
     let mut kinds: Vec<Noise> = Noise::available(&problem);

@@ -5,15 +5,15 @@
 
 use super::{Kind, Whitener};
 use crate::problem::DwellRow;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// `|F x|^2 - sum_g |S_g' x|^2` of columns x.
 #[derive(Debug)]
 pub(crate) struct Form<'w> {
     filters: &'w [Kind],
-    /// Times this.
-    unit: f64,
+    /// Then each row times this; where there is none, as it is.
+    factors: Option<DVector<f64>>,
     /// The `S_g`.
     pub shares: Vec<Shares>,
 }
@@ -35,28 +35,51 @@ impl Whitener {
             one => std::slice::from_ref(one),
         };
         let Some((Kind::Groups(unit, groups), filters)) = all.split_last() else {
-            return Form { filters: all, unit: 1.0, shares: Vec::new() };
+            return Form { filters: all, factors: None, shares: Vec::new() };
         };
-        let numbers: BTreeMap<usize, usize> =
-            dwells.iter().enumerate().map(|(i, d)| (d.first_row, i)).collect();
-        let rows = dwells.last().map_or(0, |d| d.range().end);
-        let shares = groups.iter().map(|(own, p)| {
+        let taken = |group: &(Vec<usize>, DMatrix<f64>), s: &mut DMatrix<f64>| {
+            let (own, p) = group;
             // (I - P P')^2 = I - S S', the columns of P being orthogonal.
-            let mut s = DMatrix::zeros(rows, p.ncols());
             for (mut to, from) in s.column_iter_mut().zip(p.column_iter()) {
                 let size = unit * (2.0 - from.norm_squared()).sqrt();
                 own.iter().zip(from.iter()).for_each(|(row, from)| to[*row] = size * from);
             }
-            filters.iter().rev().for_each(|one| one.apply_transposed(&mut s));
-            let of_group = own.iter().filter_map(|row| numbers.get(row).copied());
-            let of_group: Vec<usize> = match filters.iter().all(Kind::keeps_dwells_apart) {
-                true => of_group.collect(),
-                false => (0..dwells.len()).collect(),
+        };
+        let back = |s: &mut DMatrix<f64>| filters.iter().rev().for_each(|one| one.apply_transposed(s));
+        let rows = dwells.last().map_or(0, |d| d.range().end);
+        let mut factors = DVector::from_element(rows, 1.0);
+        groups.iter().flat_map(|(own, _)| own).for_each(|row| factors[*row] = *unit);
+        let shares = if filters.iter().all(Kind::keeps_dwells_apart) {
+            // Groups share no dwell: all of them stand in one matrix.
+            let rank = groups.iter().map(|(_, p)| p.ncols()).max().unwrap_or(0);
+            let mut s = DMatrix::zeros(rows, rank);
+            groups.iter().for_each(|group| taken(group, &mut s));
+            back(&mut s);
+            let numbers: BTreeMap<usize, usize> =
+                dwells.iter().enumerate().map(|(i, d)| (d.first_row, i)).collect();
+            let of_group = |(own, p): &(Vec<usize>, DMatrix<f64>)| {
+                let members = own.iter().filter_map(|row| numbers.get(row).copied()).collect();
+                Shares::of(members, dwells, (&s, p.ncols()))
             };
-            let of_dwell = |i: &usize| s.rows(dwells[*i].first_row, dwells[*i].rows).into_owned();
-            Shares { of_dwell: of_group.iter().map(of_dwell).collect(), dwells: of_group }
-        });
-        Form { filters, unit: *unit, shares: shares.collect() }
+            groups.iter().map(of_group).collect()
+        } else {
+            let of_group = |group: &(Vec<usize>, DMatrix<f64>)| {
+                let mut s = DMatrix::zeros(rows, group.1.ncols());
+                taken(group, &mut s);
+                back(&mut s);
+                Shares::of((0..dwells.len()).collect(), dwells, (&s, group.1.ncols()))
+            };
+            groups.iter().map(of_group).collect()
+        };
+        Form { filters, factors: Some(factors), shares }
+    }
+}
+
+impl Shares {
+    /// From the rows of these dwells in so many columns.
+    fn of(members: Vec<usize>, dwells: &[DwellRow], (s, rank): (&DMatrix<f64>, usize)) -> Shares {
+        let of_dwell = |i: &usize| s.view((dwells[*i].first_row, 0), (dwells[*i].rows, rank)).into_owned();
+        Shares { of_dwell: members.iter().map(of_dwell).collect(), dwells: members }
     }
 }
 
@@ -69,8 +92,8 @@ impl Form<'_> {
     /// Columns times F, in place.
     pub fn filter(&self, columns: &mut DMatrix<f64>) {
         self.filters.iter().for_each(|one| one.apply(columns));
-        if self.unit != 1.0 {
-            *columns *= self.unit;
+        if let Some(factors) = &self.factors {
+            columns.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
         }
     }
 }
