@@ -173,7 +173,8 @@ fn mean_and_variance(values: &[f64]) -> (f64, f64) {
 }
 
 /// Mean cosine between the residual of each suspect and that of the suspect next to it in joint space. Accidents point
-/// anywhere; neighbours that err alike are a cause.
+/// anywhere; neighbours that err alike are a cause, but those within one accident: two dwells in which the same markers were
+/// swapped.
 fn agreement(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
     if found.len() < MIN_AGREEING {
         return 0.0;
@@ -183,8 +184,12 @@ fn agreement(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
     let mut sum = 0.0;
     for &i in found {
         let distance = |j: &usize| (z.row(i) - z.row(*j)).norm_squared();
-        let others =
-            found.iter().copied().filter(|j| *j != i && problem.dwells[*j].measured_as(&problem.dwells[i]));
+        let own = &problem.dwells[i];
+        let one_accident = |other: &DwellRow| {
+            other.id.recording == own.id.recording && other.id.dwell.abs_diff(own.id.dwell) < RUN
+        };
+        let apart = |other: &DwellRow| other.measured_as(own) && !one_accident(other);
+        let others = found.iter().copied().filter(|j| apart(&problem.dwells[*j]));
         if let Some(j) = others.min_by(|a, b| distance(a).total_cmp(&distance(b))) {
             sum += rows(i).dot(&rows(j)) / (rows(i).norm() * rows(j).norm()).max(1e-300);
         }

@@ -137,6 +137,11 @@ fn dwells_in_a_row_are_an_event_and_stay() {
     let mut p = sound(5);
     [60, 61].iter().enumerate().for_each(|(k, i)| push(&mut p, *i, 6e-3 * apart(k).normalize()));
     assert_eq!(aside(&p), [60, 61]);
+    // Nor are two times two, though both of each err alike.
+    let mut p = sound(6);
+    let pairs = [20, 21, 100, 101];
+    pairs.iter().for_each(|i| push(&mut p, *i, 6e-3 * apart(i / 50).normalize()));
+    assert_eq!(aside(&p), pairs);
 }
 
 #[test]
