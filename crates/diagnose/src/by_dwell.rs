@@ -111,7 +111,9 @@ impl<'m> ByDwell<'m> {
 
     /// Numbers that a column takes while it is weighed.
     pub fn height(&self) -> usize {
-        if self.square.is_some() { self.with_residual.nrows() } else { self.base.nrows() }
+        let taken: usize = self.with_shares.iter().flatten().map(DMatrix::nrows).sum();
+        let rows = if self.square.is_some() { self.with_residual.nrows() } else { self.base.nrows() };
+        rows.max(taken / self.c.max(1))
     }
 
     /// Of terms that are functions times this base.
