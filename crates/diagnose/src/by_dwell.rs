@@ -6,7 +6,7 @@
 //! squares of such sums, where the whitener's [form](crate::whitener::Form) keeps dwells apart; where it remembers them, columns are
 //! filtered, and nothing else is done row by row. Of events that are sums alone all of it is a difference of two running sums.
 
-use crate::columns::Columns;
+use crate::columns::{Columns, write_product};
 use crate::evidence::Metric;
 use crate::problem::{DwellRow, Problem};
 use crate::projection::{Gram, Projection};
@@ -46,7 +46,6 @@ impl<'m> OnRows<'m> {
 pub(crate) struct ByDwell<'m> {
     on_rows: &'m OnRows<'m>,
     base: DMatrix<f64>,
-    c: usize,
     /// Column i c + j: base column i times base column j, as the form filters them: dwells x c^2; none where it remembers dwells.
     square: Option<DMatrix<f64>>,
     /// Times the residual: dwells x c.
@@ -101,7 +100,7 @@ impl<'m> ByDwell<'m> {
         };
         let with_shares =
             (0..c).map(|i| form.shares.iter().map(|share| of_share(share, i)).collect()).collect();
-        ByDwell { on_rows, base, c, square, with_residual, with_geometry, with_shares }
+        ByDwell { on_rows, base, square, with_residual, with_geometry, with_shares }
     }
 
     /// Whether all that is asked of a column is a sum over dwells.
@@ -111,9 +110,13 @@ impl<'m> ByDwell<'m> {
 
     /// Numbers that a column takes while it is weighed.
     pub fn height(&self) -> usize {
-        let taken: usize = self.with_shares.iter().flatten().map(DMatrix::nrows).sum();
-        let rows = if self.square.is_some() { self.with_residual.nrows() } else { self.base.nrows() };
-        rows.max(taken / self.c.max(1))
+        let rows = if self.square.is_some() { self.on_rows.dwells.len() } else { self.base.nrows() };
+        rows.max(self.taken())
+    }
+
+    /// Numbers that are taken out of a column, over all groups of dwells.
+    fn taken(&self) -> usize {
+        self.with_shares.first().map_or(0, |groups| groups.iter().map(DMatrix::nrows).sum())
     }
 
     /// Of terms that are functions times this base.
@@ -126,36 +129,36 @@ impl<'m> ByDwell<'m> {
             stacked.columns_mut(at, basis.ncols()).copy_from(basis);
             at += basis.ncols();
         }
-        let projection = self.on_rows.projection;
+        let (projection, c) = (self.on_rows.projection, self.base.ncols());
         let score = stacked.tr_mul(&self.with_residual);
         // Rows of Q' X, column by column of the base.
         let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(|q| inner(q, &stacked)).collect();
-        let shares: Vec<DMatrix<f64>> = (0..self.c).map(|i| self.shares_of(i, &stacked)).collect();
+        let shares: Vec<DMatrix<f64>> = (0..c).map(|i| self.shares_of(i, &stacked)).collect();
         let filtered: Vec<DMatrix<f64>> = match &self.square {
             Some(_) => Vec::new(),
-            None => (0..self.c).map(|i| self.filtered(i, &stacked)).collect(),
+            None => (0..c).map(|i| self.filtered(i, &stacked)).collect(),
         };
         let mut at = 0;
         for (k, basis) in block.iter().zip(&functions) {
             let m = basis.ncols();
             let own = |i: usize| spent[i].columns(at, m);
-            let mut gram = Gram::zeros(m * self.c, projection.q.ncols());
-            for i in 0..self.c {
+            let mut gram = Gram::zeros(m * c, projection.q.ncols());
+            for i in 0..c {
                 let g = score.view((at, i), (m, 1)) - own(i).tr_mul(&projection.z);
                 gram.g.rows_mut(i * m, m).copy_from(&g);
                 gram.spent.columns_mut(i * m, m).copy_from(&own(i));
-                for j in i..self.c {
+                for j in i..c {
                     let mut full = match &self.square {
                         Some(square) => {
                             let mut weighted = basis.as_ref().clone();
                             for mut column in weighted.column_iter_mut() {
-                                column.component_mul_assign(&square.column(i * self.c + j));
+                                column.component_mul_assign(&square.column(i * c + j));
                             }
                             inner(basis, &weighted)
                         }
                         None => inner(&filtered[i].columns(at, m), &filtered[j].columns(at, m)),
                     };
-                    if shares[i].nrows() > 0 {
+                    if self.taken() > 0 {
                         full -= inner(&shares[i].columns(at, m), &shares[j].columns(at, m));
                     }
                     if i == j {
@@ -174,8 +177,7 @@ impl<'m> ByDwell<'m> {
     /// What is taken out of each group of dwells, of a base column times functions.
     fn shares_of(&self, i: usize, functions: &DMatrix<f64>) -> DMatrix<f64> {
         let groups = &self.on_rows.form.shares;
-        let ranks = self.with_shares[i].iter().map(DMatrix::nrows);
-        let mut taken = DMatrix::zeros(ranks.sum(), functions.ncols());
+        let mut taken = DMatrix::zeros(self.taken(), functions.ncols());
         for (function, mut taken) in functions.column_iter().zip(taken.column_iter_mut()) {
             let (function, mut rest) = (function.as_slice(), taken.as_mut_slice());
             for (group, products) in groups.iter().zip(&self.with_shares[i]) {
@@ -194,12 +196,9 @@ impl<'m> ByDwell<'m> {
     /// A base column times functions, row by row as the form filters them.
     fn filtered(&self, i: usize, functions: &DMatrix<f64>) -> DMatrix<f64> {
         let mut rows = DMatrix::zeros(self.base.nrows(), functions.ncols());
-        let base = self.base.column(i);
         for (function, mut rows) in functions.column_iter().zip(rows.column_iter_mut()) {
-            for (d, value) in self.on_rows.dwells.iter().zip(function.iter()) {
-                let own = base.as_slice()[d.range()].iter();
-                rows.as_mut_slice()[d.range()].iter_mut().zip(own).for_each(|(to, own)| *to = own * value);
-            }
+            let values = self.on_rows.dwells.iter().zip(function.iter().copied());
+            write_product(self.base.column(i).as_slice(), values, rows.as_mut_slice());
         }
         self.on_rows.form.filter(&mut rows);
         rows
@@ -222,7 +221,7 @@ impl<'m> ByDwell<'m> {
         let at = |place: usize| sums.column(bounds.partition_point(|bound| *bound < place));
         for k in events {
             let Columns::Within { on, .. } = terms[*k] else { continue };
-            let (c, p) = (self.c, projection.q.ncols());
+            let (c, p) = (self.base.ncols(), projection.q.ncols());
             let within = at(on.end) - at(on.start);
             let full = DMatrix::from_column_slice(c, c, &within.as_slice()[..c * c]);
             let spent = DMatrix::from_column_slice(p, c, &within.as_slice()[c * c + c..]);
@@ -238,11 +237,12 @@ impl<'m> ByDwell<'m> {
 
     /// Sums over the dwells before each of these places: `square`, `with_residual`, then `with_geometry`, a column a place.
     fn until(&self, square: &DMatrix<f64>, places: &[usize], bounds: &[usize]) -> DMatrix<f64> {
+        let c = self.base.ncols();
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by_key(|d| places[*d]);
         let spent = self.with_geometry.iter().flat_map(DMatrix::column_iter);
         let all = square.column_iter().chain(self.with_residual.column_iter()).chain(spent);
-        let mut sums = DMatrix::zeros(self.c * (self.c + 1 + self.on_rows.q.ncols()), bounds.len());
+        let mut sums = DMatrix::zeros(c * (c + 1 + self.on_rows.q.ncols()), bounds.len());
         for (k, column) in all.enumerate() {
             let (mut sum, mut next) = (0.0, order.iter().peekable());
             for (b, bound) in bounds.iter().enumerate() {

@@ -177,14 +177,8 @@ impl Columns {
         for c in 0..base.ncols() {
             for b in 0..basis.ncols() {
                 let mut column = out.column_mut(c * basis.ncols() + b);
-                let (to, base) = (column.as_mut_slice(), base.column(c));
-                for (dwell, value) in dwells.iter().zip(basis.column(b)) {
-                    let value = value * factor;
-                    if value != 0.0 {
-                        let own = base.rows(dwell.first_row, dwell.rows);
-                        to[dwell.range()].iter_mut().zip(own.iter()).for_each(|(to, own)| *to = own * value);
-                    }
-                }
+                let values = basis.column(b).into_iter().map(|value| value * factor);
+                write_product(base.column(c).as_slice(), dwells.iter().zip(values), column.as_mut_slice());
             }
         }
     }
@@ -221,6 +215,18 @@ impl Columns {
                 Columns::Together(parts.iter().map(|part| part.select(kept, rows, cut)).collect())
             }
         }
+    }
+}
+
+/// A column of a base times a value in each dwell, into a place of zeros.
+pub(crate) fn write_product<'d>(
+    base: &[f64],
+    values: impl Iterator<Item = (&'d DwellRow, f64)>,
+    to: &mut [f64],
+) {
+    for (dwell, value) in values.filter(|(_, value)| *value != 0.0) {
+        let rows = dwell.range();
+        to[rows.clone()].iter_mut().zip(&base[rows]).for_each(|(to, own)| *to = own * value);
     }
 }
 

@@ -1,6 +1,5 @@
 //! Events: effects that begin, or act, at a moment that their names tell.
 
-use armcal_core::DwellId;
 use armcal_model::{Since, place_and_moment};
 
 /// Dwells by which one event may be told elsewhere by another effect, or once other effects are in the model.
@@ -12,12 +11,9 @@ fn event(spec: &str) -> Option<(&str, Since)> {
     Some((place, since?))
 }
 
-/// The first dwell in which an event acts, and the last one's number, of one that ends again.
-pub(crate) fn stretch(spec: &str) -> Option<(DwellId, usize)> {
-    match event(spec)? {
-        (_, Since::Dwells { first, last }) => Some((first, last)),
-        _ => None,
-    }
+/// When an event acts that ends again.
+pub(crate) fn passing(spec: &str) -> Option<Since> {
+    event(spec).map(|(_, since)| since).filter(|since| matches!(since, Since::Dwells { .. }))
 }
 
 /// Whether two names are one effect, told a few dwells apart.

@@ -6,13 +6,13 @@ use crate::diagnosis::{
     BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, NotTestable,
     UnknownReport, Verdict,
 };
-use crate::events::{stretch, together};
+use crate::events::{passing, together};
 use crate::explain::explanations;
 use crate::forward::{Accepted, named};
 use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
-use crate::problem::{Candidate, DwellRow, Part, Problem};
+use crate::problem::{Candidate, Part, Problem};
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
@@ -339,10 +339,9 @@ fn warnings(
 fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
     let dwells = &a.room.problem.dwells;
     let shifted = SHIFTS.contains(&a.candidate.family.as_str());
-    let during = stretch(&a.candidate.spec).filter(|_| shifted);
-    during.is_some_and(|(first, last)| {
-        let within = |d: &&DwellRow| (first..=DwellId { dwell: last, ..first }).contains(&d.id);
-        dwells.iter().filter(within).flat_map(|d| &d.parts).all(|part| part.tracked)
+    let during = passing(&a.candidate.spec).filter(|_| shifted);
+    during.is_some_and(|during| {
+        dwells.iter().filter(|d| during.holds(d.id)).flat_map(|d| &d.parts).all(|part| part.tracked)
     })
 }
 

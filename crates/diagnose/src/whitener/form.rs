@@ -37,49 +37,32 @@ impl Whitener {
         let Some((Kind::Groups(unit, groups), filters)) = all.split_last() else {
             return Form { filters: all, factors: None, shares: Vec::new() };
         };
-        let taken = |group: &(Vec<usize>, DMatrix<f64>), s: &mut DMatrix<f64>| {
-            let (own, p) = group;
+        let rows = dwells.last().map_or(0, |d| d.range().end);
+        let mut factors = DVector::from_element(rows, 1.0);
+        // Groups share no row: all of them stand in one matrix. Where a filter remembers there is one alone, of all rows.
+        let rank = groups.iter().map(|(_, p)| p.ncols()).max().unwrap_or(0);
+        let mut s = DMatrix::zeros(rows, rank);
+        for (own, p) in groups {
+            own.iter().for_each(|row| factors[*row] = *unit);
             // (I - P P')^2 = I - S S', the columns of P being orthogonal.
             for (mut to, from) in s.column_iter_mut().zip(p.column_iter()) {
                 let size = unit * (2.0 - from.norm_squared()).sqrt();
                 own.iter().zip(from.iter()).for_each(|(row, from)| to[*row] = size * from);
             }
-        };
-        let back = |s: &mut DMatrix<f64>| filters.iter().rev().for_each(|one| one.apply_transposed(s));
-        let rows = dwells.last().map_or(0, |d| d.range().end);
-        let mut factors = DVector::from_element(rows, 1.0);
-        groups.iter().flat_map(|(own, _)| own).for_each(|row| factors[*row] = *unit);
-        let shares = if filters.iter().all(Kind::keeps_dwells_apart) {
-            // Groups share no dwell: all of them stand in one matrix.
-            let rank = groups.iter().map(|(_, p)| p.ncols()).max().unwrap_or(0);
-            let mut s = DMatrix::zeros(rows, rank);
-            groups.iter().for_each(|group| taken(group, &mut s));
-            back(&mut s);
-            let numbers: BTreeMap<usize, usize> =
-                dwells.iter().enumerate().map(|(i, d)| (d.first_row, i)).collect();
-            let of_group = |(own, p): &(Vec<usize>, DMatrix<f64>)| {
-                let members = own.iter().filter_map(|row| numbers.get(row).copied()).collect();
-                Shares::of(members, dwells, (&s, p.ncols()))
+        }
+        filters.iter().rev().for_each(|one| one.apply_transposed(&mut s));
+        let of_row: BTreeMap<usize, usize> =
+            dwells.iter().enumerate().map(|(i, d)| (d.first_row, i)).collect();
+        let of_group = |(own, p): &(Vec<usize>, DMatrix<f64>)| {
+            let members: Vec<usize> = own.iter().filter_map(|row| of_row.get(row).copied()).collect();
+            let of_dwell = |i: &usize| {
+                let DwellRow { first_row, rows, .. } = dwells[*i];
+                s.view((first_row, 0), (rows, p.ncols())).into_owned()
             };
-            groups.iter().map(of_group).collect()
-        } else {
-            let of_group = |group: &(Vec<usize>, DMatrix<f64>)| {
-                let mut s = DMatrix::zeros(rows, group.1.ncols());
-                taken(group, &mut s);
-                back(&mut s);
-                Shares::of((0..dwells.len()).collect(), dwells, (&s, group.1.ncols()))
-            };
-            groups.iter().map(of_group).collect()
+            Shares { of_dwell: members.iter().map(of_dwell).collect(), dwells: members }
         };
+        let shares = groups.iter().map(of_group).collect();
         Form { filters, factors: Some(factors), shares }
-    }
-}
-
-impl Shares {
-    /// From the rows of these dwells in so many columns.
-    fn of(members: Vec<usize>, dwells: &[DwellRow], (s, rank): (&DMatrix<f64>, usize)) -> Shares {
-        let of_dwell = |i: &usize| s.view((dwells[*i].first_row, 0), (dwells[*i].rows, rank)).into_owned();
-        Shares { of_dwell: members.iter().map(of_dwell).collect(), dwells: members }
     }
 }
 
