@@ -54,6 +54,17 @@ fn mistakes_on_an_arm_of_free_poses_that_are_named_stay_named() {
 }
 
 #[test]
+fn a_joint_that_was_homed_again_is_told_with_the_recording_from_which_on() {
+    // By its truth the second of three recordings and the third begin with another zero.
+    let case = answer("homed-again-between-recordings", Rig::Table);
+    let told = |s: &&armcal_mistakes::run::Statement| {
+        s.code == "joint-zero" && s.text.contains("from recording `roll` on")
+    };
+    assert_eq!(case.said.statements.iter().filter(told).count(), 1, "{:#?}", case.said);
+    assert_eq!(case.judgement, Judgement::Right);
+}
+
+#[test]
 fn a_sound_session_of_each_rig_is_not_accused() {
     for number in 0..6 {
         let folder = tempfile::tempdir().expect("temporary folder");

@@ -150,8 +150,12 @@ impl<'a> Rooms<'a> {
 
     /// ln evidence of the model with these effects under white noise alone, to compare it with that of others.
     pub fn ln_evidence(&mut self, accepted: &[Candidate]) -> Result<f64, DiagnoseError> {
-        let problem = self.bare(accepted)?;
-        Ok(Metric::new(Noise::White, 0.0, &problem, 1.0).ln_evidence(self.config))
+        let known = self.known(&names(accepted));
+        let problem = match &known {
+            Some(room) => &room.problem,
+            None => &self.bare(accepted)?,
+        };
+        Ok(Metric::new(Noise::White, 0.0, problem, 1.0).ln_evidence(self.config))
     }
 
     /// A problem without the dwells that do not count.

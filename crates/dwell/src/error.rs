@@ -53,8 +53,10 @@ pub enum DwellError {
     NoMotion { seen: String, advice: &'static str },
     /// The two speed profiles do not resemble each other at any offset.
     #[error(
-        "aligning the clocks: the best correlation of predicted and measured tip speed is {correlation:.2} \
-         (at {offset_s:+.3} s), below clock.min_correlation = {min_correlation}; {hint}"
+        "aligning the clocks: the best correlation of predicted and measured tip speed is {below:.3} \
+         (at {offset_s:+.3} s), below clock.min_correlation = {min_correlation}; {hint}",
+        // Rounded to nearest it could be as printed.
+        below = (.correlation * 1e3).floor() * 1e-3
     )]
     CorrelationTooLow { correlation: f64, offset_s: f64, min_correlation: f64, hint: String },
     /// The best offset lies at the edge of the range searched.

@@ -1,6 +1,7 @@
 //! What both programs are run over: shipped pipelines, and rigs of the lab that hide one thing each.
 
 use crate::Result;
+use crate::process::{self, Ended};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -48,6 +49,8 @@ pub struct Run {
     pub status: Option<i32>,
     /// Least processor time of all repeats [s].
     pub cpu_s: f64,
+    /// High-water mark of its memory in the first run [MiB].
+    pub peak_mib: f64,
 }
 
 /// Every case: shipped pipelines by their file, rigs by what they hide.
@@ -91,18 +94,12 @@ impl Case {
 
     fn once(&self, programs: &[PathBuf; 2], k: usize) -> Result<Run> {
         let folder = self.results.join(["before", "now"][k]);
-        let began_s = children_cpu_s()?;
-        let output = Command::new(&programs[k])
-            .args(["run", "--verbose"])
-            .arg(&self.pipeline)
-            .arg("--out")
-            .arg(&folder)
-            .env("RAYON_NUM_THREADS", "1")
-            .output()?;
-        let cpu_s = children_cpu_s()? - began_s;
+        let mut command = Command::new(&programs[k]);
+        command.args(["run", "--verbose"]).arg(&self.pipeline).arg("--out").arg(&folder);
+        let Ended { output, cpu_s, peak_mib } = process::run(command.env("RAYON_NUM_THREADS", "1"))?;
         let text = String::from_utf8_lossy(&output.stdout);
         let said = text.replace(&folder.display().to_string(), "OUT");
-        Ok(Run { folder, said, status: output.status.code(), cpu_s })
+        Ok(Run { folder, said, status: output.status.code(), cpu_s, peak_mib })
     }
 }
 
@@ -161,13 +158,4 @@ fn absolute(value: &mut toml::Value, folder: &Path) {
         toml::Value::Array(values) => values.iter_mut().for_each(|v| absolute(v, folder)),
         _ => {}
     }
-}
-
-/// Processor time of all ended children, user and system [s].
-fn children_cpu_s() -> Result<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat")?;
-    // Behind the name of the program, which may hold spaces: fields 16 and 17 of proc(5), in ticks of 10 ms.
-    let (_, fields) = stat.rsplit_once(')').ok_or("/proc/self/stat has no name")?;
-    let ticks = fields.split_whitespace().skip(13).take(2).map(str::parse::<f64>);
-    Ok(ticks.sum::<std::result::Result<f64, _>>()? * 0.01)
 }

@@ -2,17 +2,18 @@
 //!
 //! `cargo bench -p armcal --bench before -- REVISION` builds that revision (default `HEAD`: what is not committed is compared
 //! with what is) in a worktree under `target/before`, runs it and this tree over every shipped pipeline and twenty simulated
-//! rigs, compares every number of every file they leave, and prints processor times side by side. It ends with an error
+//! rigs, compares every number of every file they leave, and prints processor times and memory side by side. It ends with an error
 //! where anything moved or the new program is more than 5 % slower over all cases. `--tolerance 1e-12` allows numbers to move
 //! by that share of the larger one; `--repeats N` (3) runs each case so often and takes the fastest; words that are no option are
 //! cases to run alone.
 //!
-//! `revision` builds the older program; `cases` says what is run; `files` compares what they left.
+//! `revision` builds the older program; `cases` says what is run, and `process` runs it; `files` compares what they left.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its numbers")]
 
 mod cases;
 mod files;
+mod process;
 mod revision;
 
 use cases::{Case, Run};
@@ -37,7 +38,10 @@ fn main() -> Result<()> {
     let options = options(&root, &all)?;
     let programs =
         [revision::built(&root, &folder, &options.revision)?, PathBuf::from(env!("CARGO_BIN_EXE_armcal"))];
-    println!("{:<28} {:>12} {:>10} {:>9}  largest change", "case", "numbers", "before [s]", "now [s]");
+    println!(
+        "{:<28} {:>12} {:>10} {:>9} {:>12} {:>9}  largest change",
+        "case", "numbers", "before [s]", "now [s]", "before [MiB]", "now [MiB]"
+    );
     let (mut total_s, mut moved) = ([0.0; 2], 0);
     for name in all.iter().filter(|n| options.named.is_empty() || options.named.contains(n)) {
         let Some(case) = Case::made(name, &root, &folder, &programs[1])? else {
@@ -48,7 +52,10 @@ fn main() -> Result<()> {
         let told = compared(&before, &now, options.tolerance)?;
         moved += usize::from(told.moved);
         total_s = [total_s[0] + before.cpu_s, total_s[1] + now.cpu_s];
-        println!("{name:<28} {:>12} {:>10.2} {:>9.2}  {}", told.numbers, before.cpu_s, now.cpu_s, told.words);
+        println!(
+            "{name:<28} {:>12} {:>10.2} {:>9.2} {:>12.0} {:>9.0}  {}",
+            told.numbers, before.cpu_s, now.cpu_s, before.peak_mib, now.peak_mib, told.words
+        );
     }
     let ratio = total_s[1] / total_s[0];
     println!("together {:.2} s before, {:.2} s now: {ratio:.3}", total_s[0], total_s[1]);

@@ -5,7 +5,7 @@ use crate::page::{Bar, Section, Table, seconds};
 use crate::{Options, Result};
 use armcal_lab::scenario::{Design, Scenario, seal};
 use rayon::prelude::*;
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Different recordings; more of them are the same files under other names, each calibrated by itself all the same.
@@ -20,8 +20,6 @@ const FLAT: f64 = 1.1;
 const CPU_S: f64 = 0.04;
 
 pub fn section(options: &Options) -> Result<Section> {
-    let folder = options.data.join("batch");
-    let made = make(&folder)?;
     let mut section = Section::new("Batch");
     section.say(format!(
         "`armcal batch` of recordings of the paper's rig (33 dwells, one tilt), from an empty folder to the campaign's table \
@@ -29,12 +27,12 @@ pub fn section(options: &Options) -> Result<Section> {
          under other names and worked on in full. Efficiency is T(1) / (p T(p)); CPU over p T(p) says how busy the cores \
          were, so that an efficiency below it was lost to other programs or to memory, not to waiting.",
     ));
-    threads(&made, &folder, options, &mut section)?;
-    recordings(&made, &folder, options, &mut section)?;
+    threads(options, &mut section)?;
+    recordings(options, &mut section)?;
     Ok(section)
 }
 
-fn threads(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Section) -> Result<()> {
+fn threads(options: &Options, section: &mut Section) -> Result<()> {
     let all = std::thread::available_parallelism()?.get();
     let count = FOR_THREADS.min(options.recordings);
     let mut table =
@@ -44,7 +42,7 @@ fn threads(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Sec
     counts.retain(|p| *p <= all);
     counts.dedup();
     for threads in counts {
-        let cost = batch(made, folder, count, threads)?;
+        let cost = batch(options, count, threads)?;
         let wall_s = cost.spent.wall_s;
         let core_s = wall_s * threads as f64;
         let efficiency = *one_s.get_or_insert(wall_s) / core_s;
@@ -83,12 +81,12 @@ fn threads(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Sec
     Ok(())
 }
 
-fn recordings(made: &[PathBuf], folder: &Path, options: &Options, section: &mut Section) -> Result<()> {
+fn recordings(options: &Options, section: &mut Section) -> Result<()> {
     let all = std::thread::available_parallelism()?.get();
     let mut table = Table::new(&["recordings", "threads", "wall [s]", "per second", "peak memory [MiB]"]);
     let mut peaks_mib = Vec::new();
     for count in RECORDINGS.into_iter().filter(|count| *count <= options.recordings) {
-        let cost = batch(made, folder, count, all)?;
+        let cost = batch(options, count, all)?;
         table.row([
             count.to_string(),
             all.to_string(),
@@ -116,33 +114,40 @@ fn recordings(made: &[PathBuf], folder: &Path, options: &Options, section: &mut 
 }
 
 /// One batch from nothing.
-fn batch(made: &[PathBuf], folder: &Path, count: usize, jobs: usize) -> Result<Cost> {
-    let (work, out) = (folder.join("work"), folder.join("campaign"));
-    for old in [&work, &out] {
-        if old.exists() {
-            std::fs::remove_dir_all(old)?;
-        }
-        std::fs::create_dir_all(old)?;
+fn batch(options: &Options, count: usize, jobs: usize) -> Result<Cost> {
+    let out = options.data.join("batch/campaign");
+    if out.exists() {
+        std::fs::remove_dir_all(&out)?;
     }
+    let mut arguments = arguments(options, count, jobs)?;
+    arguments.push(out.clone().into());
+    let cost = armcal(arguments)?;
+    std::fs::remove_dir_all(&out)?;
+    Ok(cost)
+}
+
+/// The command line of a batch of so many recordings, which are placed, but for the folder it writes to, which comes last.
+pub fn arguments(options: &Options, count: usize, jobs: usize) -> Result<Vec<OsString>> {
+    let folder = options.data.join("batch");
+    let (made, work) = (make(&folder)?, folder.join(format!("work-{count}")));
+    if work.exists() {
+        std::fs::remove_dir_all(&work)?;
+    }
+    std::fs::create_dir_all(&work)?;
     for i in 0..count {
         // No copies: a thousand recordings would fill the disk.
         std::fs::hard_link(&made[i % made.len()], work.join(format!("recording{i:04}.mcap")))?;
     }
     let (pattern, pipeline, jobs) = (work.join("*.mcap"), folder.join("1/pipeline.toml"), jobs.to_string());
-    let arguments: [&OsStr; 8] = [
-        OsStr::new("batch"),
-        pattern.as_os_str(),
-        OsStr::new("--pipeline"),
-        pipeline.as_os_str(),
-        OsStr::new("--out"),
-        out.as_os_str(),
-        OsStr::new("--jobs"),
-        OsStr::new(&jobs),
-    ];
-    let cost = armcal(arguments)?;
-    std::fs::remove_dir_all(&out)?;
-    std::fs::remove_dir_all(&work)?;
-    Ok(cost)
+    Ok(vec![
+        "batch".into(),
+        pattern.into(),
+        "--pipeline".into(),
+        pipeline.into(),
+        "--jobs".into(),
+        jobs.into(),
+        "--out".into(),
+    ])
 }
 
 /// The pipeline of one of the recordings, which is made where it is not there.

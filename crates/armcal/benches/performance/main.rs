@@ -4,11 +4,11 @@
 //! parts it prints them and leaves the page alone: `cargo bench -p armcal --bench performance -- fit reading`; with `--into-page` a
 //! part without bars takes its place on the page, and says when it was measured.
 //! `--size-mb N` sets the size of the recording that is read, `--recordings N` the most recordings of a batch (1000 both),
-//! `--poses N` the most poses of a campaign.
+//! `--poses N` the most poses of a campaign, `--older REVISION` the commit whose program runs beside this one.
 //! Data go to `target/bench-data`.
 //!
 //! `recordings` generates what is read; `reading`, `fit`, `diagnosis`, `growth` (of what `campaign` makes), `stages` of a run,
-//! `memory`, `alignment` (of clocks), `batch` are the parts; `peers` finds or makes
+//! `memory`, `alignment` (of clocks), `batch`, `older` (the same commands by an older commit) are the parts; `peers` finds or makes
 //! the tools they are compared with (`../peers`), skipped loudly where they cannot be had; `clock` measures, `child`
 //! measures processes, `page` lays out, `machine` says on what.
 
@@ -25,15 +25,23 @@ mod fit_problem;
 mod growth;
 mod machine;
 mod memory;
+mod older;
 mod page;
 mod peers;
+#[path = "../before/process.rs"]
+mod process;
 mod reading;
 mod recordings;
+#[path = "../before/revision.rs"]
+mod revision;
 mod stages;
 mod walk;
 
 use page::Section;
 use std::path::{Path, PathBuf};
+
+/// The last commit before cost was looked at.
+const OLDER: &str = "fd49d09";
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
@@ -41,7 +49,7 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 type Part = fn(&Options) -> Result<Section>;
 
 /// Each by its name, in the order of the page.
-const PARTS: [(&str, Part); 8] = [
+const PARTS: [(&str, Part); 9] = [
     ("reading", reading::section),
     ("fit", fit::section),
     ("diagnosis", diagnosis::section),
@@ -50,6 +58,7 @@ const PARTS: [(&str, Part); 8] = [
     ("memory", memory::section),
     ("alignment", alignment::section),
     ("batch", batch::section),
+    ("older", older::section),
 ];
 
 /// What the command line asks for.
@@ -60,6 +69,8 @@ pub struct Options {
     pub recordings: usize,
     /// Most poses of a campaign.
     pub poses: usize,
+    /// The revision whose program runs beside this one.
+    pub older: String,
     /// Where generated recordings and built peers lie.
     pub data: PathBuf,
 }
@@ -73,8 +84,13 @@ fn main() -> Result<()> {
         return child::run(rest);
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut options =
-        Options { size_mb: 1000, recordings: 1000, poses: 20_000, data: root.join("target/bench-data") };
+    let mut options = Options {
+        size_mb: 1000,
+        recordings: 1000,
+        poses: 20_000,
+        older: OLDER.into(),
+        data: root.join("target/bench-data"),
+    };
     let mut named = Vec::new();
     let mut into_page = false;
     let mut arguments = arguments.iter();
@@ -85,6 +101,8 @@ fn main() -> Result<()> {
             options.recordings = count(argument, arguments.next())?;
         } else if argument == "--poses" {
             options.poses = count(argument, arguments.next())?;
+        } else if argument == "--older" {
+            options.older = arguments.next().ok_or("--older needs a revision")?.clone();
         } else if argument == "--into-page" {
             into_page = true;
         } else if PARTS.iter().any(|(name, _)| name == argument) {
@@ -109,7 +127,7 @@ fn main() -> Result<()> {
     } else if into_page {
         let page = std::fs::read_to_string(&path)?;
         let page = sections.iter().try_fold(page, |page, section| page::with(&page, section));
-        std::fs::write(&path, page.ok_or("a part has bars, or is not on the page: measure all parts")?)?;
+        std::fs::write(&path, page.ok_or("a part has bars: measure all parts")?)?;
     }
     Ok(())
 }

@@ -168,10 +168,11 @@ pub fn page(sections: &[Section], options: &Options) -> String {
     text.trim_end().to_owned() + "\n"
 }
 
-/// The page with one part measured anew; none where it is not on the page, or has bars, which stand on its top too.
+/// The page with one part measured anew, at its end where it was not yet on it; none where it has bars, which stand on its top too.
 pub fn with(page: &str, section: &Section) -> Option<String> {
     let head = format!("## {}\n", section.title);
-    let (before, rest) = page.split_once(&head)?;
+    let end = format!("{}\n\n", page.trim_end());
+    let (before, rest) = page.split_once(&head).unwrap_or((&end, ""));
     let behind = rest.find("\n## ").map_or("", |at| &rest[at + 1..]);
     let text = section.text();
     let own = text.strip_prefix(&head).filter(|_| section.bars.is_empty())?;

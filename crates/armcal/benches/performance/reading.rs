@@ -11,7 +11,7 @@ use armcal_recording::{JointStream, PoseStream, Recording, Streams, sha256_of};
 use rayon::ThreadPool;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Rounds of the in-process readers, each reader once a round so that a busy machine hits all alike.
 const ROUNDS: usize = 9;
@@ -24,9 +24,15 @@ const READERS: [&str; 5] = [
     "SHA-256 of the file",
 ];
 
-pub fn section(options: &Options) -> Result<Section> {
+/// The recording that is read, made where it is not there.
+pub fn placed(options: &Options) -> Result<PathBuf> {
     let path = options.data.join(format!("streams-{}mb-seed1.mcap", options.size_mb));
     recordings::streams(&path, options.size_mb * 1_000_000, 1)?;
+    Ok(path)
+}
+
+pub fn section(options: &Options) -> Result<Section> {
+    let path = placed(options)?;
     let bytes = std::fs::metadata(&path)?.len();
     let samples = read(&path, false)?;
     let mut section = Section::new("Reading two streams into columns");

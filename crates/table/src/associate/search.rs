@@ -40,23 +40,28 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
     let sites: Vec<(Vector3<f64>, f64)> =
         problem.sites.iter().map(|s| (supposed.supposed_m(&s.at_m) - middle_m, s.weight)).collect();
     let shifts = steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
+    let turns = steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD);
+    let turned = |turn_rad: &f64| -> Vec<(Vector3<f64>, f64)> {
+        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), *turn_rad);
+        sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect()
+    };
+    let turned: Vec<_> = turns.iter().map(turned).collect();
     let (mut scored, mut highest) = (Vec::new(), f64::NEG_INFINITY);
-    for turn_rad in steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD) {
-        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn_rad);
-        let turned: Vec<_> = sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect();
-        for (score, shift) in shifted(problem, &turned, &shifts) {
+    for (turn, sites) in turned.iter().enumerate() {
+        for (score, shift) in shifted(problem, sites, &shifts) {
             if score >= WORTH * highest {
                 highest = highest.max(score);
-                scored.push((score, (turn_rad, shift)));
+                scored.push((score, (turn, shift)));
             }
         }
     }
-    let field = |&(turn_rad, shift): &(f64, Vector3<f64>)| {
+    let place = |(turn, shift): &(usize, Vector3<f64>), site: usize| turned[*turn][site].0 + shift;
+    let field = |(turn, shift): &(usize, Vector3<f64>)| {
         let mut field = supposed.clone();
-        field.turn_and_shift(turn_rad, shift);
+        field.turn_and_shift(turns[*turn], *shift);
         field
     };
-    different(problem, scored, field, false)
+    different(problem, scored, place, false).iter().map(field).collect()
 }
 
 /// Support of the sites (place on the board, weight) at every shift of the grid, less what a far shift costs.
@@ -78,17 +83,17 @@ fn shifted(
         let at = |side: f64| ((to - from + side - shifts[0]) / GRID_M).clamp(0.0, n as f64);
         at(-reach_m).floor() as usize..(at(reach_m).ceil() as usize + 1).min(n)
     };
+    let mut across = Vec::new();
     for (p, weight) in sites {
         best.fill(0.0);
         for cavity in &problem.layout.points_m {
             let along = within(p.y, cavity.y);
+            across.clear();
+            across.extend(shifts[along.clone()].iter().map(|shift| (p.y + shift - cavity.y).powi(2)));
             for x in within(p.x, cavity.x) {
-                for at in along.clone().map(|y| x * n + y) {
-                    let gap = p + grid[at] - cavity;
-                    let support = 1.0 - (gap.x * gap.x + gap.y * gap.y) / (reach_m * reach_m);
-                    if support > best[at] {
-                        best[at] = support;
-                    }
+                let beside = (p.x + shifts[x] - cavity.x).powi(2);
+                for (best, across) in best[x * n..][along.clone()].iter_mut().zip(&across) {
+                    *best = f64::max(*best, 1.0 - (beside + across) / (reach_m * reach_m));
                 }
             }
         }
@@ -111,7 +116,8 @@ pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
     }
     let n = problem.layout.len() as f64;
     let centre_m = problem.layout.points_m.iter().sum::<Vector3<f64>>() / n;
-    different(problem, scored, |pose| Field::none(*pose, centre_m), true)
+    let place = |pose: &Pose, site: usize| pose.transform_point(&problem.sites[site].at_m.into()).coords;
+    different(problem, scored, place, true).into_iter().map(|pose| Field::none(pose, centre_m)).collect()
 }
 
 /// How much all places support an alignment; none where that is less than `least`.
@@ -142,30 +148,30 @@ fn support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64)
     if support > 0.0 { (k, support) } else { (u32::MAX, 0.0) }
 }
 
-/// The best alignments of which each puts at least some places into other cavities than those before it.
+/// The best alignments of which each puts at least some places into other cavities than those before it; `place_of` is where on the
+/// board an alignment puts a site.
 fn different<T>(
     problem: &Problem,
     mut scored: Vec<(f64, T)>,
-    field_of: impl Fn(&T) -> Field,
+    place_of: impl Fn(&T, usize) -> Vector3<f64>,
     in_space: bool,
-) -> Vec<Field> {
+) -> Vec<T> {
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = WORTH * scored.first().map_or(0.0, |s| s.0);
     let enough = (problem.sites.len() / 8).max(1);
-    let mut kept: Vec<(Field, Vec<u32>)> = Vec::new();
-    for (_, rough) in scored.iter().take(LOOK).take_while(|s| s.0 >= least) {
-        let field = field_of(rough);
-        let cavity = |s: &Site| support(problem, &field.aligned_m(&s.at_m), in_space).0;
-        let cavities: Vec<u32> = problem.sites.iter().map(cavity).collect();
+    let mut kept: Vec<(T, Vec<u32>)> = Vec::new();
+    for (_, rough) in scored.into_iter().take(LOOK).take_while(|s| s.0 >= least) {
+        let cavity = |site: usize| support(problem, &place_of(&rough, site), in_space).0;
+        let cavities: Vec<u32> = (0..problem.sites.len()).map(cavity).collect();
         let differs = |other: &Vec<u32>| cavities.iter().zip(other).filter(|(a, b)| a != b).count() >= enough;
         if kept.iter().all(|(_, other)| differs(other)) {
-            kept.push((field, cavities));
+            kept.push((rough, cavities));
             if kept.len() == KEEP {
                 break;
             }
         }
     }
-    kept.into_iter().map(|(field, _)| field).collect()
+    kept.into_iter().map(|(rough, _)| rough).collect()
 }
 
 fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {

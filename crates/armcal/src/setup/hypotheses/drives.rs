@@ -5,7 +5,7 @@
 use super::joints::{SIGN, ZERO, scale, shift};
 use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::trial::{Change, Inputs};
-use armcal_core::{Parameter, Unit};
+use armcal_core::{DwellId, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override, Since};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -15,7 +15,8 @@ const COUPLED: &str = "convert it in the driver that records it, or read the joi
 const FREE: &str = "leave out `free = false`, or mend the values that are held fixed";
 const FIXED: &str = "free it in the model file, or mend its value there";
 const PRIORS: &str = "mend the values in the model file, or widen the deviation that it allows";
-const HOMED: &str = "give it to a pipeline of its own, or add `[[effects]]` zero_slip with its recording";
+const HOMED: &str =
+    "give what differs to a pipeline of its own, or add `[[effects]]` zero_slip with its `since`";
 
 /// Ratios of gears and units that are mistaken for none; those near 1 are in `joints`.
 const RATIOS: [f64; 6] = [3.0, 5.0, 10.0, 50.0, 100.0, 1000.0];
@@ -86,11 +87,11 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         let scale = ("scale", within(RATIO_BOUND));
         all.push(effect("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
-    let later = || inputs.seen.iter().enumerate().skip(1);
-    for (&j, (r, seen)) in turning.iter().flat_map(|j| later().map(move |r| (j, r))) {
+    let moments = moments(inputs);
+    for (&j, (since, words)) in turning.iter().flat_map(|j| moments.iter().map(move |moment| (j, moment))) {
         for start_deg in SLIPS_DEG {
-            let change = format!("another zero of {} from recording `{}` on", joint(j), seen.name);
-            let spec = EffectSpec::new("zero_slip").at(j).since(Since::Recording(r));
+            let change = format!("another zero of {} {words}", joint(j));
+            let spec = EffectSpec::new("zero_slip").at(j).since(since.clone());
             let unit = Some("deg".to_owned());
             let offset = ("offset", Override { unit, start: Some(start_deg), ..within(ZERO_BOUND_DEG) });
             all.push(effect("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
@@ -109,6 +110,19 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     all.extend(all_zeros(inputs, at_bound));
     all.extend(let_go(inputs));
     all
+}
+
+/// When a joint may have been homed again: from each recording on, and for each alone.
+fn moments(inputs: &Inputs) -> Vec<(Since, String)> {
+    let all = inputs.seen.iter().enumerate();
+    // From the first on is always, from the last on is the last alone.
+    let on = all.clone().skip(1).map(|(recording, seen)| {
+        (Since::Dwell(DwellId { recording, dwell: 0 }), format!("from recording `{}` on", seen.name))
+    });
+    let alone = all.take(inputs.seen.len().saturating_sub(1)).map(|(recording, seen)| {
+        (Since::Recording(recording), format!("in recording `{}` alone", seen.name))
+    });
+    on.chain(alone).collect()
 }
 
 /// Parameters that the model file holds fixed, each and together, and priors that are too tight.
