@@ -1,4 +1,5 @@
 use armcal_mistakes::judge::{Case, Judgement, case};
+use armcal_mistakes::run::{Place, Statement};
 use armcal_mistakes::{Rig, kinds, sound};
 use std::path::Path;
 
@@ -57,10 +58,10 @@ fn mistakes_on_an_arm_of_free_poses_that_are_named_stay_named() {
 fn a_joint_that_was_homed_again_is_told_with_the_recording_from_which_on() {
     // By its truth the second of three recordings and the third begin with another zero.
     let case = answer("homed-again-between-recordings", Rig::Table);
-    let told = |s: &&armcal_mistakes::run::Statement| {
-        s.code == "joint-zero" && s.text.contains("from recording `roll` on")
-    };
-    assert_eq!(case.said.statements.iter().filter(told).count(), 1, "{:#?}", case.said);
+    let setup: Vec<&Statement> = case.said.statements.iter().filter(|s| s.place == Place::Setup).collect();
+    let [told] = setup.as_slice() else { panic!("{:#?}", case.said) };
+    assert_eq!(told.code, "joint-zero");
+    assert!(told.text.contains("from recording `roll` on"), "{}", told.text);
     assert_eq!(case.judgement, Judgement::Right);
 }
 
