@@ -91,7 +91,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     for (&j, (since, words)) in turning.iter().flat_map(|j| moments.iter().map(move |moment| (j, moment))) {
         for start_deg in SLIPS_DEG {
             let change = format!("another zero of {} {words}", joint(j));
-            let spec = EffectSpec::new("zero_slip").at(j).since(since.clone());
+            let spec = EffectSpec::new("zero_slip").at(j).since(*since);
             let unit = Some("deg".to_owned());
             let offset = ("offset", Override { unit, start: Some(start_deg), ..within(ZERO_BOUND_DEG) });
             all.push(effect("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
