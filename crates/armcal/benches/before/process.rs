@@ -8,6 +8,9 @@ use std::time::Duration;
 /// How often the high-water mark of a process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
+/// Field of proc(5)'s stat where the times of all ended children begin.
+const OF_CHILDREN: usize = 16;
+
 /// What a program said and took.
 pub struct Ended {
     pub output: Output,
@@ -19,7 +22,7 @@ pub struct Ended {
 
 /// Runs a program that nothing else runs beside.
 pub fn run(command: &mut Command) -> Result<Ended> {
-    let began_s = children_cpu_s()?;
+    let began_s = stat_cpu_s(OF_CHILDREN)?;
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
     let status = format!("/proc/{}/status", child.id());
     let (ended, ends) = channel::<()>();
@@ -33,21 +36,21 @@ pub fn run(command: &mut Command) -> Result<Ended> {
     let output = child.wait_with_output();
     drop(ended);
     let peak_mib = watch.join().map_err(|_| "looking at a program's memory failed")?;
-    Ok(Ended { output: output?, cpu_s: children_cpu_s()? - began_s, peak_mib })
+    Ok(Ended { output: output?, cpu_s: stat_cpu_s(OF_CHILDREN)? - began_s, peak_mib })
 }
 
 /// The high-water mark in a status of proc(5) [MiB]; none of a process that has ended.
-fn high_water_mib(status: &str) -> Option<f64> {
+pub fn high_water_mib(status: &str) -> Option<f64> {
     let text = std::fs::read_to_string(status).ok()?;
     let kib = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix(" kB")?;
     Some(kib.parse::<f64>().ok()? / 1024.0)
 }
 
-/// Processor time of all ended children, user and system [s].
-fn children_cpu_s() -> Result<f64> {
+/// Two times of this process's stat in proc(5), user and system, from field `first` on, together [s].
+pub fn stat_cpu_s(first: usize) -> Result<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat")?;
-    // Behind the name of the program, which may hold spaces: fields 16 and 17 of proc(5), in ticks of 10 ms.
+    // Behind the name of the program, which is field 2 and may hold spaces; in ticks of 10 ms.
     let (_, fields) = stat.rsplit_once(')').ok_or("/proc/self/stat has no name")?;
-    let ticks = fields.split_whitespace().skip(13).take(2).map(str::parse::<f64>);
+    let ticks = fields.split_whitespace().skip(first - 3).take(2).map(str::parse::<f64>);
     Ok(ticks.sum::<std::result::Result<f64, _>>()? * 0.01)
 }

@@ -119,15 +119,13 @@ fn batch(options: &Options, count: usize, jobs: usize) -> Result<Cost> {
     if out.exists() {
         std::fs::remove_dir_all(&out)?;
     }
-    let mut arguments = arguments(options, count, jobs)?;
-    arguments.push(out.clone().into());
-    let cost = armcal(arguments)?;
+    let cost = armcal(arguments(options, count, jobs, &out)?)?;
     std::fs::remove_dir_all(&out)?;
     Ok(cost)
 }
 
-/// The command line of a batch of so many recordings, which are placed, but for the folder it writes to, which comes last.
-pub fn arguments(options: &Options, count: usize, jobs: usize) -> Result<Vec<OsString>> {
+/// The command line of a batch of so many recordings, which are placed.
+pub fn arguments(options: &Options, count: usize, jobs: usize, out: &Path) -> Result<Vec<OsString>> {
     let folder = options.data.join("batch");
     let (made, work) = (make(&folder)?, folder.join(format!("work-{count}")));
     if work.exists() {
@@ -147,6 +145,7 @@ pub fn arguments(options: &Options, count: usize, jobs: usize) -> Result<Vec<OsS
         "--jobs".into(),
         jobs.into(),
         "--out".into(),
+        out.into(),
     ])
 }
 

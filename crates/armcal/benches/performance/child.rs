@@ -1,7 +1,7 @@
 //! armcal as a process of its own, which tells what it cost: this program again, called with an armcal command line.
 
-use crate::Result;
 use crate::clock::{self, Spent};
+use crate::{Result, process};
 use armcal::cli::Cli;
 use armcal::commands;
 use clap::Parser as _;
@@ -20,14 +20,12 @@ pub struct Cost {
     pub peak_mib: f64,
 }
 
-/// The child's side: runs the command, and ends stderr with its high-water mark [KiB] and processor time [s].
+/// The child's side: runs the command, and ends stderr with its high-water mark [MiB] and processor time [s].
 pub fn run(arguments: &[String]) -> Result<()> {
     let cli = Cli::try_parse_from([String::from("armcal")].iter().chain(arguments))?;
     commands::dispatch(&cli)?;
-    let status = std::fs::read_to_string("/proc/self/status")?;
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).ok_or("no VmHWM")?;
-    let peak_kib: f64 = peak.trim().trim_end_matches(" kB").parse()?;
-    eprintln!("\n{CHILD} {peak_kib} {}", clock::process_cpu_s()?);
+    let peak_mib = process::high_water_mib("/proc/self/status").ok_or("no VmHWM")?;
+    eprintln!("\n{CHILD} {peak_mib} {}", clock::process_cpu_s()?);
     Ok(())
 }
 
@@ -47,8 +45,8 @@ fn told(command: &mut Command) -> Result<Cost> {
     let wall_s = began.elapsed().as_secs_f64();
     let said = String::from_utf8_lossy(&output.stderr);
     let told = said.lines().last().and_then(|line| line.strip_prefix(CHILD)?.trim().split_once(' '));
-    let Some((peak_kib, cpu_s)) = told.filter(|_| output.status.success()) else {
+    let Some((peak_mib, cpu_s)) = told.filter(|_| output.status.success()) else {
         return Err(format!("{command:?} did not finish: {said}").into());
     };
-    Ok(Cost { spent: Spent { wall_s, cpu_s: cpu_s.parse()? }, peak_mib: peak_kib.parse::<f64>()? / 1024.0 })
+    Ok(Cost { spent: Spent { wall_s, cpu_s: cpu_s.parse()? }, peak_mib: peak_mib.parse()? })
 }

@@ -1,8 +1,11 @@
 //! Wall time, and the time that the threads of this process were on a processor: the second tells how much of the
 //! first was waiting for other programs.
 
-use crate::Result;
+use crate::{Result, process};
 use std::time::Instant;
+
+/// Field of proc(5)'s stat where the times of the process itself begin.
+const OF_ITSELF: usize = 14;
 
 /// Time one piece of work took.
 #[derive(Debug, Clone, Copy)]
@@ -30,11 +33,7 @@ pub fn median(spent: &[Spent]) -> Spent {
 
 /// Time on a processor of the whole process since it began, ended threads included, user and system [s].
 pub fn process_cpu_s() -> Result<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat")?;
-    // Behind the name of the program, which may hold spaces: fields 14 and 15 of proc(5), in ticks of 10 ms.
-    let (_, fields) = stat.rsplit_once(')').ok_or("/proc/self/stat has no name")?;
-    let ticks = fields.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
-    Ok(ticks.sum::<std::result::Result<f64, _>>()? * 0.01)
+    process::stat_cpu_s(OF_ITSELF)
 }
 
 /// Time on a processor of all living threads since they began [s]; not a number where there is no `/proc`.

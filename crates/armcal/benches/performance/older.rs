@@ -12,7 +12,7 @@ use std::process::Command;
 /// A session with something unlisted takes a diagnosis longest.
 const HIDDEN: &str = "outside:cable_drag";
 
-/// A command by its name, its arguments but for the last, which is where it writes.
+/// A command by its name and its arguments.
 struct Case {
     what: String,
     threads: usize,
@@ -62,9 +62,10 @@ pub fn section(options: &Options) -> Result<Section> {
 
 /// What is run, on recordings of the other parts.
 fn cases(options: &Options) -> Result<Vec<Case>> {
-    let mut cases = Vec::new();
+    let (mut cases, out) = (Vec::new(), out(options));
     let mut run = |what: String, pipeline: PathBuf| {
-        cases.push(Case { what, threads: 1, arguments: vec!["run".into(), pipeline.into(), "--out".into()] });
+        let arguments = vec!["run".into(), pipeline.into(), "--out".into(), out.clone().into()];
+        cases.push(Case { what, threads: 1, arguments });
     };
     for (poses, weighed) in [(2_000, Weighed::All), (16_811, Weighed::None)] {
         if poses <= options.poses {
@@ -86,22 +87,24 @@ fn cases(options: &Options) -> Result<Vec<Case>> {
         if count <= options.recordings {
             let plural = if threads == 1 { "" } else { "s" };
             let what = format!("batch of {count} recordings, {threads} thread{plural}");
-            cases.push(Case { what, threads, arguments: batch::arguments(options, count, threads)? });
+            cases.push(Case { what, threads, arguments: batch::arguments(options, count, threads, &out)? });
         }
     }
     Ok(cases)
 }
 
+/// Where commands write that do.
+fn out(options: &Options) -> PathBuf {
+    options.data.join("older-out")
+}
+
 impl Case {
     /// From nothing to its outputs, which are not kept.
     fn run(&self, program: &Path, options: &Options) -> Result<Ended> {
-        let out = options.data.join("older-out");
         let mut command = Command::new(program);
         command.args(&self.arguments).env("RAYON_NUM_THREADS", self.threads.to_string());
-        if self.arguments.last().is_some_and(|last| last == "--out") {
-            command.arg(&out);
-        }
         let ended = process::run(&mut command)?;
+        let out = out(options);
         if out.exists() {
             std::fs::remove_dir_all(&out)?;
         }
