@@ -48,7 +48,6 @@ pub struct Request<'a> {
 pub fn batch(request: &Request<'_>, progress: &Progress) -> Result<(Campaign, Vec<PathBuf>, usize), Error> {
     let receipt = work_on(request, Shard::WHOLE, progress)?;
     let skipped = receipt.skipped;
-    memory::give_back();
     let (campaign, written) = put_together(vec![receipt], request.out)?;
     Ok((campaign, written, skipped))
 }

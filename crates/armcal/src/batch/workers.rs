@@ -1,5 +1,6 @@
 //! Several recordings at a time.
 
+use super::memory;
 use crate::error::Error;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -44,6 +45,7 @@ pub(super) fn each<T: Send>(
                     // Nobody panics while holding it: pushing is all that is done.
                     done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((i, result));
                 }
+                pool.broadcast(|_| memory::give_back());
             });
         }
     });
