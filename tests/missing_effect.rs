@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 /// Simulates a laboratory and returns a pipeline on its recordings; the truth stays where only the assertion looks.
 fn recorded(lab: &str, folder: &Path) -> PathBuf {
+    recorded_by(&root().join(lab), folder)
+}
+
+fn recorded_by(lab: &Path, folder: &Path) -> PathBuf {
     let recordings = folder.join("recordings");
-    let output = armcal(
-        [Path::new("simulate"), &root().join(lab), Path::new("--out"), &recordings].map(Path::as_os_str),
-    );
+    let output = armcal([Path::new("simulate"), lab, Path::new("--out"), &recordings].map(Path::as_os_str));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let pipeline = folder.join("pipeline.toml");
     std::fs::write(&pipeline, paper_pipeline(&recordings)).expect("pipeline");
@@ -87,6 +89,42 @@ fn the_papers_backlash_is_named_and_adding_it_brings_the_error_down() {
     // The extended pipeline stands on its own and gives the same.
     let again = run_pipeline(&extended, &folder.path().join("again"), &[0, 3]);
     assert_eq!(mean(&again, "fitted_mm"), with);
+}
+
+/// What was remounted or knocked between the second and third of four recordings acts in no recording alone.
+#[test]
+fn what_moved_between_recordings_and_stayed_is_named_from_the_recording_on() {
+    let lab = std::fs::read_to_string(root().join("pipelines/lab/paper-experiment.toml")).expect("lab");
+    let rig = &lab[..lab.find("[[recordings]]").expect("recordings")];
+    let rig = rig.replace("\"../boards/paper.toml\"", "\"builtin:paper\"");
+    let (own_seed, _) = rig[rig.find("seed = ").expect("seed")..].split_once('#').expect("a comment");
+    for (seed, body, shift_mm, effect) in [
+        (21, "tool", 0.7, "tool_shift@2.0"),
+        (22, "tool", 6.0, "tool_shift@2.0"),
+        (23, "base", 0.7, "frame_shift@2.0"),
+        // A base that is more than 10 mm elsewhere is a mistake of the setup.
+        (24, "base", 4.0, "frame_shift@2.0"),
+    ] {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let lab = rig.replacen(own_seed, &format!("seed = {seed} "), 1)
+            + "[[recordings]]\nname = \"normal\"\n[[recordings]]\nname = \"roll\"\nroll_deg = 11.7\n\
+               [[recordings]]\nname = \"pitch\"\npitch_deg = 11.8\n[[recordings]]\nname = \"again\"\n"
+            + &format!(
+                "[[mechanisms]]\nkind = \"bump\"\nbody = \"{body}\"\nshift_mm = [{shift_mm}, -{shift_mm}, {shift_mm}]\n\
+                 recording = 2\n"
+            );
+        let path = folder.path().join("lab.toml");
+        std::fs::write(&path, lab).expect("lab");
+        let pipeline = recorded_by(&path, folder.path());
+        let text = std::fs::read_to_string(&pipeline).expect("pipeline");
+        let again = folder.path().join("recordings/again.mcap");
+        let with = format!("[[recordings]]\npaths = [{:?}]\n\n[streams.joints]", again.display().to_string());
+        std::fs::write(&pipeline, text.replacen("[streams.joints]", &with, 1)).expect("pipeline");
+        let summary = run_pipeline(&pipeline, &folder.path().join("out"), &[3]);
+        let diagnosis = &summary["diagnosis"];
+        assert_eq!(diagnosis["verdict"], "identified", "seed {seed}: {:#}", diagnosis["explanations"]);
+        assert_eq!(names(diagnosis), [effect], "seed {seed}");
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::crossval::sign_flip;
+use crate::events::moment;
 use crate::problem::{Candidate, DwellRow, Problem};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
@@ -41,7 +42,7 @@ pub(crate) fn contrast(
     if candidate.toggle == Toggle::None || candidate.toggle == Toggle::Recording {
         return None;
     }
-    let pairs = pairs(problem, candidate.toggle, config);
+    let pairs = pairs(problem, candidate, config);
     if pairs.len() < MIN_PAIRS {
         return None;
     }
@@ -78,9 +79,14 @@ pub(crate) fn contrast(
     })
 }
 
-/// Disjoint pairs of dwells of one recording at the same place that differ in the driver.
-pub(crate) fn pairs(problem: &Problem, toggle: Toggle, config: &DiagnosisConfig) -> Vec<(usize, usize)> {
+/// Disjoint pairs of dwells of one recording at the same place that differ in the driver; of an event, of which it acts in one
+/// alone.
+fn pairs(problem: &Problem, candidate: &Candidate, config: &DiagnosisConfig) -> Vec<(usize, usize)> {
     let limit = config.same_pose_deg.to_radians();
+    let moment = moment(&candidate.spec);
+    let differs = |a: &DwellRow, b: &DwellRow| {
+        differs(a, b, candidate.toggle) && moment.is_none_or(|since| since.holds(a.id) != since.holds(b.id))
+    };
     let mut used = vec![false; problem.dwells.len()];
     let mut found = Vec::new();
     for i in 0..used.len() {
@@ -89,7 +95,7 @@ pub(crate) fn pairs(problem: &Problem, toggle: Toggle, config: &DiagnosisConfig)
         }
         let partner = (i + 1..used.len()).find(|&j| {
             let (a, b) = (&problem.dwells[i], &problem.dwells[j]);
-            !used[j] && a.measured_as(b) && same_place(a, b, limit) && differs(a, b, toggle)
+            !used[j] && a.measured_as(b) && same_place(a, b, limit) && differs(a, b)
         });
         if let Some(j) = partner {
             (used[i], used[j]) = (true, true);
@@ -120,5 +126,26 @@ fn differs(a: &DwellRow, b: &DwellRow, toggle: Toggle) -> bool {
             _ => false,
         },
         Toggle::Recording | Toggle::None => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{own, planted};
+
+    /// Three recordings of 33 cavities, each visited in dwells 0 to 32 and again in 33 to 65.
+    #[test]
+    fn pairs_of_an_event_lie_on_both_sides_of_it() {
+        let p = planted(&[], 0, 1);
+        let pairs_of = |spec: &str| {
+            let candidate = Candidate { spec: spec.into(), toggle: Toggle::Time, ..own(&p, "backlash:1") };
+            pairs(&p, &candidate, &DiagnosisConfig::default()).len()
+        };
+        assert_eq!(pairs_of("zero_drift:1"), 99);
+        // Between two recordings no pair of one recording sees it.
+        assert_eq!((pairs_of("zero_slip:1@1.0"), pairs_of("zero_slip:1@1.33")), (0, 33));
+        // Of dwells 33 to 40 alone the first visits lie outside.
+        assert_eq!(pairs_of("zero_slip:1@1.33-40"), 8);
     }
 }

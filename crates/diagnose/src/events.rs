@@ -11,9 +11,14 @@ fn event(spec: &str) -> Option<(&str, Since)> {
     Some((place, since?))
 }
 
+/// When an event acts.
+pub(crate) fn moment(spec: &str) -> Option<Since> {
+    event(spec).map(|(_, since)| since)
+}
+
 /// When an event acts that ends again.
 pub(crate) fn passing(spec: &str) -> Option<Since> {
-    event(spec).map(|(_, since)| since).filter(|since| matches!(since, Since::Dwells { .. }))
+    moment(spec).filter(|since| matches!(since, Since::Dwells { .. }))
 }
 
 /// Whether two names are one effect, told a few dwells apart.
