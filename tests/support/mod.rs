@@ -130,7 +130,8 @@ pub fn run_as_shipped(name: &str) -> Value {
 
 /// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times the
 /// floor, and no result is called adequate above twice the floor, whatever is named; where a name is, one side of the hold-out
-/// may be above it, because a part of the hold-out may hold all poses that show an effect.
+/// may be above it, because a part of the hold-out may hold all poses that show an effect. What is identified is so with a
+/// probability that says so.
 pub fn believable(summary: &Value, what: &str) {
     let floors = |error: &str, floor: &str| {
         let at = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
@@ -139,6 +140,10 @@ pub fn believable(summary: &Value, what: &str) {
     let diagnosed = floors("/diagnosis/holdout_mm/before", "/diagnosis/floor_mm");
     if let (Some(floors), "nothing_missing") = (diagnosed, text(summary, "/diagnosis/verdict")) {
         assert!(floors <= 1.5, "{what}: nothing is missing at {floors:.2} floors");
+    }
+    if text(summary, "/diagnosis/verdict") == "identified" {
+        let probability = number(summary, "/diagnosis/probability");
+        assert!(probability > 0.9, "{what}: identified with a probability of {probability}");
     }
     let of = |side: &str| floors(&format!("/fit/{side}/fitted_mm/mean"), "/fit/noise_floor_mm");
     let held_out = summary.pointer("/fit/holdout/n").and_then(Value::as_u64) > Some(0);

@@ -258,6 +258,8 @@ pub struct Rival {
     pub name: String,
     /// By how much its ln evidence is less.
     pub behind_nats: f64,
+    /// Whether that is so once both are refitted, or in the linearised model.
+    pub refitted: bool,
     /// Errors with it instead, on places the fit did not see.
     pub places: HeldOut,
 }

@@ -162,12 +162,14 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
         say(
             &format!("{}.rival", e.name),
             format!(
-                "the next listed explanation is {}, e^{:.1} times less probable from the data; it would leave {:.3} mm \
-                 there, {:.3} mm more",
+                "the next listed explanation is {}, e^{:.1} times less probable from the data{}; it would leave {:.3} mm \
+                 there, {:.3} mm {}",
                 r.name,
                 r.behind_nats,
+                if r.refitted { " once both are refitted" } else { "" },
                 r.places.after,
-                r.places.after - e.places.after
+                (r.places.after - e.places.after).abs(),
+                if r.places.after < e.places.after { "less" } else { "more" }
             ),
         );
     }

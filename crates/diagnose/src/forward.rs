@@ -8,6 +8,7 @@ use crate::lead;
 use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms};
+use crate::special::ln_sum_exp;
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
 use std::collections::BTreeSet;
@@ -29,9 +30,33 @@ pub(crate) struct Accepted {
     pub grade: Grade,
     /// Names that the data do not tell from it, and that the user's knowledge of the arm does.
     pub instead_of: Vec<String>,
+    /// Entries that were refitted beside the others, with the ln evidence of each refit; empty where no refit changed the
+    /// answer.
+    pub refits: Vec<(usize, f64)>,
 }
 
 impl Accepted {
+    /// The ln evidence of an entry of the room: among those that were refitted by their refits, all of these together as the
+    /// linearised weighing has them.
+    pub fn ln_evidence(&self, entry: usize) -> f64 {
+        let linearised = |k: usize| self.room.weighed.entries[k].ln_evidence;
+        let together = || ln_sum_exp(self.refits.iter().map(|(k, _)| linearised(*k)));
+        self.ln_share(entry).map_or_else(|| linearised(entry), |ln_share| together() + ln_share)
+    }
+
+    /// The posterior probability of an entry of the room; likewise.
+    pub fn probability(&self, entry: usize) -> f64 {
+        let linearised = |k: usize| self.room.weighed.entries[k].probability;
+        let together = || self.refits.iter().map(|(k, _)| linearised(*k)).sum::<f64>();
+        self.ln_share(entry).map_or_else(|| linearised(entry), |ln_share| together() * ln_share.exp())
+    }
+
+    /// ln of the share of an entry in what was refitted; all have the same prior.
+    fn ln_share(&self, entry: usize) -> Option<f64> {
+        let (_, own) = self.refits.iter().find(|(k, _)| *k == entry)?;
+        Some(own - ln_sum_exp(self.refits.iter().map(|(_, ln)| *ln)))
+    }
+
     /// Fall of the squared residual by it beside the others, declared noise = 1.
     pub fn fall(&self) -> f64 {
         self.judged.own().score * self.room.weighed.scale.powi(2)
@@ -113,7 +138,14 @@ pub(crate) fn confirm(
                 weakest = Some((ln, k));
             }
             let candidate = weighed.entries[entry].candidate.clone();
-            judged.push(Accepted { candidate, judged: verdict, room: room.clone(), grade, instead_of });
+            judged.push(Accepted {
+                candidate,
+                judged: verdict,
+                room: room.clone(),
+                grade,
+                instead_of,
+                refits: Vec::new(),
+            });
         }
         match weakest {
             Some((_, k)) => drop(steps.remove(k)),

@@ -14,7 +14,7 @@ use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
 use crate::problem::{Candidate, Part, Problem};
 use crate::refit::Refit;
-use crate::reports::{candidate_reports, not_testable, parameters, rival};
+use crate::reports::{after_refits, candidate_reports, not_testable, parameters, rival};
 use crate::rooms::{Room, Rooms};
 use crate::search::{Search, from_nothing, search};
 use crate::structure::{Structure, structure};
@@ -103,12 +103,15 @@ impl Before {
 }
 
 fn assemble(
-    before: Before,
+    mut before: Before,
     (dwells, aside): (usize, Vec<DwellId>),
     search: &Search,
     config: &DiagnosisConfig,
 ) -> Diagnosis {
     let effects: Vec<FoundEffect> = search.accepted.iter().map(|a| found_effect(a, config)).collect();
+    if let [only] = search.accepted.as_slice() {
+        after_refits(&mut before.candidates, only);
+    }
     let verdict = if search.left_over { Verdict::Unknown } else { Verdict::NothingMissing };
     let (rest, with_curves) = (&search.rest, &search.with_curves);
     let mut unlisted: Vec<UnknownReport> = search.curves.iter().map(|c| c.report.clone()).collect();
@@ -185,15 +188,16 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     };
     let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l) || holds(*l, *k));
     let meant = (0..weighed.entries.len()).filter(meant);
-    let probability = judged.p_same + meant.map(|k| weighed.entries[k].probability).sum::<f64>();
+    let probability = judged.p_same + meant.map(|k| a.probability(k)).sum::<f64>();
     let (parameters, combination) = parameters(judged, weighed);
+    let log_evidence = a.ln_evidence(judged.entry);
     FoundEffect {
         name: name(&judged.entry),
         set,
         probability: probability.min(1.0),
         p_adjusted: judged.own().p_adjusted,
-        log_evidence: weighed.entries[judged.entry].ln_evidence,
-        margin_nats: judged.above_other,
+        log_evidence,
+        margin_nats: judged.above_other + log_evidence - weighed.entries[judged.entry].ln_evidence,
         parameters,
         combination,
         places: judged.places,

@@ -112,23 +112,39 @@ pub(crate) fn candidate_reports(
     reports
 }
 
+/// Puts what refits made of the only effect found, and of its rivals, in the place of what the linearised weighing has.
+pub(crate) fn after_refits(reports: &mut [CandidateReport], found: &Accepted) {
+    for (k, _) in &found.refits {
+        let entry = &found.room.weighed.entries[*k];
+        // Beside others, or in a base with curves, it was weighed anew.
+        let same =
+            |r: &&mut CandidateReport| r.spec == entry.candidate.spec && r.log_evidence == entry.ln_evidence;
+        if let Some(report) = reports.iter_mut().find(same) {
+            report.log_evidence = found.ln_evidence(*k);
+            report.probability += found.probability(*k) - entry.probability;
+        }
+    }
+    reports.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+}
+
 /// The best listed explanation that is no other name for a found effect: how far behind, and what it does to places the
 /// fit did not see.
 pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
     let (judged, problem, weighed) = (&found.judged, &found.room.problem, &found.room.weighed);
     let own = &weighed.entries[judged.entry];
     let another = |k: &usize| {
-        let e = &weighed.entries[*k];
-        !e.candidate.holds(&own.candidate)
+        !weighed.entries[*k].candidate.holds(&own.candidate)
             && judged.set.iter().all(|s| !weighed.one_name(*s, *k))
-            && e.ln_evidence > 0.0
+            && found.ln_evidence(*k) > 0.0
     };
-    let k = weighed.ranking().into_iter().find(another)?;
+    let ahead = |a: usize, b: usize| if found.ln_evidence(b) > found.ln_evidence(a) { b } else { a };
+    let k = weighed.ranking().into_iter().filter(another).reduce(ahead)?;
     let columns = &weighed.entries[k].candidate.columns;
     let groups = independent_groups(problem, weighed);
     Some(Rival {
         name: weighed.entries[k].candidate.spec.clone(),
-        behind_nats: own.ln_evidence - weighed.entries[k].ln_evidence,
+        behind_nats: found.ln_evidence(judged.entry) - found.ln_evidence(k),
+        refitted: found.refits.iter().any(|(l, _)| *l == k),
         places: weighed.gain(problem, (columns, &columns.dense(&problem.dwells, 1.0)), &groups, config),
     })
 }

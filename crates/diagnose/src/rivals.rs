@@ -173,7 +173,7 @@ fn decided(found: &Accepted, evidence: &[(usize, f64)], config: &DiagnosisConfig
     judged.set = set;
     let candidate = weighed.entries[judged.entry].candidate.clone();
     let same = judged.set == found.judged.set && grade == found.grade;
-    (!same).then(|| Accepted { candidate, judged, grade, ..found.clone() })
+    (!same).then(|| Accepted { candidate, judged, grade, refits: evidence.to_vec(), ..found.clone() })
 }
 
 #[cfg(test)]

@@ -387,7 +387,11 @@ pub(crate) fn found(e: &FoundEffect) -> String {
     };
     let h = &e.places;
     let rival = e.rival.as_ref().map_or(String::new(), |r| {
-        format!("; the next listed explanation, {}, would leave {:.3} mm", r.name, r.places.after)
+        let refitted = match r.refitted {
+            true => format!(", and is e^{:.1} times less probable once both are refitted", r.behind_nats),
+            false => String::new(),
+        };
+        format!("; the next listed explanation, {}, would leave {:.3} mm{refitted}", r.name, r.places.after)
     });
     printable(&format!(
         "{}{set}: {}; linearised, each place left out in turn: from {:.3} to {:.3} mm (change {:.3} to {:.3}, 95 \

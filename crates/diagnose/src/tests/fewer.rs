@@ -17,7 +17,14 @@ fn left(p: &Problem, specs: &[&str]) -> Vec<String> {
             let room = rooms.with(&others)?;
             let judged = room.judge(entry(&room.weighed, spec), &config);
             let grade = judged.grade(&room.weighed, &config);
-            accepted.push(Accepted { candidate: own(p, spec), judged, room, grade, instead_of: Vec::new() });
+            accepted.push(Accepted {
+                candidate: own(p, spec),
+                judged,
+                room,
+                grade,
+                instead_of: Vec::new(),
+                refits: Vec::new(),
+            });
         }
         fewer(rooms, Found { accepted, may_be_shape: false }, &config)
     });

@@ -16,7 +16,7 @@ fn accepted(p: &Problem, spec: &str) -> Accepted {
     let room = room(p, &config);
     let judged = room.judge(entry(&room.weighed, spec), &config);
     let grade = judged.grade(&room.weighed, &config);
-    Accepted { candidate: own(p, spec), grade, judged, room, instead_of: Vec::new() }
+    Accepted { candidate: own(p, spec), grade, judged, room, instead_of: Vec::new(), refits: Vec::new() }
 }
 
 fn searched(p: &Problem) -> Search {

@@ -163,7 +163,16 @@ fn what_a_refit_puts_far_behind_leaves_the_answer_and_what_it_puts_ahead_takes_t
     // Twice three nats.
     let after = |ln: f64| decided(&found, &[(own, 100.0), (other, 100.0 + ln)], &quick());
     assert!(after(-5.9).is_none(), "it stays beside");
-    assert_eq!(after(-6.1).map(|a| a.judged.set), Some(vec![own]));
+    let alone = after(-6.1).unwrap();
+    assert_eq!(alone.judged.set, [own]);
+    // Together they are as probable as they were, each in the proportion of its refit.
+    let linearised = |k: usize| found.room.weighed.entries[k].probability;
+    let together = linearised(own) + linearised(other);
+    assert!((alone.probability(own) - together / (1.0 + (-6.1f64).exp())).abs() < 1e-12);
+    assert!((alone.probability(other) - together / (1.0 + 6.1f64.exp())).abs() < 1e-12);
+    assert!((alone.ln_evidence(own) - alone.ln_evidence(other) - 6.1).abs() < 1e-9);
+    let third = entry(&found.room.weighed, "scale:1");
+    assert_eq!(alone.probability(third), linearised(third));
     assert!(after(2.9).is_none());
     let ahead = after(3.1).unwrap();
     assert!(ahead.judged.entry == other || ahead.grade == Grade::OrUnlisted);
