@@ -1,5 +1,5 @@
 use crate::support::slurm::slurm;
-use crate::support::{armcal, paper_pipeline, python_with, read_json, root};
+use crate::support::{armcal, paper_pipeline, python_with, read_json, root, shipped, simulate};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -226,18 +226,17 @@ const WEEK_S: u64 = 7 * DAY_S;
 
 /// Simulates these of many recordings of the rig that this seed draws, one every so often, with something hidden in them.
 fn sessions(folder: &Path, seed: u64, numbers: std::ops::Range<u64>, every_s: u64, hidden: &str) {
-    let shipped = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
+    let shipped = shipped("lab/paper-small.toml");
     let own = shipped.split("[[recordings]]").next().expect("a head");
-    let boards = format!("\"{}/pipelines/boards/", root().display());
     let start_s = 1_760_000_000 + numbers.start * every_s;
     let every = format!("interval_s = {every_s}.0");
-    let mut lab = own.replace("\"../boards/", &boards).replace("interval_s = 900.0", &every);
+    let mut lab = own.replace("interval_s = 900.0", &every);
     lab = lab.replace("1_760_000_000", &start_s.to_string()).replace("seed = 4", &format!("seed = {seed}"));
     lab.push_str(hidden);
     numbers.for_each(|number| lab.push_str(&format!("\n[[recordings]]\nname = \"week{number:02}\"\n")));
     let file = folder.join("lab.toml");
     std::fs::write(&file, lab).expect("lab file");
-    expect(&armcal([Path::new("simulate"), &file, Path::new("--out"), folder]), 0);
+    simulate(&file, folder, &[]);
 }
 
 fn changes(json: &Value) -> Vec<(String, String, String, f64)> {

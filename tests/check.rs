@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, paper_pipeline, python_with, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, python_with, root, run_pipeline, shipped, simulate};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -51,14 +51,11 @@ impl Job {
     /// On the rig of the shipped recordings, with something hidden in it.
     fn hiding(mechanism: &str) -> Job {
         let folder = tempfile::tempdir().expect("temporary folder");
-        let shipped = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
-        let boards = format!("\"{}/pipelines/boards/", root().display());
-        let lab = shipped.replace("\"../boards/", &boards) + "\n[[mechanisms]]\n" + mechanism;
-        std::fs::write(folder.path().join("lab.toml"), lab).expect("lab file");
-        let recordings = folder.path().join("recordings");
         let lab = folder.path().join("lab.toml");
-        let output = armcal([Path::new("simulate"), &lab, Path::new("--out"), &recordings]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = shipped("lab/paper-small.toml") + "\n[[mechanisms]]\n" + mechanism;
+        std::fs::write(&lab, text).expect("lab file");
+        let recordings = folder.path().join("recordings");
+        simulate(&lab, &recordings, &[]);
         Job { folder, recordings }
     }
 

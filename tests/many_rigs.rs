@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, simulate};
 use serde_json::Value;
 use std::path::Path;
 
@@ -138,9 +138,7 @@ fn a_simulation_repeats_itself_and_other_seeds_differ() {
     let bytes = |seed: &str| {
         let folder = tempfile::tempdir().expect("temporary folder");
         let lab = root().join("pipelines/lab/paper-small.toml");
-        let args = ["simulate".as_ref(), lab.as_os_str(), "--out".as_ref(), folder.path().as_os_str()];
-        let output = armcal(args.into_iter().chain(["--seed".as_ref(), seed.as_ref()]));
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        simulate(&lab, folder.path(), &["--seed", seed]);
         std::fs::read(folder.path().join(Path::new("normal.mcap"))).expect("recording")
     };
     let first = bytes("11");

@@ -1,6 +1,6 @@
 //! Arms measured against points, distances and planes: what a lab without a camera has.
 
-use crate::support::{armcal, number, read_json, root, run_pipeline, shipped};
+use crate::support::{armcal, number, read_json, root, run_pipeline, shipped, simulate};
 use armcal_report::open_model;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,10 @@ const PLAY: &str = "\n[[mechanisms]]\nkind = \"gap\"\njoint = 2\nwidth_deg = 0.5
 
 /// Simulates the shipped laboratory with more in it, and gives the shipped pipeline on its recording, changed by `edit`.
 fn recorded(folder: &Path, more: &str, edit: impl Fn(String) -> String) -> PathBuf {
-    let board = root().join("pipelines/boards/paper.toml");
-    let lab = std::fs::read_to_string(root().join("pipelines/lab/gauges.toml")).expect("lab");
-    let lab = lab.replace("../boards/paper.toml", &board.to_string_lossy()) + more;
+    let lab = shipped("lab/gauges.toml") + more;
     let (file, made) = (folder.join("lab.toml"), folder.join("made"));
     std::fs::write(&file, lab).expect("lab");
-    let output = armcal([Path::new("simulate"), &file, Path::new("--out"), &made].map(Path::as_os_str));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    simulate(&file, &made, &[]);
     written(folder, "pipeline", &edit(pipeline_on(&made)))
 }
 

@@ -1,16 +1,11 @@
-use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline};
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, shipped, simulate};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Simulates a laboratory and returns a pipeline on its recordings; the truth stays where only the assertion looks.
 fn recorded(lab: &str, folder: &Path) -> PathBuf {
-    recorded_by(&root().join(lab), folder)
-}
-
-fn recorded_by(lab: &Path, folder: &Path) -> PathBuf {
     let recordings = folder.join("recordings");
-    let output = armcal([Path::new("simulate"), lab, Path::new("--out"), &recordings].map(Path::as_os_str));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    simulate(&root().join(lab), &recordings, &[]);
     let pipeline = folder.join("pipeline.toml");
     std::fs::write(&pipeline, paper_pipeline(&recordings)).expect("pipeline");
     pipeline
@@ -121,25 +116,33 @@ fn what_moved_between_recordings_and_stayed_is_named_from_the_recording_on() {
 
 /// A pipeline on five recordings of the paper's rig, which hides a mechanism.
 fn five_recordings(seed: u64, mechanism: &str, folder: &Path) -> PathBuf {
-    let lab = std::fs::read_to_string(root().join("pipelines/lab/paper-experiment.toml")).expect("lab");
-    let rig = &lab[..lab.find("[[recordings]]").expect("recordings")];
-    let rig = rig.replace("\"../boards/paper.toml\"", "\"builtin:paper\"");
-    let (own_seed, _) = rig[rig.find("seed = ").expect("seed")..].split_once('#').expect("a comment");
-    let recordings = "[[recordings]]\nname = \"normal\"\n[[recordings]]\nname = \"roll\"\nroll_deg = 11.7\n\
-                      [[recordings]]\nname = \"pitch\"\npitch_deg = 11.8\n[[recordings]]\nname = \"again\"\n\
-                      [[recordings]]\nname = \"roll-again\"\nroll_deg = 11.7\n";
-    let rig = rig.replacen(own_seed, &format!("seed = {seed} "), 1);
+    let lab = shipped("lab/paper-experiment.toml");
+    let (rig, _) = lab.split_once("[[recordings]]").expect("recordings of the lab");
+    let names = [
+        ("normal", 0.0, 0.0),
+        ("roll", 11.7, 0.0),
+        ("pitch", 0.0, 11.8),
+        ("again", 0.0, 0.0),
+        ("roll-again", 11.7, 0.0),
+    ];
+    let of_lab = names.map(|(name, roll, pitch)| {
+        format!("[[recordings]]\nname = \"{name}\"\nroll_deg = {roll:?}\npitch_deg = {pitch:?}\n")
+    });
     let path = folder.join("lab.toml");
-    std::fs::write(&path, format!("{rig}{recordings}[[mechanisms]]\n{mechanism}")).expect("lab");
-    let pipeline = recorded_by(&path, folder);
-    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
-    let at = |name: &str| folder.join("recordings").join(name).display().to_string();
-    let with = format!(
-        "[[recordings]]\npaths = [{:?}]\n\n[[recordings]]\npaths = [{:?}]\ntilt = {{ roll_deg = 11.7 }}\n\n[streams.joints]",
-        at("again.mcap"),
-        at("roll-again.mcap")
-    );
-    std::fs::write(&pipeline, text.replacen("[streams.joints]", &with, 1)).expect("pipeline");
+    std::fs::write(&path, format!("{rig}{}[[mechanisms]]\n{mechanism}", of_lab.concat())).expect("lab");
+    let recordings = folder.join("recordings");
+    simulate(&path, &recordings, &["--seed", &seed.to_string()]);
+    let text = paper_pipeline(&recordings);
+    let (_, rest) = text.split_once("[streams.joints]").expect("streams");
+    let of_pipeline = names.map(|(name, roll, pitch)| {
+        let path = recordings.join(format!("{name}.mcap"));
+        format!(
+            "[[recordings]]\npaths = [{path:?}]\ntilt = {{ roll_deg = {roll:?}, pitch_deg = {pitch:?} }}\n"
+        )
+    });
+    let pipeline = folder.join("pipeline.toml");
+    let text = format!("name = \"paper\"\n{}[streams.joints]{rest}", of_pipeline.concat());
+    std::fs::write(&pipeline, text).expect("pipeline");
     pipeline
 }
 

@@ -1,5 +1,7 @@
 use crate::support::slurm::slurm;
-use crate::support::{armcal, in_one_line, number, python_with, read_json, root, run_pipeline, shipped};
+use crate::support::{
+    self, armcal, in_one_line, number, python_with, read_json, root, run_pipeline, shipped,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -29,11 +31,9 @@ fn write(path: &Path, text: &str) {
 
 /// Simulates the days with the paper's small rig into `folder`.
 fn simulate(folder: &Path, days: &[(&str, f64, f64)]) {
-    let lab = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
+    let lab = shipped("lab/paper-small.toml");
     let (rig, _) = lab.split_once("[[recordings]]").expect("recordings of the lab");
-    let mut text = rig
-        .replace("\"../boards/", &format!("\"{}/pipelines/boards/", root().display()))
-        .replace("interval_s = 900.0", "interval_s = 86400.0");
+    let mut text = rig.replace("interval_s = 900.0", "interval_s = 86400.0");
     for (name, roll_deg, pitch_deg) in days {
         text += &format!(
             "[[recordings]]\nname = \"{name}\"\nroll_deg = {roll_deg:?}\npitch_deg = {pitch_deg:?}\n\n"
@@ -41,8 +41,7 @@ fn simulate(folder: &Path, days: &[(&str, f64, f64)]) {
     }
     let path = folder.join("lab.toml");
     write(&path, &text);
-    let output = armcal(["simulate".as_ref(), path.as_os_str(), "--out".as_ref(), folder.as_os_str()]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    support::simulate(&path, folder, &[]);
 }
 
 /// A shipped pipeline on some of the days, without diagnosis; `more` is appended.

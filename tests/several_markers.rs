@@ -1,4 +1,4 @@
-use crate::support::{armcal, number, read_json, root, run_pipeline};
+use crate::support::{armcal, number, read_json, root, run_pipeline, simulate};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{FeatureId, Observation, Pose};
 use armcal_diagnose::{Calibrated, DiagnosisConfig, Verdict, diagnose};
@@ -25,8 +25,7 @@ fn recorded(folder: &Path, lab: &str, edit: impl Fn(String) -> String) -> PathBu
     let file = folder.join("lab.toml");
     std::fs::write(&file, lab).expect("lab");
     let made = folder.join("made");
-    let output = armcal([Path::new("simulate"), &file, Path::new("--out"), &made].map(Path::as_os_str));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    simulate(&file, &made, &[]);
     let text =
         std::fs::read_to_string(root().join("pipelines/simulated/three-markers.toml")).expect("pipeline");
     let text = text

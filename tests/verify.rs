@@ -1,5 +1,5 @@
 use crate::support::browser::{browser, scripted};
-use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, shipped};
+use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, shipped, simulate};
 use crate::transfer::transfer;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -51,8 +51,7 @@ fn the_papers_experiment_and_what_it_becomes_with_the_effect() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let folder = folder.path();
     let lab = root().join("pipelines/lab/paper-experiment.toml");
-    let output = armcal([Path::new("simulate"), &lab, Path::new("--out"), folder]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    simulate(&lab, folder, &[]);
     let set_points =
         "[streams.set_points]\ntopic = \"/joint_set_points\"\nnames = [\"joint1\", \"joint2\", \"joint3\"]\n";
     let verifying = pipeline(folder, "verify", &VERIFYING, set_points);

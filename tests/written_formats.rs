@@ -1,4 +1,6 @@
-use crate::support::{armcal, python_with, quick_pipeline, read_json, root, run_pipeline, shipped, skip};
+use crate::support::{
+    armcal, python_with, quick_pipeline, read_json, root, run_pipeline, shipped, simulate, skip,
+};
 use armcal_core::{FeatureId, Parameter, Pose, Unit};
 use armcal_model::{Chain, Frames, Model};
 use armcal_report::{PastArms, PastObservations, open_model};
@@ -31,8 +33,7 @@ fn with_play(folder: &Path, play: bool) -> PathBuf {
     let recordings = folder.join("recordings");
     if !recordings.exists() {
         let lab = root().join("pipelines/lab/paper-backlash.toml");
-        let made = armcal([Path::new("simulate"), &lab, Path::new("--out"), &recordings]);
-        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        simulate(&lab, &recordings, &[]);
     }
     let effect = |joint| format!("\n[[effects]]\nkind = \"backlash\"\ntarget = {joint}\n");
     let effects: String = if play { [1, 2, 3].map(effect).concat() } else { String::new() };

@@ -71,13 +71,21 @@ pub fn files_made(command: &mut Command, out: &Path) -> BTreeMap<String, Vec<u8>
         .collect()
 }
 
-/// The text of a shipped pipeline, usable from any folder: its files are found where they are.
+/// Simulates a laboratory into a folder; `more` arguments.
+pub fn simulate(lab: &Path, out: &Path, more: &[&str]) {
+    let own = [Path::new("simulate"), lab, Path::new("--out"), out].map(Path::as_os_str);
+    let output = armcal(own.into_iter().chain(more.iter().map(std::ffi::OsStr::new)));
+    assert!(output.status.success(), "{}: {}", lab.display(), String::from_utf8_lossy(&output.stderr));
+}
+
+/// The text of a shipped pipeline or laboratory, usable from any folder: its files are found where they are.
 pub fn shipped(name: &str) -> String {
-    let pipelines = root().join("pipelines");
-    let text = std::fs::read_to_string(pipelines.join(name)).expect("a shipped pipeline");
-    ["../", "boards/", "models/"].iter().fold(text, |text, beside| {
-        text.replace(&format!("\"{beside}"), &format!("\"{}/{beside}", pipelines.display()))
-    })
+    let file = root().join("pipelines").join(name);
+    let text = std::fs::read_to_string(&file).expect("a shipped file");
+    let folder = file.parent().expect("its folder").display().to_string();
+    ["../", "boards/", "models/"]
+        .iter()
+        .fold(text, |text, beside| text.replace(&format!("\"{beside}"), &format!("\"{folder}/{beside}")))
 }
 
 /// The same, its recordings of the paper's rig looked for in `recordings`.
