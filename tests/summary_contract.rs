@@ -38,7 +38,7 @@ const CONTRACT: &[(&str, &str)] = &[
     ("/diagnosis/candidates/0/effect", "string"),
     ("/diagnosis/candidates/0/target", "string"),
     ("/diagnosis/candidates/0/parameters", "object"),
-    ("/diagnosis/candidates/0/log_evidence", "number"),
+    ("/diagnosis/candidates/0/behind_nats", "number"),
     ("/diagnosis/candidates/0/probability", "number"),
     ("/diagnosis/candidates/0/p_adjusted", "number"),
     ("/diagnosis/candidates/0/holdout_mm/before", "number"),

@@ -46,12 +46,12 @@ pub(crate) fn error_curves(
         let room = rooms.with(&base)?;
         let own = room.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
         let best = own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
-        if let Some(report) = best.and_then(|u| described(&room.problem, &room.weighed, u, config)) {
+        if let Some(report) = best.and_then(|u| described(&room, u, config)) {
             curves.push(Curve { candidate: shape.clone(), report });
         }
     }
     share_ripples(&mut curves);
-    curves.sort_by(|a, b| b.report.log_evidence.total_cmp(&a.report.log_evidence));
+    curves.sort_by(|a, b| b.report.gain_nats.total_cmp(&a.report.gain_nats));
     Ok(curves)
 }
 

@@ -61,9 +61,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Names, most probable first: one for each effect when identified, all members of the sets when ambiguous.
     pub names: Vec<String>,
-    /// Probability of the answer (the least probable effect's, when there are several); none where the answer is that
-    /// nothing explains the errors, where noise alone is improbable and nothing is worth a name, or that of a verdict which
-    /// the refit has taken back.
+    /// Probability of the answer among all that was scored; none where it is that nothing explains the errors.
     pub probability: Option<f64>,
     /// Largest family-wise p-value of the effects named; of the best candidate when none is.
     pub p_adjusted: f64,
@@ -98,6 +96,8 @@ pub struct Diagnosis {
     pub holdout_mm: BeforeAfter,
     /// Mean error that the declared noise alone would give on those points [mm].
     pub floor_mm: f64,
+    /// Mean error that repeatability alone gives, from poses that were revisited [mm]; none where too few were.
+    pub repeatability_mm: Option<f64>,
     /// What the errors of `holdout_mm` are.
     pub judged: JudgedOn,
     /// What is neither explained nor at the floor; also beside effects that explain a part.
@@ -116,16 +116,11 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether nothing is named though noise alone is improbable: the errors are no larger than noise may give.
-    pub fn not_worth_a_name(&self) -> bool {
-        self.verdict == Verdict::NothingMissing && self.probability.is_none()
-    }
-
     /// Takes verdict, names and their probability from the effects that were found, if any.
     pub(crate) fn name_again(&mut self) {
         let of = |number: fn(&FoundEffect) -> f64| self.effects.iter().map(number);
         let (probability, p_adjusted) =
-            (of(|e| e.probability).fold(1.0, f64::min), of(|e| e.p_adjusted).fold(0.0, f64::max));
+            (of(|e| e.probability).product(), of(|e| e.p_adjusted).fold(0.0, f64::max));
         let single = self.effects.iter().all(|e| e.set.len() == 1);
         self.names = match single {
             true => self.effects.iter().map(|e| e.name.clone()).collect(),
@@ -178,26 +173,27 @@ pub struct Unexplained {
     pub error_mm: f64,
     /// Mean error that the declared noise alone would give [mm].
     pub floor_mm: f64,
-    /// The first over the second; `null` in JSON where no noise is declared.
-    pub times_floor: f64,
+    /// Mean error that repeatability alone gives, from poses that were revisited [mm]; none where too few were.
+    pub repeatability_mm: Option<f64>,
+    /// The error over the larger of the two; `null` in JSON where no noise is declared.
+    pub times_expected: f64,
+    /// Share of the squared error beyond that which what was found explains.
+    pub explained_share: f64,
     /// In which dwells it is largest, the clearest first; empty where it is alike everywhere.
     pub places: Vec<ErrorPlace>,
     /// How the scatter repeats, where that is beyond doubt: `repeated at every visit to a place`.
     pub scatter: Option<String>,
-    /// What was tried and did not explain it: the number of listed effects and of unlisted shapes, and names with what
-    /// became of them.
+    /// What was tried and did not explain it.
     pub tried: Tried,
 }
 
 /// What a diagnosis tried.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tried {
     /// Effects of the catalogue, each at every target.
     pub listed: usize,
     /// Shapes outside the catalogue: where something may enter, over what it may depend.
     pub unlisted: usize,
-    /// Names that the refit did not confirm, with the errors before and after [mm].
-    pub refitted: Vec<(String, BeforeAfter)>,
 }
 
 /// The model with what was found in it, calibrated anew.
@@ -233,10 +229,13 @@ pub struct FoundEffect {
     pub probability: f64,
     /// Family-wise p-value.
     pub p_adjusted: f64,
-    /// ln Bayes factor against its absence, the other effects in the model.
-    pub log_evidence: f64,
-    /// ln Bayes factor against the best unlisted explanation of another shape.
-    pub margin_nats: f64,
+    /// By how much the score with it is more than without it, the other effects in the model, and the standard error of that
+    /// [nats].
+    pub gain_nats: f64,
+    /// Standard error of it.
+    pub gain_se: f64,
+    /// By how much that score is more than with the best unlisted explanation in its place [nats]; none where there is none.
+    pub above_unlisted_nats: Option<f64>,
     /// Size: of one step, or of the refit with it where a report made one.
     pub parameters: Vec<ParameterReport>,
     /// What the data determine of several amplitudes, where they do not determine each.
@@ -256,11 +255,11 @@ pub struct FoundEffect {
 pub struct Rival {
     /// Its name.
     pub name: String,
-    /// By how much its ln evidence is less.
+    /// By how much the score is less with it instead, and the standard error of that [nats].
     pub behind_nats: f64,
-    /// Whether that is so once both are refitted, or in the linearised model.
-    pub refitted: bool,
-    /// Errors with it instead, on places the fit did not see.
+    /// Standard error of it.
+    pub behind_se: f64,
+    /// Errors with it instead, on places the linearised fit did not see.
     pub places: HeldOut,
 }
 
@@ -292,24 +291,32 @@ pub struct CandidateReport {
     pub target: String,
     /// One-step estimates, or those of the refit with it where a report made one.
     pub parameters: Vec<ParameterReport>,
-    /// ln Bayes factor against nothing.
-    pub log_evidence: f64,
-    /// Posterior probability; of the best, with that of unlisted explanations of its shape.
-    pub probability: f64,
+    /// How it stands against the answer; none where it was not among the best.
+    pub standing: Option<Standing>,
     /// Bootstrap p-value against the best of all candidates.
     pub p_adjusted: f64,
-    /// Bootstrap p-value on its own.
-    pub p_raw: f64,
-    /// Mean error on places the fit did not see [mm]; the best few only.
+    /// Mean error on places the linearised fit did not see [mm]; the best few only.
     pub holdout_mm: Option<BeforeAfter>,
-    /// The same on recordings it did not see.
-    pub recording_mm: Option<BeforeAfter>,
     /// Share of its signature that the fitted geometry takes over.
     pub absorbed: f64,
     /// Smallest size seen with 80 % power, in typical sizes.
     pub smallest_seen: f64,
     /// Mechanisms and entries that are the same to these data.
     pub same_to_the_data: Vec<String>,
+}
+
+/// How an explanation stands against the answer, or, where none has a name, against the best.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// By how much its score is less: the ln predictive density of dwells that its fit did not see [nats]. Negative where it is
+    /// more, by no more than chance.
+    pub behind_nats: f64,
+    /// Standard error of that over groups of dwells.
+    pub behind_se: f64,
+    /// Probability among all that was scored, nothing and what is not listed among it.
+    pub probability: f64,
+    /// Whether it is of the answer.
+    pub in_answer: bool,
 }
 
 /// An effect the data could not have shown.
@@ -332,10 +339,10 @@ pub struct UnknownReport {
     pub channel: String,
     /// What it depends on: `q1`.
     pub driver: String,
-    /// Probability that something unlisted is there.
+    /// Probability that it is this, or something like it, among nothing and the best listed explanation.
     pub probability: f64,
-    /// ln Bayes factor against nothing.
-    pub log_evidence: f64,
+    /// By how much the score with it is more than with nothing [nats].
+    pub gain_nats: f64,
     /// Unit of the shape.
     pub unit: Unit,
     /// The shape along the driver, with its band.

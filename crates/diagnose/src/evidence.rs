@@ -46,12 +46,6 @@ impl Metric {
         columns
     }
 
-    /// ln evidence of the geometry alone, noise variance marginalised, up to what is the same for all geometries.
-    pub fn ln_evidence(&self, config: &DiagnosisConfig) -> f64 {
-        let (p, nu) = (&self.projection, config.noise_prior_dof);
-        -0.5 * p.ln_det - 0.5 * (nu + p.residual.len() as f64) * (nu + p.rss).ln()
-    }
-
     /// ln Bayes factor of a term against its absence under this noise.
     pub fn ln_bayes(&self, gram: &Gram, config: &DiagnosisConfig) -> f64 {
         ln_bayes(gram, self.projection.rss, self.projection.dof(), config)

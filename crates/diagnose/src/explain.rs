@@ -13,14 +13,8 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
     say(
         "p_nothing",
         format!(
-            "with the prior odds {} : {} : {} for nothing, a listed effect and an unlisted one, the data leave a \
-             probability of {:.2e} that nothing is missing; below {} something is{}",
-            config.prior_nothing,
-            config.prior_catalogue,
-            config.prior_unknown,
-            d.p_nothing,
-            config.max_probability_nothing,
-            if d.not_worth_a_name() { ", here something too small to be worth a name" } else { "" }
+            "of all explanations that were scored by dwells their fits did not see, nothing has a probability of {}",
+            probability(d.p_nothing)
         ),
     );
     say(
@@ -35,7 +29,7 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
         ),
     );
     for e in &d.effects {
-        effect(e, config, &mut say);
+        effect(e, &mut say);
     }
     let found = match d.effects.is_empty() && d.unlisted.is_empty() {
         true => String::new(),
@@ -44,10 +38,12 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
     say(
         "holdout_mm",
         format!(
-            "the mean {} error is {:.3} mm{found}; the declared noise alone would give {:.3} mm",
+            "the mean {} error is {:.3} mm{found}; the declared noise alone would give {:.3} mm{}",
             d.judged.words(),
             d.holdout_mm.before,
-            d.floor_mm
+            d.floor_mm,
+            d.repeatability_mm
+                .map_or(String::new(), |mm| format!(", and poses that were revisited differ by {mm:.3} mm"))
         ),
     );
     for u in &d.unlisted {
@@ -108,11 +104,6 @@ fn verdict(d: &Diagnosis) -> String {
         (None, _) => "",
     };
     match d.verdict {
-        Verdict::NothingMissing if d.not_worth_a_name() => {
-            "the errors are no larger than the noise alone may give; what is improbable as noise in them is too small to be worth \
-             a name"
-                .to_owned()
-        }
         Verdict::NothingMissing => {
             "nothing is missing that these data can show; the list of what they cannot show belongs to this answer".to_string()
         }
@@ -133,21 +124,27 @@ fn verdict(d: &Diagnosis) -> String {
     }
 }
 
-fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, String)) {
+fn effect(e: &FoundEffect, say: &mut dyn FnMut(&str, String)) {
     say(
         &format!("{}.probability", e.name),
         format!(
-            "given the other effects found, {} is the cause with probability {:.3}, in its listed shape or one like it",
+            "given the other effects found, {} is the cause with probability {} among all that was refitted in its place",
             e.set.join(" or "),
-            e.probability
+            probability(e.probability)
         ),
     );
     say(
-        &format!("{}.log_evidence", e.name),
+        &format!("{}.gain", e.name),
         format!(
-            "the data are e^{:.1} times as probable with {} as without, and e^{:.1} times as probable as with the best \
-             unlisted explanation of another shape (a name needs e^{})",
-            e.log_evidence, e.name, e.margin_nats, config.margin_nats
+            "of dwells that the fit did not see, the model with {} says {:.1} +- {:.1} nats more than without{}",
+            e.name,
+            e.gain_nats,
+            e.gain_se,
+            e.above_unlisted_nats.map_or(String::new(), |nats| format!(
+                ", and {:.1} nats {} than with the best unlisted explanation in its place",
+                nats.abs(),
+                if nats < 0.0 { "less" } else { "more" }
+            ))
         ),
     );
     say(
@@ -162,14 +159,8 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
         say(
             &format!("{}.rival", e.name),
             format!(
-                "the next listed explanation is {}, e^{:.1} times less probable from the data{}; it would leave {:.3} mm \
-                 there, {:.3} mm {}",
-                r.name,
-                r.behind_nats,
-                if r.refitted { " once both are refitted" } else { "" },
-                r.places.after,
-                (r.places.after - e.places.after).abs(),
-                if r.places.after < e.places.after { "less" } else { "more" }
+                "the next listed explanation is {}, {:.1} +- {:.1} nats behind once both are refitted",
+                r.name, r.behind_nats, r.behind_se
             ),
         );
     }
@@ -186,4 +177,9 @@ fn effect(e: &FoundEffect, config: &DiagnosisConfig, say: &mut dyn FnMut(&str, S
             ),
         );
     }
+}
+
+/// A probability, small ones as what they are below.
+fn probability(p: f64) -> String {
+    if p < 5e-4 { "less than 0.001".to_owned() } else { format!("{p:.3}") }
 }

@@ -2,16 +2,16 @@
 //!
 //! A search takes what explains most at each step. Of causes in several joints that may be one family in all of them, which no
 //! single one is, and what it leaves of a cause then gets a name of its own. With what was found elsewhere in the model, each
-//! joint that has several names is asked once more: one takes their place where the model with it is the more probable one.
+//! joint that has several names is asked once more: one takes their place where the model with it says as much of dwells that it did not see.
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
 use crate::forward::{Accepted, named};
-use crate::problem::{Candidate, Problem};
+use crate::problem::Candidate;
 use crate::rooms::Rooms;
 use crate::search::{Found, going_on};
 
-/// The same with one name for several of a target, wherever that says more.
+/// The same with one name for several of a target, wherever that says as much.
 pub(crate) fn fewer(
     rooms: &mut Rooms<'_>,
     found: Found,
@@ -24,7 +24,7 @@ pub(crate) fn fewer(
     Ok(found)
 }
 
-/// With one name for several of the first target for which that says more; none where there is no such target.
+/// With one name for several of the first target for which that says as much; none where there is no such target.
 fn simpler(
     rooms: &mut Rooms<'_>,
     accepted: &[Accepted],
@@ -45,9 +45,10 @@ fn simpler(
         let ranked = room.weighed.ranking().into_iter().map(|k| &room.weighed.entries[k].candidate);
         let Some(one) = ranked.into_iter().find(|c| c.target == target && !c.is_group()) else { continue };
         let with_one = [others, vec![one.clone()]].concat();
-        let before = rooms.ln_evidence(&names)? - own.iter().map(|c| ln_tried(&room.problem, c)).sum::<f64>();
-        let after = rooms.ln_evidence(&with_one)? - ln_tried(&room.problem, one);
-        if after <= before {
+        let (Some(before), Some(after)) = (rooms.score(&names, &room), rooms.score(&with_one, &room)) else {
+            continue;
+        };
+        if before.above(&after).nats >= config.margin_nats {
             continue;
         }
         let again = going_on(rooms, &with_one, config)?.filter(|again| again.accepted.len() < names.len());
@@ -56,12 +57,6 @@ fn simpler(
         }
     }
     Ok(None)
-}
-
-/// ln of how many values of its shape were tried for a name that was searched for: what the choice of one costs.
-fn ln_tried(problem: &Problem, name: &Candidate) -> f64 {
-    let scan = problem.scans.iter().find(|scan| scan.points.iter().any(|point| point.spec == name.spec));
-    scan.map_or(0.0, |scan| (scan.tried.max(1) as f64).ln())
 }
 
 #[cfg(test)]

@@ -4,11 +4,11 @@ use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
 use crate::events::moved;
 use crate::judge::{Grade, Judged};
-use crate::lead;
 use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms};
-use crate::special::ln_sum_exp;
+use crate::score::Score;
+use crate::settle::{Instead, Scored};
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
 use std::collections::BTreeSet;
@@ -16,6 +16,9 @@ use std::rc::Rc;
 
 /// Steps none of which had a name at once, and which together say less than one unlisted shape: no more are tried.
 const PATIENCE: usize = 4;
+
+/// Entries that are scored at each step, those that the weighing likes best.
+const LEADING: usize = 8;
 
 /// One accepted effect as judged with the others in the model.
 #[derive(Debug, Clone)]
@@ -30,31 +33,16 @@ pub(crate) struct Accepted {
     pub grade: Grade,
     /// Names that the data do not tell from it, and that the user's knowledge of the arm does.
     pub instead_of: Vec<String>,
-    /// Entries that were refitted beside the others, with the ln evidence of each refit; empty where no refit changed the
-    /// answer.
-    pub refits: Vec<(usize, f64)>,
+    /// All names that are the same answer, by their entries, its own first.
+    pub set: Vec<usize>,
+    /// Everything that was refitted in its place.
+    pub ranked: Vec<Scored>,
 }
 
 impl Accepted {
-    /// The ln evidence of an entry of the room: among those that were refitted by their refits, all of these together as the
-    /// linearised weighing has them.
-    pub fn ln_evidence(&self, entry: usize) -> f64 {
-        let linearised = |k: usize| self.room.weighed.entries[k].ln_evidence;
-        let together = || ln_sum_exp(self.refits.iter().map(|(k, _)| linearised(*k)));
-        self.ln_share(entry).map_or_else(|| linearised(entry), |ln_share| together() + ln_share)
-    }
-
-    /// The posterior probability of an entry of the room; likewise.
-    pub fn probability(&self, entry: usize) -> f64 {
-        let linearised = |k: usize| self.room.weighed.entries[k].probability;
-        let together = || self.refits.iter().map(|(k, _)| linearised(*k)).sum::<f64>();
-        self.ln_share(entry).map_or_else(|| linearised(entry), |ln_share| together() * ln_share.exp())
-    }
-
-    /// ln of the share of an entry in what was refitted; all have the same prior.
-    fn ln_share(&self, entry: usize) -> Option<f64> {
-        let (_, own) = self.refits.iter().find(|(k, _)| *k == entry)?;
-        Some(own - ln_sum_exp(self.refits.iter().map(|(_, ln)| *ln)))
+    /// Probability that its place is taken by one of these.
+    pub fn probability(&self, those: impl Fn(Instead) -> bool) -> f64 {
+        self.ranked.iter().filter(|scored| those(scored.what)).map(|scored| scored.weight).sum()
     }
 
     /// Fall of the squared residual by it beside the others, declared noise = 1.
@@ -62,14 +50,11 @@ impl Accepted {
         self.judged.own().score * self.room.weighed.scale.powi(2)
     }
 
-    /// Whether its answer is what explains most beside the others: nothing else would be taken there.
-    pub fn leads(&self) -> bool {
-        let weighed = &self.room.weighed;
-        let of_answer = |top: usize| {
-            let holds = |k: usize| weighed.entries[top].candidate.holds(&weighed.entries[k].candidate);
-            self.judged.set.iter().any(|k| weighed.one_name(*k, top) || holds(*k))
-        };
-        weighed.ranking().first().is_some_and(|top| of_answer(*top))
+    /// Whether nothing else is clearly better beside the others.
+    pub fn leads(&self, config: &DiagnosisConfig) -> bool {
+        let detail = self.judged.detail(config);
+        let own = &self.judged.score;
+        leading(&self.room, config).first().is_none_or(|(_, best)| !best.above(own).is_clear(detail))
     }
 }
 
@@ -129,13 +114,10 @@ pub(crate) fn confirm(
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
-            let (verdict, instead_of) = lead::as_known(&room, room.judge(entry, config), config);
-            let verdict = lead::as_measured(&room, lead::as_possible(&room, verdict, config), config);
-            let entry = verdict.entry;
-            let grade = verdict.grade(weighed, config);
-            let ln = weighed.entries[entry].ln_evidence;
-            if grade == Grade::Refused && weakest.is_none_or(|w| ln < w.0) {
-                weakest = Some((ln, k));
+            let verdict = room.judge(entry, config);
+            let (grade, nats) = (verdict.grade(config), verdict.gain.nats);
+            if grade == Grade::Refused && weakest.is_none_or(|w| nats < w.0) {
+                weakest = Some((nats, k));
             }
             let candidate = weighed.entries[entry].candidate.clone();
             judged.push(Accepted {
@@ -143,8 +125,9 @@ pub(crate) fn confirm(
                 judged: verdict,
                 room: room.clone(),
                 grade,
-                instead_of,
-                refits: Vec::new(),
+                set: vec![entry],
+                instead_of: Vec::new(),
+                ranked: Vec::new(),
             });
         }
         match weakest {
@@ -168,6 +151,24 @@ fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
     })
 }
 
+/// Entries that the weighing likes best, each name once, with their scores: those first that are worth most.
+pub(crate) fn leading(room: &Room, config: &DiagnosisConfig) -> Vec<(usize, Score)> {
+    let Room { problem, weighed, .. } = room;
+    let mut names: Vec<usize> = Vec::new();
+    for k in weighed.ranking() {
+        let new = names.iter().all(|n| !weighed.one_name(*n, k));
+        names.extend((new && names.len() < LEADING).then_some(k));
+    }
+    let scored = |k: usize| {
+        let columns = weighed.entries[k].candidate.columns.dense(&problem.dwells, 1.0);
+        (k, room.score_with(&columns))
+    };
+    let mut scored: Vec<(usize, Score)> = names.into_iter().map(scored).collect();
+    let worth = |(k, score): &(usize, Score)| score.worth(weighed.amplitudes(*k), config);
+    scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    scored
+}
+
 /// Accepts the best candidate again and again while it is promising. `cells` stay in the base.
 pub(crate) fn forward(
     rooms: &mut Rooms<'_>,
@@ -186,13 +187,13 @@ pub(crate) fn forward(
         if weighed.p_nothing >= config.max_probability_nothing {
             break;
         }
-        let Some(top) = weighed.ranking().first().copied() else { break };
+        let Some((top, _)) = leading(&room, config).into_iter().next() else { break };
         let mut judged = room.judge(top, config);
-        let mut named = judged.grade(weighed, config) == Grade::Named;
+        let mut named = judged.grade(config) == Grade::Named;
         if !named && let Some(first) = best_pair(&room.problem, weighed, config).filter(|k| *k != top) {
             let other = room.judge(first, config);
-            if other.promising(weighed, config) {
-                named = other.grade(weighed, config) == Grade::Named;
+            if other.promising(config) {
+                named = other.grade(config) == Grade::Named;
                 judged = other;
             }
         }
@@ -201,7 +202,7 @@ pub(crate) fn forward(
         if !named && entry.ln_evidence >= config.margin_nats && rooms.refine(&accepted, &entry.candidate)? {
             continue;
         }
-        if !judged.promising(weighed, config) {
+        if !judged.promising(config) {
             break;
         }
         let fall = judged.own().score * weighed.scale.powi(2);

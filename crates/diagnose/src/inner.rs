@@ -4,7 +4,7 @@ use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
     BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, NotTestable,
-    UnknownReport, Verdict,
+    Rival, UnknownReport, Verdict,
 };
 use crate::events::{passing, together};
 use crate::explain::explanations;
@@ -14,13 +14,15 @@ use crate::nested::RESAMPLINGS;
 use crate::outliers::{Cleaned, flipped, set_aside};
 use crate::problem::{Candidate, Part, Problem};
 use crate::refit::Refit;
-use crate::reports::{after_refits, candidate_reports, not_testable, parameters, rival};
+use crate::ranking::Ranking;
+use crate::reports::{candidate_reports, not_testable, parameters};
 use crate::rooms::{Room, Rooms};
 use crate::search::{Search, from_nothing, search};
+use crate::settle::{Instead, settle};
 use crate::structure::{Structure, structure};
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
-use crate::{DiagnoseError, next, rivals};
+use crate::{DiagnoseError, next};
 use armcal_core::{DwellId, Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DVector;
@@ -62,16 +64,18 @@ pub(crate) fn diagnose_beyond(
     let Cleaned { keep, aside, problem, weighed } = set_aside(whole, config);
     let dwells = keep.len();
     let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
-    // A room of many poses takes much memory: this one is done with before others come.
-    let before = Before::of(rooms.with(&[])?.as_ref(), config);
     let mut search = search(&mut rooms, proposed, config)?;
-    rivals::settle(&mut search, &mut rooms, config)?;
+    settle(&mut search, &mut rooms, config)?;
+    let room = rooms.with(&[])?;
+    let ranking = Ranking::of(&search, &room, &mut rooms, config);
+    let before = Before::of(&room, ranking, config);
     Ok(assemble(before, (dwells, aside), &search, config))
 }
 
 /// What is told of the model without effects.
 struct Before {
     p_nothing: f64,
+    p_unlisted: f64,
     /// Of the best entry.
     p_adjusted: f64,
     tried_unlisted: usize,
@@ -84,15 +88,16 @@ struct Before {
 }
 
 impl Before {
-    fn of(room: &Room, config: &DiagnosisConfig) -> Before {
+    fn of(room: &Room, ranking: Ranking, config: &DiagnosisConfig) -> Before {
         let Room { problem, weighed, .. } = room;
         let top = weighed.ranking().first().map(|top| room.judge(*top, config));
         let top = top.as_ref();
         Before {
-            p_nothing: weighed.p_nothing,
+            p_nothing: ranking.p_nothing,
+            p_unlisted: ranking.p_unlisted,
             p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
             tried_unlisted: weighed.unlisted.len(),
-            candidates: candidate_reports(problem, weighed, top, &by_place(problem), config),
+            candidates: candidate_reports(room, &ranking.explanations, top, config),
             cannot_tell_apart: confused(problem, weighed, config),
             not_testable: not_testable(problem, weighed),
             structure: structure(problem, config),
@@ -103,22 +108,19 @@ impl Before {
 }
 
 fn assemble(
-    mut before: Before,
+    before: Before,
     (dwells, aside): (usize, Vec<DwellId>),
     search: &Search,
     config: &DiagnosisConfig,
 ) -> Diagnosis {
     let effects: Vec<FoundEffect> = search.accepted.iter().map(|a| found_effect(a, config)).collect();
-    if let [only] = search.accepted.as_slice() {
-        after_refits(&mut before.candidates, only);
-    }
     let verdict = if search.left_over { Verdict::Unknown } else { Verdict::NothingMissing };
     let (rest, with_curves) = (&search.rest, &search.with_curves);
     let mut unlisted: Vec<UnknownReport> = search.curves.iter().map(|c| c.report.clone()).collect();
     if search.left_over && unlisted.is_empty() {
-        unlisted.extend(unknown_report(&rest.problem, &rest.weighed, config));
+        unlisted.extend(unknown_report(rest, config));
     }
-    let probability = if search.left_over { 1.0 - before.p_nothing } else { before.p_nothing };
+    let probability = if search.left_over { before.p_unlisted } else { before.p_nothing };
     let noise = noise(&with_curves.weighed);
     let mut diagnosis = Diagnosis {
         verdict,
@@ -134,6 +136,7 @@ fn assemble(
         tried_unlisted: before.tried_unlisted,
         rest_may_be_shape: search.may_be_shape,
         floor_mm: before.floor_mm,
+        repeatability_mm: None,
         judged: JudgedOn::Linearised,
         unexplained: None,
         refitted: None,
@@ -177,27 +180,20 @@ fn floor_mm(problem: &Problem) -> f64 {
 fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
     let (judged, weighed) = (&a.judged, &a.room.weighed);
     let name = |k: &usize| weighed.entries[*k].candidate.spec.clone();
-    let mut set: Vec<String> = judged.set.iter().map(name).collect();
+    let mut set: Vec<String> = a.set.iter().map(name).collect();
     if a.grade == Grade::OrUnlisted || seen_by_the_sensor_alone(a) {
         set.push(NOT_LISTED.to_string());
     }
-    // What a group of which it is a member says is said of the member too.
-    let holds = |l: usize, k: usize| {
-        let group = &weighed.entries[l].candidate;
-        group.is_group() && group.holds(&weighed.entries[k].candidate)
-    };
-    let meant = |l: &usize| judged.set.iter().any(|k| weighed.one_name(*k, *l) || holds(*l, *k));
-    let meant = (0..weighed.entries.len()).filter(meant);
-    let probability = judged.p_same + meant.map(|k| a.probability(k)).sum::<f64>();
+    let probability = a.probability(|what| matches!(what, Instead::Entry(k) if a.set.contains(&k)));
     let (parameters, combination) = parameters(judged, weighed);
-    let log_evidence = a.ln_evidence(judged.entry);
     FoundEffect {
         name: name(&judged.entry),
         set,
         probability: probability.min(1.0),
         p_adjusted: judged.own().p_adjusted,
-        log_evidence,
-        margin_nats: judged.above_other + log_evidence - weighed.entries[judged.entry].ln_evidence,
+        gain_nats: judged.gain.nats,
+        gain_se: judged.gain.se,
+        above_unlisted_nats: judged.unlisted.as_ref().map(|u| -u.above.nats),
         parameters,
         combination,
         places: judged.places,
@@ -205,6 +201,26 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
         contrast: judged.contrast.clone(),
         rival: rival(a, config),
     }
+}
+
+/// The best listed explanation that is no name of a found effect: how far behind, and what it does to places the linearised fit
+/// did not see.
+fn rival(a: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
+    let Room { problem, weighed, .. } = a.room.as_ref();
+    let own = a.ranked.iter().find(|s| s.what == Instead::Entry(a.judged.entry))?;
+    let others = a.ranked.iter().filter_map(|s| match s.what {
+        Instead::Entry(k) if !a.set.contains(&k) => Some((k, own.score.above(&s.score))),
+        _ => None,
+    });
+    let (k, behind) = others.min_by(|a, b| a.1.nats.total_cmp(&b.1.nats))?;
+    let columns = &weighed.entries[k].candidate.columns;
+    let effect = columns.dense(&problem.dwells, 1.0);
+    Some(Rival {
+        name: weighed.entries[k].candidate.spec.clone(),
+        behind_nats: behind.nats,
+        behind_se: behind.se,
+        places: weighed.gain(problem, (columns, &effect), &a.room.exam().folds, config),
+    })
 }
 
 /// Pairs of testable entries whose signatures, at typical size, are the same.

@@ -2,10 +2,9 @@
 
 use crate::knowledge::Knowledge;
 use crate::problem::{Candidate, Problem};
-use crate::rivals::AfterRefit;
 use crate::view::View;
 use crate::{DiagnoseError, Refit};
-use armcal_calibrate::{Ended, FitConfig, ModelProblem, fitted_values, gram, linearise};
+use armcal_calibrate::{Ended, FitConfig, ModelProblem, fitted_values};
 use armcal_core::{Observation, Parameter};
 use armcal_model::{Model, Session};
 use std::cell::RefCell;
@@ -151,6 +150,11 @@ impl Refit for ModelRefit<'_> {
         self.view(&fitted.model, &fitted.values).problem()
     }
 
+    fn base(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        let fitted = self.fitted(&names(accepted))?;
+        self.view(&fitted.model, &fitted.values).problem_at()
+    }
+
     fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
         let base = names(accepted);
         let own_spec = self.model.effect(&own.spec)?;
@@ -164,25 +168,6 @@ impl Refit for ModelRefit<'_> {
         }
         let fitted = self.fitted(&base)?;
         self.view(&fitted.model, &fitted.values).problem_of(&own_spec)
-    }
-
-    fn refitted(
-        &mut self,
-        accepted: &[Candidate],
-        keep: &[bool],
-    ) -> Result<Option<AfterRefit>, DiagnoseError> {
-        let fitted = self.fitted(&names(accepted))?;
-        let linear = linearise(&fitted.model, self.seen.weighed, &fitted.values, self.fit)?;
-        let kept = linear.poses.iter().zip(keep).filter(|(_, keep)| **keep);
-        let rows: Vec<usize> = kept.flat_map(|(pose, _)| pose.rows.clone()).collect();
-        let residual = linear.residual.select_rows(&rows);
-        let mut jacobian = linear.jacobian.select_rows(&rows);
-        let mut square = residual.norm_squared();
-        for (mut column, axis) in jacobian.column_iter_mut().zip(&linear.axes) {
-            column /= axis.precision.sqrt();
-            square += axis.precision * axis.offset.powi(2);
-        }
-        Ok(Some(AfterRefit { square, rows: rows.len(), normal: gram(&jacobian) }))
     }
 
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {

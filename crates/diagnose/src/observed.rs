@@ -72,9 +72,7 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     }
     let mut diagnosis = diagnose_beyond(&mut refit, &proposed, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
-    let refitted = refitted(calibrated, &diagnosis)
-        .map(|found| diagnosis.each_by_its_absence(calibrated, found, config))
-        .map(|found| diagnosis.with_rests(calibrated, found));
+    let refitted = refitted(calibrated, &diagnosis).map(|found| diagnosis.with_rests(calibrated, found));
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
 }

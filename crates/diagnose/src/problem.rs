@@ -176,11 +176,6 @@ impl Candidate {
         self.spec.split(Candidate::AND)
     }
 
-    /// Whether another one is among them.
-    pub(crate) fn holds(&self, other: &Candidate) -> bool {
-        self.members().any(|member| member == other.spec)
-    }
-
     /// Whether it stands for several effects together.
     pub(crate) fn is_group(&self) -> bool {
         self.spec.contains(Candidate::AND)
@@ -227,6 +222,12 @@ impl Problem {
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.dwells.first().map_or(0, |d| d.joint_rad.len())
+    }
+
+    /// Standard deviation of what the fit leaves, in units of the declared noise.
+    pub(crate) fn sigma(&self) -> f64 {
+        let dof = self.rows().saturating_sub(self.geometry.ncols()).max(1) as f64;
+        (self.residual.norm_squared() / dof).sqrt()
     }
 
     /// Checks that sizes agree and everything is finite.

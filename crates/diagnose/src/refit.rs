@@ -2,7 +2,6 @@
 
 use crate::DiagnoseError;
 use crate::problem::{Candidate, Problem};
-use crate::rivals::AfterRefit;
 
 /// Gives the problem with some effects in its base model.
 pub trait Refit {
@@ -14,23 +13,18 @@ pub trait Refit {
         Ok(self.problem(accepted)?.with_only(&own.spec))
     }
 
+    /// The same with nothing to weigh.
+    fn base(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        let problem = self.problem(accepted)?;
+        Ok(Problem { candidates: Vec::new(), scans: Vec::new(), channels: Vec::new(), ..problem })
+    }
+
     /// Refits with a candidate beside the accepted effects. Where it does not act in proportion to its size, every later
     /// problem has its columns as they are at the size found, instead of their derivative at zero; says whether any
     /// changed, which can happen once for each candidate.
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
         let _ = (accepted, candidate);
         Ok(false)
-    }
-
-    /// What a fit with these effects leaves of the kept dwells; none where problems are one linearisation, in which a refit
-    /// says what the weighing says.
-    fn refitted(
-        &mut self,
-        accepted: &[Candidate],
-        keep: &[bool],
-    ) -> Result<Option<AfterRefit>, DiagnoseError> {
-        let _ = (accepted, keep);
-        Ok(None)
     }
 }
 

@@ -4,12 +4,12 @@ use crate::bootstrap::Significance;
 use crate::combination::{Combination, combination};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, one_step, smallest_seen};
-use crate::crossval::{Group, compare, left_out};
-use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport, Rival};
-use crate::forward::Accepted;
+use crate::crossval::{by_place, compare, left_out};
+use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
 use crate::judge::Judged;
-use crate::judge::independent_groups;
 use crate::problem::{Amplitude, Candidate, Problem};
+use crate::ranking::Explanation;
+use crate::rooms::Room;
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
@@ -56,97 +56,108 @@ fn sizes(
 /// An effect that must be this many times its typical size to be seen is not seen at any.
 const AT_NO_SIZE: f64 = 1e3;
 
-/// The whole catalogue against the base model, best first.
+/// Explanations as the judge ranks them, and behind them the rest of the catalogue.
 pub(crate) fn candidate_reports(
-    problem: &Problem,
-    weighed: &Weighed,
+    room: &Room,
+    ranking: &[Explanation],
     top: Option<&Judged>,
-    groups: &[Group],
     config: &DiagnosisConfig,
 ) -> Vec<CandidateReport> {
-    let (crossed, projection) = (weighed.crossed(problem), &weighed.metrics[0].projection);
-    let variance = projection.rss / projection.dof();
-    let order = weighed.ranking();
-    let before = left_out(problem, None, groups, weighed.scale);
-    let none = Significance { score: 0.0, surprise: 0.0, p_raw: 1.0, p_adjusted: 1.0 };
-    let mut reports = Vec::new();
-    for (rank, k) in order.iter().copied().enumerate() {
-        let entry = &weighed.entries[k];
-        let c = &entry.candidate;
-        let fitted = one_step(&entry.white, 1.0);
-        let significance = top.map_or(none, |t| t.significance[k]);
-        let own_variance = projection.variance_without(significance.score);
-        let held = (rank < SHOWN).then(|| {
-            let effect = c.columns.dense(&problem.dwells, 1.0);
-            let after = left_out(problem, Some(&effect), groups, weighed.scale);
-            compare(problem, &before, &after, groups, config)
-        });
-        let mut same: Vec<String> = c.aliases.clone();
-        let smallest_seen = smallest_seen(&entry.white, variance, order.len());
-        // What these motions do not show at any size looks like everything and like nothing.
-        if rank < SHOWN && smallest_seen.is_finite() {
-            let others = order.iter().filter(|l| **l != k).filter(|l| {
-                crossed.likeness(k, &fitted.estimate, **l, own_variance).cosine > config.merge_cosine
-            });
-            same.extend(others.map(|l| weighed.entries[*l].candidate.spec.clone()));
+    let Room { problem, weighed, .. } = room;
+    let groups = by_place(problem);
+    let before = left_out(problem, None, &groups, weighed.scale);
+    let entry = |spec: &str| weighed.entries.iter().position(|e| e.candidate.spec == spec);
+    let mut reports: Vec<CandidateReport> = Vec::new();
+    for (rank, explanation) in ranking.iter().enumerate() {
+        let members: Vec<usize> = explanation.effects.iter().filter_map(|spec| entry(spec)).collect();
+        let alone = entry(&explanation.spec());
+        let Some(of) = alone.or_else(|| members.first().copied()) else { continue };
+        let mut report = of_entry(room, of, top);
+        report.standing = Some(explanation.standing);
+        report.p_adjusted = explanation.p_adjusted;
+        let whole = if alone.is_some() { vec![of] } else { members };
+        if rank < SHOWN {
+            let parts: Vec<DMatrix<f64>> = whole
+                .iter()
+                .map(|k| weighed.entries[*k].candidate.columns.dense(&problem.dwells, 1.0))
+                .collect();
+            let after = left_out(problem, Some(&side_by_side(&parts)), &groups, weighed.scale);
+            let held = compare(problem, &before, &after, &groups, config);
+            report.holdout_mm = Some(BeforeAfter { before: held.before, after: held.after });
+            report.same_to_the_data.extend(alike(room, of, config));
         }
-        reports.push(CandidateReport {
-            spec: c.spec.clone(),
-            effect: c.family.clone(),
-            target: c.target.clone(),
-            parameters: sizes(&c.amplitudes, &fitted.estimate, &(&fitted.covariance * own_variance)),
-            log_evidence: entry.ln_evidence,
-            probability: top.filter(|t| t.entry == k).map_or(0.0, |t| t.p_same) + entry.probability,
-            p_adjusted: significance.p_adjusted,
-            p_raw: significance.p_raw,
-            holdout_mm: held.map(|h| BeforeAfter { before: h.before, after: h.after }),
-            recording_mm: top
-                .filter(|t| t.entry == k)
-                .and_then(|t| t.recordings)
-                .map(|h| BeforeAfter { before: h.before, after: h.after }),
-            absorbed: fitted.absorbed,
-            smallest_seen,
-            same_to_the_data: same,
-        });
+        if alone.is_none() {
+            report.become_several(explanation, whole.iter().map(|k| of_entry(room, *k, top)));
+        }
+        reports.push(report);
     }
+    let taken: Vec<String> = reports.iter().map(|r| r.spec.clone()).collect();
+    let rest = weighed.ranking().into_iter().map(|k| of_entry(room, k, top));
+    reports.extend(rest.filter(|r| !taken.contains(&r.spec)));
     reports
 }
 
-/// Puts what refits made of the only effect found, and of its rivals, in the place of what the linearised weighing has.
-pub(crate) fn after_refits(reports: &mut [CandidateReport], found: &Accepted) {
-    for (k, _) in &found.refits {
-        let entry = &found.room.weighed.entries[*k];
-        // Beside others, or in a base with curves, it was weighed anew.
-        let same =
-            |r: &&mut CandidateReport| r.spec == entry.candidate.spec && r.log_evidence == entry.ln_evidence;
-        if let Some(report) = reports.iter_mut().find(same) {
-            report.log_evidence = found.ln_evidence(*k);
-            report.probability += found.probability(*k) - entry.probability;
-        }
-    }
-    reports.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter()).collect();
+    DMatrix::from_columns(&columns)
 }
 
-/// The best listed explanation that is no other name for a found effect: how far behind, and what it does to places the
-/// fit did not see.
-pub(crate) fn rival(found: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
-    let (judged, problem, weighed) = (&found.judged, &found.room.problem, &found.room.weighed);
-    let own = &weighed.entries[judged.entry];
-    let another = |k: &usize| {
-        !weighed.entries[*k].candidate.holds(&own.candidate)
-            && judged.set.iter().all(|s| !weighed.one_name(*s, *k))
-            && found.ln_evidence(*k) > 0.0
-    };
-    let ahead = |a: usize, b: usize| if found.ln_evidence(b) > found.ln_evidence(a) { b } else { a };
-    let k = weighed.ranking().into_iter().filter(another).reduce(ahead)?;
-    let columns = &weighed.entries[k].candidate.columns;
-    let groups = independent_groups(problem, weighed);
-    Some(Rival {
-        name: weighed.entries[k].candidate.spec.clone(),
-        behind_nats: found.ln_evidence(judged.entry) - found.ln_evidence(k),
-        refitted: found.refits.iter().any(|(l, _)| *l == k),
-        places: weighed.gain(problem, (columns, &columns.dense(&problem.dwells, 1.0)), &groups, config),
-    })
+/// One entry by itself: its sizes in one step, and what these data could show of it.
+fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
+    let Room { weighed, .. } = room;
+    let projection = &weighed.metrics[0].projection;
+    let entry = &weighed.entries[k];
+    let c = &entry.candidate;
+    let fitted = one_step(&entry.white, 1.0);
+    let none = Significance { score: 0.0, surprise: 0.0, p_raw: 1.0, p_adjusted: 1.0 };
+    let significance = top.map_or(none, |t| t.significance[k]);
+    let own_variance = projection.variance_without(significance.score);
+    let covariance = &fitted.covariance * own_variance;
+    CandidateReport {
+        spec: c.spec.clone(),
+        effect: c.family.clone(),
+        target: c.target.clone(),
+        parameters: sizes(&c.amplitudes, &fitted.estimate, &covariance),
+        standing: None,
+        p_adjusted: significance.p_adjusted,
+        holdout_mm: None,
+        absorbed: fitted.absorbed,
+        smallest_seen: smallest_seen(&entry.white, projection.rss / projection.dof(), weighed.entries.len()),
+        same_to_the_data: c.aliases.clone(),
+    }
+}
+
+/// Other entries whose signatures are that of an entry as it was fitted.
+fn alike(room: &Room, k: usize, config: &DiagnosisConfig) -> Vec<String> {
+    let Room { problem, weighed, .. } = room;
+    let entry = &weighed.entries[k];
+    let projection = &weighed.metrics[0].projection;
+    // What these motions do not show at any size looks like everything and like nothing.
+    if !smallest_seen(&entry.white, projection.rss / projection.dof(), weighed.entries.len()).is_finite() {
+        return Vec::new();
+    }
+    let (crossed, theta) = (weighed.crossed(problem), one_step(&entry.white, 1.0).estimate);
+    let same = |l: &usize| *l != k && crossed.likeness(k, &theta, *l, 1.0).cosine > config.merge_cosine;
+    let others = weighed.ranking().into_iter().filter(same);
+    others.map(|l| weighed.entries[l].candidate.spec.clone()).collect()
+}
+
+impl CandidateReport {
+    /// Of several effects together: their sizes by their full names, and the least that these data show of any.
+    fn become_several(&mut self, explanation: &Explanation, members: impl Iterator<Item = CandidateReport>) {
+        let members: Vec<CandidateReport> = members.collect();
+        self.spec = explanation.spec();
+        self.effect = members.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>().join(Candidate::AND);
+        self.target = members.iter().map(|m| m.target.as_str()).collect::<Vec<_>>().join(", ");
+        let named = |m: &CandidateReport| {
+            let full = |p: &ParameterReport| ParameterReport { name: format!("{}.{}", m.spec, p.name), ..p.clone() };
+            m.parameters.iter().map(full).collect::<Vec<_>>()
+        };
+        self.parameters = members.iter().flat_map(named).collect();
+        self.absorbed = members.iter().map(|m| m.absorbed).fold(0.0, f64::max);
+        self.smallest_seen = members.iter().map(|m| m.smallest_seen).fold(0.0, f64::max);
+        self.same_to_the_data = members.iter().flat_map(|m| m.same_to_the_data.clone()).collect();
+    }
 }
 
 /// Entries whose smallest visible size exceeds the typical one.

@@ -5,14 +5,16 @@ use crate::bootstrap::Significance;
 use crate::cells::{Dependences, Unlisted};
 use crate::columns::Cut;
 use crate::config::DiagnosisConfig;
+use crate::crossval::{by_place, by_stretch, left_out};
 use crate::evidence::Metric;
-use crate::judge::{Judged, independent_groups, judge, significance};
+use crate::judge::{Judged, judge, significance};
 use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
-use crate::rivals::AfterRefit;
-use crate::weigh::{Weighed, weigh_among};
+use crate::score::{Exam, Score};
+use crate::weigh::{Outside, Weighed, weigh_among};
 use armcal_model::Toggle;
+use nalgebra::DMatrix;
 use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::{Rc, Weak};
@@ -20,6 +22,8 @@ use std::sync::Arc;
 
 /// Family of a shape that joins the base without a name.
 const UNLISTED: &str = "unlisted";
+/// Unlisted explanations that are scored, those that the weighing likes best.
+const UNLISTED_SCORED: usize = 3;
 /// Dwells of all rooms together that are kept for whoever asks next; and of how many rooms at least and at most.
 const LAST_DWELLS: usize = 4000;
 const LAST_ROOMS: [usize; 2] = [2, 8];
@@ -31,13 +35,61 @@ pub(crate) struct Room {
     pub problem: Problem,
     /// Weighed.
     pub weighed: Weighed,
+    exam: OnceCell<Exam>,
+    nothing: OnceCell<Score>,
+    /// The best that is not listed, as it stands among all.
+    unlisted: OnceCell<Option<(usize, Score)>>,
     significance: OnceCell<Vec<Significance>>,
     judged: RefCell<BTreeMap<usize, Judged>>,
 }
 
 impl Room {
     fn new(problem: Problem, weighed: Weighed) -> Room {
-        Room { problem, weighed, significance: OnceCell::new(), judged: RefCell::default() }
+        let (exam, nothing, unlisted, significance, judged) = Default::default();
+        Room { problem, weighed, exam, nothing, unlisted, significance, judged }
+    }
+
+    /// What is left out in turn: places, or stretches of time where the noise remembers (neighbours in time would tell).
+    pub fn exam(&self) -> &Exam {
+        let of = |problem| match self.weighed.remembers() {
+            true => Exam::by_time(problem, by_stretch(problem)),
+            false => Exam::by_pose(problem, by_place(problem)),
+        };
+        self.exam.get_or_init(|| of(&self.problem))
+    }
+
+    /// The score of the base alone.
+    pub fn nothing(&self) -> &Score {
+        self.nothing.get_or_init(|| self.scored(None))
+    }
+
+    /// The score with columns in the linearised model, in the units of the problem.
+    pub fn score_with(&self, columns: &DMatrix<f64>) -> Score {
+        self.scored(Some(columns))
+    }
+
+    /// Of what is not listed, with the freedom these data give it, that which says most of dwells the fit did not see: of
+    /// those that the weighing likes best; and its score.
+    pub fn best_unlisted(&self, config: &DiagnosisConfig) -> Option<(&Outside, Score)> {
+        let unlisted = &self.weighed.unlisted;
+        let find = || {
+            let mut order: Vec<usize> =
+                (0..unlisted.len()).filter(|k| unlisted[*k].ln_evidence > 0.0).collect();
+            order.sort_by(|a, b| unlisted[*b].ln_evidence.total_cmp(&unlisted[*a].ln_evidence));
+            let score = |k: usize| {
+                let columns = self.weighed.tamed(&unlisted[k].what.columns, &self.problem, config);
+                (k, self.score_with(&columns))
+            };
+            let scored = order.into_iter().take(UNLISTED_SCORED).map(score);
+            scored.reduce(|a, b| if b.1.above(&a.1).nats > 0.0 { b } else { a })
+        };
+        let best = self.unlisted.get_or_init(find).as_ref()?;
+        Some((&unlisted[best.0], best.1.clone()))
+    }
+
+    fn scored(&self, columns: Option<&DMatrix<f64>>) -> Score {
+        let left = left_out(&self.problem, columns, &self.exam().folds, self.weighed.scale);
+        Score::of(&self.problem, &left, self.exam())
     }
 
     /// Judges an entry, once.
@@ -47,16 +99,15 @@ impl Room {
         }
         let significance =
             self.significance.get_or_init(|| significance(&self.problem, &self.weighed, config));
-        let judged = judge(&self.problem, &self.weighed, significance, entry, config);
+        let judged = judge(self, significance, entry, config);
         self.judged.borrow_mut().insert(entry, judged.clone());
         judged
     }
 
     /// Whether columns help on groups the fit did not see.
     pub fn predicts_with(&self, columns: &Columns, config: &DiagnosisConfig) -> bool {
-        let groups = independent_groups(&self.problem, &self.weighed);
         let effect = self.weighed.tamed(columns, &self.problem, config);
-        let gain = self.weighed.gain(&self.problem, (columns, &effect), &groups, config);
+        let gain = self.weighed.gain(&self.problem, (columns, &effect), &self.exam().folds, config);
         gain.p <= config.max_p_adjusted
     }
 }
@@ -74,6 +125,8 @@ pub(crate) struct Rooms<'a> {
     /// as long as somebody else needs them, and are made again otherwise.
     known: Vec<(Vec<String>, Weak<Room>)>,
     last: VecDeque<Rc<Room>>,
+    /// Scores of refits, by what was in the model and whether the noise was taken to remember.
+    scores: BTreeMap<(Vec<String>, bool), Option<Score>>,
 }
 
 impl<'a> Rooms<'a> {
@@ -86,8 +139,8 @@ impl<'a> Rooms<'a> {
     ) -> Rooms<'a> {
         let room = Rc::new(Room::new(first.0, first.1));
         let dependences = room.weighed.dependences.clone();
-        let (cut, known, last) = Default::default();
-        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last };
+        let (cut, known, last, scores) = Default::default();
+        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last, scores };
         rooms.remember(Vec::new(), &room);
         rooms
     }
@@ -132,9 +185,18 @@ impl<'a> Rooms<'a> {
         Ok(changed)
     }
 
-    /// What a refit with these effects leaves of the dwells that count.
-    pub fn refitted(&mut self, accepted: &[Candidate]) -> Result<Option<AfterRefit>, DiagnoseError> {
-        self.refit.refitted(accepted, &self.keep)
+    /// The score of a refit with these effects, in the exam of a room; none where they cannot be fitted.
+    pub fn score(&mut self, accepted: &[Candidate], room: &Room) -> Option<Score> {
+        let key = (names(accepted), room.weighed.remembers());
+        if let Some(known) = self.scores.get(&key) {
+            return known.clone();
+        }
+        let score = self.base(accepted).ok().map(|problem| {
+            let left = left_out(&problem, None, &room.exam().folds, problem.sigma());
+            Score::of(&problem, &left, room.exam())
+        });
+        self.scores.insert(key, score.clone());
+        score
     }
 
     /// What speaks for a candidate beside others, under white noise alone: its ln Bayes factor; none where the problem without
@@ -148,16 +210,6 @@ impl<'a> Rooms<'a> {
         Ok(Some(white.ln_bayes(&gram, self.config)))
     }
 
-    /// ln evidence of the model with these effects under white noise alone, to compare it with that of others.
-    pub fn ln_evidence(&mut self, accepted: &[Candidate]) -> Result<f64, DiagnoseError> {
-        let known = self.known(&names(accepted));
-        let problem = match &known {
-            Some(room) => &room.problem,
-            None => &self.bare(accepted)?,
-        };
-        Ok(Metric::new(Noise::White, 0.0, problem, 1.0).ln_evidence(self.config))
-    }
-
     /// A problem without the dwells that do not count.
     fn kept(&mut self, problem: Problem) -> Result<Problem, DiagnoseError> {
         problem.check()?;
@@ -168,24 +220,35 @@ impl<'a> Rooms<'a> {
         Ok(problem.cut_to(&self.keep, &mut self.cut))
     }
 
+    /// The problem with nothing to weigh.
+    fn base(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
+            accepted.iter().cloned().partition(|c| c.family == UNLISTED);
+        let problem = self.refit.base(&named)?;
+        Ok(with_shapes(self.kept(problem)?, &shapes))
+    }
+
     /// The problem alone.
     fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
             accepted.iter().cloned().partition(|c| c.family == UNLISTED);
-        let mut problem = match self.known(&names(&named)) {
+        let problem = match self.known(&names(&named)) {
             Some(room) => room.problem.clone(),
             None => {
                 let problem = self.refit.problem(&named)?;
                 self.kept(problem)?
             }
         };
-        for shape in &shapes {
-            // The dwells are the same in all rooms, so a shape's columns fit as they are.
-            let columns = shape.columns.dense(&problem.dwells, 1.0);
-            problem = problem.with_columns(&columns);
-        }
-        Ok(problem)
+        Ok(with_shapes(problem, &shapes))
     }
+}
+
+/// A problem with unlisted shapes in its base. The dwells are the same in all rooms, so a shape's columns fit as they are.
+fn with_shapes(problem: Problem, shapes: &[Candidate]) -> Problem {
+    shapes.iter().fold(problem, |problem, shape| {
+        let columns = shape.columns.dense(&problem.dwells, 1.0);
+        problem.with_columns(&columns)
+    })
 }
 
 /// What a base with these is known by, in whatever order they came.

@@ -94,7 +94,7 @@ fn beyond(
         return Ok(None);
     }
     let found = going_on(rooms, proposed, config)?;
-    Ok(found.filter(|found| found.accepted.iter().all(Accepted::leads)))
+    Ok(found.filter(|found| found.accepted.iter().all(|a| a.leads(config))))
 }
 
 /// The names of which these are the first: confirmed, then what they leave. None where not all of them are confirmed.

@@ -1,27 +1,21 @@
-//! What is neither explained nor at the floor, in words.
+//! What is neither explained nor of repeatability, in words.
 
-use crate::conclude::LARGE_REST;
 use crate::config::DiagnosisConfig;
-use crate::diagnosis::{Unexplained, Verdict};
+use crate::diagnosis::{Tried, Unexplained, Verdict};
 use armcal_core::{Severity, Stage, Warning};
 
-/// Code of the warning about what is neither explained nor at the floor.
+/// Code of the warning about what is neither explained nor of repeatability.
 pub const UNEXPLAINED: &str = "unexplained";
+/// Of the squared error beyond repeatability an adequate model explains at least this share.
+const ADEQUATE_SHARE: f64 = 0.5;
 
 impl Unexplained {
-    /// The warning, of the verdict and of the times that the floor is exceeded on either side of a hold-out: errors far above
-    /// the floor make a result inadequate, whatever was named beside them. None where what is left beside names is small.
-    pub(crate) fn warning(
-        &self,
-        verdict: Verdict,
-        times_floor: f64,
-        config: &DiagnosisConfig,
-    ) -> Option<Warning> {
+    /// The warning: a result is inadequate where the errors are beyond repeatability and no explanation takes half of that. None
+    /// where a name does.
+    pub(crate) fn warning(&self, verdict: Verdict, config: &DiagnosisConfig) -> Option<Warning> {
         let alone = verdict == Verdict::Unexplained;
-        let inadequate = match alone {
-            true => self.times_floor > config.floor_factor,
-            false => times_floor > LARGE_REST,
-        };
+        let beyond = self.times_expected > config.floor_factor;
+        let inadequate = beyond && (alone || self.explained_share < ADEQUATE_SHARE);
         if !alone && !inadequate {
             return None;
         }
@@ -31,12 +25,22 @@ impl Unexplained {
         Some(Warning::new(severity, Stage::Diagnose, UNEXPLAINED, "diagnosis", message))
     }
 
+    /// What the errors are compared with: repeatability where that was learnt and is more than the declared noise.
+    pub fn measure(&self) -> String {
+        match self.repeatability_mm.filter(|repeatability| *repeatability > self.floor_mm) {
+            Some(repeatability) => format!("the repeatability of {repeatability:.3} mm"),
+            None => format!("what the declared noise gives ({:.3} mm)", self.floor_mm),
+        }
+    }
+
     /// How much, where, and what was tried, in one sentence without its capital.
     pub fn sentence(&self) -> String {
-        let much = match self.times_floor.is_finite() {
+        let much = match self.times_expected.is_finite() {
             true => format!(
-                "the mean error of {:.3} mm is {:.1} times the noise floor of {:.3} mm",
-                self.error_mm, self.times_floor, self.floor_mm
+                "the mean error of {:.3} mm is {:.1} times {}",
+                self.error_mm,
+                self.times_expected,
+                self.measure()
             ),
             false => format!("the mean error is {:.3} mm, and no noise is declared", self.error_mm),
         };
@@ -55,18 +59,11 @@ impl Unexplained {
             true => "about alike in all recordings, joint ranges and directions".to_owned(),
             false => format!("largest against their noise in {}", places.join(" and in ")),
         };
-        let refitted: Vec<String> = self
-            .tried
-            .refitted
-            .iter()
-            .map(|(names, e)| format!("; {names} would leave {:.3} mm", e.after))
-            .collect();
         let scatter = self.scatter.as_ref().map_or(String::new(), |kind| format!("; the scatter is {kind}"));
+        let Tried { listed, unlisted } = self.tried;
         format!(
-            "{much}, {places}{scatter}; {} listed effects and {} unlisted shapes were tried and do not explain it{}",
-            self.tried.listed,
-            self.tried.unlisted,
-            refitted.concat()
+            "{much}, {places}{scatter}; {listed} listed effects and {unlisted} unlisted shapes were tried, and none predicts it clear \
+             of chance"
         )
     }
 }

@@ -6,10 +6,12 @@ use crate::diagnosis::{Series, ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::{expression, to_digits};
-use crate::judge::independent_groups;
+use crate::forward::leading;
 use crate::problem::{Channel, Problem};
 use crate::ripple::{Peak, beside_slow, peak};
-use crate::weigh::{Outside, Weighed};
+use crate::rooms::Room;
+use crate::score::{UNLISTED_AMPLITUDES, weights};
+use crate::weigh::Outside;
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -23,22 +25,15 @@ const FEWEST_POINTS: usize = 41;
 const POINTS_A_FUNCTION: usize = 4;
 
 /// Describes the best unlisted explanation of a weighed problem.
-pub(crate) fn unknown_report(
-    problem: &Problem,
-    weighed: &Weighed,
-    config: &DiagnosisConfig,
-) -> Option<UnknownReport> {
+pub(crate) fn unknown_report(room: &Room, config: &DiagnosisConfig) -> Option<UnknownReport> {
+    let weighed = &room.weighed;
     // A discrepancy that beats every cell knows the driver better than any cell; a cell also knows where.
-    described(problem, weighed, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
+    described(room, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
 }
 
 /// Describes one unlisted explanation.
-pub(crate) fn described(
-    problem: &Problem,
-    weighed: &Weighed,
-    outside: &Outside,
-    config: &DiagnosisConfig,
-) -> Option<UnknownReport> {
+pub(crate) fn described(room: &Room, outside: &Outside, config: &DiagnosisConfig) -> Option<UnknownReport> {
+    let Room { problem, weighed, .. } = room;
     let (best, ln) = (&outside.what, outside.ln_evidence);
     let metric = weighed.metric_of(&best.columns, problem, config);
     let gram = metric.gram(&weighed.dense(&best.columns, problem));
@@ -47,8 +42,11 @@ pub(crate) fn described(
     let drop = theta.dot(&gram.g);
     let variance = metric.projection.variance_without(drop);
     let effect = weighed.tamed(&best.columns, problem, config);
-    let groups = independent_groups(problem, weighed);
-    let places = weighed.gain(problem, (&best.columns, &effect), &groups, config);
+    let places = weighed.gain(problem, (&best.columns, &effect), &room.exam().folds, config);
+    let score = room.score_with(&effect);
+    let listed = leading(room, config).into_iter().next();
+    let mut all = vec![(&score, UNLISTED_AMPLITUDES), (room.nothing(), 0)];
+    all.extend(listed.iter().map(|(k, score)| (score, weighed.amplitudes(*k))));
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.dependences.drivers.get(d));
     let (mut shape, mut strongest, mut series) = (Vec::new(), None, None);
@@ -92,8 +90,8 @@ pub(crate) fn described(
     Some(UnknownReport {
         channel: channel.map_or("displacement", |c| c.name.as_str()).to_string(),
         driver: best.driver_name.clone(),
-        probability: weighed.p_unlisted,
-        log_evidence: ln,
+        probability: weights(&all, config)[0],
+        gain_nats: score.above(room.nothing()).nats,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
         ripple: strongest.filter(Peak::is_alone).map(|p| p.ripple),

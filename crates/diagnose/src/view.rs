@@ -55,6 +55,11 @@ impl View<'_> {
         Ok(self.of(&base, candidates))
     }
 
+    /// [`View::problem`] with nothing to weigh.
+    pub fn problem_at(&self) -> Result<Problem, DiagnoseError> {
+        Ok(self.of(&self.base()?, Vec::new()))
+    }
+
     /// The rows of a linearised fit, with candidates.
     fn of(&self, base: &Linearisation, candidates: Vec<Candidate>) -> Problem {
         Problem {

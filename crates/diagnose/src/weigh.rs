@@ -74,8 +74,6 @@ pub(crate) struct Weighed {
     pub unlisted: Vec<Outside>,
     /// Posterior probability of nothing.
     pub p_nothing: f64,
-    /// Posterior probability of something unlisted.
-    pub p_unlisted: f64,
     /// Posterior probability of correlated noise of each kind, over everything.
     pub p_noise: Vec<(Noise, f64)>,
     /// Products of all entries with each other under white noise, once somebody asked.
@@ -181,7 +179,6 @@ fn weigh_at(
     for (outside, ln) in unlisted.iter_mut().zip(&by_metric[1 + entries.len()..]) {
         outside.probability = probability(ln);
     }
-    let p_unlisted = unlisted.iter().map(|u| u.probability).sum();
     let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
     let given = problem.candidates.len();
@@ -195,7 +192,6 @@ fn weigh_at(
         points,
         unlisted,
         p_nothing,
-        p_unlisted,
         p_noise,
         crossed,
     }
@@ -294,6 +290,11 @@ impl Weighed {
         k == l || (k.max(l) >= self.given && single(k) && single(l) && placed(k) == placed(l))
     }
 
+    /// Amplitudes of an entry, a shape that was searched for counting as one more.
+    pub fn amplitudes(&self, k: usize) -> usize {
+        self.entries[k].candidate.amplitudes.len() + usize::from(k >= self.given)
+    }
+
     /// Entries by falling evidence.
     pub fn ranking(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.entries.len()).collect();
@@ -317,13 +318,6 @@ impl Weighed {
         let listed = self.entries.iter().map(|e| (&e.candidate.columns, e.ln_evidence));
         let all = listed.chain(self.unlisted.iter().map(|u| (&u.what.columns, u.ln_evidence)));
         all.max_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
-    /// Evidence that is no more than the detail of an entry's shape: a name that looks the same and is this little behind
-    /// may be the true one. Masses, radii and stiffnesses are never quite those of a formula, so that of the evidence for
-    /// an effect a small share goes to whichever formula happens to have the detail.
-    pub fn detail_nats(&self, entry: usize, config: &DiagnosisConfig) -> f64 {
-        config.margin_nats.max(config.leftover_share * self.entries[entry].ln_evidence)
     }
 
     /// Whether the noise probably remembers the dwells before.

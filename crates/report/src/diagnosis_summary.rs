@@ -23,6 +23,7 @@ pub(crate) fn diagnosis_summary(d: &Diagnosis) -> Value {
         // Mean errors of the calibrations without and with what was found, on the points that `judged` names.
         "holdout_mm": d.holdout_mm,
         "floor_mm": d.floor_mm,
+        "repeatability_mm": d.repeatability_mm,
         "judged": d.judged,
         // What is neither explained nor at the floor.
         "unexplained": d.unexplained,
@@ -45,8 +46,12 @@ fn candidate(c: &CandidateReport) -> Value {
         // How `armcal add` is told to add it.
         "spec": c.spec,
         "parameters": amplitudes,
-        "log_evidence": c.log_evidence,
-        "probability": c.probability,
+        // How it stands by the one score: `behind_nats` with its standard error, probability, whether it is of the answer; `null`
+        // where it was not among the best.
+        "behind_nats": c.standing.map(|s| s.behind_nats),
+        "behind_se": c.standing.map(|s| s.behind_se),
+        "probability": c.standing.map(|s| s.probability),
+        "in_answer": c.standing.is_some_and(|s| s.in_answer),
         "p_adjusted": c.p_adjusted,
         // Of the linearised fit, each place left out in turn; `refits` has the calibrations.
         "holdout_mm": c.holdout_mm,

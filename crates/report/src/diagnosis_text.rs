@@ -53,14 +53,14 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
         true => format!("{} {missing}", text(&d["verdict"]).replace('_', " ")),
         false => answer,
     };
-    let mut table = pen.table(&["effect", "probability", "ln B", "p", PREDICTED]);
+    let mut table = pen.table(&["explanation", "behind [nats]", "probability", "p", PREDICTED]);
     let three = |v: &Value| v.as_f64().map_or("-".to_owned(), |v| format!("{v:.3}"));
     for c in d["candidates"].as_array().into_iter().flatten().take(RANKED) {
         let h = &c["holdout_mm"];
         table.add_row(vec![
             Cell::new(told(&c["spec"])),
+            number(behind(c["behind_nats"].as_f64(), c["behind_se"].as_f64())),
             number(three(&c["probability"])),
-            number(three(&c["log_evidence"])),
             number(three(&c["p_adjusted"])),
             number(format!("{} -> {}", three(&h["before"]), three(&h["after"]))),
         ]);
@@ -211,10 +211,7 @@ fn as_spelt(d: &Diagnosis) -> String {
                 0 => String::new(),
                 n => format!(" ({n} effects of realistic size would not have shown)"),
             };
-            match d.not_worth_a_name() {
-                true => format!("Nothing is missing that is worth a name{not_shown}."),
-                false => format!("Nothing is missing that these data can show{not_shown}."),
-            }
+            format!("Nothing is missing that these data can show{not_shown}.")
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
@@ -325,7 +322,7 @@ fn one_of(set: &[String]) -> String {
 /// What stands beside the names: how much of the error they leave.
 fn beside(d: &Diagnosis) -> String {
     d.unexplained.as_ref().map_or(String::new(), |u| {
-        format!("; with it {:.3} mm remain, {:.1} times the noise floor", u.error_mm, u.times_floor)
+        format!("; with it {:.3} mm remain, {:.1} times {}", u.error_mm, u.times_expected, u.measure())
     })
 }
 
@@ -361,13 +358,13 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
 }
 
 fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
-    let mut table = pen.table(&["effect", "size", "probability", "ln B", "p", PREDICTED, "absorbed", "also"]);
+    let mut table = pen.table(&["explanation", "size", "behind [nats]", "probability", "p", PREDICTED, "absorbed", "also"]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
             Cell::new(run.in_words(&printable(&c.spec))),
             Cell::new(sizes(c)),
-            number(format!("{:.3}", c.probability)),
-            number(format!("{:.1}", c.log_evidence)),
+            number(behind(c.standing.map(|s| s.behind_nats), c.standing.map(|s| s.behind_se))),
+            number(c.standing.map_or("-".into(), |s| format!("{:.3}", s.probability))),
             number(format!("{:.3}", c.p_adjusted)),
             number(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
             number(format!("{:.0} %", c.absorbed * 100.0)),
@@ -375,6 +372,11 @@ fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
         ]);
     }
     pen.render(&table)
+}
+
+/// How far behind the answer, with its standard error.
+fn behind(nats: Option<f64>, se: Option<f64>) -> String {
+    nats.zip(se).map_or("-".into(), |(nats, se)| format!("{nats:.1} ± {se:.1}"))
 }
 
 pub(crate) fn found(e: &FoundEffect) -> String {
@@ -387,11 +389,10 @@ pub(crate) fn found(e: &FoundEffect) -> String {
     };
     let h = &e.places;
     let rival = e.rival.as_ref().map_or(String::new(), |r| {
-        let refitted = match r.refitted {
-            true => format!(", and is e^{:.1} times less probable once both are refitted", r.behind_nats),
-            false => String::new(),
-        };
-        format!("; the next listed explanation, {}, would leave {:.3} mm{refitted}", r.name, r.places.after)
+        format!(
+            "; the next listed explanation, {}, is {:.1} +- {:.1} nats behind and would leave {:.3} mm",
+            r.name, r.behind_nats, r.behind_se, r.places.after
+        )
     });
     printable(&format!(
         "{}{set}: {}; linearised, each place left out in turn: from {:.3} to {:.3} mm (change {:.3} to {:.3}, 95 \

@@ -65,7 +65,7 @@ impl RecordingNames {
         let of = |words: &str, effect: &str| format!("{words} {}", self.label(effect));
         match number.rsplit_once('.') {
             Some((effect, "probability")) => return of("probability of", effect),
-            Some((effect, "log_evidence")) => return of("evidence for", effect),
+            Some((effect, "gain")) => return of("evidence for", effect),
             Some((effect, "places")) => return of("places left out in turn, without and with", effect),
             Some((effect, "rival")) => return of("next best explanation after", effect),
             Some((effect, "contrast")) => return of("pairs of dwells that show", effect),

@@ -51,7 +51,7 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Er
         && let Some(spec) = diagnosis.unknown.as_ref().and_then(UnknownReport::effect)
     {
         let mut rivals = vec![Rival { spec, sizes: Vec::new() }];
-        for candidate in diagnosis.candidates.iter().take(3) {
+        for candidate in diagnosis.candidates.iter().filter(|c| !c.spec.contains('+')).take(3) {
             rivals.push(rival(diagnosis, &candidate.spec, joints)?);
         }
         let why =
@@ -77,10 +77,9 @@ pub fn named(words: &[String], diagnosis: Option<&Diagnosis>, joints: &[String])
 /// The effects that could not be tested and that depend on pose, direction or load, the most probable first. Events and
 /// drifts are no matter of where the arm goes.
 fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Error> {
-    let probability =
-        |name: &str| diagnosis.candidates.iter().find(|c| c.spec == name).map_or(0.0, |c| c.probability);
+    let rank = |name: &str| diagnosis.candidates.iter().position(|c| c.spec == name).unwrap_or(usize::MAX);
     let mut names: Vec<&String> = diagnosis.not_testable.iter().map(|n| &n.effect).collect();
-    names.sort_by(|a, b| probability(b).total_cmp(&probability(a)));
+    names.sort_by_key(|name| rank(name));
     let mut rivals: Vec<Rival> = Vec::new();
     for name in names {
         let rival = rival(diagnosis, name, joints)?;

@@ -121,26 +121,27 @@ fn ranking(
     names: &RecordingNames,
     index_of: &dyn Fn(&[String]) -> Option<usize>,
 ) -> Vec<Value> {
-    let found = |spec: &str| spec.split('+').all(|s| d.effects.iter().any(|e| e.set.iter().any(|n| n == s)));
+    let found = |c: &CandidateReport| c.standing.is_some_and(|s| s.in_answer);
     let row = |c: &CandidateReport| {
         let specs: Vec<String> = c.spec.split('+').map(str::to_owned).collect();
         json!({
             "spec": c.spec,
             "summary": find(&c.effect).map_or("", |kind| kind.summary),
             "size": sizes(c),
-            "probability": c.probability,
+            "probability": c.standing.map(|s| s.probability),
+            "behind_nats": c.standing.map(|s| s.behind_nats),
+            "behind_se": c.standing.map(|s| s.behind_se),
             "p_adjusted": c.p_adjusted,
-            "log_evidence": c.log_evidence,
             "absorbed": c.absorbed,
             "also": c.same_to_the_data.iter().map(|name| names.label(name)).collect::<Value>(),
             // Whether the diagnosis holds it to be missing.
-            "found": found(&c.spec),
+            "found": found(c),
             // Index into `refits`.
             "refit": index_of(&specs),
         })
     };
     let best = d.candidates.iter().take(RANKED);
-    let rest = d.candidates.iter().skip(RANKED).filter(|c| found(&c.spec));
+    let rest = d.candidates.iter().skip(RANKED).filter(|c| found(c));
     best.chain(rest).map(row).collect()
 }
 

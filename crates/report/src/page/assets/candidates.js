@@ -13,13 +13,13 @@ function candidateRow(c) {
   what.append(c.found ? "● " : "", name, element("div", c.summary, "faint"));
   const refit = c.refit === null ? null : doc.refits[c.refit];
   const change = refit && refit.change;
-  const made = row([what, c.probability.toFixed(3), c.p_adjusted.toFixed(3), refit ? judged(refit).fitted_mm.mean_text : "–",
+  const made = row([what, c.behind_nats === null ? "–" : c.behind_nats.toFixed(1) + " ± " + c.behind_se.toFixed(1), c.probability === null ? "–" : c.probability.toFixed(3), c.p_adjusted.toFixed(3), refit ? judged(refit).fitted_mm.mean_text : "–",
     change && change.ci95_mm ? signed(change.ci95_mm[0]) + " to " + signed(change.ci95_mm[1]) : "–",
     (100 * c.absorbed).toFixed(0) + " %", c.size, c.also.join(", ")]);
   made.dataset.spec = c.spec;
   if (c.refit !== null) made.dataset.refit = c.refit;
-  for (const k of [3, 4]) made.cells[k].className = "num";
-  made.cells[7].className = "faint";
+  for (const k of [1, 4, 5]) made.cells[k].className = "num";
+  made.cells[8].className = "faint";
   return made;
 }
 
@@ -27,7 +27,7 @@ function candidateTable() {
   const table = $("candidates");
   if (!table) return; // None was weighed.
   const head = document.createElement("thead");
-  head.append(row(["explanation", "probability", "p", "error with it [mm]", "change, 95 % [mm]", "geometry can hide", "size", "also called, or the same here"], "th"));
+  head.append(row(["explanation", "behind [nats]", "probability", "p", "error with it [mm]", "change, 95 % [mm]", "geometry can hide", "size", "also called, or the same here"], "th"));
   const body = document.createElement("tbody");
   body.append(...doc.candidates.map(candidateRow));
   table.replaceChildren(head, body);

@@ -1,0 +1,132 @@
+//! Every explanation that was scored, in one order: the answer first, then what may stand in its place.
+
+use crate::config::DiagnosisConfig;
+use crate::diagnosis::Standing;
+use crate::forward::{Accepted, leading};
+use crate::problem::Candidate;
+use crate::rooms::{Room, Rooms};
+use crate::score::{Score, UNLISTED_AMPLITUDES, weights};
+use crate::search::Search;
+use crate::settle::Instead;
+
+/// Effects that explain the data together.
+#[derive(Debug, Clone)]
+pub(crate) struct Explanation {
+    /// Their names.
+    pub effects: Vec<String>,
+    pub standing: Standing,
+    /// Family-wise p-value; of several the largest.
+    pub p_adjusted: f64,
+}
+
+impl Explanation {
+    /// Their names as one.
+    pub fn spec(&self) -> String {
+        self.effects.join(Candidate::AND)
+    }
+}
+
+/// The explanations in their order, and the probabilities of nothing and of what is not listed.
+#[derive(Debug)]
+pub(crate) struct Ranking {
+    pub explanations: Vec<Explanation>,
+    pub p_nothing: f64,
+    pub p_unlisted: f64,
+}
+
+impl Ranking {
+    /// Of a search that began in `room`, the one without effects.
+    pub fn of(search: &Search, room: &Room, rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Ranking {
+        match search.accepted.is_empty() {
+            true => Ranking::of_nothing(room, config),
+            false => Ranking::of_answer(&search.accepted, room, rooms, config),
+        }
+    }
+
+    /// Where no name was found: what came nearest, by itself.
+    fn of_nothing(room: &Room, config: &DiagnosisConfig) -> Ranking {
+        let listed = leading(room, config);
+        let unlisted = room.best_unlisted(config).map(|(_, score)| score);
+        let mut scores = vec![(room.nothing(), 0)];
+        scores.extend(unlisted.iter().map(|score| (score, UNLISTED_AMPLITUDES)));
+        scores.extend(listed.iter().map(|(k, score)| (score, room.weighed.amplitudes(*k))));
+        let weights = weights(&scores, config);
+        let others = 1 + usize::from(unlisted.is_some());
+        let best = listed.first().map(|l| l.1.clone());
+        let row = |((k, score), weight): (&(usize, Score), &f64)| Explanation {
+            effects: vec![room.weighed.entries[*k].candidate.spec.clone()],
+            standing: Standing::of(best.as_ref().unwrap_or(score), score, *weight, false),
+            p_adjusted: room.judge(*k, config).own().p_adjusted,
+        };
+        Ranking {
+            explanations: listed.iter().zip(&weights[others..]).map(row).collect(),
+            p_nothing: weights[0],
+            p_unlisted: weights[1..others].iter().sum(),
+        }
+    }
+
+    fn of_answer(
+        accepted: &[Accepted],
+        room: &Room,
+        rooms: &mut Rooms<'_>,
+        config: &DiagnosisConfig,
+    ) -> Ranking {
+        let answer: Vec<Candidate> = accepted.iter().map(|a| a.candidate.clone()).collect();
+        let scored = rooms.score(&answer, room);
+        let shares: Vec<f64> =
+            accepted.iter().map(|a| a.probability(|w| w == Instead::Entry(a.judged.entry))).collect();
+        let of_others = |i: usize| -> f64 {
+            shares.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, share)| share).product()
+        };
+        let mut explanations = Vec::new();
+        let row = |effects: &[Candidate], p_adjusted: f64, score: &Score, probability: f64, in_answer: bool| Explanation {
+            effects: effects.iter().map(|c| c.spec.clone()).collect(),
+            standing: Standing::of(scored.as_ref().unwrap_or(score), score, probability, in_answer),
+            p_adjusted,
+        };
+        let p_of = |a: &Accepted, k: usize| a.judged.significance[k].p_adjusted;
+        let p_others = |i: usize| {
+            let others = accepted.iter().enumerate().filter(|(k, _)| *k != i);
+            others.map(|(_, a)| p_of(a, a.judged.entry)).fold(0.0, f64::max)
+        };
+        let p_all = p_others(accepted.len());
+        explanations.extend(scored.iter().map(|own| row(&answer, p_all, own, shares.iter().product(), true)));
+        for (i, a) in accepted.iter().enumerate() {
+            for other in &a.ranked {
+                let Instead::Entry(k) = other.what else { continue };
+                if k == a.judged.entry {
+                    continue;
+                }
+                let mut swapped = answer.clone();
+                swapped[i] = a.room.weighed.entries[k].candidate.clone();
+                let score = rooms.score(&swapped, room);
+                let probability = other.weight * of_others(i);
+                let p = p_others(i).max(p_of(a, k));
+                explanations.extend(score.map(|s| row(&swapped, p, &s, probability, a.set.contains(&k))));
+            }
+        }
+        for (k, score) in leading(room, config) {
+            let alone = std::slice::from_ref(&room.weighed.entries[k].candidate);
+            let known = explanations.iter().any(|e| e.spec() == alone[0].spec);
+            let p = room.judge(k, config).own().p_adjusted;
+            explanations.extend((!known).then(|| row(alone, p, &score, 0.0, false)));
+        }
+        let of_answer = |e: &Explanation| e.standing.in_answer;
+        explanations[1..].sort_by(|a, b| {
+            let (p, q) = (&a.standing, &b.standing);
+            let behind = p.behind_nats.total_cmp(&q.behind_nats);
+            of_answer(b).cmp(&of_answer(a)).then(q.probability.total_cmp(&p.probability)).then(behind)
+        });
+        let without: f64 = accepted.iter().map(|a| a.probability(|w| w == Instead::Nothing)).product();
+        let unlisted =
+            accepted.iter().map(|a| a.probability(|w| w == Instead::Unlisted)).fold(0.0, f64::max);
+        Ranking { explanations, p_nothing: without, p_unlisted: unlisted }
+    }
+}
+
+impl Standing {
+    fn of(answer: &Score, own: &Score, probability: f64, in_answer: bool) -> Standing {
+        let behind = answer.above(own);
+        Standing { behind_nats: behind.nats, behind_se: behind.se, probability, in_answer }
+    }
+}

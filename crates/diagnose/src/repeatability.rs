@@ -1,0 +1,36 @@
+//! How well an arm and its sensor repeat, from poses that were visited more than once.
+//!
+//! ```text
+//! s^2 = sum_g sum_i |e_i - mean_g|^2 / (3 sum_g (n_g - 1)),   E|e| = s sqrt(8/pi)
+//! ```
+//!
+//! over visits to one place that came the same way in one recording (ISO 9283 asks for one direction of approach): whatever a model
+//! does not know is the same in all of these.
+
+use crate::places::places;
+use armcal_calibrate::Calibration;
+use armcal_core::{Arrival, FeatureId, Observation};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Fewest visits beyond the first one of each place.
+const FEWEST: usize = 8;
+
+/// Mean error that repeatability alone gives, as the residuals of a calibration have it [m]; none where too little was revisited.
+pub(crate) fn repeatability_m(calibration: &Calibration, observations: &[Observation]) -> Option<f64> {
+    let all: Vec<&Observation> = observations.iter().collect();
+    let mut visits: BTreeMap<(usize, String, FeatureId, String), Vec<Vector3<f64>>> = BTreeMap::new();
+    for ((place, o), residual) in places(&all).into_iter().zip(observations).zip(&calibration.residuals) {
+        let Some(place) = place.filter(|_| o.position_rows() == 3) else { continue };
+        let came = o.arrival.iter().map(Arrival::symbol).collect();
+        visits.entry((o.dwell.recording, place, o.feature, came)).or_default().push(residual.fitted_m);
+    }
+    let (mut square_m2, mut more) = (0.0, 0);
+    for errors_m in visits.values() {
+        let mean_m = errors_m.iter().sum::<Vector3<f64>>() / errors_m.len() as f64;
+        square_m2 += errors_m.iter().map(|e| (e - mean_m).norm_squared()).sum::<f64>();
+        more += errors_m.len() - 1;
+    }
+    (more >= FEWEST).then(|| (square_m2 / (3 * more) as f64).sqrt() * (8.0 / PI).sqrt())
+}

@@ -1,0 +1,188 @@
+//! Names against all that may predict as much, each refitted: which share the answer, which leads it.
+//!
+//! The weighing proposes, one step in the linearised model leaves the few that come near, refits decide: by their [`Score`] and
+//! nothing else. An answer holds every explanation that no other one is clearly better than; first comes what is worth most, each
+//! amplitude costing something.
+
+use crate::DiagnoseError;
+use crate::config::DiagnosisConfig;
+use crate::forward::{Accepted, confirm, known, named};
+use crate::judge::Grade;
+use crate::problem::Candidate;
+use crate::rooms::{Room, Rooms};
+use crate::score::{Score, UNLISTED_AMPLITUDES, weights};
+use crate::search::Search;
+
+/// Entries that are scored in the linearised model beside a name, those that the weighing likes best.
+const ALTERNATIVES: usize = 12;
+/// Of these so many are refitted, where they come within this of what is clearly worse [nats].
+const REFITTED: usize = 6;
+const SLACK_NATS: f64 = 10.0;
+/// Rounds in which names that change their places are confirmed again.
+const ROUNDS: usize = 3;
+/// Amplitudes that a size of the wrong sign counts as.
+const IMPOSSIBLE: usize = 2;
+
+/// What stands in the place of a name, beside the other names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Instead {
+    /// An entry of the room.
+    Entry(usize),
+    /// Nothing.
+    Nothing,
+    /// The best that is not listed.
+    Unlisted,
+}
+
+/// One explanation and its score.
+#[derive(Debug, Clone)]
+pub(crate) struct Scored {
+    pub what: Instead,
+    pub score: Score,
+    /// Share of the probability.
+    pub weight: f64,
+}
+
+/// Settles the names of what was found.
+pub(crate) fn settle(
+    search: &mut Search,
+    rooms: &mut Rooms<'_>,
+    config: &DiagnosisConfig,
+) -> Result<(), DiagnoseError> {
+    let curves: Vec<Candidate> = search.curves.iter().map(|c| c.candidate.clone()).collect();
+    let beside = |all: &[Accepted], i: usize| {
+        let others = all.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, a)| a.candidate.clone());
+        others.chain(curves.iter().cloned()).collect::<Vec<Candidate>>()
+    };
+    for i in 0..search.tentative.len() {
+        search.tentative[i] = settled(&search.tentative[i], &beside(&search.tentative, i), rooms, config);
+    }
+    for _ in 0..ROUNDS {
+        let before = specs(&search.accepted);
+        for i in 0..search.accepted.len() {
+            search.accepted[i] = settled(&search.accepted[i], &beside(&search.accepted, i), rooms, config);
+        }
+        if specs(&search.accepted) == before || search.accepted.len() < 2 {
+            return Ok(());
+        }
+        // Beside another name one of them may be needed no longer.
+        let steps = known(&named(&search.accepted), &search.rest);
+        search.accepted = confirm(rooms, steps, &curves, config)?;
+    }
+    Ok(())
+}
+
+fn specs(accepted: &[Accepted]) -> Vec<String> {
+    accepted.iter().map(|a| a.candidate.spec.clone()).collect()
+}
+
+/// One of them beside the others.
+fn settled(
+    found: &Accepted,
+    others: &[Candidate],
+    rooms: &mut Rooms<'_>,
+    config: &DiagnosisConfig,
+) -> Accepted {
+    let room = found.room.clone();
+    let with = |k: usize| [others, std::slice::from_ref(&room.weighed.entries[k].candidate)].concat();
+    let mut refits: Vec<(usize, Score)> = Vec::new();
+    for k in near(found, &room, config) {
+        refits.extend(rooms.score(&with(k), &room).map(|score| (k, score)));
+    }
+    let Some(nothing) = rooms.score(others, &room) else { return found.clone() };
+    let (mut set, instead_of) = answer(found, &refits, &nothing, &room, config);
+    let (mut judged, mut grade) = (found.judged.clone(), found.grade);
+    match set.first() {
+        Some(first) if *first != judged.entry => {
+            judged = room.judge(*first, config);
+            grade = judged.grade(config).max(Grade::OrUnlisted);
+        }
+        Some(_) => {}
+        None => set.push(judged.entry),
+    }
+    // Of the shape of the name it is no other answer.
+    let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
+    let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);
+    let candidate = room.weighed.entries[judged.entry].candidate.clone();
+    Accepted { candidate, judged, room, grade, set, instead_of, ranked }
+}
+
+/// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.
+fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
+    let Room { problem, weighed, .. } = room;
+    let own = found.judged.entry;
+    let mut names = vec![own];
+    for k in weighed.ranking() {
+        let new = !weighed.entries[k].candidate.is_group() && names.iter().all(|n| !weighed.one_name(*n, k));
+        names.extend((new && names.len() < ALTERNATIVES).then_some(k));
+    }
+    let one_step = |k: &usize| {
+        let columns = weighed.entries[*k].candidate.columns.dense(&problem.dwells, 1.0);
+        (*k, if *k == own { found.judged.score.clone() } else { room.score_with(&columns) })
+    };
+    let mut scored: Vec<(usize, Score)> = names.iter().map(one_step).collect();
+    scored.sort_by(|a, b| 0f64.total_cmp(&a.1.above(&b.1).nats));
+    let detail = found.judged.detail(config) + SLACK_NATS;
+    let best = scored[0].1.clone();
+    let reach = |(k, score): &(usize, Score)| *k == own || !best.above(score).is_clear(detail);
+    let mut near: Vec<usize> = scored.iter().filter(|s| reach(s)).map(|(k, _)| *k).collect();
+    let at = near.iter().position(|k| *k == own).unwrap_or(0);
+    near[..=at].rotate_right(1);
+    near.truncate(REFITTED);
+    near
+}
+
+/// The entries that are one answer, the first to be told first, and the names that the user's knowledge of the arm left out.
+fn answer(
+    found: &Accepted,
+    refits: &[(usize, Score)],
+    nothing: &Score,
+    room: &Room,
+    config: &DiagnosisConfig,
+) -> (Vec<usize>, Vec<String>) {
+    let of = |k: usize| &room.weighed.entries[k].candidate;
+    let best = refits.iter().map(|(_, score)| score.above(nothing).nats).fold(0.0, f64::max);
+    let detail = config.leftover_share * best;
+    let stands = |(k, score): &&(usize, Score)| {
+        let beaten = refits.iter().any(|(_, other)| other.above(score).is_clear(detail));
+        let real = *k == found.judged.entry || room.judge(*k, config).grade(config) > Grade::Refused;
+        !beaten && real && score.above(nothing).nats >= config.margin_nats
+    };
+    let mut set: Vec<&(usize, Score)> = refits.iter().filter(stands).collect();
+    let worth = |(k, score): &(usize, Score)| score.worth(cost(*k, room, config), config);
+    set.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    let set: Vec<usize> = set.into_iter().map(|(k, _)| *k).collect();
+    let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());
+    match acts.is_empty() {
+        true => (set, Vec::new()),
+        false => (acts, others.into_iter().map(|k| of(k).spec.clone()).collect()),
+    }
+}
+
+/// What an entry costs, in amplitudes: what came out as no such mechanism can is told after what could be.
+fn cost(k: usize, room: &Room, config: &DiagnosisConfig) -> usize {
+    let impossible = !room.judge(k, config).impossible.is_empty();
+    room.weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 }
+}
+
+/// Everything that was scored, with its share of the probability.
+fn weighed(
+    refits: Vec<(usize, Score)>,
+    nothing: Score,
+    unlisted: Option<Score>,
+    room: &Room,
+    config: &DiagnosisConfig,
+) -> Vec<Scored> {
+    let entries = refits.into_iter().map(|(k, score)| (Instead::Entry(k), score));
+    let others = std::iter::once((Instead::Nothing, nothing));
+    let all: Vec<(Instead, Score)> =
+        entries.chain(others).chain(unlisted.map(|score| (Instead::Unlisted, score))).collect();
+    let amplitudes = |what: Instead| match what {
+        Instead::Entry(k) => cost(k, room, config),
+        Instead::Nothing => 0,
+        Instead::Unlisted => UNLISTED_AMPLITUDES,
+    };
+    let scores: Vec<(&Score, usize)> = all.iter().map(|(what, score)| (score, amplitudes(*what))).collect();
+    let weights = weights(&scores, config);
+    all.into_iter().zip(weights).map(|((what, score), weight)| Scored { what, score, weight }).collect()
+}
