@@ -39,6 +39,20 @@ pub struct Observed {
     pub truth: Truth,
 }
 
+impl Observed {
+    /// The same readings, with the noise of sensor, seats and encoders declared so many times as large.
+    pub fn declaring(mut self, times: f64) -> Observed {
+        for o in &mut self.observations {
+            o.covariance_m2 *= times * times;
+            o.joint_sigma_rad.iter_mut().for_each(|sigma| *sigma *= times);
+            if let Reference::Tracked { orientation_sigma_rad, .. } = &mut o.reference {
+                *orientation_sigma_rad *= times;
+            }
+        }
+        self
+    }
+}
+
 /// Observes a session without recording it. A board file is looked for where the program runs.
 pub fn observe(config: &LabConfig) -> Result<Observed, LabError> {
     observe_from(config, Path::new(""))

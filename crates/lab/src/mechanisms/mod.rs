@@ -42,6 +42,7 @@
 //! | `soft_stop` | a rubber buffer beyond some angle | `joint`, `from_deg`, `give_percent` |
 //! | `twist` | a clamped link twists about its length as a joint turns | `link`, `by`, `deg_at_45` |
 //! | `room_temperature` | an air conditioner cycles | `links`, `per_kelvin_ppm`, `swing_k`, `period_s`, `time_constant_s` |
+//! | `waves` | all the rest: the tip is off by a smooth function of the pose | `waves` of `per_rad`, `phase_rad`, `shift_mm` |
 
 mod axis_tilt;
 mod base_compliance;
@@ -63,6 +64,7 @@ mod lag;
 mod link_bending;
 mod shapes;
 mod twist;
+mod waves;
 mod wobble;
 mod zero_slip;
 
@@ -85,6 +87,7 @@ pub use lag::Lag;
 pub use link_bending::LinkBending;
 pub use shapes::{DamagedTeeth, GearRatio, Sawtooth, SecondHarmonic, SoftStop, ToothRunout};
 pub use twist::Twist;
+pub use waves::{Wave, Waves};
 pub use wobble::AxisWobble;
 pub use zero_slip::ZeroSlip;
 
@@ -166,6 +169,7 @@ mechanisms!(
     room_temperature: RoomTemperature,
     crossed_friction: CrossedFriction,
     lag: Lag,
+    waves: Waves,
 );
 
 /// Checks the values of one `[[mechanisms]]` table and names the key at fault.

@@ -71,6 +71,26 @@ fn the_same_seed_gives_the_same_observations() {
 }
 
 #[test]
+fn declaring_other_noise_changes_no_reading() {
+    let seen = observe_from(&lab(""), Path::new(LABS)).unwrap();
+    assert_eq!(seen.clone().declaring(1.0), seen);
+    let declared = seen.clone().declaring(10.0);
+    assert_eq!((&declared.nominal, &declared.truth), (&seen.nominal, &seen.truth));
+    for (a, b) in declared.observations.iter().zip(&seen.observations) {
+        assert_eq!((&a.joint_rad, a.cavity(), a.seen_m()), (&b.joint_rad, b.cavity(), b.seen_m()));
+        assert!((a.covariance_m2 - 100.0 * b.covariance_m2).norm() < 1e-12 * a.covariance_m2.norm());
+        assert!(a.joint_sigma_rad.iter().zip(&b.joint_sigma_rad).all(|(a, b)| (a / b - 10.0).abs() < 1e-12));
+        if let (
+            Reference::Tracked { orientation: turned, orientation_sigma_rad: wide, .. },
+            Reference::Tracked { orientation, orientation_sigma_rad: sigma, .. },
+        ) = (&a.reference, &b.reference)
+        {
+            assert!(turned == orientation && (wide / sigma - 10.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
 fn tracked_means_scatter_as_they_say() {
     let mut config = lab("");
     config.task.passes.clear();

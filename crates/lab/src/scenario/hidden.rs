@@ -30,3 +30,10 @@ pub struct Hidden {
     /// What it depends on.
     pub driver: String,
 }
+
+impl Hidden {
+    /// Whether it is a smooth displacement over the whole pose: no name and no place is right for it.
+    pub fn is_discrepancy(&self) -> bool {
+        self.mechanism == "waves"
+    }
+}

@@ -1,6 +1,7 @@
 //! Scenarios.
 
 use super::*;
+use crate::mechanisms::MechanismConfig;
 use armcal_core::Reference;
 
 fn everything() -> Vec<&'static str> {
@@ -15,9 +16,11 @@ fn every_family_can_be_observed_and_says_what_it_hides() {
         let seen = scenario.observe().unwrap();
         assert!((260..=297).contains(&seen.observations.len()), "{name}: {}", seen.observations.len());
         let hidden = &seen.truth.hidden;
-        assert_eq!(hidden.len(), usize::from(!name.starts_with("nothing")), "{name}");
+        let displaced = name.starts_with("nothing:smooth");
+        assert_eq!(hidden.len(), usize::from(displaced || !name.starts_with("nothing")), "{name}");
         for h in hidden {
-            assert_eq!(h.effect.is_none(), name.starts_with("outside:"), "{name}");
+            assert_eq!(h.effect.is_none(), displaced || name.starts_with("outside:"), "{name}");
+            assert_eq!(h.is_discrepancy(), displaced, "{name}");
             assert!(!h.channel.is_empty() && !h.driver.is_empty() && h.size != 0.0);
         }
         let json = serde_json::to_string(&seen.truth).unwrap();
@@ -57,6 +60,53 @@ fn a_middling_size_moves_the_tip_by_tenths_to_some_millimetres() {
         let moved_mm = 1e3 * moved_m(name, Design::FreePoses);
         println!("{name}: {moved_mm:.2} mm");
         assert!((0.05..12.0).contains(&moved_mm), "{name}: {moved_mm} mm");
+    }
+}
+
+/// As large as asked at the dwells that are seen, with the hand led to another place by it; smooth; and the seed's own.
+#[test]
+fn a_discrepancy_is_smooth_and_as_large_as_asked() {
+    let sum = |name: &str, seed| {
+        let mut planted = Scenario::new(name, Design::FreePoses, seed).plant().unwrap();
+        let Some(MechanismConfig::Waves(waves)) = planted.config.mechanisms.pop() else { panic!("no waves") };
+        (waves, planted)
+    };
+    for (name, times) in [("nothing:smooth_3", 3.0), ("nothing:smooth_10", 10.0)] {
+        for seed in 0..4 {
+            let (waves, _) = sum(name, seed);
+            let seen = Scenario::new(name, Design::FreePoses, seed).observe().unwrap();
+            let asked_m = times * discrepancy::declared_m(&seen.observations);
+            let ratio = discrepancy::spread_m(&waves, &seen.observations) / asked_m;
+            assert!((ratio - 1.0).abs() < 0.05, "{name} seed {seed}: {ratio} of what was asked");
+            let arm = crate::arm::AxisArm::from_rows(&seen.truth.rows);
+            let neighbour = |q: &Vec<f64>| q.iter().map(|q| q + 0.01).collect::<Vec<_>>();
+            for q in seen.observations.iter().map(|o| &o.joint_rad) {
+                let to = neighbour(q);
+                let (apart_m, change_m) =
+                    ((arm.tip(q) - arm.tip(&to)).norm(), (waves.shift_m(q) - waves.shift_m(&to)).norm());
+                let share = change_m / asked_m * 0.01 / apart_m;
+                assert!(share < 0.35, "{name} seed {seed}: {share} of its size over 1 cm");
+            }
+        }
+    }
+    assert_eq!(sum("nothing:smooth_3", 1), sum("nothing:smooth_3", 1));
+    assert_ne!(sum("nothing:smooth_3", 1).0, sum("nothing:smooth_3", 2).0);
+}
+
+/// The tip itself is displaced: what the camera sees, and what is seated in a cavity, both differ from the rigid arm.
+#[test]
+fn a_discrepancy_moves_the_true_tip() {
+    let seen = Scenario::new("nothing:smooth_10", Design::FreePoses, 3).observe().unwrap();
+    let Some(MechanismConfig::Waves(waves)) = seen.truth.config.mechanisms.first() else {
+        panic!("no waves")
+    };
+    let arm = crate::arm::AxisArm::from_rows(&seen.truth.rows);
+    let base = &seen.truth.world_from_base;
+    let turn = nalgebra::UnitQuaternion::from_quaternion(base.quaternion_xyzw.into());
+    for dwell in seen.truth.recordings.iter().flat_map(|recording| &recording.dwells) {
+        let from_base_m = nalgebra::Vector3::from(dwell.tip_world_m) - nalgebra::Vector3::from(base.xyz_m);
+        let off_m = (turn.inverse() * from_base_m - arm.tip(&dwell.link_rad)).norm();
+        assert!((off_m - waves.shift_m(&dwell.link_rad).norm()).abs() < 2e-5, "{off_m} m");
     }
 }
 

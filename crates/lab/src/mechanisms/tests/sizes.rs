@@ -42,6 +42,7 @@ const NOTHING_MUCH: &[&str] = &[
     "kind = 'twist'\nlink = 2\nby = 1\ndeg_at_45 = 0.0",
     "kind = 'room_temperature'\nper_kelvin_ppm = 70\nswing_k = 0.0\nperiod_s = 300\ntime_constant_s = 60",
     "kind = 'crossed_friction'\njoint = 2\nby = 3\nfriction_nm = 0.0\nstiffness_nm_rad = 500",
+    "kind = 'waves'\nwaves = [{ per_rad = [1, 2, 3], phase_rad = 0.5, shift_mm = [0.0, 0.0, 0.0] }]",
 ];
 
 fn lab() -> LabConfig {
@@ -80,6 +81,10 @@ fn what_cannot_be_is_refused_by_its_key() {
         ("kind = 'axis_tilt'\njoint = 1\ntilt_deg = 1", "2 or later"),
         ("kind = 'belt_compliance'\njoint = 3\nstiffness_nm_rad = 1", "mechanisms[0].joint"),
         ("kind = 'gap'\njoint = 1\nwidth_deg = nan", "width_deg"),
+        (
+            "kind = 'waves'\nwaves = [{ per_rad = [1.0], phase_rad = 0, shift_mm = [1, 0, 0] }]",
+            "waves.per_rad",
+        ),
     ] {
         let config = LabConfig { mechanisms: vec![toml::from_str(text).unwrap()], ..lab() };
         let error = config.check().unwrap_err().to_string();
