@@ -3,7 +3,7 @@
 use super::{Outcome, may_write, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::score::{Campaign, Judgement, page, rows, score, table};
+use crate::score::{Campaign, Judgement, Reliability, Way, page, rows, score, table};
 use armcal_lab::LabError;
 use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs};
 use armcal_recording::atomic;
@@ -34,6 +34,9 @@ pub struct Request {
     /// Write recordings to disk and run the whole pipeline on them, instead of handing over observations.
     #[arg(long)]
     pub sealed: bool,
+    /// Declare the noise of sensor, seats and encoders this many times as large as it is: names should not depend on it.
+    #[arg(long, value_name = "F", default_value_t = 1.0, conflicts_with_all = ["sealed", "sealed_seeds"])]
+    pub noise_factor: f64,
     /// Write the tables, with intervals and every miss, as Markdown: docs/confusion.md.
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
@@ -56,11 +59,14 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         let n = finished.fetch_add(1, Ordering::Relaxed) + 1;
         progress.step(&format!("scenario {n} of {all}"));
     };
-    let scored = score(&scenarios, request.sealed, &done)?;
-    let whole_way = score(&whole_way, true, &done)?;
+    let noise_factor = request.noise_factor;
+    let way = if request.sealed { Way::Recorded } else { Way::Observed { noise_factor } };
+    let scored = score(&scenarios, way, &done)?;
+    let whole_way = score(&whole_way, Way::Recorded, &done)?;
     progress.finish();
     if let Some(file) = &request.page {
-        let campaign = Campaign { command: command(request), scored: &scored, whole_way: &whole_way };
+        let command = command(request);
+        let campaign = Campaign { command, scored: &scored, whole_way: &whole_way, noise_factor };
         atomic::write(file, page(&campaign).as_bytes()).map_err(Error::Output)?;
     }
     let rows = rows(&scored);
@@ -73,15 +79,20 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         let (first, last) = (request.from, request.from + request.seeds.saturating_sub(1));
         let slowest = scored.iter().map(|s| s.answer.seconds).fold(0.0, f64::max);
         print(&format!(
-            "\n{} scenarios, seeds {first} to {last}, size {}; {wrong} confidently wrong; slowest diagnosis {slowest:.2} s\n",
+            "\n{} scenarios, seeds {first} to {last}, size {}; {wrong} confidently wrong; {}; slowest diagnosis {slowest:.2} s\n",
             scored.len(),
             request.size,
+            Reliability::of(scored.iter()).claim(),
         ))?;
     }
     Ok(Outcome::Done)
 }
 
 fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
+    if !(request.noise_factor > 0.0 && request.noise_factor.is_finite()) {
+        let why = format!("must be positive, is {}", request.noise_factor);
+        return Err(Error::of_usage(LabError::Value { key: "noise-factor".to_owned(), why }));
+    }
     let mut names: Vec<String> = Vec::new();
     for word in &request.families {
         match word.as_str() {
@@ -129,6 +140,9 @@ fn command(request: &Request) -> String {
     words.push(format!("--seeds {} --from {}", request.seeds, request.from));
     if request.sealed {
         words.push("--sealed".to_owned());
+    }
+    if request.noise_factor != 1.0 {
+        words.push(format!("--noise-factor {}", request.noise_factor));
     }
     if request.sealed_seeds > 0 {
         words.push(format!("--sealed-seeds {}", request.sealed_seeds));

@@ -22,8 +22,12 @@ pub struct Answer {
     pub verdict: Verdict,
     /// Its names.
     pub names: Vec<String>,
+    /// Its probability, where it has one.
+    pub probability: Option<f64>,
     /// The sets behind them, one for each effect found.
     pub sets: Vec<Vec<String>>,
+    /// The probability of each set.
+    pub set_probabilities: Vec<f64>,
     /// Where and over what the unlisted enters.
     pub unknown: Option<(String, String)>,
     /// What `armcal add suggested` would add.
@@ -44,9 +48,9 @@ pub struct Answer {
     pub calibration_seconds: f64,
 }
 
-/// The observations handed over as the pipeline would have made them.
-pub fn quick(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
-    let observed = scenario.observe()?;
+/// The observations handed over as the pipeline would have made them, their noise declared so many times as large.
+pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), Error> {
+    let observed = scenario.observe()?.declaring(noise_factor);
     let (model, observations) = (nominal_model(&observed.nominal)?, &observed.observations);
     let (fit, session) = (FitConfig::default(), Session::of(observations));
     let holdout = match observations.iter().any(|o| o.cavity().is_some()) {
@@ -108,7 +112,9 @@ fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, 
     Ok(Answer {
         verdict: diagnosis.verdict,
         names: diagnosis.names.clone(),
+        probability: diagnosis.probability,
         sets: diagnosis.effects.iter().map(|e| e.set.clone()).collect(),
+        set_probabilities: diagnosis.effects.iter().map(|e| e.probability).collect(),
         unknown: diagnosis.unknown.as_ref().map(|u| (u.channel.clone(), u.driver.clone())),
         suggested: suggested.iter().map(EffectSpec::to_string).collect(),
         before_mm: held_out_mm(before),

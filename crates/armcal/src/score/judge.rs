@@ -12,11 +12,14 @@ pub(super) const DWELLS: usize = 2;
 /// A held-out error within this factor of the floor is at the floor.
 pub(super) const AT_FLOOR: f64 = 1.1;
 
+/// Errors within this factor of the floor may be called nothing: the diagnosis's own `floor_factor`.
+pub(super) const NEAR_FLOOR: f64 = 1.5;
+
 /// How right an answer was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
-    /// Nothing was hidden and nothing was claimed.
+    /// Nothing that has a name was hidden, and no name was given.
     RightlySilent,
     /// Everything hidden was named first.
     First,
@@ -50,6 +53,9 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
             _ => Judgement::Wrong,
         };
     }
+    if hidden.iter().all(Hidden::is_discrepancy) {
+        return displaced(answer);
+    }
     let listed: Vec<&Hidden> = hidden.iter().filter(|h| h.effect.is_some()).collect();
     if answer.verdict == Verdict::NothingMissing {
         let shown = answer.before_mm > AT_FLOOR * answer.floor_mm;
@@ -61,9 +67,8 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
     let first =
         |h: &&Hidden| answer.sets.iter().any(|set| set.first().is_some_and(|name| is(h, name, false)));
     let within = |h: &&Hidden| answer.sets.iter().flatten().any(|name| is(h, name, true));
-    let explained = |set: &Vec<String>| set.iter().any(|name| listed.iter().any(|h| is(h, name, true)));
-    let wrong = answer.sets.iter().filter(|set| !explained(set)).count();
-    let confident = answer.sets.iter().any(|set| set.len() == 1 && !explained(set));
+    let wrong = answer.sets.iter().filter(|set| !holds_truth(set, hidden)).count();
+    let confident = answer.sets.iter().any(|set| set.len() == 1 && !holds_truth(set, hidden));
     if wrong == 0 && listed.iter().all(first) {
         return Judgement::First;
     }
@@ -75,6 +80,23 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
         (_, true, _) => Judgement::Wrong,
         (_, _, 0) => Judgement::Partial,
         _ => Judgement::WrongSet,
+    }
+}
+
+/// Whether one of the names is that of something hidden. That it may be something not listed is no name.
+pub(super) fn holds_truth(set: &[String], hidden: &[Hidden]) -> bool {
+    set.iter().any(|name| hidden.iter().any(|h| is(h, name, true)))
+}
+
+/// Of a smooth displacement, which nothing listed is: any listed name is wrong, that something unlisted or unexplained is
+/// left is right, and that nothing is missing is right only as long as the errors are near the floor.
+fn displaced(answer: &Answer) -> Judgement {
+    if answer.sets.iter().flatten().any(|name| name != NOT_LISTED) {
+        return Judgement::Wrong;
+    }
+    match answer.verdict {
+        Verdict::NothingMissing if answer.before_mm > NEAR_FLOOR * answer.floor_mm => Judgement::Silent,
+        _ => Judgement::RightlySilent,
     }
 }
 
@@ -126,7 +148,32 @@ fn same_effect(truth: &str, name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::same_effect;
+    use super::{Judgement, judge, same_effect};
+    use crate::score::page::tests::scored;
+    use armcal_diagnose::{NOT_LISTED, Verdict};
+
+    /// A smooth displacement has no name: what is told of it, at 1.2 and at 2 floors, and how right that is.
+    #[test]
+    fn of_a_smooth_displacement_every_name_is_wrong() {
+        let hidden = armcal_lab::scenario::Hidden {
+            effect: None,
+            mechanism: "waves".to_owned(),
+            ..scored("backlash", 1, Judgement::First, &[]).hidden.remove(0)
+        };
+        for (verdict, sets, far, near) in [
+            (Verdict::Identified, &[&["backlash:2"][..]][..], Judgement::Wrong, Judgement::Wrong),
+            (Verdict::Ambiguous, &[&["backlash:2", NOT_LISTED]], Judgement::Wrong, Judgement::Wrong),
+            (Verdict::Unknown, &[], Judgement::RightlySilent, Judgement::RightlySilent),
+            (Verdict::Unexplained, &[], Judgement::RightlySilent, Judgement::RightlySilent),
+            (Verdict::NothingMissing, &[], Judgement::Silent, Judgement::RightlySilent),
+        ] {
+            let mut answer = scored("nothing:smooth_3", 1, Judgement::Wrong, sets).answer;
+            answer.verdict = verdict;
+            assert_eq!(judge(&answer, std::slice::from_ref(&hidden)), far, "{verdict:?}");
+            answer.before_mm = 1.2 * answer.floor_mm;
+            assert_eq!(judge(&answer, std::slice::from_ref(&hidden)), near, "{verdict:?} near the floor");
+        }
+    }
 
     #[test]
     fn names_are_the_same_within_what_nobody_can_tell() {

@@ -8,11 +8,13 @@ mod case;
 mod interval;
 mod judge;
 mod page;
+mod reliability;
 mod table;
 
 pub use case::{Answer, nominal_model, quick, sealed};
 pub use judge::{Judgement, judge};
 pub use page::{Campaign, page};
+pub use reliability::Reliability;
 pub use table::{Row, rows, table};
 
 use crate::error::Error;
@@ -33,16 +35,27 @@ pub struct Scored {
     pub judgement: Judgement,
 }
 
+/// How a scenario reaches the diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    /// As observations, the noise of sensor, seats and encoders declared so many times as large as it is thought to be.
+    Observed {
+        /// How many times.
+        noise_factor: f64,
+    },
+    /// As recordings on disk, through the whole pipeline.
+    Recorded,
+}
+
 /// Runs scenarios in parallel, in their order; `done` is told of each one.
-pub fn score(
-    scenarios: &[Scenario],
-    whole_pipeline: bool,
-    done: &(dyn Fn() + Sync),
-) -> Result<Vec<Scored>, Error> {
+pub fn score(scenarios: &[Scenario], way: Way, done: &(dyn Fn() + Sync)) -> Result<Vec<Scored>, Error> {
     scenarios
         .par_iter()
         .map(|scenario| {
-            let (answer, hidden) = if whole_pipeline { sealed(scenario)? } else { quick(scenario)? };
+            let (answer, hidden) = match way {
+                Way::Observed { noise_factor } => quick(scenario, noise_factor)?,
+                Way::Recorded => sealed(scenario)?,
+            };
             let judgement = judge(&answer, &hidden);
             done();
             Ok(Scored { scenario: scenario.clone(), answer, hidden, judgement })
