@@ -7,6 +7,7 @@
 mod case;
 mod interval;
 mod judge;
+mod nothing;
 mod page;
 mod reliability;
 mod table;
