@@ -165,7 +165,8 @@ fn errs_more(
         held.change_text()
     );
     let subject = names.join(" + ");
-    held.harms().then(|| Warning::new(Severity::Notice, Stage::Diagnose, "holdout-errs-more", subject, message))
+    held.harms()
+        .then(|| Warning::new(Severity::Notice, Stage::Diagnose, "holdout-errs-more", subject, message))
 }
 
 #[cfg(test)]

@@ -54,12 +54,7 @@ pub(crate) fn ln_by_group(problem: &Problem, left_out: &DVector<f64>, groups: &[
 
 impl Kind {
     /// Of the points that are tracked, or of those that are not; none where there are none.
-    fn of(
-        problem: &Problem,
-        left_out: &DVector<f64>,
-        groups: &[Vec<usize>],
-        tracked: bool,
-    ) -> Option<Kind> {
+    fn of(problem: &Problem, left_out: &DVector<f64>, groups: &[Vec<usize>], tracked: bool) -> Option<Kind> {
         let errors: Vec<Vec<Axes>> = groups
             .iter()
             .map(|dwells| {

@@ -78,7 +78,7 @@ impl Judged {
 
     /// Whether it says more than nothing of dwells that the fit did not see.
     fn predicts(&self, config: &DiagnosisConfig) -> bool {
-        self.gain.nats >= config.margin_nats && self.places.p < config.max_p_heldout
+        self.gain.nats >= config.margin_nats.max(self.gain.se) && self.places.p < config.max_p_heldout
     }
 
     /// How far the name can be trusted.

@@ -79,11 +79,14 @@ impl Ranking {
             shares.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, share)| share).product()
         };
         let mut explanations = Vec::new();
-        let row = |effects: &[Candidate], p_adjusted: f64, score: &Score, probability: f64, in_answer: bool| Explanation {
-            effects: effects.iter().map(|c| c.spec.clone()).collect(),
-            standing: Standing::of(scored.as_ref().unwrap_or(score), score, probability, in_answer),
-            p_adjusted,
-        };
+        let row =
+            |effects: &[Candidate], p_adjusted: f64, score: &Score, probability: f64, in_answer: bool| {
+                Explanation {
+                    effects: effects.iter().map(|c| c.spec.clone()).collect(),
+                    standing: Standing::of(scored.as_ref().unwrap_or(score), score, probability, in_answer),
+                    p_adjusted,
+                }
+            };
         let p_of = |a: &Accepted, k: usize| a.judged.significance[k].p_adjusted;
         let p_others = |i: usize| {
             let others = accepted.iter().enumerate().filter(|(k, _)| *k != i);
@@ -118,8 +121,7 @@ impl Ranking {
             of_answer(b).cmp(&of_answer(a)).then(q.probability.total_cmp(&p.probability)).then(behind)
         });
         let without: f64 = accepted.iter().map(|a| a.probability(|w| w == Instead::Nothing)).product();
-        let unlisted =
-            accepted.iter().map(|a| a.probability(|w| w == Instead::Unlisted)).fold(0.0, f64::max);
+        let unlisted = accepted.iter().map(|a| a.probability(|w| w == Instead::Unlisted)).fold(0.0, f64::max);
         Ranking { explanations, p_nothing: without, p_unlisted: unlisted }
     }
 }

@@ -150,7 +150,8 @@ impl CandidateReport {
         self.effect = members.iter().map(|m| m.effect.as_str()).collect::<Vec<_>>().join(Candidate::AND);
         self.target = members.iter().map(|m| m.target.as_str()).collect::<Vec<_>>().join(", ");
         let named = |m: &CandidateReport| {
-            let full = |p: &ParameterReport| ParameterReport { name: format!("{}.{}", m.spec, p.name), ..p.clone() };
+            let full =
+                |p: &ParameterReport| ParameterReport { name: format!("{}.{}", m.spec, p.name), ..p.clone() };
             m.parameters.iter().map(full).collect::<Vec<_>>()
         };
         self.parameters = members.iter().flat_map(named).collect();

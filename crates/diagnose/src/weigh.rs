@@ -183,18 +183,7 @@ fn weigh_at(
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
     let given = problem.candidates.len();
     let crossed = OnceCell::new();
-    Weighed {
-        scale,
-        metrics,
-        dependences,
-        entries,
-        given,
-        points,
-        unlisted,
-        p_nothing,
-        p_noise,
-        crossed,
-    }
+    Weighed { scale, metrics, dependences, entries, given, points, unlisted, p_nothing, p_noise, crossed }
 }
 
 /// Terms of one kind.

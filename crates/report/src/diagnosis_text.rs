@@ -358,7 +358,16 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
 }
 
 fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
-    let mut table = pen.table(&["explanation", "size", "behind [nats]", "probability", "p", PREDICTED, "absorbed", "also"]);
+    let mut table = pen.table(&[
+        "explanation",
+        "size",
+        "behind [nats]",
+        "probability",
+        "p",
+        PREDICTED,
+        "absorbed",
+        "also",
+    ]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
             Cell::new(run.in_words(&printable(&c.spec))),
