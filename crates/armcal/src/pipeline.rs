@@ -94,6 +94,9 @@ pub struct Pipeline {
     /// How the missing effect is looked for.
     #[serde(default)]
     pub diagnosis: DiagnosisConfig,
+    /// How good the result has to be.
+    #[serde(default)]
+    pub accuracy: AccuracySection,
     /// What stands beside a verification on these recordings.
     #[serde(default)]
     pub verify: VerifyConfig,
@@ -114,6 +117,15 @@ pub struct Pipeline {
     /// The file's text, carried into the results.
     #[serde(skip)]
     pub text: String,
+}
+
+/// How good the result has to be.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AccuracySection {
+    /// Mean error of the judged points that is wanted at most [mm]: above it the result is inadequate (exit 3), at it nothing about
+    /// the size of the errors makes it so. Eq. 4 of the paper has it as `a`.
+    pub wanted_mm: Option<f64>,
 }
 
 /// One recording.

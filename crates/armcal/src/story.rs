@@ -234,6 +234,7 @@ pub(crate) fn run_of(
     (observations, session): (Vec<Observation>, Session),
     calibration: Calibration,
 ) -> Run {
+    let ties = frames::ties(pipeline, &model);
     Run {
         pipeline_name: pipeline.name.clone(),
         pipeline_text: pipeline.text.clone(),
@@ -248,6 +249,8 @@ pub(crate) fn run_of(
         setup: SetupReport::default(),
         diagnosis: None,
         undiagnosed: Some(Undiagnosed::NotAsked),
+        wanted_mm: pipeline.accuracy.wanted_mm,
+        ties,
         steps: Vec::new(),
         alternatives: Vec::new(),
         warnings: Vec::new(),
@@ -269,6 +272,7 @@ pub fn recalibrate(
     if run.setup.mistakes().next().is_none() {
         diagnose_again(run, pipeline, progress);
     }
+    run.ties = frames::ties(pipeline, &run.model);
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
     add_refits(run, pipeline, progress)

@@ -12,7 +12,7 @@ const LARGE_SCALE: f64 = 1.5;
 /// known about the cause.
 pub const INADEQUATE: f64 = 2.0;
 /// Code of the warning about residuals that scatter more than declared.
-const ABOVE_NOISE: &str = "residuals-above-noise";
+pub const ABOVE_NOISE: &str = "residuals-above-noise";
 /// Code of the warning about a mean error above the floor.
 pub const ABOVE_FLOOR: &str = "errors-above-floor";
 /// Share of outliers from which on they are no exceptions.

@@ -28,16 +28,14 @@ pub struct DiagnosisConfig {
     pub max_probability_nothing: f64,
     /// A name needs a family-wise p-value (bootstrap, max-T) at most this; default 0.01.
     pub max_p_adjusted: f64,
-    /// Mass of the credible set; default 0.95.
-    pub credible_mass: f64,
-    /// A name must beat the best unlisted explanation by this many nats; default 3.
+    /// What a further amplitude must gain in the score, the ln predictive density of dwells that a fit did not see; default 3.
     pub margin_nats: f64,
     /// Effects whose fitted signature is this parallel are one answer; default 0.98.
     pub merge_cosine: f64,
     /// Largest p-value of the leave-place-out gain (sign flips); default 0.05.
     pub max_p_heldout: f64,
-    /// A further effect must remove at least this share of what the first one removed, and this share of an effect's
-    /// evidence may be the detail of its shape; default 0.01.
+    /// A further effect must remove at least this share of what the first one removed, and this share of what an effect gains
+    /// may be the detail of its shape; default 0.01.
     pub leftover_share: f64,
     /// Pairs with an expected log-likelihood ratio (times two) below this cannot be told apart; default 6.
     pub min_delta: f64,
@@ -47,16 +45,11 @@ pub struct DiagnosisConfig {
     pub seed: u64,
     /// Most effects accepted one after the other; default 8.
     pub max_effects: usize,
-    /// Most members of an ambiguous set; beyond it the verdict is unknown. Default 8.
-    pub max_set: usize,
     /// A dwell is set aside when its left-out residual is as rare as this many sigma; default 5.
     pub outlier_sigma: f64,
-    /// Errors up to this many times the noise floor, scattering up to this many times as declared, are at the floor: only
-    /// then may nothing be missing; default 1.5.
+    /// Errors up to this many times what repeatability and the declared noise give are of these: only then may nothing be
+    /// missing; default 1.5.
     pub floor_factor: f64,
-    /// With everything found in the model, errors above this many times the floor take back every name: what leaves so
-    /// much has not been understood; default 10.
-    pub unexplained_factor: f64,
     /// Most dwells that weigh explanations; of more, as many are drawn evenly over time. All of them take part in
     /// fits. Default 400.
     pub max_weighed: usize,
@@ -83,7 +76,6 @@ impl Default for DiagnosisConfig {
             unlisted_effect_mm: 0.5,
             max_probability_nothing: 0.02,
             max_p_adjusted: 0.01,
-            credible_mass: 0.95,
             margin_nats: 3.0,
             merge_cosine: 0.98,
             max_p_heldout: 0.05,
@@ -92,10 +84,8 @@ impl Default for DiagnosisConfig {
             resamplings: 999,
             seed: 0,
             max_effects: 8,
-            max_set: 8,
             outlier_sigma: 5.0,
             floor_factor: 1.5,
-            unexplained_factor: 10.0,
             max_weighed: 400,
             same_pose_deg: 0.6,
             exclude: BTreeMap::new(),
@@ -116,7 +106,6 @@ impl DiagnosisConfig {
             ("prior_correlated_noise", self.prior_correlated_noise),
             ("max_probability_nothing", self.max_probability_nothing),
             ("max_p_adjusted", self.max_p_adjusted),
-            ("credible_mass", self.credible_mass),
             ("merge_cosine", self.merge_cosine),
             ("max_p_heldout", self.max_p_heldout),
         ] {
@@ -129,7 +118,6 @@ impl DiagnosisConfig {
             ("unlisted_effect_mm", self.unlisted_effect_mm),
             ("outlier_sigma", self.outlier_sigma),
             ("floor_factor", self.floor_factor),
-            ("unexplained_factor", self.unexplained_factor),
             ("same_pose_deg", self.same_pose_deg),
         ] {
             if !(value.is_finite() && value > 0.0) {

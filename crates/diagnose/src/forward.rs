@@ -62,12 +62,10 @@ impl Accepted {
 pub(crate) struct Step {
     /// What joins the model.
     pub candidate: Candidate,
-    ln_evidence: f64,
     named_at_once: bool,
-    /// ln Bayes factor of the best cell at that point.
-    ln_cell: f64,
-    /// ln of the prior of one entry over that of one cell.
-    ln_prior: f64,
+    /// By how much the score rose with it, and would have risen with the best unlisted shape in its place [nats].
+    gain_nats: f64,
+    unlisted_nats: f64,
     /// Fall of the squared residual, declared noise = 1.
     fall: f64,
 }
@@ -75,7 +73,7 @@ pub(crate) struct Step {
 impl Step {
     /// One that was confirmed before.
     pub fn known(candidate: Candidate, fall: f64) -> Step {
-        Step { candidate, ln_evidence: 0.0, named_at_once: true, ln_cell: 0.0, ln_prior: 0.0, fall }
+        Step { candidate, named_at_once: true, gain_nats: 0.0, unlisted_nats: 0.0, fall }
     }
 }
 
@@ -182,7 +180,15 @@ pub(crate) fn forward(
     while steps.len() < config.max_effects {
         let mut accepted: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         accepted.extend_from_slice(cells);
-        let room = rooms.with(&accepted)?;
+        let room = match rooms.with(&accepted) {
+            Ok(room) => room,
+            // The last one cannot be fitted beside the others: the search ends without it.
+            Err(_) if !steps.is_empty() => {
+                rooms.dropped.extend(steps.pop().map(|step| step.candidate.spec));
+                break;
+            }
+            Err(error) => return Err(error),
+        };
         let weighed = &room.weighed;
         if weighed.p_nothing >= config.max_probability_nothing {
             break;
@@ -213,17 +219,10 @@ pub(crate) fn forward(
             may_be_shape = true;
             break;
         }
-        let count = weighed.unlisted.iter().filter(|u| u.what.channel.is_some()).count().max(1) as f64;
-        let ln_prior = (config.prior_catalogue / weighed.entries.len().max(1) as f64).ln()
-            - (0.5 * config.prior_unknown / count).ln();
-        let step = Step {
-            candidate: entry.candidate.clone(),
-            ln_evidence: entry.ln_evidence,
-            named_at_once: named,
-            ln_cell: weighed.best_cell().map_or(f64::NEG_INFINITY, |u| u.ln_evidence),
-            ln_prior,
-            fall,
-        };
+        let gain_nats = judged.gain.nats;
+        let unlisted_nats = judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats);
+        let candidate = entry.candidate.clone();
+        let step = Step { candidate, named_at_once: named, gain_nats, unlisted_nats, fall };
         steps.extend(one_by_one(step, &room.problem));
         if cells.is_empty() {
             drop_superseded(&mut steps, rooms, config)?;
@@ -261,13 +260,8 @@ fn one_by_one(step: Step, problem: &Problem) -> Vec<Step> {
     let of = |spec: &str| all_of(problem).find(|c| c.spec == spec).cloned();
     let members = step.candidate.members().filter_map(of).collect::<Vec<_>>();
     let share = 1.0 / members.len().max(1) as f64;
-    let one = |candidate| Step {
-        candidate,
-        ln_evidence: share * step.ln_evidence,
-        ln_prior: 0.0,
-        fall: share * step.fall,
-        ..step
-    };
+    let one =
+        |candidate| Step { candidate, gain_nats: share * step.gain_nats, fall: share * step.fall, ..step };
     members.into_iter().map(one).collect()
 }
 
@@ -292,12 +286,12 @@ fn drop_superseded(
 }
 
 /// Whether the steps from the first one that could not be named alone say more than the best single unlisted shape at
-/// that point.
+/// that point, by a margin for each of them.
 fn beats_a_cell(steps: &[Step], config: &DiagnosisConfig) -> bool {
     let Some(from) = steps.iter().position(|s| !s.named_at_once) else { return true };
-    let together: f64 = steps[from..].iter().map(|s| s.ln_evidence).sum();
-    let cost: f64 = steps[from + 1..].iter().map(|s| s.ln_prior.min(0.0)).sum();
-    together + cost - steps[from].ln_cell >= config.margin_nats
+    let together: f64 = steps[from..].iter().map(|s| s.gain_nats).sum();
+    let cost = config.margin_nats * (steps.len() - from) as f64;
+    together - cost >= steps[from].unlisted_nats
 }
 
 fn all_of(problem: &Problem) -> impl Iterator<Item = &Candidate> {

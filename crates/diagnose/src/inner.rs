@@ -26,6 +26,7 @@ use crate::{DiagnoseError, next};
 use armcal_core::{DwellId, Severity, Stage, Warning, listed};
 use armcal_model::Toggle;
 use nalgebra::DVector;
+use std::collections::BTreeSet;
 
 /// Noise this far above the declaration is worth a word.
 const SIGMA_RATIO: f64 = 1.4;
@@ -47,7 +48,7 @@ pub(crate) fn propose(
     let config = &DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
     let whole = refit.problem(&[])?;
     whole.check()?;
-    let Cleaned { keep, problem, weighed, .. } = set_aside(whole, config);
+    let Cleaned { keep, problem, weighed, .. } = set_aside(whole.evaluable(&mut BTreeSet::new()), config);
     let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
     Ok(named(&from_nothing(&mut rooms, config)?.accepted))
 }
@@ -61,15 +62,30 @@ pub(crate) fn diagnose_beyond(
     config.check()?;
     let whole = refit.problem(&[])?;
     whole.check()?;
-    let Cleaned { keep, aside, problem, weighed } = set_aside(whole, config);
+    let mut dropped = BTreeSet::new();
+    let Cleaned { keep, aside, problem, weighed } = set_aside(whole.evaluable(&mut dropped), config);
     let dwells = keep.len();
     let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
+    rooms.dropped = dropped;
     let mut search = search(&mut rooms, proposed, config)?;
     settle(&mut search, &mut rooms, config)?;
     let room = rooms.with(&[])?;
     let ranking = Ranking::of(&search, &room, &mut rooms, config);
     let before = Before::of(&room, ranking, config);
-    Ok(assemble(before, (dwells, aside), &search, config))
+    let mut diagnosis = assemble(before, (dwells, aside), &search, config);
+    diagnosis.warnings.extend(not_evaluated(&rooms.dropped));
+    Ok(diagnosis)
+}
+
+/// That some candidates had no part in the choice.
+fn not_evaluated(dropped: &BTreeSet<String>) -> Option<Warning> {
+    let names: Vec<String> = dropped.iter().cloned().collect();
+    let message = format!(
+        "{} had no part in the choice: a derivative is no number here, or the model with it cannot be fitted",
+        listed(&names)
+    );
+    let notice = || Warning::new(Severity::Notice, Stage::Diagnose, "not-evaluated", listed(&names), message);
+    (!names.is_empty()).then(notice)
 }
 
 /// What is told of the model without effects.

@@ -38,20 +38,27 @@ impl Noise {
     pub fn word(self) -> Cow<'static, str> {
         let plain = match self {
             Noise::Slack(joint) => {
-                return format!("another angle of joint {} in every dwell, as within play", joint + 1).into();
+                return format!(
+                    "as if joint {} took an angle of its own in every dwell, within play",
+                    joint + 1
+                )
+                .into();
             }
             Noise::White => "independent from dwell to dwell",
-            Noise::Place => "repeated at every visit to a place (seat or cavity errors)",
-            Noise::Visit => "repeated at visits to a place within a recording",
-            Noise::Memory => "correlated over a few dwells in a row",
-            Noise::Sensor => "a wandering position sensor, larger than declared",
+            Noise::Place => "alike at every visit to a place, as seats and cavities off their place make it",
+            Noise::Visit => "alike at visits to a place within a recording",
+            Noise::Memory => "alike over a few dwells in a row",
+            Noise::Sensor => {
+                "alike over neighbouring tracked dwells and larger than declared, as a sensor or a frame that drifts makes it"
+            }
             Noise::Tracked => "larger than declared where the tip was tracked",
             Noise::TrackedAndPlace => {
-                "larger than declared where the tip was tracked, and cavities off their place"
+                "larger than declared where the tip was tracked, and alike at every visit to a cavity"
             }
             Noise::Seated => "larger than declared where the tip was seated",
             Noise::SensorAndPlace => {
-                "a wandering position sensor, larger than declared, and cavities off their place"
+                "alike over neighbouring tracked dwells and larger than declared, as a sensor or a frame that drifts makes it, and \
+                 alike at every visit to a cavity"
             }
         };
         plain.into()

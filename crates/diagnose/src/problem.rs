@@ -8,6 +8,7 @@ use crate::whitener::Whitener;
 use armcal_core::{DwellId, Measured, Unit};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3xX};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A linearised calibration with everything that might be missing from it.
@@ -264,15 +265,26 @@ impl Problem {
         if !finite.into_iter().all(|v| v.is_finite()) {
             return Err(DiagnoseError::NotFinite { what: "the residual or the geometry".to_string() });
         }
-        for c in &self.candidates {
-            if !c.columns.is_finite() {
-                return Err(DiagnoseError::NotFinite { what: format!("candidate {}", c.spec) });
-            }
-        }
         if rows < 6 || self.dwells.len() < 4 {
             return Err(DiagnoseError::TooFew { rows, parameters: self.geometry.ncols() });
         }
         Ok(())
+    }
+
+    /// The same without what cannot be evaluated here, a derivative being no number; `dropped` are given its names.
+    pub(crate) fn evaluable(mut self, dropped: &mut BTreeSet<String>) -> Problem {
+        let mut keep = |c: &Candidate| {
+            let evaluable = c.columns.is_finite();
+            if !evaluable {
+                dropped.insert(c.spec.clone());
+            }
+            evaluable
+        };
+        self.candidates.retain(&mut keep);
+        self.scans.iter_mut().for_each(|scan| scan.points.retain(&mut keep));
+        self.scans.retain(|scan| !scan.points.is_empty());
+        self.channels.retain(|channel| channel.columns.iter().all(|v| v.is_finite()));
+        self
     }
 
     /// The same problem with more columns among the geometry, each with the prior of an effect's amplitude.

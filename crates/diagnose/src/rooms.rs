@@ -16,7 +16,7 @@ use crate::weigh::{Outside, Weighed, weigh_among};
 use armcal_model::Toggle;
 use nalgebra::DMatrix;
 use std::cell::{OnceCell, RefCell};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::rc::{Rc, Weak};
 use std::sync::Arc;
 
@@ -127,6 +127,8 @@ pub(crate) struct Rooms<'a> {
     last: VecDeque<Rc<Room>>,
     /// Scores of refits, by what was in the model and whether the noise was taken to remember.
     scores: BTreeMap<(Vec<String>, bool), Option<Score>>,
+    /// Candidates that could not be evaluated, or not be fitted.
+    pub dropped: BTreeSet<String>,
 }
 
 impl<'a> Rooms<'a> {
@@ -139,8 +141,8 @@ impl<'a> Rooms<'a> {
     ) -> Rooms<'a> {
         let room = Rc::new(Room::new(first.0, first.1));
         let dependences = room.weighed.dependences.clone();
-        let (cut, known, last, scores) = Default::default();
-        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last, scores };
+        let (cut, known, last, scores, dropped) = Default::default();
+        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last, scores, dropped };
         rooms.remember(Vec::new(), &room);
         rooms
     }
@@ -195,6 +197,9 @@ impl<'a> Rooms<'a> {
             let left = left_out(&problem, None, &room.exam().folds, problem.sigma());
             Score::of(&problem, &left, room.exam())
         });
+        if score.is_none() {
+            self.dropped.extend(accepted.last().map(|candidate| candidate.spec.clone()));
+        }
         self.scores.insert(key, score.clone());
         score
     }
@@ -213,6 +218,7 @@ impl<'a> Rooms<'a> {
     /// A problem without the dwells that do not count.
     fn kept(&mut self, problem: Problem) -> Result<Problem, DiagnoseError> {
         problem.check()?;
+        let problem = problem.evaluable(&mut self.dropped);
         if self.keep.iter().all(|k| *k) {
             return Ok(problem);
         }

@@ -25,6 +25,11 @@ impl Diagnosis {
         Ok(effects)
     }
 
+    /// Of each effect that is suggested by a name all names that are the same answer.
+    pub fn sets(&self) -> Vec<Vec<String>> {
+        self.effects.iter().chain(self.beside_curves()).map(|e| e.set.clone()).collect()
+    }
+
     /// Effects that show once the error curves of joints are in the model; none where what is missing is anything else.
     pub fn beside_curves(&self) -> &[FoundEffect] {
         let curves = !self.unlisted.is_empty() && self.unlisted.iter().all(|u| u.own_angle().is_some());

@@ -45,7 +45,7 @@ pub use dh_toml::DhRow;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, Offered, Override, PlacedEffect,
     Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find, is_of_effect,
-    least_dwells, place_and_moment,
+    least_dwells, place_and_moment, tables_toml,
 };
 pub use error::ModelError;
 pub use fixed::{FixedPlace, Length};

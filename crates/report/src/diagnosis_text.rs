@@ -8,7 +8,7 @@ use crate::recording_names::RecordingNames;
 use crate::run::Run;
 use crate::sizes::{clear, size_in_table, sizes, sizes_of};
 use crate::text::printable;
-use armcal_core::{Certainty, SetupReport};
+use armcal_core::{Certainty, SetupReport, listed};
 use armcal_diagnose::{Diagnosis, FoundEffect, HeldOut, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
@@ -23,6 +23,8 @@ const PREDICTED: &str = "linearised, left out [mm]";
 const FEW_SIZES: usize = 2;
 /// Share of a curve [%] from which the multiples of a ripple are worth a word.
 const BENT_PERCENT: f64 = 5.0;
+/// Where the declared noise gives this many times the error that remains it is declared too large.
+const OVERDECLARED: f64 = 1.5;
 /// Heading of the tables that add what is unlisted.
 const PASTE: &str = "To paste into the pipeline";
 
@@ -184,7 +186,27 @@ fn added(run: &Run, d: &Diagnosis) -> Option<String> {
 
 /// The answer in one sentence.
 pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
-    run.in_words(&as_spelt(d)) + &joints_told(run, d)
+    let ties = run.ties.iter().map(|(name, all)| tied(name, all));
+    let also = overdeclared(d).into_iter().chain(ties);
+    let told = [as_spelt(run, d)].into_iter().chain(also).collect::<Vec<_>>().join(" ");
+    run.in_words(&told) + &joints_told(run, d)
+}
+
+/// That a name in the model stands for one of several.
+fn tied(name: &str, all: &[String]) -> String {
+    printable(&format!("In the model, {name} is one of {}: the data did not tell which.", listed(all)))
+}
+
+/// That errors end below what the declared noise gives, where they do, and by how much.
+fn overdeclared(d: &Diagnosis) -> Option<String> {
+    let (floor, error) = (d.floor_mm, d.holdout_mm.after);
+    (floor > OVERDECLARED * error).then(|| {
+        format!(
+            "The noise is declared too large: it would give a mean error of {floor:.3} mm, {:.1} times the {error:.3} mm that \
+             remain.",
+            floor / error
+        )
+    })
 }
 
 /// The names of the joints that a headline numbers through all branches; nothing for an arm without any.
@@ -203,7 +225,7 @@ fn joints_told(run: &Run, d: &Diagnosis) -> String {
 }
 
 /// The same with recordings by their index, and events as a pipeline spells them.
-fn as_spelt(d: &Diagnosis) -> String {
+fn as_spelt(run: &Run, d: &Diagnosis) -> String {
     let unseen = d.not_testable.len();
     match d.verdict {
         Verdict::NothingMissing => {
@@ -211,7 +233,8 @@ fn as_spelt(d: &Diagnosis) -> String {
                 0 => String::new(),
                 n => format!(" ({n} effects of realistic size would not have shown)"),
             };
-            format!("Nothing is missing that these data can show{not_shown}.")
+            let nothing = if run.ties.is_empty() { "Nothing" } else { "Nothing else" };
+            format!("{nothing} is missing that these data can show{not_shown}.")
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));

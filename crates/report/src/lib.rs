@@ -13,6 +13,7 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod adequate;
 mod by_marker;
 mod campaign;
 mod channels;

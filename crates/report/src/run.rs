@@ -2,13 +2,14 @@
 
 pub use armcal_campaign::Status;
 
+use crate::adequate::as_wanted;
 use crate::diagnosis_text::{headline, setup_beside, setup_sentence};
 use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
-use armcal_calibrate::{ABOVE_FLOOR, Calibration, Residual};
+use armcal_calibrate::{Calibration, Residual};
 use armcal_core::{Dwell, DwellId, ErrorStats, Observation, Rejection, Role, SetupReport, Severity, Warning};
-use armcal_diagnose::{Diagnosis, UNEXPLAINED};
+use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
 use armcal_recording::{FileReport, RecordingReport, sha256_of};
@@ -50,6 +51,11 @@ pub struct Run {
     pub diagnosis: Option<Diagnosis>,
     /// Why there is no diagnosis.
     pub undiagnosed: Option<Undiagnosed>,
+    /// Mean error that its user wants at most [mm], where that was said.
+    pub wanted_mm: Option<f64>,
+    /// Effects of its model that stand for one of several: the name as a pipeline spells it, and all names that the data left when
+    /// it was added.
+    pub ties: Vec<(String, Vec<String>)>,
     /// What the diagnosis found, added one effect after the other (what has no name at once), fitted and held out anew.
     pub steps: Vec<Refit>,
     /// What the most probable candidates would do, each alone in the run's model; those that are no step already.
@@ -177,10 +183,7 @@ impl Run {
         let all = of_setup.iter().chain(all).chain(of_diagnosis);
         let mut own = without_repeats(all.chain(&outputs));
         own.retain(|w| !of_recordings.contains(w));
-        // How far above the floor, the diagnosis tells with the places.
-        let unexplained = own.iter().any(|w| w.code == UNEXPLAINED && w.severity == Severity::Inadequate);
-        own.retain(|w| w.code != ABOVE_FLOOR || !unexplained);
-        own.into_iter().cloned().collect()
+        as_wanted(self, own.into_iter().cloned().collect())
     }
 
     /// What the run says about its model: the same in every output.

@@ -9,12 +9,14 @@ use crate::stages::frames;
 use crate::story::{self, Fitted, Settled};
 use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
-use armcal_diagnose::Nested;
-use armcal_model::{EffectSpec, effects_toml};
+use armcal_core::listed;
+use armcal_diagnose::{Diagnosis, Nested};
+use armcal_model::{EffectSpec, EffectTable, tables_toml};
 use armcal_recording::{atomic, may_put};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
 use clap::Args;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The word for "whatever the diagnosis suggests".
@@ -42,6 +44,8 @@ pub struct Request {
 /// What is added, what it does to recordings that did not teach it, and what is left out for that.
 struct Chosen {
     new: Vec<EffectSpec>,
+    /// Of each found effect all names that are the same answer.
+    sets: Vec<Vec<String>>,
     transfer: Vec<Transfer>,
     left_out: Vec<LeftOut>,
     nested: Option<Nested>,
@@ -53,14 +57,15 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     may_write(results(&pipeline, &request.out))?;
     let named = named(&request.effects, &pipeline)?;
     if let Some(new) = &named {
-        extend(&pipeline, &request.pipeline, request.write.as_deref(), new)?;
+        extend(&pipeline, &request.pipeline, request.write.as_deref(), (new, &[]))?;
     }
     let progress = Progress::new();
     let settled = story::settle(&pipeline, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
-    let Chosen { new, transfer, left_out, nested } = chosen(named, &pipeline, &settled, &effects, &progress)?;
-    let extended = extend(&pipeline, &request.pipeline, request.write.as_deref(), &new)?;
+    let Chosen { new, sets, transfer, left_out, nested } =
+        chosen(named, &pipeline, &settled, &effects, &progress)?;
+    let extended = extend(&pipeline, &request.pipeline, request.write.as_deref(), (&new, &sets))?;
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
@@ -81,6 +86,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         let pipeline = serde_json::to_value(&extended.path).map_err(Error::Json)?;
         let value = json!({
             "added": added,
+            // Of each that stands for one of several all names.
+            "one_of": run.ties.iter().cloned().collect::<BTreeMap<_, _>>(),
             // What the diagnosis suggests and another session or recording contradicts.
             "left_out": left_out,
             // Each effect fitted on all recordings but one and judged on that one.
@@ -93,7 +100,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         });
         print(&super::json_text(&value)?)?;
     } else {
-        let added = run.in_words(&added.join(", "));
+        let one_of = |name: &String| match set_of(name, &sets) {
+            Some(set) => format!("{name} (one of {}: these data do not tell which)", listed(set)),
+            None => name.clone(),
+        };
+        let added = run.in_words(&added.iter().map(one_of).collect::<Vec<_>>().join(", "));
         print(&format!("Added {added} to {}\n\n", request.pipeline.display()))?;
         for LeftOut { effect, reason } in &left_out {
             print(&format!("Left out: {}: {reason}\n\n", run.in_words(effect)))?;
@@ -135,7 +146,7 @@ fn chosen(
     let checked = |new: &[EffectSpec]| transfers(pipeline, geometry, (base, new), observations, progress);
     if let Some(new) = named {
         let transfer = checked(&new)?;
-        return Ok(Chosen { new, transfer, left_out: Vec::new(), nested: None });
+        return Ok(Chosen { new, sets: Vec::new(), transfer, left_out: Vec::new(), nested: None });
     }
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
@@ -143,6 +154,7 @@ fn chosen(
         Some(found) => story::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?,
         None => None,
     };
+    let sets = diagnosis.as_ref().map_or_else(Vec::new, Diagnosis::sets);
     let lasting = diagnosis.map(|d| d.lasting(joints, pipeline.recordings.len())).transpose()?;
     let (mut new, of_time) = lasting.unwrap_or_default();
     let mut left_out: Vec<LeftOut> = of_time.iter().map(LeftOut::of_time).collect();
@@ -157,7 +169,7 @@ fn chosen(
         let reasons = left_out.iter().map(|l| format!("{}: {}", l.effect, l.reason)).collect();
         return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: reasons });
     }
-    Ok(Chosen { new, transfer, left_out, nested })
+    Ok(Chosen { new, sets, transfer, left_out, nested })
 }
 
 /// A pipeline with more effects, and where it is written.
@@ -175,14 +187,23 @@ pub fn extend(
     pipeline: &Pipeline,
     original: &Path,
     write: Option<&Path>,
-    new: &[EffectSpec],
+    (new, sets): (&[EffectSpec], &[Vec<String>]),
 ) -> Result<Extended, Error> {
-    let tables = effects_toml(new).map_err(Error::Toml)?;
+    let table = |effect: &EffectSpec| {
+        let one_of = set_of(&effect.to_string(), sets).cloned().unwrap_or_default();
+        EffectTable { one_of, ..EffectTable::from(effect) }
+    };
+    let tables = tables_toml(new.iter().map(table).collect()).map_err(Error::Toml)?;
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
     let path = write.map_or_else(|| beside(original, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
     may_put(&path, pipeline.text.as_bytes()).map_err(Error::Output)?;
     Ok(Extended { pipeline, path })
+}
+
+/// The names that are the same answer as one, where there are several.
+fn set_of<'s>(name: &str, sets: &'s [Vec<String>]) -> Option<&'s Vec<String>> {
+    sets.iter().find(|set| set.len() > 1 && set.iter().any(|other| other == name))
 }
 
 /// `paper.toml` and `backlash:1` give `paper+backlash-1.toml`.

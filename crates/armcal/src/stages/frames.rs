@@ -209,6 +209,13 @@ pub fn effect_specs(pipeline: &Pipeline, model: &Model) -> Result<Vec<EffectSpec
     pipeline.effects.iter().map(|table| table.spec(joints).map_err(Error::Model)).collect()
 }
 
+/// Effects of the pipeline that stand for one of several names: how it is spelt, and all of them.
+pub fn ties(pipeline: &Pipeline, model: &Model) -> Vec<(String, Vec<String>)> {
+    let joints = model.chain().joint_names();
+    let tied = pipeline.effects.iter().filter(|table| table.one_of.len() > 1);
+    tied.filter_map(|table| Some((table.spec(joints).ok()?.to_string(), table.one_of.clone()))).collect()
+}
+
 /// Starts every estimated board frame where the association found the board.
 pub fn start_frames(pipeline: &Pipeline, model: &mut Model, places: &[Option<Association>]) {
     if pipeline.table.as_ref().is_none_or(|t| t.pose != BoardPose::Estimated) {

@@ -9,6 +9,7 @@ use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story;
 use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_recording::atomic;
 use armcal_report::{Basis, PageKind, Refit, Run, refit_json, report_html};
@@ -111,7 +112,8 @@ impl Bench {
         if new.is_empty() {
             return Err(Error::NothingToKeep { path: self.path.clone() });
         }
-        let extended = add::extend(&self.pipeline, &self.path, None, &new)?;
+        let sets = self.run.diagnosis.as_ref().map_or_else(Vec::new, Diagnosis::sets);
+        let extended = add::extend(&self.pipeline, &self.path, None, (&new, &sets))?;
         atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
         Ok(extended.path)
     }

@@ -40,6 +40,7 @@ impl Formula {
             name: Some(self.name.clone()),
             formula: Some(self.formula.clone()),
             acts_on: Some(self.acts_on.clone()),
+            one_of: Vec::new(),
             shape: BTreeMap::new(),
             parameters: self.parameters.clone(),
         }

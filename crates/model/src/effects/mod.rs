@@ -80,7 +80,7 @@ pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;
 pub use spec::{EffectSpec, Since, place_and_moment};
-pub use table::{EffectTable, Override, Word, effects_toml};
+pub use table::{EffectTable, Override, Word, effects_toml, tables_toml};
 
 pub(crate) use declared::Declared;
 pub(crate) use nominal_pose::NominalPose;

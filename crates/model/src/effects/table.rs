@@ -45,6 +45,9 @@ pub struct EffectTable {
     /// What an expression acts on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acts_on: Option<String>,
+    /// Names that the data did not tell from it when it was added, its own among them. They do not act.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub one_of: Vec<String>,
     /// Shapes by their names, SI; any other key, which [`EffectTable::spec`] then names.
     #[serde(flatten)]
     pub shape: BTreeMap<String, Word<f64>>,
@@ -157,7 +160,7 @@ impl EffectTable {
 }
 
 fn unknown_key(key: &str) -> String {
-    let known = ["kind", "target", "since", "name", "formula", "acts_on", "parameters"];
+    let known = ["kind", "target", "since", "name", "formula", "acts_on", "one_of", "parameters"];
     format!("there is no key \"{key}\"{}", hint(key, known.into_iter()))
 }
 
@@ -171,6 +174,7 @@ impl From<&EffectSpec> for EffectTable {
             name: expression.map(|e| e.name.clone()),
             formula: expression.map(|e| e.formula.clone()),
             acts_on: expression.map(|e| e.acts_on.clone()),
+            one_of: Vec::new(),
             shape: spec.shape.iter().map(|(key, value)| (key.clone(), Word::Number(*value))).collect(),
             parameters: spec.overrides.clone(),
         }
@@ -182,9 +186,17 @@ impl From<&EffectSpec> for EffectTable {
 /// # Errors
 /// A value that TOML cannot hold.
 pub fn effects_toml(effects: &[EffectSpec]) -> Result<String, toml::ser::Error> {
+    tables_toml(effects.iter().map(EffectTable::from).collect())
+}
+
+/// The same of tables.
+///
+/// # Errors
+/// A value that TOML cannot hold.
+pub fn tables_toml(effects: Vec<EffectTable>) -> Result<String, toml::ser::Error> {
     #[derive(Serialize)]
     struct Section {
         effects: Vec<EffectTable>,
     }
-    toml::to_string(&Section { effects: effects.iter().map(EffectTable::from).collect() })
+    toml::to_string(&Section { effects })
 }

@@ -104,6 +104,8 @@ pub fn synthetic() -> Synthetic {
         setup: SetupReport::default(),
         diagnosis: None,
         undiagnosed: Some(Undiagnosed::NotAsked),
+        wanted_mm: None,
+        ties: Vec::new(),
         steps: Vec::new(),
         alternatives: Vec::new(),
         transfer: None,
