@@ -54,7 +54,8 @@ fn refined(now: &Inputs, tried: Tried) -> Tried {
         let number = Some(Number { value, ..number.clone() });
         attempt(now, Hypothesis { number, freedom: Freedom::Number, ..of_value })
     };
-    let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.mean_m);
+    // By the spread: of a scale, the plain mean is least at too small a one.
+    let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.of_spread());
     let [mut low, mut high] = number.between;
     let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));
     let (mut at_a, mut at_b) = (at(a), at(b));
@@ -72,7 +73,7 @@ fn refined(now: &Inputs, tried: Tried) -> Tried {
     }
     let mut best = tried;
     for other in [at_a, at_b].into_iter().flatten() {
-        if other.misfit.mean_m < best.misfit.mean_m {
+        if other.misfit.of_spread() < best.misfit.of_spread() {
             best = other;
         }
     }

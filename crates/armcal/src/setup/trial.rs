@@ -6,10 +6,11 @@ use crate::stages::associated::Associated;
 use crate::stages::perceive::Seen;
 use crate::story::{self, Fitted};
 use armcal_calibrate::{HoldoutConfig, Objective};
-use armcal_core::{Dwell, Parameter};
+use armcal_core::{Dwell, FeatureId, Observation, Parameter};
 use armcal_model::Chain;
 use armcal_table::{Board, Place};
-use std::collections::BTreeSet;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An error of this many times its expectation is as bad as no error at all: a dwell that finds no place counts as much.
 const CAP: f64 = 300.0;
@@ -83,6 +84,8 @@ pub struct Misfit {
     pub mean_m: f64,
     /// Mean error that noise would give [m].
     pub floor_m: f64,
+    /// How far what was measured spreads, as [`spread_m`] has it [m].
+    pub spread_m: f64,
     /// Dwells that were used.
     pub used: usize,
     /// Dwells that sit in a cavity.
@@ -100,13 +103,41 @@ impl Misfit {
     /// Of inputs that cannot be fitted.
     pub fn of_nothing() -> Misfit {
         let log = saturating(CAP);
-        Misfit { log, mean_m: f64::INFINITY, floor_m: 0.0, used: 0, seated: 0, homeless: 0 }
+        Misfit { log, mean_m: f64::INFINITY, floor_m: 0.0, spread_m: 1.0, used: 0, seated: 0, homeless: 0 }
     }
 
     /// Mean error over the floor.
     pub fn times_floor(&self) -> f64 {
         self.mean_m / self.floor_m
     }
+
+    /// Mean error over the spread of what was measured; infinite where that is one point. Whatever shrinks all data shrinks
+    /// all errors: of changes that rescale, this alone says whether anything fits better.
+    pub fn of_spread(&self) -> f64 {
+        self.mean_m / self.spread_m
+    }
+}
+
+/// Root mean square distance of measured positions from their mean [m]: those that a sensor saw of each tip or marker in the
+/// world, those of cavities in the board. Where nothing measured is a position, a metre: no change rescales any.
+pub fn spread_m(observations: &[Observation]) -> f64 {
+    let mut all: BTreeMap<Option<FeatureId>, Vec<Vector3<f64>>> = BTreeMap::new();
+    for o in observations {
+        match (o.seen_m(), o.in_board_m()) {
+            (Some(seen_m), _) => all.entry(Some(o.feature)).or_default().push(*seen_m),
+            (None, Some(in_board_m)) => all.entry(None).or_default().push(*in_board_m),
+            (None, None) => {}
+        }
+    }
+    let n: usize = all.values().map(Vec::len).sum();
+    if n == 0 {
+        return 1.0;
+    }
+    let from_mean_m2 = |points: &Vec<Vector3<f64>>| {
+        let mean_m = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+        points.iter().map(|p| (p - mean_m).norm_squared()).sum::<f64>()
+    };
+    (all.values().map(from_mean_m2).sum::<f64>() / n as f64).sqrt()
 }
 
 /// The bounds that a calibration had to widen.
@@ -171,6 +202,7 @@ impl Inputs {
             log: (of_used + unused * saturating(CAP)) / total.max(1) as f64,
             mean_m: residuals.iter().map(|r| r.fitted_m.norm()).sum::<f64>() / n,
             floor_m: residuals.iter().map(|r| r.expected_norm_m).sum::<f64>() / n,
+            spread_m: spread_m(&fitted.observations),
             used: used.len(),
             seated: places(&|place| matches!(place, Place::Seated { .. })),
             homeless: places(&|place| matches!(place, Place::Unassigned { .. } | Place::Ambiguous { .. })),
@@ -185,5 +217,42 @@ impl Inputs {
     /// Changes every dwell.
     pub fn each_dwell(&mut self, mut change: impl FnMut(&mut Dwell)) {
         self.seen.iter_mut().flat_map(|s| &mut s.dwells).for_each(&mut change);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::{DwellId, Reference};
+    use proptest::prelude::*;
+
+    fn seen(points_m: &[[f64; 3]]) -> Vec<Observation> {
+        let of = |p: &[f64; 3]| {
+            let position_m = (*p).into();
+            let reference =
+                Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: f64::INFINITY };
+            Observation::bare(DwellId { recording: 0, dwell: 0 }, vec![0.0], reference)
+        };
+        points_m.iter().map(of).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_measured_spreads_as_it_is_scaled_wherever_it_is(
+            points_m in prop::collection::vec(prop::array::uniform3(-2.0f64..2.0), 1..20),
+            by_m in prop::array::uniform3(-5.0f64..5.0),
+            scale in 1e-3f64..1e3,
+        ) {
+            let other: Vec<[f64; 3]> = points_m.iter().map(|p| [0, 1, 2].map(|k| scale * (p[k] + by_m[k]))).collect();
+            let (before_m, after_m) = (spread_m(&seen(&points_m)), spread_m(&seen(&other)));
+            prop_assert!((after_m - scale * before_m).abs() < 1e-9 * scale);
+        }
+    }
+
+    #[test]
+    fn one_point_does_not_spread_and_two_do() {
+        assert!(spread_m(&seen(&[[0.5, 0.1, 0.2]; 7])) < 1e-12);
+        assert!((spread_m(&seen(&[[0.0; 3], [0.0, 0.0, 0.4]])) - 0.2).abs() < 1e-12);
+        assert_eq!(spread_m(&[]), 1.0);
     }
 }

@@ -12,6 +12,8 @@ const LEAST_FACTOR: f64 = 3.0;
 pub const ALIKE_FACTOR: f64 = 1.3;
 /// Below this many times the floor, frames that are let go are possible, not sure.
 const FRAMES_FROM: f64 = 5.0;
+/// A model that predicts the mean of what was measured, whatever the joints do, errs by this much of its spread.
+const KNOWS_NOTHING: f64 = 1.0;
 /// Errors within this many times the floor leave nothing to explain.
 const NOTHING_LEFT: f64 = 1.2;
 /// With this many dwells at the board and in no cavity, and this share of all there, the board is in doubt.
@@ -41,11 +43,14 @@ pub fn explains(before: &Misfit, after: &Misfit) -> bool {
     let keeps = after.used >= before.used && after.homeless <= before.homeless && after.log < before.log;
     let all = before.log - after.log >= LEAST_FACTOR.ln();
     let enough = before.used > 0 || after.used >= LEAST_USED;
-    let falls = enough && after.mean_m <= before.mean_m / LEAST_FACTOR && (all || keeps);
+    // What shrinks all data shrinks all errors: they are judged by the spread of the data.
+    let least = before.of_spread().min(KNOWS_NOTHING) / LEAST_FACTOR;
+    let falls = enough && after.of_spread() <= least && (all || keeps);
     let seats = after.seated as f64 >= SEATED_FACTOR * before.seated as f64
         && before.seated > 0
         && after.homeless < before.homeless
-        && after.times_floor() <= before.times_floor().max(WORTH_LOOKING);
+        && after.times_floor() <= before.times_floor().max(WORTH_LOOKING)
+        && after.of_spread() <= KNOWS_NOTHING / LEAST_FACTOR;
     falls || seats
 }
 
@@ -67,7 +72,8 @@ pub fn sure(before: &Misfit, freedom: Freedom) -> bool {
 
 /// Whether a change loses no dwell and leaves nothing to explain.
 pub fn at_the_floor(before: &Misfit, after: &Misfit) -> bool {
-    after.used >= before.used && after.homeless <= before.homeless && after.times_floor() <= NOTHING_LEFT
+    let keeps = after.used >= before.used && after.homeless <= before.homeless;
+    keeps && after.times_floor() <= NOTHING_LEFT && after.of_spread() < before.of_spread()
 }
 
 /// Whether physics, `within` its bounds, explains the errors with less freedom than what is believed, or better.
@@ -100,7 +106,7 @@ mod tests {
     /// So many dwells, all of them used and seated, with errors of so many times a floor of 0.1 mm.
     fn seated(n: usize, times_floor: f64) -> Misfit {
         let (log, mean_m) = (times_floor.ln(), times_floor * 1e-4);
-        Misfit { log, mean_m, floor_m: 1e-4, used: n, seated: n, homeless: 0 }
+        Misfit { log, mean_m, floor_m: 1e-4, spread_m: 0.15, used: n, seated: n, homeless: 0 }
     }
 
     #[test]
@@ -226,6 +232,22 @@ mod tests {
             let chosen = best(&tried).expect("there is one");
             let lowest = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
             prop_assert!(tried[chosen].1 <= lowest + 0.5 * 3f64.ln() + 1e-12);
+        }
+
+        #[test]
+        fn what_scales_measured_positions_and_errors_alike_is_judged_as_if_it_did_not(
+            before in 1.0f64..300.0, after in 0.1f64..300.0, n in 10usize..300, scale in 1e-3f64..1e3
+        ) {
+            let scaled = |m: Misfit| {
+                Misfit { mean_m: scale * m.mean_m, floor_m: scale * m.floor_m, spread_m: scale * m.spread_m, ..m }
+            };
+            let (before, after) = (seated(n, before), seated(n, after));
+            // Where the two are alike, rounding decides.
+            prop_assume!((before.of_spread() / after.of_spread() / LEAST_FACTOR - 1.0).abs() > 1e-9);
+            prop_assert_eq!(explains(&before, &scaled(after)), explains(&before, &after));
+            prop_assert!(!explains(&before, &scaled(before)), "nothing but the scale is another");
+            let in_one_point = Misfit { spread_m: after.mean_m, ..after };
+            prop_assert!(!explains(&Misfit::of_nothing(), &in_one_point));
         }
 
         #[test]
