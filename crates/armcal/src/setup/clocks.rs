@@ -39,19 +39,21 @@ pub fn what_would_align(
     let tip = samples.tip.clone()?;
     let now = Reading { joints: samples.joints.clone(), tip, lengths: 1.0 };
     let mut tried: Vec<(f64, String)> = Vec::new();
-    for (changed, words) in changes(&now, samples) {
+    // With a body that stands still no reading of the joints aligns but by chance: it is another one.
+    let still = still(samples);
+    let mut all = if still.is_none() { changes(&now) } else { Vec::new() };
+    all.extend(other_bodies(&now, samples));
+    for (changed, words) in all {
         tried.extend(correlation(&changed).filter(|c| *c >= AGREES).map(|c| (c, words)));
     }
     // Of those that do as well, the first: it is the simplest.
     let best = tried.iter().map(|t| t.0).fold(0.0, f64::max);
     let like = |t: &(f64, String)| t.0 >= best - SAME.max(0.25 * (1.0 - best));
     let first = tried.into_iter().find(like);
-    first
-        .map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})"))
-        .or_else(|| still(samples))
+    first.map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})")).or(still)
 }
 
-fn changes(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
+fn changes(now: &Reading) -> Vec<(Reading, String)> {
     let joints = &now.joints;
     let n = joints.joint_rad.len();
     let named = |j: usize| format!("joint {} ({})", j + 1, joints.names.get(j).map_or("", String::as_str));
@@ -108,6 +110,12 @@ fn changes(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
         let words = format!("[length-unit] with the lengths of the model {words} (the unit of the model)");
         all.push((Reading { lengths: factor, ..now.clone() }, words));
     }
+    all
+}
+
+/// Bodies that may be the tip.
+fn other_bodies(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
+    let mut all = Vec::new();
     for (role, body) in [("base", &samples.base), ("table", &samples.table)] {
         if let Some(body) = body.as_ref().filter(|body| !body.is_empty()) {
             let words = format!(

@@ -3,7 +3,8 @@
 //! A mistake of the setup is discrete: a sign, an order, a unit, a frame. Each is a hypothesis: the inputs with that one
 //! thing changed (`hypotheses`), fitted anew (`trial`, `attempt`, `search`), weighed against the inputs as the pipeline has them
 //! (`weigh`, `beyond`, `alone`) and told (`words`). The right one makes the errors fall as nothing else does; it is reported with what it would do. What
-//! needs no refit (a body that never moves, a tilt that contradicts its measurement) is looked at directly (`facts`).
+//! needs no refit (a body that never moves, a tilt that contradicts its measurement) is looked at directly (`facts`), first, and
+//! ends the search where it is beyond doubt.
 //!
 //! No physical effect is looked for while a mistake stands: its name would be that of the mistake.
 
@@ -23,33 +24,38 @@ pub use clocks::{Reading, what_would_align};
 pub use trial::{Change, Inputs};
 
 use crate::story::Fitted;
-use armcal_core::SetupReport;
+use armcal_core::{SetupFinding, SetupReport};
 
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Looks for mistakes in the inputs of a calibration.
 pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
-    let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
-    // Of what is not what it is said to be, a change elsewhere takes a share of the errors, and says nothing.
-    if report.findings.is_empty() {
-        search::search(inputs, Some(fitted), &mut report);
-    }
+    let sound = facts::sound(fitted);
+    let mut report = led_by(facts::evident(inputs, sound), inputs, Some(fitted));
     // What a mistake does to tilts and frames is its consequence.
-    let alone = report.findings.is_empty();
-    report.findings.extend(facts::facts(inputs, fitted, alone));
+    report.findings.extend(match sound {
+        true if report.findings.is_empty() => facts::declared(inputs, fitted),
+        true => Vec::new(),
+        false => facts::doubtful(inputs),
+    });
     report.findings.sort_by_key(|f| std::cmp::Reverse(f.certainty));
     report
 }
 
 /// The same for inputs that could not be calibrated at all.
 pub fn examine_failed(inputs: &Inputs) -> SetupReport {
-    let mut report = SetupReport { findings: facts::streams(inputs), ..SetupReport::default() };
-    if report.findings.is_empty() {
-        report.findings.extend(facts::readings(inputs));
-    }
-    if report.findings.is_empty() {
-        search::search(inputs, None, &mut report);
+    let mut seen = facts::evident(inputs, false);
+    seen.extend(facts::doubtful(inputs));
+    led_by(seen, inputs, None)
+}
+
+/// What was seen without a refit, and what a search finds where none of that is a mistake: beside a reading or a stream that
+/// is none, a change elsewhere takes a share of the errors, and says nothing.
+fn led_by(seen: Vec<SetupFinding>, inputs: &Inputs, fitted: Option<&Fitted>) -> SetupReport {
+    let mut report = SetupReport { findings: seen, ..SetupReport::default() };
+    if report.mistakes().next().is_none() {
+        search::search(inputs, fitted, &mut report);
     }
     report
 }

@@ -7,7 +7,7 @@ use super::hypotheses::{Freedom, Hypothesis, hypotheses};
 use super::trial::{Inputs, Misfit};
 use super::unseen::unseen;
 use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone, sure};
-use super::words::{finding, moved_frame};
+use super::words::{Side, finding, gain, moved_frame};
 use crate::story::Fitted;
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 
@@ -35,13 +35,14 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
     let (found, ended) = one_upon_the_other(now, first, begun, report, &mut possible);
     let one_recording = matches!(&found[..], [(only, _)] if only.recording.is_some());
     let alone = fitted.filter(|_| found.is_empty() || one_recording);
-    report.findings.extend(match alone.and_then(|fitted| each_alone(inputs, fitted, &begun)) {
+    let sure = match alone.and_then(|fitted| each_alone(inputs, fitted, &begun)) {
         Some(finding) => vec![finding],
-        None if found.is_empty() => {
-            fitted.and_then(|f| perhaps(inputs, f, &begun, &possible)).into_iter().collect()
-        }
         None => told(inputs, fitted, &found, (begun, ended)),
-    });
+    };
+    if sure.is_empty() {
+        report.findings.extend(fitted.and_then(|f| perhaps(inputs, f, &begun, &possible)));
+    }
+    report.findings.extend(sure);
 }
 
 /// The mistakes that explain the errors, and the misfit without them; `first` is the fit as it is, `before` its misfit.
@@ -89,21 +90,25 @@ fn one_upon_the_other(
 }
 
 /// What was found as it is reported: everything undone together on all dwells and the pipeline's own hold-out gives the
-/// numbers.
+/// numbers. Nothing where that improves nothing, whatever a quick fit said.
 fn told(
     inputs: &Inputs,
     fitted: Option<&Fitted>,
     found: &[Found],
     (begun, ended): (Misfit, Misfit),
 ) -> Vec<SetupFinding> {
+    if found.is_empty() {
+        return Vec::new();
+    }
     let mut mended = inputs.clone();
     found.iter().for_each(|(h, _)| mended = h.undone(&mended));
     let after = mended.fit().ok();
     let together = found.iter().map(|(h, _)| h.change.as_str()).collect::<Vec<_>>().join(" and ");
+    let sides = (&Side { fitted, trial: begun }, &Side { fitted: after.as_ref(), trial: ended });
+    let Some(gain) = gain(sides.0, sides.1) else { return Vec::new() };
     let one = |(h, alternatives): &Found| {
         let moved = fitted.zip(after.as_ref()).and_then(|(from, to)| moved_frame(&mended, h, from, to));
-        let before = (fitted.map(|f| &f.calibration), begun);
-        finding(h, &together, alternatives, moved, before, (after.as_ref().map(|f| &f.calibration), ended))
+        finding(h, (&together, &gain), alternatives, moved, sides)
     };
     found.iter().map(one).collect()
 }
@@ -113,12 +118,12 @@ fn perhaps(inputs: &Inputs, fitted: &Fitted, begun: &Misfit, possible: &[Tried])
     let weights: Vec<(Freedom, f64)> = possible.iter().map(weight).collect();
     let Tried { hypothesis, misfit, .. } = &possible[best(&weights)?];
     let mended = hypothesis.undone(inputs).fit().ok()?;
-    let (before, after) = (&fitted.calibration, &mended.calibration);
-    let errs_less = after.judged().fitted.mean_m < before.judged().fitted.mean_m;
     let moved = moved_frame(inputs, hypothesis, fitted, &mended);
-    let finding =
-        finding(hypothesis, &hypothesis.change, &[], moved, (Some(before), *begun), (Some(after), *misfit));
-    errs_less.then_some(SetupFinding { certainty: Certainty::Possible, ..finding })
+    let before = Side { fitted: Some(fitted), trial: *begun };
+    let after = Side { fitted: Some(&mended), trial: *misfit };
+    let gain = gain(&before, &after)?;
+    let finding = finding(hypothesis, (&hypothesis.change, &gain), &[], moved, (&before, &after));
+    Some(SetupFinding { certainty: Certainty::Possible, ..finding })
 }
 
 fn weight(t: &Tried) -> (Freedom, f64) {

@@ -3,11 +3,9 @@
 use super::attempt::{Tried, attempt};
 use super::hypotheses::reversed;
 use super::trial::{Inputs, Misfit};
+use super::weigh::SAME_FACTOR;
 use armcal_core::Unseen;
 use armcal_report::millimetres;
-
-/// Errors that differ by less than this factor are the same.
-const SAME_FACTOR: f64 = 1.05;
 
 /// The sign of the last joint, where it only turns the tool about its own axis. Of `inputs`, which fit like `now`.
 pub fn unseen(inputs: &Inputs, now: &Misfit) -> Option<Unseen> {

@@ -10,6 +10,8 @@ pub const WORTH_LOOKING: f64 = 1.5;
 const LEAST_FACTOR: f64 = 3.0;
 /// Changes that fit within this factor of each other are not told apart.
 pub const ALIKE_FACTOR: f64 = 1.3;
+/// Errors that differ by less than this factor are the same.
+pub const SAME_FACTOR: f64 = 1.05;
 /// Below this many times the floor, frames that are let go are possible, not sure.
 const FRAMES_FROM: f64 = 5.0;
 /// A model that predicts the mean of what was measured, whatever the joints do, errs by this much of its spread.

@@ -2,7 +2,8 @@
 
 use super::beyond;
 use super::hypotheses::{Estimated, Hypothesis};
-use super::trial::{Inputs, Misfit};
+use super::trial::{Inputs, Misfit, spread_m};
+use super::weigh::SAME_FACTOR;
 use crate::story::Fitted;
 use armcal_calibrate::Calibration;
 use armcal_core::{Certainty, SetupFinding};
@@ -11,58 +12,81 @@ use armcal_report::millimetres;
 /// Parameters of a change that are told, at most.
 const TOLD: usize = 3;
 
-/// A change that explains the errors, as it is reported: `before` and `after` the calibrations, `begun` and `ended` the
-/// trials, all with everything that was found undone `together`.
+/// A side of what is told: the full calibration where there is one, and the trial.
+pub struct Side<'a> {
+    /// The full calibration.
+    pub fitted: Option<&'a Fitted>,
+    /// The trial.
+    pub trial: Misfit,
+}
+
+impl Side<'_> {
+    /// Mean error by which it is judged [m].
+    fn mean_m(&self) -> f64 {
+        self.fitted.map_or(self.trial.mean_m, |f| f.calibration.judged().fitted.mean_m)
+    }
+
+    /// How far what was measured spreads [m].
+    fn spread_m(&self) -> f64 {
+        self.fitted.map_or(self.trial.spread_m, |f| spread_m(&f.observations))
+    }
+}
+
+/// What changes do, in a clause; none where they improve nothing that is judged.
+pub fn gain(before: &Side<'_>, after: &Side<'_>) -> Option<String> {
+    let (begun, ended, after_m) = (&before.trial, &after.trial, after.mean_m());
+    let Some(fitted) = before.fitted else {
+        let mean = millimetres(after_m);
+        return Some(match begun.used {
+            0 => format!("{} dwells find their place, with a mean error of {mean} mm", ended.used),
+            _ => format!("the mean error is {mean} mm"),
+        });
+    };
+    let before_m = before.mean_m();
+    let held_out = if fitted.calibration.held_out() { "held-out " } else { "" };
+    let spreads_m = [before.spread_m(), after.spread_m()];
+    // The errors after, as they would be if the data were as large as before.
+    let alike_m = after_m * spreads_m[0] / spreads_m[1];
+    let [was, is, would_be] = [before_m, after_m, alike_m].map(millimetres);
+    let falls = before_m > SAME_FACTOR * alike_m && was != would_be;
+    match falls {
+        true if after_m < before_m && was != is => {
+            Some(format!("the mean {held_out}error falls from {was} to {is} mm"))
+        }
+        true => {
+            let [from, to] = spreads_m.map(millimetres);
+            Some(format!(
+                "the mean {held_out}error is {is} mm of positions that spread by {to} mm, instead of {was} of {from} mm"
+            ))
+        }
+        false if ended.seated > begun.seated => Some(format!(
+            "{} instead of {} dwells sit in a cavity, and their mean {held_out}error is {is} mm",
+            ended.seated, begun.seated
+        )),
+        false => None,
+    }
+}
+
+/// A change that explains the errors, as it is reported; `together` is everything that was found, and `gain` what that does.
 pub fn finding(
     h: &Hypothesis,
-    together: &str,
+    (together, gain): (&str, &str),
     alternatives: &[String],
     moved: Option<String>,
-    (before, begun): (Option<&Calibration>, Misfit),
-    (after, ended): (Option<&Calibration>, Misfit),
+    (before, after): (&Side<'_>, &Side<'_>),
 ) -> SetupFinding {
-    let judged_m = |c: &Calibration| c.judged().fitted.mean_m;
-    let before_m = before.map(judged_m);
-    let after_m = after.map_or(ended.mean_m, judged_m);
-    let held_out = match before {
-        Some(c) if c.held_out() => "held-out ",
-        _ => "",
-    };
-    let falls = match before_m {
-        Some(before_m) if before_m <= after_m && ended.seated == begun.seated => format!(
-            "a quick fit leaves {} instead of {} mm (the calibration {} either way)",
-            millimetres(ended.mean_m),
-            millimetres(begun.mean_m),
-            millimetres(after_m)
-        ),
-        Some(before_m) if before_m <= after_m => format!(
-            "{} instead of {} dwells sit in a cavity, and their mean {held_out}error is {} mm",
-            ended.seated,
-            begun.seated,
-            millimetres(after_m)
-        ),
-        Some(before_m) => {
-            let (before, after) = (millimetres(before_m), millimetres(after_m));
-            format!("the mean {held_out}error falls from {before} to {after} mm")
-        }
-        None if begun.used == 0 => {
-            let mean = millimetres(after_m);
-            format!("{} dwells find their place, with a mean error of {mean} mm", ended.used)
-        }
-        None => format!("the mean error is {} mm", millimetres(after_m)),
-    };
     let or = match alternatives.is_empty() {
         true => String::new(),
         false => format!(" (these data cannot tell it from: {})", armcal_core::listed(alternatives)),
     };
-    let ends = moved.unwrap_or_else(|| after.map_or(String::new(), |c| estimated(h, c)));
+    let ends = moved.unwrap_or_else(|| after.fitted.map_or(String::new(), |f| estimated(h, &f.calibration)));
     SetupFinding {
         code: h.code,
         subject: h.subject.clone(),
-        message: format!("with {together}{or} {falls}{ends}; {}", h.remedy),
+        message: format!("with {together}{or} {gain}{ends}; {}", h.remedy),
         certainty: Certainty::Mistake,
-        before_mm: before_m.map(|m| m * 1e3),
-        after_mm: Some(after_m * 1e3),
+        before_mm: before.fitted.map(|_| before.mean_m() * 1e3),
+        after_mm: Some(after.mean_m() * 1e3),
         alternatives: alternatives.to_vec(),
     }
 }

@@ -1,6 +1,6 @@
 //! Base, table and tip: do they move and turn as what they are said to be?
 
-use super::{TURNS_RAD, mistake};
+use super::{TURNS_RAD, mistake, possible};
 use crate::setup::beyond::apart;
 use crate::setup::trial::Inputs;
 use crate::stages::perceive::Seen;
@@ -14,29 +14,42 @@ const STANDS_M: f64 = 0.005;
 const SAME_M: f64 = 1e-3;
 const SAME_RAD: f64 = 5e-3;
 
-/// Orientations that are exactly the identity in every recording: the field was never filled in.
+/// Orientations that are exactly the identity in every recording: where the position beside them was measured, the field was
+/// never filled in. A base or table that is published as a constant may stand so.
 pub fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
     let unturned = |angle_rad: f64| angle_rad < 1e-12;
     let body = |of: fn(&Seen) -> &Option<MeanPose>| {
         let mut poses = inputs.seen.iter().filter_map(|s| of(s).as_ref()).peekable();
-        poses.peek().is_some() && poses.all(|p| unturned(p.pose.rotation.angle()))
+        poses.peek().is_some() && poses.all(|p| p.has_orientation && unturned(p.pose.rotation.angle()))
     };
     let mut turns = inputs.dwells().filter_map(|d| d.tip.as_ref()?.orientation).peekable();
     let of_tip = inputs.pipeline.fit.use_orientation && turns.peek().is_some();
     let tip = of_tip && turns.all(|q| unturned(q.angle()));
+    let measured = |role: &str| {
+        let travels_m = inputs.seen.iter().flat_map(|s| &s.travels_m);
+        role == "tip" || travels_m.into_iter().any(|(of, travel_m)| *of == role && *travel_m > 0.0)
+    };
     let bodies = [("base", body(|s| &s.base)), ("table", body(|s| &s.table)), ("tip", tip)];
-    bodies
-        .into_iter()
-        .filter(|(_, missing)| *missing)
+    let missing = bodies.into_iter().filter(|(_, missing)| *missing);
+    missing
         .map(|(role, _)| {
-            mistake(
-                "quaternion-missing",
-                format!("the {role}"),
-                format!(
-                    "the orientation of the {role} is exactly the identity in every recording: its quaternion is not filled \
-                     in; mend what publishes [streams.{role}]"
+            let seen = format!("the orientation of the {role} is exactly the identity in every recording");
+            let subject = format!("the {role}");
+            match measured(role) {
+                true => mistake(
+                    "quaternion-missing",
+                    subject,
+                    format!("{seen}: its quaternion is not filled in; mend what publishes [streams.{role}]"),
                 ),
-            )
+                false => possible(
+                    "quaternion-missing",
+                    subject,
+                    format!(
+                        "{seen}, and its position never varies: it stands so, or what publishes [streams.{role}] does not \
+                         fill in its quaternion"
+                    ),
+                ),
+            }
         })
         .collect()
 }

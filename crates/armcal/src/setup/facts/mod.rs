@@ -27,38 +27,39 @@ const FLAT_M: f64 = 0.01;
 /// Errors below this many times the floor say that nothing of importance is wrong.
 const SOUND: f64 = 1.5;
 
-/// Everything that can be looked at directly; tilts and frames only where no other mistake was found.
-pub fn facts(inputs: &Inputs, fitted: &Fitted, alone: bool) -> Vec<SetupFinding> {
-    let mut all = Vec::new();
-    // Poses that are fitted to errors say nothing of tilts and frames.
-    let sound = fitted.calibration.times_floor() <= SOUND;
-    if alone && sound {
-        all.extend(tilts(inputs, fitted));
-        all.extend(declared_frames(fitted));
-    }
-    if !sound {
-        all.extend(readings(inputs));
-        all.extend(bodies::no_quaternion(inputs));
-        all.extend(joints::set_points(inputs));
-    }
-    all
+/// Whether the errors say that nothing of importance is wrong.
+pub fn sound(fitted: &Fitted) -> bool {
+    fitted.calibration.times_floor() <= SOUND
 }
 
-/// Readings of joints that no encoder gives: stuck, saturated, with stamps of no clock.
-pub fn readings(inputs: &Inputs) -> Vec<SetupFinding> {
-    let mut all = joints::stuck(inputs);
-    if all.is_empty() {
-        all.extend(joints::saturated(inputs));
-    }
-    all.extend(joints::stamps(inputs));
-    all
-}
-
-/// Streams that are not what they are said to be, whatever was fitted to them.
-pub fn streams(inputs: &Inputs) -> Vec<SetupFinding> {
+/// Streams that are not what they are said to be, whatever was fitted to them; and where the errors are not `sound`, joints
+/// that never move and orientations that were never filled in.
+pub fn evident(inputs: &Inputs, sound: bool) -> Vec<SetupFinding> {
     let mut all: Vec<SetupFinding> = bodies::same_body(inputs).into_iter().collect();
     all.extend(joints::speeds(inputs));
     all.extend(bodies::moving(inputs));
+    if !sound {
+        all.extend(joints::stuck(inputs));
+        all.extend(bodies::no_quaternion(inputs));
+    }
+    all
+}
+
+/// Readings of joints that look like none, beside errors: saturated, with stamps of no clock, set-points.
+pub fn doubtful(inputs: &Inputs) -> Vec<SetupFinding> {
+    let mut all = Vec::new();
+    if joints::stuck(inputs).is_empty() {
+        all.extend(joints::saturated(inputs));
+    }
+    all.extend(joints::stamps(inputs));
+    all.extend(joints::set_points(inputs));
+    all
+}
+
+/// Tilts and frames that contradict their declaration. Poses that are fitted to errors say nothing of them.
+pub fn declared(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
+    let mut all = tilts(inputs, fitted);
+    all.extend(declared_frames(fitted));
     all
 }
 
