@@ -42,29 +42,33 @@ pub fn gain(before: &Side<'_>, after: &Side<'_>) -> Option<String> {
             _ => format!("the mean error is {mean} mm"),
         });
     };
-    let before_m = before.mean_m();
     let held_out = if fitted.calibration.held_out() { "held-out " } else { "" };
-    let spreads_m = [before.spread_m(), after.spread_m()];
+    let seats = || {
+        (ended.seated > begun.seated).then(|| {
+            let (n, instead, mean) = (ended.seated, begun.seated, millimetres(after_m));
+            format!(
+                "{n} instead of {instead} dwells sit in a cavity, and their mean {held_out}error is {mean} mm"
+            )
+        })
+    };
+    falls([before.mean_m(), after_m], [before.spread_m(), after.spread_m()], held_out).or_else(seats)
+}
+
+/// That the error fell, by more than rounding, against the spread of what was measured.
+fn falls([before_m, after_m]: [f64; 2], spreads_m: [f64; 2], held_out: &str) -> Option<String> {
     // The errors after, as they would be if the data were as large as before.
     let alike_m = after_m * spreads_m[0] / spreads_m[1];
     let [was, is, would_be] = [before_m, after_m, alike_m].map(millimetres);
-    let falls = before_m > SAME_FACTOR * alike_m && was != would_be;
-    match falls {
-        true if after_m < before_m && was != is => {
-            Some(format!("the mean {held_out}error falls from {was} to {is} mm"))
-        }
-        true => {
+    let fell = before_m > SAME_FACTOR * alike_m && was != would_be;
+    fell.then(|| match after_m < before_m && was != is {
+        true => format!("the mean {held_out}error falls from {was} to {is} mm"),
+        false => {
             let [from, to] = spreads_m.map(millimetres);
-            Some(format!(
+            format!(
                 "the mean {held_out}error is {is} mm of positions that spread by {to} mm, instead of {was} of {from} mm"
-            ))
+            )
         }
-        false if ended.seated > begun.seated => Some(format!(
-            "{} instead of {} dwells sit in a cavity, and their mean {held_out}error is {is} mm",
-            ended.seated, begun.seated
-        )),
-        false => None,
-    }
+    })
 }
 
 /// A change that explains the errors, as it is reported; `together` is everything that was found, and `gain` what that does.
@@ -116,4 +120,30 @@ pub fn moved_frame(now: &Inputs, h: &Hypothesis, from: &Fitted, to: &Fitted) -> 
         millimetres(m),
         rad.to_degrees()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_falls_only_by_more_than_rounding_and_by_the_spread_of_the_data() {
+        let told =
+            |errors_mm: [f64; 2], spreads_m| falls(errors_mm.map(|mm| mm * 1e-3), spreads_m, "held-out ");
+        let same = [0.5, 0.5];
+        assert_eq!(
+            told([353.01, 0.13], same).unwrap(),
+            "the mean held-out error falls from 353.01 to 0.13 mm"
+        );
+        assert_eq!(told([0.134, 0.126], same), None, "0.13 to 0.13 mm");
+        assert_eq!(told([100.0, 96.0], same), None, "less than a twentieth");
+        assert_eq!(told([0.13, 0.14], same), None);
+        // Positions read as millimetres.
+        assert_eq!(told([1.58, 0.064], [0.5, 0.5e-3]), None);
+        let grown = told([0.064, 1.58], [0.5e-3, 0.5]).unwrap();
+        assert_eq!(
+            grown,
+            "the mean held-out error is 1.58 mm of positions that spread by 500.00 mm, instead of 0.064 of 0.50 mm"
+        );
+    }
 }

@@ -41,6 +41,19 @@ pub const KINDS: &[Kind] = &[
     kind("zero-off-by-tens-of-degrees", "joint-zero-gross", ALL, zero_off),
     whole("zeros-of-all-joints-off", "joint-zero-gross", ALL, zeros_off),
     joint("homed-again-between-recordings", "joint-zero-event", 1, homed_again),
+    kind("joint-reversed-in-one-recording", "joint-sign", ALL, |s, d| in_one(s, d, 0, |q, j| q[j] = -q[j])),
+    kind("joints-exchanged-in-one-recording", "joint-order", ALL, |s, d| {
+        in_one(s, d, 1, |q, j| q.swap(j - 1, j))
+    }),
+    kind("joint-in-degrees-in-one-recording", "joint-unit", ALL, |s, d| {
+        in_one(s, d, 0, |q, j| q[j] = q[j].to_degrees())
+    }),
+    kind("one-recording-in-degrees", "joint-unit", ALL, |s, d| {
+        in_one(s, d, 0, |q, _| q.iter_mut().for_each(|q| *q = q.to_degrees()))
+    }),
+    kind("quarter-turn-in-one-recording", "joint-zero-gross", ALL, |s, d| {
+        in_one(s, d, 1, |q, j| q[j] += FRAC_PI_2)
+    }),
     kind("forearm-angle-absolute", "joint-coupling", ALL, absolute_angle),
     whole("speeds-in-the-place-of-angles", "wrong-field", ALL, speeds),
 ];
@@ -118,6 +131,24 @@ fn zeros_off(session: &mut Session, draw: &mut Draw) {
 fn homed_again(session: &mut Session, draw: &mut Draw, joint: usize) {
     let angle = draw.signed(2.0, 6.0).to_radians();
     session.joints(|at, q| q[joint] += if at.recording >= 1 { angle } else { 0.0 });
+}
+
+/// One recording made by another driver, or after another homing: of a joint from the one with this index on. A report has to
+/// name the recording.
+fn in_one(
+    session: &mut Session,
+    draw: &mut Draw,
+    first: usize,
+    change: impl Fn(&mut [f64], usize),
+) -> Result<Vec<String>, Error> {
+    let joint = first + draw.pick(session.joint_names().len() - first);
+    let one = draw.pick(session.recordings.len());
+    session.joints(|at, q| {
+        if at.recording == one {
+            change(q, joint);
+        }
+    });
+    Ok(vec![format!("`{}`", session.recordings[one].name)])
 }
 
 /// The forearm's encoder reads against the room, not against the upper arm.

@@ -14,7 +14,7 @@ use armcal_table::Tilt;
 use nalgebra::{Matrix3, Vector3};
 
 /// A joint that turned by this much did move [rad].
-const TURNS_RAD: f64 = 0.1;
+pub const TURNS_RAD: f64 = 0.1;
 
 /// Tilts differ from their declaration by less than this, with the mechanism as it is [rad].
 const TILT_RAD: f64 = 0.07;
@@ -116,10 +116,15 @@ fn width_m(points_m: &[Vector3<f64>]) -> f64 {
     (along.sum() - along.max()).max(0.0).sqrt()
 }
 
-/// Measured frames that the fit has moved far from their measurement.
+/// Measured frames that the fit has moved far from their measurement. What a bound holds back of the arm's own, a frame takes:
+/// then it says nothing.
 fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
+    let estimates = &fitted.calibration.fit.estimates;
+    if estimates.iter().any(|e| e.at_bound && e.parameter.role == Role::Robot) {
+        return Vec::new();
+    }
     let mut all = Vec::new();
-    for e in &fitted.calibration.fit.estimates {
+    for e in estimates {
         let (Role::KnownFrame, Some(sigma)) = (e.parameter.role, e.parameter.prior_sigma) else { continue };
         let off = e.value - e.parameter.nominal;
         if off.abs() > SIGMAS * sigma && off.abs() > OFF && e.parameter.free {

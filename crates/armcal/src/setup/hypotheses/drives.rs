@@ -3,12 +3,14 @@
 //! Rarer than a sign or an order, and more of them: tried where none of those explains the errors.
 
 use super::joints::{SIGN, ZERO, scale, shift};
+use super::parts::parts;
 use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::trial::{Change, Inputs};
 use armcal_core::{DwellId, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override, Since};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 
 const RATIO: &str = "mend `counts_per_turn` in [streams.joints], or divide by the gear's ratio in the driver";
 const COUPLED: &str = "convert it in the driver that records it, or read the joint's own angle";
@@ -114,15 +116,11 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
 
 /// When a joint may have been homed again: from each recording on, and for each alone.
 fn moments(inputs: &Inputs) -> Vec<(Since, String)> {
-    let all = inputs.seen.iter().enumerate();
-    // From the first on is always, from the last on is the last alone.
-    let on = all.clone().skip(1).map(|(recording, seen)| {
-        (Since::Dwell(DwellId { recording, dwell: 0 }), format!("from recording `{}` on", seen.name))
-    });
-    let alone = all.take(inputs.seen.len().saturating_sub(1)).map(|(recording, seen)| {
-        (Since::Recording(recording), format!("in recording `{}` alone", seen.name))
-    });
-    on.chain(alone).collect()
+    let since = |part: Range<usize>| match part.end == inputs.seen.len() {
+        true => Since::Dwell(DwellId { recording: part.start, dwell: 0 }),
+        false => Since::Recording(part.start),
+    };
+    parts(inputs).into_iter().map(|(part, words)| (since(part), words)).collect()
 }
 
 /// Parameters that the model file holds fixed, each and together, and priors that are too tight.

@@ -5,6 +5,7 @@ mod drives;
 mod frames;
 mod joints;
 mod model;
+mod parts;
 mod poses;
 mod readings;
 
@@ -30,7 +31,7 @@ pub struct Hypothesis {
     pub number: Option<Number>,
     /// Parameters that the fit estimates for the change; it is no mistake unless one of them comes out far off.
     pub estimated: Vec<Estimated>,
-    /// The recording that it is about, where it is about one.
+    /// The recording that it leaves out, where it leaves one out.
     pub recording: Option<usize>,
     /// The change itself.
     pub apply: Arc<dyn Fn(&mut Inputs) + Send + Sync>,
@@ -151,7 +152,8 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 
     all.extend(board::hypotheses(inputs));
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
-    let mut rarer = drives::hypotheses(inputs, at_bound);
+    let mut rarer = parts::hypotheses(inputs, &all);
+    rarer.extend(drives::hypotheses(inputs, at_bound));
     rarer.extend(model::of_another_size(inputs));
     rarer.extend(board::from_the_other_side(inputs));
     [all, rarer]
