@@ -39,10 +39,10 @@ pub fn what_would_align(
     let tip = samples.tip.clone()?;
     let now = Reading { joints: samples.joints.clone(), tip, lengths: 1.0 };
     let mut tried: Vec<(f64, String)> = Vec::new();
-    // With a body that stands still no reading of the joints aligns but by chance: it is another one.
+    // With a body that stands still no reading of the joints aligns but by chance: it is another one, or read in another unit.
     let still = still(samples);
-    let mut all = if still.is_none() { changes(&now) } else { Vec::new() };
-    all.extend(other_bodies(&now, samples));
+    let mut all = if still.is_none() { of_joints(&now) } else { Vec::new() };
+    all.extend(of_bodies(&now, samples));
     for (changed, words) in all {
         tried.extend(correlation(&changed).filter(|c| *c >= AGREES).map(|c| (c, words)));
     }
@@ -53,7 +53,7 @@ pub fn what_would_align(
     first.map(|(c, words)| format!("{words} the clocks align (correlation {c:.3})")).or(still)
 }
 
-fn changes(now: &Reading) -> Vec<(Reading, String)> {
+fn of_joints(now: &Reading) -> Vec<(Reading, String)> {
     let joints = &now.joints;
     let n = joints.joint_rad.len();
     let named = |j: usize| format!("joint {} ({})", j + 1, joints.names.get(j).map_or("", String::as_str));
@@ -100,6 +100,12 @@ fn changes(now: &Reading) -> Vec<(Reading, String)> {
     }
     let words = "[wrong-field] with the joints' readings taken for speeds and summed over time";
     with_joints(&summed, words.to_owned());
+    all
+}
+
+/// Units of tip and model, and other bodies that may be the tip.
+fn of_bodies(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
+    let mut all = Vec::new();
     for (factor, words) in [(1e3, "a thousand times as large"), (1e-3, "a thousandth")] {
         let mut changed = now.clone();
         changed.tip.position_m.iter_mut().for_each(|p| *p *= factor);
@@ -110,12 +116,6 @@ fn changes(now: &Reading) -> Vec<(Reading, String)> {
         let words = format!("[length-unit] with the lengths of the model {words} (the unit of the model)");
         all.push((Reading { lengths: factor, ..now.clone() }, words));
     }
-    all
-}
-
-/// Bodies that may be the tip.
-fn other_bodies(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
-    let mut all = Vec::new();
     for (role, body) in [("base", &samples.base), ("table", &samples.table)] {
         if let Some(body) = body.as_ref().filter(|body| !body.is_empty()) {
             let words = format!(

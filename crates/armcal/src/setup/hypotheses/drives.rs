@@ -1,63 +1,38 @@
-//! What stands between a joint and its reading: a gear, a pulley, another joint's angle, a zero that was lost.
+//! What stands between a joint and its reading: a gear, a pulley, another joint's angle; and what the model holds fixed.
 //!
-//! Rarer than a sign or an order, and more of them: tried where none of those explains the errors.
+//! Rarer than a sign or an order: tried where none of those explains the errors.
 
-use super::joints::{SIGN, ZERO, scale, shift};
-use super::parts::parts;
+use super::joints::{scale, shift};
 use super::{Estimated, Freedom, Hypothesis};
 use crate::setup::trial::{Change, Inputs};
-use armcal_core::{DwellId, Parameter, Unit};
-use armcal_model::{EffectSpec, EffectTable, Override, Since};
+use armcal_core::{Parameter, Unit};
+use armcal_model::{EffectSpec, EffectTable, Override};
 use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
-use std::ops::Range;
 
 const RATIO: &str = "mend `counts_per_turn` in [streams.joints], or divide by the gear's ratio in the driver";
 const COUPLED: &str = "convert it in the driver that records it, or read the joint's own angle";
 const FREE: &str = "leave out `free = false`, or mend the values that are held fixed";
 const FIXED: &str = "free it in the model file, or mend its value there";
 const PRIORS: &str = "mend the values in the model file, or widen the deviation that it allows";
-const HOMED: &str =
-    "give what differs to a pipeline of its own, or add `[[effects]]` zero_slip with its `since`";
 
 /// Ratios of gears and units that are mistaken for none; those near 1 are in `joints`.
 const RATIOS: [f64; 6] = [3.0, 5.0, 10.0, 50.0, 100.0, 1000.0];
 /// A ratio further from 1 than this is no tolerance of a gear or pulley.
 const RATIO_OFF: f64 = 0.03;
-/// How far a ratio and a zero may come out.
+/// How far a ratio may come out.
 const RATIO_BOUND: f64 = 0.5;
-const ZERO_BOUND_DEG: f64 = 60.0;
-/// Where the search for such a zero starts.
-const SLIPS_DEG: [f64; 6] = [-30.0, -12.0, -4.0, 4.0, 12.0, 30.0];
-/// Where the search for the zero of the whole session starts.
-const ZEROS_DEG: [f64; 8] = [-36.0, -26.0, -17.0, -8.0, 8.0, 17.0, 26.0, 36.0];
-/// No assembly puts a zero this far off [rad].
-const FAR_ZERO_RAD: f64 = 0.1;
-/// What moved between recordings by less is a slip by a tooth of a belt (2.8 deg of 128), which the diagnosis names [rad].
-const SLIPPED_RAD: f64 = 0.055;
 /// Fixed parameters are let go this far, and are wrong if they come out this far off [m], [rad].
 const FREED: f64 = 0.05;
 const FAR_FREED: f64 = 2e-3;
 /// Priors that are this many standard deviations off are too tight.
 const FAR_SIGMAS: f64 = 4.0;
 
-pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
+pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let names = inputs.chain.joint_names();
     let turning: Vec<usize> =
         (0..names.len()).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
     let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
     let mut all = Vec::new();
-    for &j in &turning {
-        for (quarters, words) in [(1.0, "+90"), (-1.0, "-90"), (2.0, "180")] {
-            let change = format!("the sign of {} reversed and {words} deg added to it", joint(j));
-            all.push(Hypothesis::new("joint-sign", joint(j), change, SIGN, move |i| {
-                i.each_dwell(|d| {
-                    scale(d, j, -1.0);
-                    shift(d, j, quarters * FRAC_PI_2);
-                });
-            }));
-        }
-    }
     let each = (0..names.len()).map(|j| (vec![j], joint(j)));
     for (set, subject) in each.chain([((0..names.len()).collect(), "all joints".to_owned())]) {
         for ratio in RATIOS {
@@ -82,49 +57,17 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             }));
         }
     }
-    let within = |bound: f64| Override { bound: Some(bound), prior: Some(bound), ..Override::default() };
     for j in 0..names.len() {
         let change = format!("the gear ratio of {} estimated", joint(j));
         let spec = EffectSpec::new("gear_ratio").at(j);
         let scale = ("scale", within(RATIO_BOUND));
         all.push(effect("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
-    let moments = moments(inputs);
-    for (&j, (since, words)) in turning.iter().flat_map(|j| moments.iter().map(move |moment| (j, moment))) {
-        for start_deg in SLIPS_DEG {
-            let change = format!("another zero of {} {words}", joint(j));
-            let spec = EffectSpec::new("zero_slip").at(j).since(*since);
-            let unit = Some("deg".to_owned());
-            let offset = ("offset", Override { unit, start: Some(start_deg), ..within(ZERO_BOUND_DEG) });
-            all.push(effect("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
-        }
-    }
-    for (&j, &start_deg) in turning.iter().flat_map(|j| ZEROS_DEG.iter().map(move |z| (j, z))) {
-        let theta = format!("{}.theta", names[j]);
-        let Some(p) = inputs.chain.parameters().iter().find(|p| p.name == theta) else { continue };
-        let change = format!("another zero of {} ({theta})", joint(j));
-        let estimated = vec![Estimated::of(p, FAR_ZERO_RAD)];
-        let hypothesis = Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
-            i.changes.push(Change { plus: start_deg.to_radians(), ..super::model::widened(&theta) });
-        });
-        all.push(hypothesis.estimating(Freedom::Number, estimated));
-    }
-    all.extend(all_zeros(inputs, at_bound));
-    all.extend(let_go(inputs));
     all
 }
 
-/// When a joint may have been homed again: from each recording on, and for each alone.
-fn moments(inputs: &Inputs) -> Vec<(Since, String)> {
-    let since = |part: Range<usize>| match part.end == inputs.seen.len() {
-        true => Since::Dwell(DwellId { recording: part.start, dwell: 0 }),
-        false => Since::Recording(part.start),
-    };
-    parts(inputs).into_iter().map(|(part, words)| (since(part), words)).collect()
-}
-
 /// Parameters that the model file holds fixed, each and together, and priors that are too tight.
-fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
+pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
     let parameters = inputs.chain.parameters();
     let fixed: Vec<&Parameter> = parameters.iter().filter(|p| !p.free).collect();
     let mut all = Vec::new();
@@ -165,21 +108,13 @@ fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
     all
 }
 
-/// The zeros of all joints, where more than one of them is on its bound.
-fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
-    let is_zero = |p: &Parameter| p.name.ends_with(".theta");
-    let zeros: Vec<Parameter> = inputs.chain.parameters().iter().filter(|p| is_zero(p)).cloned().collect();
-    let far = at_bound.iter().filter(|p| is_zero(p)).map(Estimated::beyond).collect::<Vec<_>>();
-    (far.len() > 1).then(|| {
-        let change = "the zeros of all joints free to leave their bounds";
-        let widen =
-            move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| super::model::widened(&p.name)));
-        Hypothesis::new("joint-zero", "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
-    })
+/// An amplitude as far as this either way.
+pub fn within(bound: f64) -> Override {
+    Override { bound: Some(bound), prior: Some(bound), ..Override::default() }
 }
 
 /// An effect of the catalogue whose one amplitude may be far larger than its physics allows.
-fn effect(
+pub fn effect(
     code: &'static str,
     subject: String,
     change: String,

@@ -8,6 +8,7 @@ mod model;
 mod parts;
 mod poses;
 mod readings;
+mod zeros;
 
 use super::trial::Inputs;
 use armcal_core::Parameter;
@@ -153,7 +154,9 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 
     all.extend(model::hypotheses(inputs, at_bound));
     all.extend(frames::hypotheses(inputs));
     let mut rarer = parts::hypotheses(inputs, &all);
-    rarer.extend(drives::hypotheses(inputs, at_bound));
+    rarer.extend(drives::hypotheses(inputs));
+    rarer.extend(zeros::hypotheses(inputs, at_bound));
+    rarer.extend(drives::let_go(inputs));
     rarer.extend(model::of_another_size(inputs));
     rarer.extend(board::from_the_other_side(inputs));
     [all, rarer]
