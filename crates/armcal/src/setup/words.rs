@@ -132,7 +132,7 @@ mod tests {
             |errors_mm: [f64; 2], spreads_m| falls(errors_mm.map(|mm| mm * 1e-3), spreads_m, "held-out ");
         let same = [0.5, 0.5];
         assert_eq!(
-            told([353.01, 0.13], same).unwrap(),
+            told([353.01, 0.13], same).expect("it falls"),
             "the mean held-out error falls from 353.01 to 0.13 mm"
         );
         assert_eq!(told([0.134, 0.126], same), None, "0.13 to 0.13 mm");
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(told([0.13, 0.14], same), None);
         // Positions read as millimetres.
         assert_eq!(told([1.58, 0.064], [0.5, 0.5e-3]), None);
-        let grown = told([0.064, 1.58], [0.5e-3, 0.5]).unwrap();
+        let grown = told([0.064, 1.58], [0.5e-3, 0.5]).expect("it falls");
         assert_eq!(
             grown,
             "the mean held-out error is 1.58 mm of positions that spread by 500.00 mm, instead of 0.064 of 0.50 mm"
