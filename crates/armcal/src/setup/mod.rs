@@ -15,6 +15,7 @@ mod clocks;
 mod facts;
 mod hypotheses;
 mod search;
+mod spread;
 mod trial;
 mod unseen;
 mod weigh;

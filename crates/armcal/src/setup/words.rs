@@ -2,7 +2,8 @@
 
 use super::beyond;
 use super::hypotheses::{Estimated, Hypothesis};
-use super::trial::{Inputs, Misfit, spread_m};
+use super::spread::spread_m;
+use super::trial::{Inputs, Misfit};
 use super::weigh::SAME_FACTOR;
 use crate::story::Fitted;
 use armcal_calibrate::Calibration;
