@@ -136,23 +136,33 @@ pub fn run_as_shipped(name: &str) -> Value {
     own.get_or_init(run).clone()
 }
 
-/// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times the
-/// floor, and no result is called adequate above twice the floor, whatever is named; where a name is, one side of the hold-out
-/// may be above it, because a part of the hold-out may hold all poses that show an effect. What is identified is so with a
-/// probability that says so.
+/// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times what
+/// repeatability and the declared noise give, and no result is called adequate above twice the floor unless its user wants no
+/// more, the errors are those of repeatability, or what was found explains half of what is beyond it. The first explanation told is
+/// the answer.
 pub fn believable(summary: &Value, what: &str) {
     let floors = |error: &str, floor: &str| {
         let at = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
         at(error).zip(at(floor)).map(|(error, floor)| error / floor)
     };
-    let diagnosed = floors("/diagnosis/holdout_mm/before", "/diagnosis/floor_mm");
-    if let (Some(floors), "nothing_missing") = (diagnosed, text(summary, "/diagnosis/verdict")) {
-        assert!(floors <= 1.5, "{what}: nothing is missing at {floors:.2} floors");
+    let mm = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
+    let expected_mm =
+        mm("/diagnosis/floor_mm").map(|floor| floor.max(mm("/diagnosis/repeatability_mm").unwrap_or(0.0)));
+    let errors_mm =
+        mm("/diagnosis/holdout_mm/before").zip(mm("/diagnosis/holdout_mm/after")).zip(expected_mm);
+    if let (Some(((before, _), expected)), "nothing_missing") =
+        (errors_mm, text(summary, "/diagnosis/verdict"))
+    {
+        assert!(before <= 1.5 * expected, "{what}: nothing is missing at {:.2} floors", before / expected);
     }
-    if text(summary, "/diagnosis/verdict") == "identified" {
-        let probability = number(summary, "/diagnosis/probability");
-        assert!(probability > 0.9, "{what}: identified with a probability of {probability}");
+    if let Some(first) = summary.pointer("/diagnosis/names/0").and_then(Value::as_str) {
+        let told = text(summary, "/diagnosis/candidates/0/spec");
+        assert!(told.split('+').any(|name| name == first), "{what}: {first} is named, {told} stands first");
     }
+    let understood = errors_mm.is_some_and(|((before, after), expected)| {
+        let beyond = before.powi(2) - expected.powi(2);
+        after <= 1.5 * expected || before.powi(2) - after.powi(2) >= 0.5 * beyond
+    });
     let of = |side: &str| floors(&format!("/fit/{side}/fitted_mm/mean"), "/fit/noise_floor_mm");
     let held_out = summary.pointer("/fit/holdout/n").and_then(Value::as_u64) > Some(0);
     let named = ["identified", "ambiguous", "unknown"].contains(&text(summary, "/diagnosis/verdict"));
@@ -162,7 +172,7 @@ pub fn believable(summary: &Value, what: &str) {
         (false, _) => of("train"),
     };
     if let (Some(floors), "ok") = (judged, text(summary, "/status")) {
-        assert!(floors <= 2.0, "{what}: adequate at {floors:.2} floors");
+        assert!(floors <= 2.0 || understood, "{what}: adequate at {floors:.2} floors");
     }
 }
 

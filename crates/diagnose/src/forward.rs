@@ -162,7 +162,7 @@ pub(crate) fn leading(room: &Room, config: &DiagnosisConfig) -> Vec<(usize, Scor
         (k, room.score_with(&columns))
     };
     let mut scored: Vec<(usize, Score)> = names.into_iter().map(scored).collect();
-    let worth = |(k, score): &(usize, Score)| score.worth(weighed.amplitudes(*k), config);
+    let worth = |(k, score): &(usize, Score)| score.worth(config.margin_nats * weighed.amplitudes(*k) as f64);
     scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     scored
 }

@@ -37,6 +37,7 @@ mod conclude;
 mod config;
 mod confusion;
 mod contrasts;
+mod costs;
 mod crossval;
 mod curves;
 mod density;

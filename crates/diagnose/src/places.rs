@@ -81,6 +81,12 @@ pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisCon
     drawn.into_iter().flat_map(|i| &observations[poses[i].clone()]).collect()
 }
 
+/// The pose of each observation: the same number for those that are alike in every joint.
+pub(crate) fn poses(observations: &[Observation]) -> Vec<usize> {
+    let mut poses = Alike::within(SAME_POSE_RAD);
+    observations.iter().map(|o| poses.group_of(&o.joint_rad)).collect()
+}
+
 /// [`places`] of each pose of these observations.
 pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String>> {
     let poses = measured_together(observations);

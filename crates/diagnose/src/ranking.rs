@@ -5,7 +5,7 @@ use crate::diagnosis::Standing;
 use crate::forward::{Accepted, leading};
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms};
-use crate::score::{Score, UNLISTED_AMPLITUDES, weights};
+use crate::score::{Score, weights};
 use crate::search::Search;
 use crate::settle::Instead;
 
@@ -47,9 +47,10 @@ impl Ranking {
     fn of_nothing(room: &Room, config: &DiagnosisConfig) -> Ranking {
         let listed = leading(room, config);
         let unlisted = room.best_unlisted(config).map(|(_, score)| score);
-        let mut scores = vec![(room.nothing(), 0)];
-        scores.extend(unlisted.iter().map(|score| (score, UNLISTED_AMPLITUDES)));
-        scores.extend(listed.iter().map(|(k, score)| (score, room.weighed.amplitudes(*k))));
+        let costs = room.costs(config);
+        let mut scores = vec![(room.nothing(), costs.of_nothing())];
+        scores.extend(unlisted.iter().map(|score| (score, costs.of_unlisted())));
+        scores.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
         let weights = weights(&scores, config);
         let others = 1 + usize::from(unlisted.is_some());
         let best = listed.first().map(|l| l.1.clone());

@@ -4,10 +4,10 @@
 //! s^2 = sum_g sum_i |e_i - mean_g|^2 / (3 sum_g (n_g - 1)),   E|e| = s sqrt(8/pi)
 //! ```
 //!
-//! over visits to one place that came the same way in one recording (ISO 9283 asks for one direction of approach): whatever a model
-//! does not know is the same in all of these.
+//! over visits to one pose (of a seated tip in one cavity) that came the same way in one recording (ISO 9283 asks for one direction of
+//! approach): whatever a model does not know is the same in all of these.
 
-use crate::places::places;
+use crate::places::poses;
 use armcal_calibrate::Calibration;
 use armcal_core::{Arrival, FeatureId, Observation};
 use nalgebra::Vector3;
@@ -19,12 +19,14 @@ const FEWEST: usize = 8;
 
 /// Mean error that repeatability alone gives, as the residuals of a calibration have it [m]; none where too little was revisited.
 pub(crate) fn repeatability_m(calibration: &Calibration, observations: &[Observation]) -> Option<f64> {
-    let all: Vec<&Observation> = observations.iter().collect();
-    let mut visits: BTreeMap<(usize, String, FeatureId, String), Vec<Vector3<f64>>> = BTreeMap::new();
-    for ((place, o), residual) in places(&all).into_iter().zip(observations).zip(&calibration.residuals) {
-        let Some(place) = place.filter(|_| o.position_rows() == 3) else { continue };
-        let came = o.arrival.iter().map(Arrival::symbol).collect();
-        visits.entry((o.dwell.recording, place, o.feature, came)).or_default().push(residual.fitted_m);
+    let mut visits: BTreeMap<(usize, usize, FeatureId, String), Vec<Vector3<f64>>> = BTreeMap::new();
+    let each = poses(observations).into_iter().zip(observations).zip(&calibration.residuals);
+    for ((pose, o), residual) in each.filter(|((_, o), _)| o.position_rows() == 3) {
+        let came = o.arrival.iter().map(Arrival::symbol).chain(o.cavity().unwrap_or_default().chars());
+        visits
+            .entry((o.dwell.recording, pose, o.feature, came.collect()))
+            .or_default()
+            .push(residual.fitted_m);
     }
     let (mut square_m2, mut more) = (0.0, 0);
     for errors_m in visits.values() {

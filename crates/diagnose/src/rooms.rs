@@ -5,6 +5,7 @@ use crate::bootstrap::Significance;
 use crate::cells::{Dependences, Unlisted};
 use crate::columns::Cut;
 use crate::config::DiagnosisConfig;
+use crate::costs::Costs;
 use crate::crossval::{by_place, by_stretch, left_out};
 use crate::evidence::Metric;
 use crate::judge::{Judged, judge, significance};
@@ -56,6 +57,11 @@ impl Room {
             false => Exam::by_pose(problem, by_place(problem)),
         };
         self.exam.get_or_init(|| of(&self.problem))
+    }
+
+    /// What explanations cost beside each other [nats].
+    pub fn costs<'r>(&'r self, config: &'r DiagnosisConfig) -> Costs<'r> {
+        Costs { room: self, config }
     }
 
     /// The score of the base alone.

@@ -21,8 +21,6 @@ use rand_chacha::ChaCha8Rng;
 const GROUPS: usize = 16;
 /// Standard errors from which a difference is clear (one-sided 99 %).
 const CLEAR: f64 = 2.33;
-/// What is not listed counts as so many amplitudes.
-pub(crate) const UNLISTED_AMPLITUDES: usize = 4;
 /// A smaller difference is none, whatever its standard error [nats] (Sivula et al., section 3).
 const SMALL_NATS: f64 = 4.0;
 
@@ -94,9 +92,9 @@ impl Score {
         Score { by_group: ln_by_group(problem, left_out, &exam.groups) }
     }
 
-    /// What it is worth: less what its amplitudes cost.
-    pub fn worth(&self, amplitudes: usize, config: &DiagnosisConfig) -> f64 {
-        self.by_group.iter().sum::<f64>() - config.margin_nats * amplitudes as f64
+    /// What it is worth: less what its explanation costs [nats].
+    pub fn worth(&self, cost: f64) -> f64 {
+        self.by_group.iter().sum::<f64>() - cost
     }
 
     /// By how much it says more than another one.
@@ -126,9 +124,8 @@ impl Difference {
 }
 
 /// Weights of explanations that look like probabilities: their shares in copies of the data whose groups are drawn anew. Each
-/// comes with its number of amplitudes, and each amplitude costs [`DiagnosisConfig::margin_nats`]: of what predicts alike, the
-/// simpler is the more probable.
-pub(crate) fn weights(scores: &[(&Score, usize)], config: &DiagnosisConfig) -> Vec<f64> {
+/// comes with what it costs [nats]: of what predicts alike, the simpler is the more probable.
+pub(crate) fn weights(scores: &[(&Score, f64)], config: &DiagnosisConfig) -> Vec<f64> {
     let groups = scores.first().map_or(0, |(score, _)| score.by_group.len());
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x00b3_a0b0);
     let mut weights = vec![0.0; scores.len()];
@@ -136,9 +133,9 @@ pub(crate) fn weights(scores: &[(&Score, usize)], config: &DiagnosisConfig) -> V
         // Weights of a Dirichlet distribution: exponential ones over their sum.
         let drawn: Vec<f64> = (0..groups).map(|_| -(1.0 - rng.random::<f64>()).ln()).collect();
         let scale = groups as f64 / drawn.iter().sum::<f64>();
-        let ln = |(score, amplitudes): &(&Score, usize)| {
+        let ln = |(score, cost): &(&Score, f64)| {
             let each = score.by_group.iter().zip(&drawn).map(|(ln, weight)| ln * weight);
-            scale * each.sum::<f64>() - config.margin_nats * *amplitudes as f64
+            scale * each.sum::<f64>() - cost
         };
         let all: Vec<f64> = scores.iter().map(ln).collect();
         let total = ln_sum_exp(all.iter().copied());

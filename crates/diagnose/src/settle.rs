@@ -10,7 +10,7 @@ use crate::forward::{Accepted, confirm, known, named};
 use crate::judge::Grade;
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms};
-use crate::score::{Score, UNLISTED_AMPLITUDES, weights};
+use crate::score::{Score, weights};
 use crate::search::Search;
 
 /// Entries that are scored in the linearised model beside a name, those that the weighing likes best.
@@ -18,10 +18,10 @@ const ALTERNATIVES: usize = 12;
 /// Of these so many are refitted, where they come within this of what is clearly worse [nats].
 const REFITTED: usize = 6;
 const SLACK_NATS: f64 = 10.0;
+/// Moments, and shapes, of one cause that are scored.
+const MOMENTS: usize = 2;
 /// Rounds in which names that change their places are confirmed again.
 const ROUNDS: usize = 3;
-/// Amplitudes that a size of the wrong sign counts as.
-const IMPOSSIBLE: usize = 2;
 
 /// What stands in the place of a name, beside the other names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,7 +113,10 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
     let own = found.judged.entry;
     let mut names = vec![own];
     for k in weighed.ranking() {
-        let new = !weighed.entries[k].candidate.is_group() && names.iter().all(|n| !weighed.one_name(*n, k));
+        let other_moments = names.iter().filter(|n| weighed.one_cause(**n, k)).count();
+        let new = !weighed.entries[k].candidate.is_group()
+            && other_moments < MOMENTS
+            && names.iter().all(|n| !weighed.one_name(*n, k));
         names.extend((new && names.len() < ALTERNATIVES).then_some(k));
     }
     let one_step = |k: &usize| {
@@ -149,20 +152,19 @@ fn answer(
         !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
     let mut set: Vec<&(usize, Score)> = refits.iter().filter(stands).collect();
-    let worth = |(k, score): &(usize, Score)| score.worth(cost(*k, room, config), config);
+    let worth = |(k, score): &(usize, Score)| score.worth(room.costs(config).of_entry(*k));
     set.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-    let set: Vec<usize> = set.into_iter().map(|(k, _)| *k).collect();
+    let mut causes: Vec<usize> = Vec::new();
+    for (k, _) in set {
+        let new = causes.iter().all(|known| !room.weighed.one_cause(*known, *k));
+        causes.extend(new.then_some(*k));
+    }
+    let set = causes;
     let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());
     match acts.is_empty() {
         true => (set, Vec::new()),
         false => (acts, others.into_iter().map(|k| of(k).spec.clone()).collect()),
     }
-}
-
-/// What an entry costs, in amplitudes: what came out as no such mechanism can is told after what could be.
-fn cost(k: usize, room: &Room, config: &DiagnosisConfig) -> usize {
-    let impossible = !room.judge(k, config).impossible.is_empty();
-    room.weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 }
 }
 
 /// Everything that was scored, with its share of the probability.
@@ -177,12 +179,13 @@ fn weighed(
     let others = std::iter::once((Instead::Nothing, nothing));
     let all: Vec<(Instead, Score)> =
         entries.chain(others).chain(unlisted.map(|score| (Instead::Unlisted, score))).collect();
-    let amplitudes = |what: Instead| match what {
-        Instead::Entry(k) => cost(k, room, config),
-        Instead::Nothing => 0,
-        Instead::Unlisted => UNLISTED_AMPLITUDES,
+    let costs = room.costs(config);
+    let cost = |what: Instead| match what {
+        Instead::Entry(k) => costs.of_entry(k),
+        Instead::Nothing => costs.of_nothing(),
+        Instead::Unlisted => costs.of_unlisted(),
     };
-    let scores: Vec<(&Score, usize)> = all.iter().map(|(what, score)| (score, amplitudes(*what))).collect();
+    let scores: Vec<(&Score, f64)> = all.iter().map(|(what, score)| (score, cost(*what))).collect();
     let weights = weights(&scores, config);
     all.into_iter().zip(weights).map(|((what, score), weight)| Scored { what, score, weight }).collect()
 }

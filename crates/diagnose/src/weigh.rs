@@ -13,6 +13,7 @@ use crate::projection::Gram;
 use crate::sizes;
 use crate::special::ln_sum_exp;
 use crate::whitener::Whitener;
+use armcal_model::place_and_moment;
 use nalgebra::DMatrix;
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -277,6 +278,13 @@ impl Weighed {
         };
         let single = |k: usize| !self.entries[k].candidate.is_group();
         k == l || (k.max(l) >= self.given && single(k) && single(l) && placed(k) == placed(l))
+    }
+
+    /// Whether two entries are one effect at one target, apart from a shape, and from the moment of an event: when it happened
+    /// is no other cause.
+    pub fn one_cause(&self, k: usize, l: usize) -> bool {
+        let place = |k: usize| place_and_moment(&self.entries[k].candidate.spec).map(|(place, _)| place);
+        self.one_name(k, l) || place(k).is_some_and(|own| place(l).is_some_and(|other| own == other))
     }
 
     /// Amplitudes of an entry, a shape that was searched for counting as one more.

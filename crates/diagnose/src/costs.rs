@@ -1,0 +1,39 @@
+//! What an explanation costs before it may be the answer: its freedom, and that it was picked among many.
+
+use crate::config::DiagnosisConfig;
+use crate::rooms::Room;
+
+/// Amplitudes that a size of the wrong sign counts as: what came out as no such mechanism can is told after what could be.
+const IMPOSSIBLE: usize = 2;
+/// What is not listed counts as so many amplitudes.
+const UNLISTED: usize = 4;
+
+/// Costs in a room [nats]: [`DiagnosisConfig::margin_nats`] for each amplitude, and -ln of the prior, which the entries of the
+/// catalogue, and what is not listed, share evenly.
+#[derive(Clone, Copy)]
+pub(crate) struct Costs<'r> {
+    pub room: &'r Room,
+    pub config: &'r DiagnosisConfig,
+}
+
+impl Costs<'_> {
+    pub fn of_nothing(self) -> f64 {
+        -self.config.prior_nothing.ln()
+    }
+
+    pub fn of_unlisted(self) -> f64 {
+        self.of(UNLISTED, self.config.prior_unknown, self.room.weighed.unlisted.len())
+    }
+
+    /// Of an entry of the catalogue.
+    pub fn of_entry(self, k: usize) -> f64 {
+        let weighed = &self.room.weighed;
+        let impossible = !self.room.judge(k, self.config).impossible.is_empty();
+        let amplitudes = weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 };
+        self.of(amplitudes, self.config.prior_catalogue, weighed.entries.len())
+    }
+
+    fn of(self, amplitudes: usize, prior: f64, count: usize) -> f64 {
+        self.config.margin_nats * amplitudes as f64 - (prior / count.max(1) as f64).ln()
+    }
+}
