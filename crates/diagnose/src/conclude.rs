@@ -160,7 +160,8 @@ fn errs_more(
     let held = compare_heldout(before, &refitted.calibration, observations, config)?;
     let names: Vec<String> = refitted.effects.iter().map(ToString::to_string).collect();
     let message = format!(
-        "{} predicts dwells that were left out place by place, but on this hold-out it {}: what it predicts does not reach there,          or a turn leaves out what it acts in; another hold-out (`[holdout]`) may tell",
+        "{} predicts dwells that were left out place by place, but on this hold-out it {}: what it predicts does not reach \
+         there, or a turn leaves out what it acts in; another hold-out (`[holdout]`) may tell",
         listed(&names),
         held.change_text()
     );
