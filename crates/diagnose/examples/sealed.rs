@@ -147,10 +147,12 @@ fn main() {
             );
             for c in d.candidates.iter().take(6) {
                 println!(
-                    "  {} lnB {:.1} P {:.4} p {:.3} {:?} absorbed {:.3} smallest {:.2} {:?}",
+                    "  {} {} p {:.3} {:?} absorbed {:.3} smallest {:.2} {:?}",
                     c.spec,
-                    c.log_evidence,
-                    c.probability,
+                    c.standing.map_or(String::new(), |s| format!(
+                        "behind {:.1} +- {:.1} P {:.4}",
+                        s.behind_nats, s.behind_se, s.probability
+                    )),
                     c.p_adjusted,
                     c.holdout_mm,
                     c.absorbed,
@@ -160,12 +162,15 @@ fn main() {
             }
             if let Some(u) = &d.unknown {
                 println!(
-                    "  unknown {} <- {} lnB {:.1} P {:.4} {:?} {:?}",
-                    u.channel, u.driver, u.log_evidence, u.probability, u.expression, u.rivals
+                    "  unknown {} <- {} gain {:.1} P {:.4} {:?} {:?}",
+                    u.channel, u.driver, u.gain_nats, u.probability, u.expression, u.rivals
                 );
             }
             for e in &d.effects {
-                println!("  {:?} P {:.3} margin {:.1} {:?}", e.set, e.probability, e.margin_nats, e.contrast);
+                println!(
+                    "  {:?} P {:.3} gain {:.1} +- {:.1} {:?}",
+                    e.set, e.probability, e.gain_nats, e.gain_se, e.contrast
+                );
             }
             for e in &d.explanations {
                 println!("  {}: {}", e.number, e.sentence);

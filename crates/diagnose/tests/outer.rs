@@ -158,14 +158,14 @@ fn of_thousands_of_poses_all_that_weigh_confirm_what_a_search_through_few_propos
         let config = DiagnosisConfig { max_weighed, ..config() };
         let found = with_calibrated(&model, &calibration, &observations, |c| diagnose(c, &config)).unwrap();
         let mut effects: Vec<(String, f64)> =
-            found.effects.iter().map(|e| (e.name.clone(), e.log_evidence)).collect();
+            found.effects.iter().map(|e| (e.name.clone(), e.gain_nats)).collect();
         effects.sort_by(|a, b| a.0.cmp(&b.0));
         effects
     };
     let (all, few) = (found(1700), found(400));
     let names = |of: &[(String, f64)]| of.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     assert_eq!((names(&all), names(&few)), (vec!["backlash:1".into(), "eccentricity:2".into()], names(&all)));
-    // Evidence grows with the poses that weigh: those of the proposal were 480.
+    // The gain grows with the poses that weigh: those of the proposal were 480.
     for (all, few) in all.iter().zip(&few) {
         assert!((3.0..6.0).contains(&(all.1 / few.1)), "{all:?} {few:?}");
     }
@@ -196,20 +196,16 @@ fn a_complete_model_misses_nothing() {
 }
 
 #[test]
-fn what_is_no_larger_than_noise_is_not_worth_a_claim_however_improbable() {
+fn what_is_no_larger_than_noise_is_nothing_however_improbable() {
     // Nearly everything counts as improbable here: what is left to say is that the errors are those of noise.
     let config = DiagnosisConfig { max_probability_nothing: 0.9999, ..config() };
-    let mut improbable = 0;
     for seed in 20..26 {
         let (model, observations) = observed(&[], 0.0, seed);
         let fit = calibration(&model, &observations);
         let d = with_calibrated(&model, &fit, &observations, |c| diagnose(c, &config).unwrap());
         assert_eq!(d.verdict, Verdict::NothingMissing, "seed {seed}: {:?} {}", d.names, fit.times_floor());
         assert!(d.unlisted.is_empty() && d.unexplained.is_none());
-        assert_eq!(d.not_worth_a_name(), d.p_nothing < 0.9999);
-        improbable += usize::from(d.not_worth_a_name());
     }
-    assert!(improbable > 2, "{improbable}");
 }
 
 #[test]
@@ -326,8 +322,8 @@ fn errors_above_the_floor_without_an_explanation_are_unexplained() {
         assert_eq!(d.verdict, Verdict::Unexplained, "{:?}", d.names);
         assert!(d.names.is_empty() && d.effects.is_empty() && d.probability.is_none());
         let left = d.unexplained.as_ref().unwrap();
-        assert!((15.0..25.0).contains(&left.times_floor), "{left:?}");
-        assert_eq!(left.times_floor, before.times_floor());
+        assert!((15.0..25.0).contains(&left.times_expected), "{left:?}");
+        assert!((left.times_expected / before.times_floor() - 1.0).abs() < 1e-9, "nothing was revisited");
         assert!(left.tried.listed > 20 && left.tried.unlisted > 20, "{left:?}");
         let grave = d.warnings.iter().any(|w| w.code == "unexplained" && w.severity == Severity::Inadequate);
         assert!(grave, "{:?}", d.warnings);

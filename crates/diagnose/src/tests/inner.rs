@@ -4,6 +4,7 @@
 
 use super::*;
 use crate::problem::{Candidate, Columns};
+use crate::settle::{Instead, Scored};
 use crate::tests::arm::SIGMA_M;
 use crate::tests::{arm, entry, in_rooms, own, planted, quick, room};
 use armcal_core::DwellId;
@@ -15,13 +16,20 @@ fn accepted(p: &Problem, spec: &str) -> Accepted {
     let config = quick();
     let room = room(p, &config);
     let judged = room.judge(entry(&room.weighed, spec), &config);
-    let grade = judged.grade(&room.weighed, &config);
-    Accepted { candidate: own(p, spec), grade, judged, room, instead_of: Vec::new(), refits: Vec::new() }
+    let grade = judged.grade(&config);
+    let set = vec![judged.entry];
+    let (instead_of, ranked) = Default::default();
+    Accepted { candidate: own(p, spec), grade, judged, room, instead_of, set, ranked }
 }
 
 fn searched(p: &Problem) -> Search {
     let config = quick();
-    in_rooms(p, &config, |rooms| search(rooms, &[], &config)).unwrap()
+    in_rooms(p, &config, |rooms| {
+        let mut found = search(rooms, &[], &config)?;
+        settle(&mut found, rooms, &config)?;
+        Ok::<_, DiagnoseError>(found)
+    })
+    .unwrap()
 }
 
 fn codes(all: &[Warning]) -> Vec<&str> {
@@ -30,8 +38,18 @@ fn codes(all: &[Warning]) -> Vec<&str> {
 
 fn assembled(p: &Problem, search: &Search) -> Diagnosis {
     let config = quick();
-    let before = Before::of(&room(p, &config), &config);
+    let room = room(p, &config);
+    let ranking = in_rooms(p, &config, |rooms| Ranking::of(search, &room, rooms, &config));
+    let before = Before::of(&room, ranking, &config);
     assemble(before, (p.dwells.len(), Vec::new()), search, &config)
+}
+
+/// Probability of what is not listed where no name was found.
+fn p_unlisted(p: &Problem) -> f64 {
+    let (config, nothing_found) = (quick(), searched(&planted(&[], 0, 6)));
+    let ranking =
+        in_rooms(p, &config, |rooms| Ranking::of(&nothing_found, &room(p, &config), rooms, &config));
+    ranking.p_unlisted
 }
 
 #[test]
@@ -48,7 +66,7 @@ fn nothing_found_is_told_with_the_probability_of_nothing() {
     assert!(d.p_adjusted > 0.05, "{}", d.p_adjusted);
     s.left_over = true;
     let d = assembled(&p, &s);
-    assert_eq!((d.verdict, d.probability), (Verdict::Unknown, Some(1.0 - d.p_nothing)));
+    assert_eq!((d.verdict, d.probability), (Verdict::Unknown, Some(p_unlisted(&p))));
 }
 
 #[test]
@@ -83,7 +101,7 @@ fn two_names_or_a_doubt_are_ambiguous() {
     assert_eq!(d.names, ["backlash:1", NOT_LISTED]);
     let mut s = searched(&p);
     let other = entry(&s.accepted[0].room.weighed, "scale:2");
-    s.accepted[0].judged.set.push(other);
+    s.accepted[0].set.push(other);
     let d = assembled(&p, &s);
     assert_eq!(
         (d.verdict, &d.names[..]),
@@ -92,7 +110,7 @@ fn two_names_or_a_doubt_are_ambiguous() {
 }
 
 #[test]
-fn several_effects_are_as_sure_as_the_least_sure() {
+fn several_effects_are_as_sure_as_all_of_them_together() {
     let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
     let mut s = searched(&p);
     assert_eq!(s.accepted.len(), 2);
@@ -101,36 +119,30 @@ fn several_effects_are_as_sure_as_the_least_sure() {
     s.accepted[1].judged.significance[second].p_adjusted = 0.007;
     let d = assembled(&p, &s);
     assert_eq!(d.p_adjusted, 0.007);
-    let least = d.effects.iter().map(|e| e.probability).fold(1.0, f64::min);
-    assert_eq!(d.probability, Some(least));
+    assert_eq!(d.probability, Some(d.effects[0].probability * d.effects[1].probability));
 }
 
 #[test]
-fn an_effects_probability_is_that_of_all_that_its_set_means() {
-    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let own_point = Candidate { spec: "backlash:1,shape=2".into(), ..own(&p, "backlash:1") };
-    p.scans.push(crate::Scan::of("backlash:1", vec![own_point]));
-    p.candidates.push(Candidate { spec: "backlash:1+backlash:2".into(), ..own(&p, "backlash:1") });
+fn an_effects_probability_is_that_of_its_set_and_of_nothing_else() {
     let config = quick();
-    let mut a = accepted(&p, "backlash:1");
-    let (k, l) = (a.judged.entry, entry(&a.room.weighed, "backlash:1,shape=2"));
-    let mut r = Rc::try_unwrap(a.room).expect("nobody else has the room");
-    r.weighed.entries.iter_mut().for_each(|e| e.probability = 1e-3);
-    let group = r.weighed.entries.iter().position(|e| e.candidate.is_group()).unwrap();
-    r.weighed.entries[group].probability = 0.1;
-    (r.weighed.entries[k].probability, r.weighed.entries[l].probability) = (0.5, 0.3);
-    a.room = Rc::new(r);
-    a.judged.set = vec![k];
-    a.judged.p_same = 0.04;
+    let mut a = searched(&planted(&[("backlash:1", 1.0)], 0, 3)).accepted.remove(0);
+    let score = a.ranked[0].score.clone();
+    let other = entry(&a.room.weighed, "scale:2");
+    let share = |what, weight| Scored { what, score: score.clone(), weight };
+    let own = Instead::Entry(a.judged.entry);
+    a.ranked = vec![share(own, 0.5), share(Instead::Entry(other), 0.3)];
+    a.ranked.extend([share(Instead::Nothing, 0.15), share(Instead::Unlisted, 0.05)]);
+    a.set = vec![a.judged.entry];
     let found = found_effect(&a, &config);
-    assert!((found.probability - 0.94).abs() < 1e-12, "{}", found.probability);
-    let w = &a.room.weighed;
-    assert_eq!(found.log_evidence, w.entries[k].ln_evidence);
-    assert_eq!(found.margin_nats, a.judged.above_other);
+    assert_eq!((found.probability, &found.set[..]), (0.5, &["backlash:1".to_string()][..]));
+    assert_eq!(found.rival.as_ref().map(|r| (r.name.as_str(), r.behind_nats)), Some(("scale:2", 0.0)));
+    a.set.push(other);
+    let found = found_effect(&a, &config);
+    assert!((found.probability - 0.8).abs() < 1e-12 && found.rival.is_none(), "{}", found.probability);
+    assert_eq!((found.gain_nats, found.gain_se), (a.judged.gain.nats, a.judged.gain.se));
+    assert_eq!(found.above_unlisted_nats, a.judged.unlisted.as_ref().map(|u| -u.above.nats));
     a.grade = Grade::OrUnlisted;
-    assert_eq!(found_effect(&a, &config).set, ["backlash:1", NOT_LISTED]);
-    a.grade = Grade::Named;
-    assert_eq!(found_effect(&a, &config).set, ["backlash:1"]);
+    assert_eq!(found_effect(&a, &config).set, ["backlash:1", "scale:2", NOT_LISTED]);
 }
 
 #[test]
@@ -260,5 +272,6 @@ fn curves_come_first_and_else_the_best_unlisted() {
     assert_eq!((d.verdict, d.unlisted.len()), (Verdict::Unknown, 1));
     let u = d.unknown.as_ref().unwrap();
     assert_eq!((u.channel.as_str(), u.driver.as_str()), (channel, driver));
-    assert_eq!(d.probability, Some(1.0 - d.p_nothing));
+    assert_eq!(d.probability, Some(p_unlisted(&p)));
+    assert!(d.probability > Some(0.9), "{:?}", d.probability);
 }

@@ -6,6 +6,7 @@ use super::*;
 use crate::forward::tests::{beside, planted, strong, told};
 use crate::problem::{Columns, Problem};
 use crate::refit::LinearRefit;
+use crate::settle::settle;
 use crate::tests::{arm, in_rooms, own, quick};
 use crate::weigh::weigh;
 use std::sync::Arc;
@@ -120,10 +121,14 @@ fn of_names_that_the_data_leave_the_known_one_is_told() {
     let twin = Candidate { spec: "twin".into(), family: "twin".into(), columns, ..a };
     p.candidates.push(twin);
     let told = |p: &Problem| {
-        let s = in_rooms(p, &config, |rooms| search(rooms, &[], &config)).unwrap();
-        let [one] = &s.accepted[..] else { panic!("one effect was planted") };
+        let s = in_rooms(p, &config, |rooms| {
+            let mut s = search(rooms, &[], &config)?;
+            settle(&mut s, rooms, &config)?;
+            Ok::<_, DiagnoseError>(s)
+        });
+        let [one] = &s.unwrap().accepted[..] else { panic!("one effect was planted") };
         let name = |k: &usize| one.room.weighed.entries[*k].candidate.spec.clone();
-        let set: Vec<String> = one.judged.set.iter().map(name).collect();
+        let set: Vec<String> = one.set.iter().map(name).collect();
         (one.candidate.spec.clone(), set, one.instead_of.clone())
     };
     let (_, both, others) = told(&p);
