@@ -57,9 +57,9 @@ impl Diagnosis {
         self.repeatability_mm.map_or(self.floor_mm, |repeatability| repeatability.max(self.floor_mm))
     }
 
-    /// How many times that a calibration errs.
+    /// How many times that a calibration errs; its floor may hold what no reading shows of a play.
     fn times_expected(&self, calibration: &Calibration) -> f64 {
-        error_mm(calibration) / self.expected_mm()
+        error_mm(calibration) / self.expected_mm().max(calibration.noise_floor_m * 1e3)
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise
