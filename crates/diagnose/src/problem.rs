@@ -228,7 +228,8 @@ impl Problem {
     /// Standard deviation of what the fit leaves, in units of the declared noise.
     pub(crate) fn sigma(&self) -> f64 {
         let dof = self.rows().saturating_sub(self.geometry.ncols()).max(1) as f64;
-        (self.residual.norm_squared() / dof).sqrt()
+        let left = &self.residual - &self.geometry * crate::judge::base_fit(self);
+        (left.norm_squared() / dof).sqrt()
     }
 
     /// Checks that sizes agree and everything is finite.
