@@ -53,14 +53,16 @@ impl Ranking {
         scores.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
         let weights = weights(&scores, config);
         let others = 1 + usize::from(unlisted.is_some());
-        let best = listed.first().map(|l| l.1.clone());
+        let mut rows: Vec<(&(usize, Score), &f64)> = listed.iter().zip(&weights[others..]).collect();
+        rows.sort_by(|a, b| b.1.total_cmp(a.1));
+        let best = rows.first().map(|row| row.0.1.clone());
         let row = |((k, score), weight): (&(usize, Score), &f64)| Explanation {
             effects: vec![room.weighed.entries[*k].candidate.spec.clone()],
             standing: Standing::of(best.as_ref().unwrap_or(score), score, *weight, false),
             p_adjusted: room.judge(*k, config).own().p_adjusted,
         };
         Ranking {
-            explanations: listed.iter().zip(&weights[others..]).map(row).collect(),
+            explanations: rows.into_iter().map(row).collect(),
             p_nothing: weights[0],
             p_unlisted: weights[1..others].iter().sum(),
         }
