@@ -172,4 +172,4 @@ fn errs_more(
 
 #[cfg(test)]
 #[path = "tests/conclude.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -113,3 +113,7 @@ fn ln_density(errors: &[Axes], size: Size) -> f64 {
     };
     errors.iter().flatten().map(of).sum()
 }
+
+#[cfg(test)]
+#[path = "tests/density.rs"]
+mod tests;

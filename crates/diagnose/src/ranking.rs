@@ -135,3 +135,7 @@ impl Standing {
         Standing { behind_nats: behind.nats, behind_se: behind.se, probability, in_answer }
     }
 }
+
+#[cfg(test)]
+#[path = "tests/ranking.rs"]
+mod tests;

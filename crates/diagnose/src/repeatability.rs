@@ -36,3 +36,7 @@ pub(crate) fn repeatability_m(calibration: &Calibration, observations: &[Observa
     }
     (more >= FEWEST).then(|| (square_m2 / (3 * more) as f64).sqrt() * (8.0 / PI).sqrt())
 }
+
+#[cfg(test)]
+#[path = "tests/repeatability.rs"]
+mod tests;

@@ -144,3 +144,7 @@ pub(crate) fn weights(scores: &[(&Score, f64)], config: &DiagnosisConfig) -> Vec
     weights.iter_mut().for_each(|weight| *weight /= config.resamplings as f64);
     weights
 }
+
+#[cfg(test)]
+#[path = "tests/score.rs"]
+pub(crate) mod tests;

@@ -189,3 +189,7 @@ fn weighed(
     let weights = weights(&scores, config);
     all.into_iter().zip(weights).map(|((what, score), weight)| Scored { what, score, weight }).collect()
 }
+
+#[cfg(test)]
+#[path = "tests/settle.rs"]
+pub(crate) mod tests;

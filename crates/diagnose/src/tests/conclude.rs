@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 
 const N: usize = 40;
 
-fn observations() -> Vec<Observation> {
+pub(crate) fn observations() -> Vec<Observation> {
     let model = planar_arm();
     let one = |dwell: usize| {
         let joint_rad = vec![0.05 * dwell as f64, 1.5 - 0.03 * dwell as f64, 0.0];
@@ -33,7 +33,7 @@ fn observations() -> Vec<Observation> {
 }
 
 /// A calibration that errs by so many millimetres in every held-out dwell, and in every one that was fitted.
-fn erring(held_out_mm: f64, fitted_mm: f64) -> Calibration {
+pub(crate) fn erring(held_out_mm: f64, fitted_mm: f64) -> Calibration {
     static BASE: OnceLock<Calibration> = OnceLock::new();
     let base = BASE.get_or_init(|| {
         calibrate(&planar_arm(), &observations(), &FitConfig::default(), &HoldoutConfig::None).unwrap()

@@ -1,0 +1,170 @@
+//! Sets and names, against planted effects and twins of them.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use super::*;
+use crate::problem::{Columns, Problem};
+use crate::search::search;
+use crate::tests::{in_rooms, own, planted, quick};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+fn spec(found: &Accepted, k: usize) -> &str {
+    &found.room.weighed.entries[k].candidate.spec
+}
+
+fn set(found: &Accepted) -> Vec<&str> {
+    found.set.iter().map(|k| spec(found, *k)).collect()
+}
+
+/// What is found in a problem, settled, and something asked of it.
+fn asked<T>(p: &Problem, ask: impl FnOnce(&Search, &mut Rooms<'_>) -> T) -> T {
+    let config = quick();
+    in_rooms(p, &config, |rooms| {
+        let mut found = search(rooms, &[], &config).unwrap();
+        settle(&mut found, rooms, &config).unwrap();
+        ask(&found, rooms)
+    })
+}
+
+fn settled_sets(p: &Problem) -> Vec<Vec<String>> {
+    let owned = |a: &Accepted| set(a).into_iter().map(str::to_owned).collect::<Vec<_>>();
+    asked(p, |found, _| found.accepted.iter().map(owned).collect())
+}
+
+/// Problems with what was planted in them.
+pub(crate) fn cases() -> Vec<(Problem, Vec<&'static str>)> {
+    let of = |names: &[&'static str], free: usize, seed: u64| {
+        let sized: Vec<(&str, f64)> = names.iter().map(|n| (*n, 1.0)).collect();
+        (planted(&sized, free, seed), names.to_vec())
+    };
+    vec![
+        of(&["backlash:1"], 0, 3),
+        of(&["zero_drift:1"], 0, 7),
+        of(&["compliance:3"], 60, 7),
+        of(&["coupling:3"], 60, 7),
+        of(&["backlash:1", "zero_drift:2"], 0, 3),
+        of(&["backlash:3", "coupling:3"], 60, 3),
+    ]
+}
+
+#[test]
+fn a_set_holds_what_was_planted_and_nothing_that_is_clearly_worse() {
+    let config = quick();
+    for (p, names) in cases() {
+        asked(&p, |found, rooms| {
+            assert_eq!(found.accepted.len(), names.len(), "{names:?}");
+            for name in &names {
+                let holds = found.accepted.iter().any(|a| set(a).contains(name));
+                assert!(holds, "{name} of {:?}", found.accepted.iter().map(set).collect::<Vec<_>>());
+            }
+            for (i, a) in found.accepted.iter().enumerate() {
+                let others = || found.accepted.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, a)| a);
+                let mut refit = |k: usize| {
+                    let mut with: Vec<Candidate> = others().map(|a| a.candidate.clone()).collect();
+                    with.push(a.room.weighed.entries[k].candidate.clone());
+                    rooms.score(&with, &a.room).unwrap()
+                };
+                let ranked: Vec<(usize, Score)> = (a.ranked.iter())
+                    .filter_map(|s| if let Instead::Entry(k) = s.what { Some((k, refit(k))) } else { None })
+                    .collect();
+                let detail = a.judged.detail(&config);
+                let worse =
+                    |score: &Score| ranked.iter().any(|(_, other)| other.above(score).is_clear(detail));
+                for (k, score) in &ranked {
+                    assert!(!(a.set.contains(k) && worse(score)), "{} is clearly worse", spec(a, *k));
+                }
+                assert_eq!(a.set[0], a.judged.entry, "the name comes first");
+                assert_eq!(a.candidate.spec, spec(a, a.set[0]));
+            }
+        });
+    }
+}
+
+#[test]
+fn shares_of_what_was_scored_are_one_together() {
+    for (p, names) in cases() {
+        asked(&p, |found, _| {
+            for a in &found.accepted {
+                assert!((a.probability(|_| true) - 1.0).abs() < 1e-9, "{names:?}");
+                assert_eq!(a.ranked.iter().filter(|s| s.what == Instead::Nothing).count(), 1);
+                assert!(a.probability(|w| w == Instead::Nothing) < 0.01, "{names:?}");
+                let of = |k: usize| a.probability(|w| w == Instead::Entry(k));
+                assert!(a.ranked.iter().all(|s| !matches!(s.what, Instead::Entry(k) if of(k) != s.weight)));
+            }
+        });
+    }
+}
+
+/// A planted play, and another candidate made of its columns.
+fn with_twin(columns: impl Fn(&DMatrix<f64>, &Problem) -> DMatrix<f64>) -> Problem {
+    let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let a = own(&p, "backlash:1");
+    let columns = columns(&a.columns.dense(&p.dwells, 1.0), &p);
+    let amplitudes = (0..columns.ncols()).map(|_| a.amplitudes[0].clone()).collect();
+    let columns = Columns::Dense(Arc::new(columns));
+    let twin = Candidate { spec: "twin".into(), family: "twin".into(), columns, amplitudes, ..a };
+    p.candidates.insert(0, twin);
+    p
+}
+
+/// The play with a share of another one's columns.
+fn mixed(share: f64) -> Problem {
+    with_twin(|a, p| a + share * own(p, "backlash:3").columns.dense(&p.dwells, 1.0))
+}
+
+#[test]
+fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
+    let half = 0.5f64.sqrt();
+    let p = with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]));
+    assert_eq!(settled_sets(&p), [["backlash:1", "twin"]]);
+    asked(&p, |found, _| {
+        let [one] = &found.accepted[..] else { panic!("one was planted") };
+        let of = |name: &str| one.probability(|w| matches!(w, Instead::Entry(k) if spec(one, k) == name));
+        let ratio = of("backlash:1") / of("twin");
+        assert!((ratio / quick().margin_nats.exp() - 1.0).abs() < 0.02, "an amplitude more costs: {ratio}");
+    });
+    let p = with_twin(|a, _| a.clone());
+    assert_eq!(settled_sets(&p).concat().len(), 2);
+    asked(&p, |found, _| {
+        let one = &found.accepted[0];
+        let shares: Vec<f64> = one.set.iter().map(|k| one.probability(|w| w == Instead::Entry(*k))).collect();
+        assert!((shares[0] - shares[1]).abs() < 1e-9, "alike to the last: {shares:?}");
+    });
+}
+
+#[test]
+fn a_twin_leaves_the_set_once_the_data_tell_it_apart() {
+    assert_eq!(settled_sets(&mixed(0.02)).concat().len(), 2);
+    assert_eq!(settled_sets(&mixed(1.5)), [["backlash:1"]]);
+}
+
+#[test]
+fn groups_and_second_values_are_no_names_of_their_own() {
+    let mut p = mixed(0.02);
+    let twin = own(&p, "twin");
+    p.candidates.push(Candidate { spec: "twin+more".into(), ..twin });
+    for shape in [2, 3] {
+        let point = Candidate { spec: format!("backlash:1,shape={shape}"), ..own(&p, "backlash:1") };
+        p.scans.push(crate::Scan::of("backlash:1", vec![point]));
+    }
+    let [names] = &settled_sets(&p)[..] else { panic!("one was planted") };
+    assert_eq!(names.iter().filter(|n| n.starts_with("backlash:1")).count(), 1, "{names:?}");
+    assert!(names.contains(&"twin".to_owned()) && !names.contains(&"twin+more".to_owned()), "{names:?}");
+}
+
+#[test]
+fn a_size_that_cannot_be_negative_and_is_comes_last() {
+    // The same columns, turned over: what explains the data is negative there.
+    let mut p = with_twin(|a, _| -1.0 * a);
+    for c in p.candidates.iter_mut().filter(|c| ["twin", "backlash:1"].contains(&c.spec.as_str())) {
+        c.amplitudes[0].never_negative = true;
+    }
+    assert_eq!(settled_sets(&p), [["backlash:1", "twin"]]);
+    asked(&p, |found, _| assert!(found.accepted[0].judged.impossible.is_empty()));
+}
+
+#[test]
+fn nothing_is_settled_where_nothing_was_found() {
+    assert!(settled_sets(&planted(&[], 0, 5)).is_empty());
+}
