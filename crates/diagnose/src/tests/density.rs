@@ -123,7 +123,7 @@ fn by() -> Rotation3<f64> {
 fn the_axes_of_the_world_do_not_matter_where_the_covariance_has_its_own() {
     let (mut p, groups) = dwells();
     let shape = Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 0.3));
-    p.dwells.iter_mut().flat_map(|d| &mut d.parts).for_each(|part| part.metres = &shape * &part.metres);
+    p.dwells.iter_mut().flat_map(|d| &mut d.parts).for_each(|part| part.metres = shape * &part.metres);
     let rows = gaussian(&p, 3.0, 6);
     let before = ln_by_group(&p, &rows, &groups);
     let after = ln_by_group(&turned(p.clone(), &by()), &rows, &groups);

@@ -52,6 +52,15 @@ fn a_difference_is_clear_beyond_chance_beyond_four_nats_and_beyond_a_detail() {
 }
 
 #[test]
+#[ignore = "fault: what one group alone says has itself for standard error, and is never clear"]
+fn what_one_group_alone_says_is_clear_where_it_says_much() {
+    let mut by_group = [0.0; 16];
+    by_group[3] = 1000.0;
+    let difference = score(&by_group).above(&score(&[0.0; 16]));
+    assert!(difference.is_clear(0.0), "{difference:?}");
+}
+
+#[test]
 fn an_amplitude_costs_as_much_as_the_margin() {
     let config = quick();
     assert_eq!(score(&[1.0, 2.5]).worth(0, &config), 3.5);
