@@ -261,23 +261,28 @@ fn the_refit_gives_the_numbers_of_the_verdict() {
     assert!(d.unexplained.is_none(), "{:?}", d.unexplained);
 }
 
+/// An arm whose joint 1 rests anywhere in two fifths of its play, on its way back from the flank that pushed it.
+fn resting(seed: u64) -> (Model, Vec<Observation>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
+    let (model, mut observations) = observed(&[], 0.0, seed);
+    let truth =
+        model.with_effects(&[model.effect("backlash:1").unwrap()], &Session::of(&observations)).unwrap();
+    let mut p = truth.nominal();
+    *p.last_mut().unwrap() = 0.0;
+    p[model.parameters().len()] = WIDTH_RAD;
+    for o in &mut observations {
+        let mut rested = o.clone();
+        rested.joint_rad[0] += o.arrival[0].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
+        let noise = Vector3::from_fn(|_, _| SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+        o.reference = Reference::position(truth.predicted_tip_in_world(&p, &rested) + noise);
+    }
+    (model, observations)
+}
+
 #[test]
 fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is_named() {
     for seed in 1..=3 {
-        let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
-        let (model, mut observations) = observed(&[], 0.0, seed);
-        let truth =
-            model.with_effects(&[model.effect("backlash:1").unwrap()], &Session::of(&observations)).unwrap();
-        let mut p = truth.nominal();
-        *p.last_mut().unwrap() = 0.0;
-        p[model.parameters().len()] = WIDTH_RAD;
-        for o in &mut observations {
-            // On its way back from the flank that pushed it, as far as across two fifths of the gap.
-            let mut rested = o.clone();
-            rested.joint_rad[0] += o.arrival[0].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
-            let noise = Vector3::from_fn(|_, _| SIGMA_M * rng.sample::<f64, _>(StandardNormal));
-            o.reference = Reference::position(truth.predicted_tip_in_world(&p, &rested) + noise);
-        }
+        let (model, observations) = resting(seed);
         let before = calibration(&model, &observations);
         let d = diagnosed(&model, &before, &observations);
         assert_eq!(d.verdict, Verdict::Identified, "{:?}", d.names);
@@ -295,6 +300,13 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
         let left = diagnosed(&extended, &after, &observations);
         assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
     }
+}
+
+#[test]
+#[ignore = "fault: the headline says backlash:1,rest=0.68, the first row backlash:1"]
+fn the_first_row_is_the_answer_of_a_joint_that_rests_in_its_play_too() {
+    let (model, observations) = resting(1);
+    assert_one_order(&told(&model, &observations).1);
 }
 
 #[test]
@@ -456,6 +468,33 @@ fn the_order_of_readings_changes_no_name() {
         let (back, other) = told(&model, &observations);
         assert_eq!((&forth, d.verdict), (&back, other.verdict), "{hidden:?}");
         assert_eq!(d.names, other.names, "{hidden:?}");
+    }
+}
+
+/// Law: the first row is the answer, rows of the answer come before all others, and no other one is clearly better.
+fn assert_one_order(d: &Diagnosis) {
+    let rows: Vec<_> = d.candidates.iter().filter_map(|c| Some((c.spec.as_str(), c.standing?))).collect();
+    let answer: Vec<&str> = d.effects.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(rows[0].0, answer.join("+"));
+    assert!(rows.is_sorted_by(|a, b| a.1.in_answer >= b.1.in_answer), "{rows:?}");
+    assert!(rows.iter().map(|(_, s)| s.probability).sum::<f64>() <= 1.0 + 1e-9, "{rows:?}");
+    let gain = d.effects.iter().map(|e| e.gain_nats).fold(0.0, f64::max);
+    for (name, s) in &rows {
+        // As clear as a set asks for: 99 % one-sided, four nats, a hundredth of the gain.
+        let clear = -s.behind_nats > (2.33 * s.behind_se).max(4.0).max(0.01 * gain);
+        assert!(!clear, "{name} is better: {s:?}");
+    }
+}
+
+#[test]
+fn the_first_row_is_the_answer_and_no_row_is_clearly_better() {
+    for (seed, hidden) in HIDDEN.into_iter().enumerate() {
+        let (model, observations) = observed(hidden, 1.0, 50 + seed as u64);
+        let (sets, d) = told(&model, &observations);
+        assert_eq!(sets.len(), hidden.len(), "{:?}", d.names);
+        let holds = |h: &&str| sets.iter().any(|set| set.iter().any(|n| n == h));
+        assert!(hidden.iter().all(holds), "{hidden:?}: {sets:?}");
+        assert_one_order(&d);
     }
 }
 
