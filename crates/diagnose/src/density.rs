@@ -1,7 +1,7 @@
 //! How probable the errors of dwells are that a fit did not see: the declared noise, and beside it what no model explains.
 //!
 //! ```text
-//! u = U'e,   u_k ~ t_5(0, f^2 lambda_k + s^2),   U diag(lambda) U' the declared covariance of a position [m^2]
+//! e ~ t_5(0, f^2 Sigma + s^2 I),   Sigma the declared covariance of a position [m^2]
 //! ```
 //!
 //! The discrepancy s is isotropic and has one size for what is tracked and one for what is seated. Where the errors are smaller than
@@ -14,8 +14,6 @@ use nalgebra::DVector;
 
 /// Degrees of freedom of Student's t.
 const T_DOF: f64 = 5.0;
-/// ln of its density at 0 with scale 1: `ln G(3) - ln G(5/2) - 1/2 ln(5 pi)`.
-const LN_T_AT_0: f64 = -0.968_619_589;
 /// Sizes on the path a doubling.
 const A_DOUBLING: f64 = 3.0;
 /// Steps of the path below the declared noise, and above it: from a thirtieth of it to a thousand times it.
@@ -106,12 +104,22 @@ fn axes(part: &Part, rows: &DVector<f64>) -> Axes {
 }
 
 fn ln_density(errors: &[Axes], size: Size) -> f64 {
-    let of = |(error_m, variance_m2): &(f64, f64)| {
-        let variance_m2 = size.declared.powi(2) * variance_m2 + size.beside_m.powi(2);
-        let square = error_m.powi(2) / variance_m2;
-        LN_T_AT_0 - 0.5 * variance_m2.ln() - 0.5 * (T_DOF + 1.0) * (square / T_DOF).ln_1p()
+    let of = |axes: &Axes| {
+        let (mut square, mut ln_det, d) = (0.0, 0.0, axes.len() as f64);
+        for (error_m, variance_m2) in axes {
+            let variance_m2 = size.declared.powi(2) * variance_m2 + size.beside_m.powi(2);
+            square += error_m.powi(2) / variance_m2;
+            ln_det += variance_m2.ln();
+        }
+        ln_t_at_0(axes.len()) - 0.5 * ln_det - 0.5 * (T_DOF + d) * (square / T_DOF).ln_1p()
     };
-    errors.iter().flatten().map(of).sum()
+    errors.iter().map(of).sum()
+}
+
+/// ln of the density of Student's t in `d` dimensions at 0 with unit scale: `ln G((5 + d)/2) - ln G(5/2) - d/2 ln(5 pi)`.
+fn ln_t_at_0(d: usize) -> f64 {
+    const LN: [f64; 4] = [0.0, -0.9686195890547249, -1.8378770664093462, -2.624175098670115];
+    LN[d.min(3)]
 }
 
 #[cfg(test)]

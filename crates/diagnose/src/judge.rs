@@ -35,6 +35,8 @@ pub(crate) struct Judged {
     /// Score with it in the linearised model, and by how much it is more than that of nothing.
     pub score: Score,
     pub gain: Difference,
+    /// What it costs more than nothing [nats]: what it must gain to be the more probable.
+    pub cost_nats: f64,
     /// Errors on places the fit did not see.
     pub places: HeldOut,
     /// Errors on recordings it did not see, where there are several.
@@ -78,7 +80,7 @@ impl Judged {
 
     /// Whether it says more than nothing of dwells that the fit did not see.
     fn predicts(&self, config: &DiagnosisConfig) -> bool {
-        self.gain.nats >= config.margin_nats.max(self.gain.se) && self.places.p < config.max_p_heldout
+        self.gain.nats >= self.cost_nats.max(self.gain.se) && self.places.p < config.max_p_heldout
     }
 
     /// How far the name can be trusted.
@@ -158,7 +160,21 @@ pub(crate) fn judge(
     let unlisted = Unlisted::beside(room, entry, &score, config);
     let gain = score.above(room.nothing());
     let significance = significance.to_vec();
-    Judged { entry, significance, score, gain, places, recordings, unlisted, contrast, impossible, gram }
+    let costs = room.costs(config);
+    let cost_nats = costs.of_amplitudes(weighed.amplitudes(entry)) - costs.of_nothing();
+    Judged {
+        entry,
+        significance,
+        score,
+        gain,
+        cost_nats,
+        places,
+        recordings,
+        unlisted,
+        contrast,
+        impossible,
+        gram,
+    }
 }
 
 impl Unlisted {

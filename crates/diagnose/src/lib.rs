@@ -10,15 +10,14 @@
 //! * `knowledge`: what the user says of the arm decides which of the catalogue are tried;
 //! * `outliers`: accidents are set aside and reported;
 //! * `search`, `forward`, `pairs`, `fewer`: one effect after the other while they are promising, and no more than needed;
-//! * `judge`: each among the others: `bootstrap` is the gate, `crossval` asks places the fit did not see, `contrasts`
-//!   pairs of visits, `confusion` what is the same to these data;
-//! * `rivals`: names against the next best, each refitted;
+//! * `density`, `score`: what an explanation says of dwells that its fit did not see, the one number by which all are compared;
+//! * `judge`: each among the others: `bootstrap` is the gate, `score` what it predicts, `contrasts` pairs of visits, `confusion` what
+//!   is the same to these data;
+//! * `settle`, `costs`, `ranking`: names against all that predicts as much, each refitted; the order of all explanations;
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
-//! * `absence`: of several names each by its absence from the refitted model;
-//! * `conclude`, `error_places`: the verdict once what was found is in the model, or where the errors are that nothing
-//!   explains;
+//! * `conclude`, `repeatability`, `error_places`: the verdict once what was found is in the model, what remains, and where;
 //! * `rests`: where a joint rests in a gap that was found;
 //! * `implied`: what each dwell says about each joint, for the eye;
 //! * `nested`: the choice made again without each part of the hold-out;

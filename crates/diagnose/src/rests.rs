@@ -9,6 +9,7 @@ use crate::diagnosis::{Diagnosis, Refitted};
 use crate::implied::{BLURRED, ImpliedError, implied_joint_errors};
 use crate::noise::Noise;
 use crate::observed::Calibrated;
+use crate::problem::Candidate;
 use armcal_core::robust::median;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_model::EffectSpec;
@@ -34,6 +35,12 @@ impl Diagnosis {
         let (old, new) = (spec.to_string(), spec.with(REST, part).to_string());
         let names = self.effects.iter_mut().flat_map(|e| std::iter::once(&mut e.name).chain(&mut e.set));
         names.chain(&mut self.names).filter(|name| **name == old).for_each(|name| name.clone_from(&new));
+        for candidate in &mut self.candidates {
+            let members = candidate.spec.split(Candidate::AND);
+            let renamed: Vec<&str> =
+                members.map(|name| if name == old { new.as_str() } else { name }).collect();
+            candidate.spec = renamed.join(Candidate::AND);
+        }
         let message = format!(
             "{new}: joint {} rests in another place of its play in every dwell, over {:.0} % of the gap; no reading shows where, \
              so that the noise floor counts it ({:.3} mm with it, {:.3} mm without); a preload, or an encoder on the link, \

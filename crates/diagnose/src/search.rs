@@ -137,7 +137,7 @@ fn beside_curves(
 
 /// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
 /// all, the best that has a place and a driver, or the best listed one.
-fn something(room: &Room, config: &DiagnosisConfig) -> bool {
+pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
     let weighed = &room.weighed;
     if weighed.p_nothing >= config.max_probability_nothing {
         return false;

@@ -11,7 +11,7 @@ use crate::judge::Grade;
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms};
 use crate::score::{Score, weights};
-use crate::search::Search;
+use crate::search::{Search, something};
 
 /// Entries that are scored in the linearised model beside a name, those that the weighing likes best.
 const ALTERNATIVES: usize = 12;
@@ -49,20 +49,40 @@ pub(crate) fn settle(
     rooms: &mut Rooms<'_>,
     config: &DiagnosisConfig,
 ) -> Result<(), DiagnoseError> {
+    let begun = specs(&search.accepted);
+    names_settled(search, rooms, config)?;
+    if specs(&search.accepted) != begun {
+        let names = named(&search.accepted);
+        let curves = search.curves.iter().map(|c| c.candidate.clone());
+        search.with_curves = rooms.with(&names.iter().cloned().chain(curves).collect::<Vec<_>>())?;
+        search.rest = rooms.with(&names)?;
+        search.left_over = something(&search.rest, config);
+    }
+    Ok(())
+}
+
+fn names_settled(
+    search: &mut Search,
+    rooms: &mut Rooms<'_>,
+    config: &DiagnosisConfig,
+) -> Result<(), DiagnoseError> {
     let curves: Vec<Candidate> = search.curves.iter().map(|c| c.candidate.clone()).collect();
     let beside = |all: &[Accepted], i: usize| {
         let others = all.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, a)| a.candidate.clone());
         others.chain(curves.iter().cloned()).collect::<Vec<Candidate>>()
     };
-    for i in 0..search.tentative.len() {
-        search.tentative[i] = settled(&search.tentative[i], &beside(&search.tentative, i), rooms, config);
-    }
+    let all = search.tentative.iter().enumerate();
+    let tentative = all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), rooms, config));
+    search.tentative = tentative.collect();
     for _ in 0..ROUNDS {
         let before = specs(&search.accepted);
+        let mut settled_all = Vec::new();
         for i in 0..search.accepted.len() {
-            search.accepted[i] = settled(&search.accepted[i], &beside(&search.accepted, i), rooms, config);
+            settled_all.push(settled(&search.accepted[i], &beside(&search.accepted, i), rooms, config));
         }
-        if specs(&search.accepted) == before || search.accepted.len() < 2 {
+        let fallen = settled_all.iter().any(Option::is_none);
+        search.accepted = settled_all.into_iter().flatten().collect();
+        if specs(&search.accepted) == before || (!fallen && search.accepted.len() < 2) {
             return Ok(());
         }
         // Beside another name one of them may be needed no longer.
@@ -76,35 +96,32 @@ fn specs(accepted: &[Accepted]) -> Vec<String> {
     accepted.iter().map(|a| a.candidate.spec.clone()).collect()
 }
 
-/// One of them beside the others.
+/// One of them beside the others; none where no refit says more than nothing.
 fn settled(
     found: &Accepted,
     others: &[Candidate],
     rooms: &mut Rooms<'_>,
     config: &DiagnosisConfig,
-) -> Accepted {
+) -> Option<Accepted> {
     let room = found.room.clone();
     let with = |k: usize| [others, std::slice::from_ref(&room.weighed.entries[k].candidate)].concat();
     let mut refits: Vec<(usize, Score)> = Vec::new();
     for k in near(found, &room, config) {
         refits.extend(rooms.score(&with(k), &room).map(|score| (k, score)));
     }
-    let Some(nothing) = rooms.score(others, &room) else { return found.clone() };
-    let (mut set, instead_of) = answer(found, &refits, &nothing, &room, config);
+    let Some(nothing) = rooms.score(others, &room) else { return Some(found.clone()) };
+    let (set, instead_of) = answer(found, &refits, &nothing, &room, config);
     let (mut judged, mut grade) = (found.judged.clone(), found.grade);
-    match set.first() {
-        Some(first) if *first != judged.entry => {
-            judged = room.judge(*first, config);
-            grade = judged.grade(config).max(Grade::OrUnlisted);
-        }
-        Some(_) => {}
-        None => set.push(judged.entry),
+    let first = *set.first()?;
+    if first != judged.entry {
+        judged = room.judge(first, config);
+        grade = judged.grade(config).max(Grade::OrUnlisted);
     }
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);
     let candidate = room.weighed.entries[judged.entry].candidate.clone();
-    Accepted { candidate, judged, room, grade, set, instead_of, ranked }
+    Some(Accepted { candidate, judged, room, grade, set, instead_of, ranked })
 }
 
 /// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.

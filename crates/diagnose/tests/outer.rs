@@ -303,7 +303,6 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
 }
 
 #[test]
-#[ignore = "fault: the headline says backlash:1,rest=0.68, the first row backlash:1"]
 fn the_first_row_is_the_answer_of_a_joint_that_rests_in_its_play_too() {
     let (model, observations) = resting(1);
     assert_one_order(&told(&model, &observations).1);

@@ -131,7 +131,6 @@ fn the_axes_of_the_world_do_not_matter_where_the_covariance_has_its_own() {
 }
 
 #[test]
-#[ignore = "fault: axes of an isotropic covariance are arbitrary, and a product of Student densities is not isotropic (up to 47 nats)"]
 fn the_axes_of_the_world_do_not_matter_where_the_covariance_is_alike_in_all() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let groups = by_place(&p).into_iter().map(|g| g.scored).collect::<Vec<_>>();

@@ -17,9 +17,8 @@ pub(crate) fn planted(names: &[(&str, f64)], free: usize, seed: u64) -> Problem 
     p.without(&p.dwells.iter().map(kept).collect::<Vec<_>>())
 }
 
-fn step(candidate: Candidate, ln: [f64; 3], named_at_once: bool) -> Step {
-    let [ln_evidence, ln_cell, ln_prior] = ln;
-    Step { candidate, ln_evidence, named_at_once, ln_cell, ln_prior, fall: 12.0 }
+fn step(candidate: Candidate, [gain_nats, unlisted_nats]: [f64; 2], named_at_once: bool) -> Step {
+    Step { candidate, named_at_once, gain_nats, unlisted_nats, fall: 12.0 }
 }
 
 fn names(steps: &[Step]) -> Vec<&str> {
@@ -31,27 +30,20 @@ pub(crate) fn strong(p: &Problem, specs: &[&str]) -> Vec<Step> {
 }
 
 #[test]
-fn steps_together_must_say_more_than_a_cell_and_their_priors() {
+fn steps_together_must_say_more_than_an_unlisted_shape_and_what_they_cost() {
     let c = own(&planted(&[], 0, 1), "backlash:1");
     let config = quick();
-    let step = |ln, named| step(c.clone(), ln, named);
-    let known = step([50.0, 90.0, -90.0], true);
-    assert!(beats_a_cell(&[known], &config), "what had a name at once needs no comparison");
-    // 10 + 8 - 2 - 13 is the margin of 3; the prior of the first one does not count, nor does a gain.
-    let two = |cell, prior| {
-        beats_a_cell(
-            &[
-                step([50.0, 90.0, 0.0], true),
-                step([10.0, cell, -9.0], false),
-                step([8.0, 99.0, prior], false),
-            ],
-            &config,
-        )
+    let step = |nats, named| step(c.clone(), nats, named);
+    assert!(
+        beats_a_cell(&[step([50.0, 90.0], true)], &config),
+        "what had a name at once needs no comparison"
+    );
+    // 10 + 8, 3 nats for each of the two.
+    let two = |cell| {
+        let steps = [step([50.0, 90.0], true), step([10.0, cell], false), step([8.0, 99.0], false)];
+        beats_a_cell(&steps, &config)
     };
-    assert!(two(13.0, -2.0));
-    assert!(!two(13.1, -2.0));
-    assert!(!two(13.0, -2.1));
-    assert!(!two(15.1, 5.0) && two(14.9, 5.0));
+    assert!(two(12.0) && !two(12.1));
 }
 
 #[test]
@@ -67,13 +59,13 @@ fn what_switches_leaves_only_what_switches_alike() {
 #[test]
 fn a_group_enters_as_its_members() {
     let p = planted(&[], 0, 1);
-    let alone = one_by_one(step(own(&p, "backlash:1"), [8.0, 1.0, -3.0], true), &p);
-    assert_eq!((names(&alone), alone[0].ln_prior), (vec!["backlash:1"], -3.0));
+    let alone = one_by_one(step(own(&p, "backlash:1"), [8.0, 1.0], true), &p);
+    assert_eq!((names(&alone), alone[0].gain_nats), (vec!["backlash:1"], 8.0));
     let group = Candidate { spec: "backlash:1+backlash:3".into(), ..own(&p, "backlash:1") };
-    let members = one_by_one(step(group, [8.0, 1.0, -3.0], true), &p);
+    let members = one_by_one(step(group, [8.0, 1.0], true), &p);
     assert_eq!(names(&members), ["backlash:1", "backlash:3"]);
     for m in &members {
-        assert_eq!((m.ln_evidence, m.ln_cell, m.ln_prior, m.fall), (4.0, 1.0, 0.0, 6.0));
+        assert_eq!((m.gain_nats, m.unlisted_nats, m.fall), (4.0, 1.0, 6.0));
         assert!(m.named_at_once);
     }
 }
@@ -141,11 +133,11 @@ fn steps_are_confirmed_among_each_other() {
     // Without a name at once, and not more than a cell: not even tried.
     let doubtful =
         |ln| vec![Step::known(own(&p, "backlash:1"), 1.0), step(own(&p, "zero_drift:2"), ln, false)];
-    assert_eq!(confirmed(&p, doubtful([90.0, 95.0, 0.0]), &[]), both[..1]);
-    assert_eq!(confirmed(&p, doubtful([90.0, 1.0, 0.0]), &[]), both);
+    assert_eq!(confirmed(&p, doubtful([90.0, 95.0]), &[]), both[..1]);
+    assert_eq!(confirmed(&p, doubtful([90.0, 1.0]), &[]), both);
     // More than a cell by itself: what comes later and says less than it costs takes no name from it.
-    let first = step(own(&p, "backlash:1"), [10.0, 5.0, 0.0], false);
-    let weak = step(own(&p, "zero_drift:2"), [3.0, 5.0, -9.0], false);
+    let first = step(own(&p, "backlash:1"), [10.0, 5.0], false);
+    let weak = step(own(&p, "zero_drift:2"), [0.5, 5.0], false);
     assert_eq!(confirmed(&p, vec![first, weak], &[]), both[..1]);
 }
 
@@ -210,13 +202,10 @@ fn a_step_carries_what_it_said() {
     let entry = entry_of(weighed, &own(&p, "backlash:1")).unwrap();
     let s = &steps[0];
     assert!(s.named_at_once && steps.len() == 1);
-    assert_eq!(s.ln_evidence, weighed.entries[entry].ln_evidence);
-    assert_eq!(s.ln_cell, weighed.best_cell().unwrap().ln_evidence);
-    let cells = weighed.unlisted.iter().filter(|u| u.what.channel.is_some()).count() as f64;
-    assert!(cells > 1.0 && cells < weighed.unlisted.len() as f64);
-    // 0.4 shared by the entries against 0.05 shared by the cells.
-    let ln_prior = (0.4 / weighed.entries.len() as f64).ln() - (0.05 / cells).ln();
-    assert!((s.ln_prior - ln_prior).abs() < 1e-12, "{} {ln_prior}", s.ln_prior);
+    let judged = r.judge(entry, &config);
+    let unlisted = judged.unlisted.as_ref().unwrap();
+    assert_eq!((s.gain_nats, s.unlisted_nats), (judged.gain.nats, judged.gain.nats + unlisted.above.nats));
+    assert!(s.gain_nats > s.unlisted_nats);
     let score = r.judge(entry, &config).own().score;
     assert!((s.fall - score * weighed.scale * weighed.scale).abs() < 1e-9 * score);
 }
