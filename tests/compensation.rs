@@ -103,7 +103,7 @@ fn calibrated(folder: &Path) -> PathBuf {
     armcal_in(folder, &["simulate", &lab, "--out", "./recordings"], &[0]);
     let pipeline = folder.join("pipeline.toml");
     std::fs::write(&pipeline, paper_pipeline(&recordings)).expect("pipeline");
-    run_pipeline(&pipeline, &folder.join("geometry"), &[3]);
+    run_pipeline(&pipeline, &folder.join("geometry"), &[0]);
     let add = ["add", "suggested", "./pipeline.toml", "--write", "./extended.toml", "--out", "./effects"];
     armcal_in(folder, &add, &[0, 3]);
     std::fs::write(folder.join("stops.csv"), stops()).expect("targets");

@@ -35,7 +35,7 @@ fn nothing_is_claimed_where_nothing_is_hidden() {
 fn the_papers_backlash_is_named_and_adding_it_brings_the_error_down() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let pipeline = recorded("pipelines/lab/paper-backlash.toml", folder.path());
-    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[3]);
+    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[0]);
     let mut found = names(&before["diagnosis"]);
     found.sort();
     assert_eq!(before["diagnosis"]["verdict"], "identified", "{:#}", before["diagnosis"]["explanations"]);
@@ -107,7 +107,7 @@ fn what_moved_between_recordings_and_stayed_is_named_from_the_recording_on() {
     ] {
         let folder = tempfile::tempdir().expect("temporary folder");
         let pipeline = five_recordings(seed, &mechanism, folder.path());
-        let summary = run_pipeline(&pipeline, &folder.path().join("out"), &[3]);
+        let summary = run_pipeline(&pipeline, &folder.path().join("out"), &[0]);
         let diagnosis = &summary["diagnosis"];
         assert_eq!(diagnosis["verdict"], "identified", "seed {seed}: {:#}", diagnosis["explanations"]);
         assert_eq!(names(diagnosis), [effect], "seed {seed}");

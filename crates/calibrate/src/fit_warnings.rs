@@ -15,6 +15,8 @@ pub const INADEQUATE: f64 = 2.0;
 pub const ABOVE_NOISE: &str = "residuals-above-noise";
 /// Code of the warning about a mean error above the floor.
 pub const ABOVE_FLOOR: &str = "errors-above-floor";
+/// Code of the warning about observations that weigh little.
+pub const OUTLIERS: &str = "outliers";
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
 
@@ -84,7 +86,7 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         let severity = if many { Severity::Inadequate } else { Severity::Notice };
         // Several observations of one dwell have one name.
         outliers.dedup();
-        add(severity, "outliers", &listed(&outliers), message);
+        add(severity, OUTLIERS, &listed(&outliers), message);
     }
     warnings
 }

@@ -70,7 +70,7 @@ pub use ended::{Ended, fitted_values};
 pub use error::CalibrateError;
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
-pub use fit_warnings::{ABOVE_FLOOR, ABOVE_NOISE, INADEQUATE};
+pub use fit_warnings::{ABOVE_FLOOR, ABOVE_NOISE, INADEQUATE, OUTLIERS};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
 pub use linearise::{LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 pub use model_problem::{ModelProblem, PositionNoise, position_covariance_m2};

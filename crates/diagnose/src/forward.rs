@@ -112,7 +112,13 @@ pub(crate) fn confirm(
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
-            let verdict = room.judge(entry, config);
+            let mut verdict = room.judge(entry, config);
+            if verdict.is_refuted(config)
+                && let Some(score) = rooms.score(&[others, vec![own]].concat(), &room)
+            {
+                // Far from the fit one step is short, and an unlisted shape has more of them.
+                verdict.refitted(&score);
+            }
             let (grade, nats) = (verdict.grade(config), verdict.gain.nats);
             if grade == Grade::Refused && weakest.is_none_or(|w| nats < w.0) {
                 weakest = Some((nats, k));
@@ -128,8 +134,11 @@ pub(crate) fn confirm(
                 ranked: Vec::new(),
             });
         }
-        match weakest {
-            Some((_, k)) => drop(steps.remove(k)),
+        // What is no more than the detail of another one's shape is no effect.
+        let most = judged.iter().map(|a| a.judged.gain.nats).fold(0.0, f64::max);
+        let detail = judged.iter().position(|a| a.judged.gain.nats < config.leftover_share * most);
+        match weakest.map(|(_, k)| k).or(detail) {
+            Some(k) => drop(steps.remove(k)),
             None => return Ok(judged),
         }
     }

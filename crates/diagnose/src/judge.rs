@@ -83,16 +83,30 @@ impl Judged {
         self.gain.nats >= self.cost_nats.max(self.gain.se) && self.places.p < config.max_p_heldout
     }
 
+    /// The best that is not listed and has another shape.
+    fn other_shape(&self, config: &DiagnosisConfig) -> Option<&Unlisted> {
+        self.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine)
+    }
+
+    /// Whether what is not listed is clearly better.
+    pub fn is_refuted(&self, config: &DiagnosisConfig) -> bool {
+        self.other_shape(config).is_some_and(|u| u.above.is_clear(self.detail(config)))
+    }
+
+    /// Takes the score of its refit for what stands against the unlisted.
+    pub fn refitted(&mut self, score: &Score) {
+        for unlisted in &mut self.unlisted {
+            unlisted.above = unlisted.score.above(score);
+        }
+    }
+
     /// How far the name can be trusted.
     pub fn grade(&self, config: &DiagnosisConfig) -> Grade {
-        let unlisted = self.unlisted.as_ref();
-        let same = |u: &&Unlisted| u.cosine > config.merge_cosine;
-        let refuted = unlisted.filter(|u| !same(u)).is_some_and(|u| u.above.is_clear(self.detail(config)));
-        if !self.real(config) || refuted {
+        if !self.real(config) || self.is_refuted(config) {
             return Grade::Refused;
         }
         // An unlisted shape has more freedom: only what says more is another answer.
-        let as_good = unlisted.filter(|u| !same(u)).is_some_and(|u| u.above.nats > 0.0);
+        let as_good = self.other_shape(config).is_some_and(|u| u.above.nats > 0.0);
         let disagrees = self.contrast.as_ref().is_some_and(|c| !c.agrees);
         if as_good || disagrees || !self.impossible.is_empty() { Grade::OrUnlisted } else { Grade::Named }
     }

@@ -4,14 +4,14 @@
 //! (`[accuracy] wanted_mm`), and where nothing is, of whether what lies beyond repeatability is understood.
 
 use crate::run::Run;
-use armcal_calibrate::{ABOVE_FLOOR, ABOVE_NOISE};
+use armcal_calibrate::{ABOVE_FLOOR, ABOVE_NOISE, OUTLIERS};
 use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::UNEXPLAINED;
 
 /// Code of the warning about errors above what is wanted.
 const ABOVE_WANTED: &str = "errors-above-wanted";
 /// Codes of the warnings about the size of errors.
-const OF_SIZE: [&str; 3] = [ABOVE_FLOOR, ABOVE_NOISE, UNEXPLAINED];
+const OF_SIZE: [&str; 4] = [ABOVE_FLOOR, ABOVE_NOISE, OUTLIERS, UNEXPLAINED];
 
 /// The warnings of a run, those about the size of its errors as grave as its user has it.
 pub(crate) fn as_wanted(run: &Run, mut warnings: Vec<Warning>) -> Vec<Warning> {
