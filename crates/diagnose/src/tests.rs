@@ -3,6 +3,8 @@
 #[path = "../tests/arm/mod.rs"]
 pub(crate) mod arm;
 
+mod causes;
+mod costs;
 mod markers;
 
 use crate::cells::Unlisted;

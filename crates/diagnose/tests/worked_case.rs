@@ -155,8 +155,11 @@ fn every_number_of_the_worked_case_follows_from_its_residuals() {
     assert!(unlisted > 0.0);
     documented(&format!("says {unlisted:.2} nats less than the play"));
 
-    // Shares in copies of the data: with weights w of the stops the play has e^(8 w'd - 3) times what nothing has.
-    let share = share_of_nothing(&each, config.margin_nats);
+    // Shares in copies of the data: with weights w of the stops the play has e^(8 w'd - cost) times what nothing has.
+    let cost = 3.0 - 0.4f64.ln() + 0.5f64.ln();
+    documented(&format!("3 nats an amplitude and ln(0.5 / 0.4) for the priors: {cost:.2} nats"));
+    assert!(gain > cost && gain > se, "what it must be");
+    let share = share_of_nothing(&each, cost);
     // The program draws 999 times, of which one or two may be of such weights that the play says nothing.
     assert!((share - d.p_nothing).abs() < 2e-3 && share < 5e-3, "{share} {}", d.p_nothing);
     documented(&format!("P(nothing) = {:.3}", d.p_nothing));
@@ -184,19 +187,17 @@ fn left_out(with_play: bool) -> Vec<f64> {
     (0..all.len()).map(error).collect()
 }
 
-/// ln densities of the eight stops, each with the size of the noise that says most of the other seven: three axes, of which two
-/// are not off.
+/// ln densities of the eight stops, each with the size of the noise that says most of the other seven: Student's t of three axes,
+/// of which two are not off. At 0 it is G(4) / G(5/2) / (5 pi)^(3/2) over the cube of the width, where G(4) = 6 and G(5/2) = 3/4 sqrt(pi).
 fn score(errors: &[f64]) -> Vec<f64> {
     let path = |k: i32| 2f64.powf(2.0 * f64::from(k) / 3.0);
     let variances: Vec<f64> = (-15..=0).map(path).chain((-9..=30).map(|k| 1.0 + path(k))).collect();
     let student = |e: f64, v: f64| {
-        let at_0 =
-            (8.0 / (3.0 * std::f64::consts::PI * 5f64.sqrt() * (v * SIGMA_MM * SIGMA_MM * 1e-6).sqrt())).ln();
-        at_0 - 3.0 * (1.0 + e * e / (5.0 * v)).ln()
+        let (pi, width_m) = (std::f64::consts::PI, v.sqrt() * SIGMA_MM * 1e-3);
+        let at_0 = (8.0 / (pi.sqrt() * (5.0 * pi).powf(1.5) * width_m.powi(3))).ln();
+        at_0 - 4.0 * (1.0 + e * e / (5.0 * v)).ln()
     };
-    let stop = |at: usize, v: f64| -> f64 {
-        [at, at + 8].iter().map(|i| student(errors[*i], v) + 2.0 * student(0.0, v)).sum()
-    };
+    let stop = |at: usize, v: f64| -> f64 { [at, at + 8].iter().map(|i| student(errors[*i], v)).sum() };
     let best = |at: usize| {
         let others = |v: f64| (0..8).filter(|k| *k != at).map(|k| stop(k, v)).sum::<f64>();
         variances.iter().copied().max_by(|a, b| others(*a).total_cmp(&others(*b))).unwrap()
@@ -205,13 +206,13 @@ fn score(errors: &[f64]) -> Vec<f64> {
 }
 
 /// Its share beside the play, over weights of the stops that are drawn at random.
-fn share_of_nothing(each: &[f64], amplitude_nats: f64) -> f64 {
+fn share_of_nothing(each: &[f64], cost_nats: f64) -> f64 {
     let mut rng = arm::rng(1);
     let draws = 50_000;
     let one = |rng: &mut rand_chacha::ChaCha8Rng| {
         let weights: Vec<f64> = each.iter().map(|_| Exp1.sample(rng)).collect();
         let mean = weights.iter().zip(each).map(|(w, d)| w * d).sum::<f64>() / weights.iter().sum::<f64>();
-        1.0 / (1.0 + (each.len() as f64 * mean - amplitude_nats).exp())
+        1.0 / (1.0 + (each.len() as f64 * mean - cost_nats).exp())
     };
     (0..draws).map(|_| one(&mut rng)).sum::<f64>() / f64::from(draws)
 }

@@ -50,6 +50,7 @@ fn one_recording_has_no_recordings_to_leave_out() {
 fn what_is_real_needs_score_gate_and_left_out_errors() {
     let (_, _, mut j) = judged();
     let config = quick();
+    j.cost_nats = 3.0;
     let mut with = |[nats, se]: [f64; 2], p_adjusted: f64, p_raw: f64, places_p: f64| {
         j.gain = Difference { nats, se };
         let own = j.entry;
@@ -64,6 +65,22 @@ fn what_is_real_needs_score_gate_and_left_out_errors() {
     assert_eq!(with([3.0, 1.0], 0.02, 0.05, 0.049), (false, true));
     assert_eq!(with([3.0, 1.0], 0.01, 0.06, 0.049), (true, false));
     assert_eq!(with([3.0, 1.0], 0.01, 0.05, 0.05), (false, false));
+    j.cost_nats = 8.0;
+    let mut real = |nats: f64| {
+        (j.gain.nats, j.places.p, j.significance[j.entry].p_adjusted) = (nats, 0.01, 0.01);
+        j.real(&config)
+    };
+    assert!(!real(7.9) && real(8.0), "it must gain what it costs");
+}
+
+#[test]
+fn what_is_judged_must_gain_what_it_costs_more_than_nothing() {
+    let (_, room, j) = judged();
+    let config = quick();
+    // One amplitude of 3 nats, and one entry of so many that share 0.4, against 0.5.
+    let by_hand = 3.0 - (0.4 / room.weighed.entries.len() as f64).ln() + 0.5f64.ln();
+    assert!((j.cost_nats - by_hand).abs() < 1e-12, "{} {by_hand}", j.cost_nats);
+    assert!(j.cost_nats > config.margin_nats);
 }
 
 #[test]

@@ -227,7 +227,12 @@ fn a_marker_that_came_loose_is_named_first_and_nothing_else_is_named() {
         let found = rig(seed, 48, Some(25)).diagnosed();
         assert_eq!(found.effects.len(), 1, "{seed}: {:?}", found.names);
         assert!(found.names.iter().all(|n| n.starts_with("marker_shift:hand@0.2")), "{:?}", found.names);
-        assert!(!found.names[0].contains('-') && found.effects[0].probability > 0.99, "{:?}", found.names);
+        // Other moments of it are no other name, but each has its own share.
+        let standings = found.candidates.iter().filter_map(|c| Some((&c.spec, c.standing?.probability)));
+        let hand = standings.filter(|(spec, _)| spec.starts_with("marker_shift:hand@")).collect::<Vec<_>>();
+        let share: f64 = hand.iter().map(|(_, p)| p).sum();
+        assert!(!found.names[0].contains('-') && share > 0.99, "{seed}: {:?} {hand:?}", found.names);
+        assert!(hand.iter().all(|(_, p)| *p <= found.effects[0].probability), "{seed}: {hand:?}");
         let clean = rig(seed, 48, None).diagnosed();
         assert_eq!(clean.verdict, Verdict::NothingMissing, "{seed}: {:?}", clean.names);
     }
