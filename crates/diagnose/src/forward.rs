@@ -113,11 +113,10 @@ pub(crate) fn confirm(
                 break;
             };
             let mut verdict = room.judge(entry, config);
-            if verdict.is_refuted(config)
+            if verdict.grade(config) < Grade::Named
                 && let Some(score) = rooms.score(&[others, vec![own]].concat(), &room)
             {
-                // Far from the fit one step is short, and an unlisted shape has more of them.
-                verdict.refitted(&score);
+                verdict.refitted(score, room.nothing());
             }
             let (grade, nats) = (verdict.grade(config), verdict.gain.nats);
             if grade == Grade::Refused && weakest.is_none_or(|w| nats < w.0) {
@@ -213,6 +212,14 @@ pub(crate) fn forward(
             }
         }
         let entry = &weighed.entries[judged.entry];
+        // Far from the fit one step is short, and an unlisted shape has more of them.
+        if !named
+            && let Some(score) =
+                rooms.score(&[accepted.clone(), vec![entry.candidate.clone()]].concat(), &room)
+        {
+            judged.refitted(score, room.nothing());
+            named = judged.grade(config) == Grade::Named;
+        }
         // Before an unlisted shape beats it, it may show what it does at its own size.
         if !named && entry.ln_evidence >= config.margin_nats && rooms.refine(&accepted, &entry.candidate)? {
             continue;

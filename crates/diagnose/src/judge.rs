@@ -93,11 +93,13 @@ impl Judged {
         self.other_shape(config).is_some_and(|u| u.above.is_clear(self.detail(config)))
     }
 
-    /// Takes the score of its refit for what stands against the unlisted.
-    pub fn refitted(&mut self, score: &Score) {
-        for unlisted in &mut self.unlisted {
-            unlisted.above = unlisted.score.above(score);
+    /// Takes the score of its refit in place of that of one step, beside nothing and the unlisted.
+    pub fn refitted(&mut self, score: Score, nothing: &Score) {
+        self.gain = score.above(nothing);
+        if let Some(unlisted) = &mut self.unlisted {
+            unlisted.above = unlisted.score.above(&score);
         }
+        self.score = score;
     }
 
     /// How far the name can be trusted.

@@ -18,6 +18,8 @@ const ALTERNATIVES: usize = 12;
 /// Of these so many are refitted, where they come within this of what is clearly worse [nats].
 const REFITTED: usize = 6;
 const SLACK_NATS: f64 = 10.0;
+/// Or within this share of what there is to gain: where a slip is large, one step is short.
+const REACH_SHARE: f64 = 0.25;
 /// Moments, and shapes, of one cause that are scored.
 const MOMENTS: usize = 2;
 /// Rounds in which names that change their places are confirmed again.
@@ -110,6 +112,7 @@ fn settled(
         refits.extend(rooms.score(&with(k), &room).map(|score| (k, score)));
     }
     let Some(nothing) = rooms.score(others, &room) else { return Some(found.clone()) };
+    let refits = one_of_each_cause(refits, &room, config);
     let (set, instead_of) = answer(found, &refits, &nothing, &room, config);
     let (mut judged, mut grade) = (found.judged.clone(), found.grade);
     let first = *set.first()?;
@@ -142,7 +145,8 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
     };
     let mut scored: Vec<(usize, Score)> = names.iter().map(one_step).collect();
     scored.sort_by(|a, b| 0f64.total_cmp(&a.1.above(&b.1).nats));
-    let detail = found.judged.detail(config) + SLACK_NATS;
+    let gain = found.judged.gain.nats;
+    let detail = (found.judged.detail(config) + SLACK_NATS).max(REACH_SHARE * gain);
     let best = scored[0].1.clone();
     let reach = |(k, score): &(usize, Score)| *k == own || !best.above(score).is_clear(detail);
     let mut near: Vec<usize> = scored.iter().filter(|s| reach(s)).map(|(k, _)| *k).collect();
@@ -150,6 +154,23 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
     near[..=at].rotate_right(1);
     near.truncate(REFITTED);
     near
+}
+
+/// Those that are worth most first; of the moments, and shapes, of one cause the best stands for all.
+fn one_of_each_cause(
+    mut refits: Vec<(usize, Score)>,
+    room: &Room,
+    config: &DiagnosisConfig,
+) -> Vec<(usize, Score)> {
+    let worth = |(k, score): &(usize, Score)| score.worth(room.costs(config).of_entry(*k));
+    refits.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    let mut causes: Vec<usize> = Vec::new();
+    refits.retain(|(k, _)| {
+        let new = causes.iter().all(|known| !room.weighed.one_cause(*known, *k));
+        causes.extend(new.then_some(*k));
+        new
+    });
+    refits
 }
 
 /// The entries that are one answer, the first to be told first, and the names that the user's knowledge of the arm left out.
@@ -168,15 +189,7 @@ fn answer(
         let real = *k == found.judged.entry || room.judge(*k, config).grade(config) > Grade::Refused;
         !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
-    let mut set: Vec<&(usize, Score)> = refits.iter().filter(stands).collect();
-    let worth = |(k, score): &(usize, Score)| score.worth(room.costs(config).of_entry(*k));
-    set.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-    let mut causes: Vec<usize> = Vec::new();
-    for (k, _) in set {
-        let new = causes.iter().all(|known| !room.weighed.one_cause(*known, *k));
-        causes.extend(new.then_some(*k));
-    }
-    let set = causes;
+    let set: Vec<usize> = refits.iter().filter(stands).map(|(k, _)| *k).collect();
     let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());
     match acts.is_empty() {
         true => (set, Vec::new()),
@@ -192,11 +205,11 @@ fn weighed(
     room: &Room,
     config: &DiagnosisConfig,
 ) -> Vec<Scored> {
+    let costs = room.costs(config);
     let entries = refits.into_iter().map(|(k, score)| (Instead::Entry(k), score));
     let others = std::iter::once((Instead::Nothing, nothing));
     let all: Vec<(Instead, Score)> =
         entries.chain(others).chain(unlisted.map(|score| (Instead::Unlisted, score))).collect();
-    let costs = room.costs(config);
     let cost = |what: Instead| match what {
         Instead::Entry(k) => costs.of_entry(k),
         Instead::Nothing => costs.of_nothing(),
