@@ -136,18 +136,16 @@ pub fn run_as_shipped(name: &str) -> Value {
     own.get_or_init(run).clone()
 }
 
-/// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times what
-/// repeatability and the declared noise give, and no result is called adequate above twice the floor unless its user wants no
-/// more, the errors are those of repeatability, or what was found explains half of what is beyond it. The first explanation told is
-/// the answer.
+/// The law of the verdict, held over everything that any test runs: *nothing is missing* never stands above 1.5 times the
+/// floor, and no result is called adequate above twice the floor unless what was found explains half of what is beyond it. The first
+/// explanation told is the answer.
 pub fn believable(summary: &Value, what: &str) {
     let floors = |error: &str, floor: &str| {
         let at = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
         at(error).zip(at(floor)).map(|(error, floor)| error / floor)
     };
     let mm = |pointer| summary.pointer(pointer).and_then(Value::as_f64);
-    let expected_mm =
-        mm("/diagnosis/floor_mm").map(|floor| floor.max(mm("/diagnosis/repeatability_mm").unwrap_or(0.0)));
+    let expected_mm = mm("/diagnosis/floor_mm");
     let errors_mm =
         mm("/diagnosis/holdout_mm/before").zip(mm("/diagnosis/holdout_mm/after")).zip(expected_mm);
     if let (Some(((before, _), expected)), "nothing_missing") =

@@ -1,7 +1,7 @@
 //! The verdict in the end: what the judge named, how much of the error that is, and what remains.
 //!
 //! Names are the judge's ([`crate::settle`]); calibrations with and without them give the figures beside. Whether *nothing* is
-//! missing is the one question of the noise: the errors must be those of repeatability.
+//! missing is the one question of the noise: the errors must be those that it gives.
 
 use crate::compare::compare_heldout;
 use crate::config::DiagnosisConfig;
@@ -43,23 +43,13 @@ impl Diagnosis {
         self.warnings.extend(refitted.iter().flat_map(|r| r.warnings.iter().cloned()));
         self.warnings.extend(refitted.as_ref().and_then(|r| errs_more(before, r, observations, config)));
         let noise_alone = noise_alone(before);
-        let agrees = self.times_expected(before) <= config.floor_factor
-            && before.fit.sigma_scale <= config.floor_factor * self.expected_mm() / self.floor_mm;
+        let agrees =
+            before.times_floor() <= config.floor_factor && before.fit.sigma_scale <= config.floor_factor;
         self.refitted = refitted.map(Box::new);
         self.settle(agrees, noise_alone);
         self.tell_unexplained(before, observations, joint_names, config);
         lead(self, observations, joint_names);
         self.explanations = explanations(self, config);
-    }
-
-    /// Mean error that repeatability gives, or the declared noise where that is more or nothing was revisited [mm].
-    pub fn expected_mm(&self) -> f64 {
-        self.repeatability_mm.map_or(self.floor_mm, |repeatability| repeatability.max(self.floor_mm))
-    }
-
-    /// How many times that a calibration errs; its floor may hold what no reading shows of a play.
-    fn times_expected(&self, calibration: &Calibration) -> f64 {
-        error_mm(calibration) / self.expected_mm().max(calibration.noise_floor_m * 1e3)
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise
@@ -84,7 +74,7 @@ impl Diagnosis {
         };
     }
 
-    /// What is neither explained nor of repeatability: how much, where, and what was tried.
+    /// What is neither explained nor of the noise: how much, where, and what was tried.
     fn tell_unexplained(
         &mut self,
         before: &Calibration,
@@ -93,7 +83,8 @@ impl Diagnosis {
         config: &DiagnosisConfig,
     ) {
         let settled = self.refitted.as_ref().map_or(before, |r| &r.calibration);
-        let times = self.times_expected(settled);
+        // Its floor may hold what no reading shows of a play.
+        let times = settled.times_floor();
         let beside_names = self.verdict != Verdict::NothingMissing && times > config.floor_factor;
         if self.verdict != Verdict::Unexplained && !beside_names {
             return;
@@ -113,7 +104,7 @@ impl Diagnosis {
             error_mm: error_mm(settled),
             floor_mm: settled.noise_floor_m * 1e3,
             repeatability_mm: self.repeatability_mm,
-            times_expected: times,
+            times_floor: times,
             explained_share: self.explained_share(),
             places: single.map_or_else(|| error_places(&errors, joint_names), |single| vec![single]),
             scatter: scatter.map(|(kind, _)| kind.to_owned()),
@@ -123,10 +114,10 @@ impl Diagnosis {
         self.unexplained = Some(unexplained);
     }
 
-    /// Share of the squared error beyond repeatability that what was found explains.
+    /// Share of the squared error beyond the declared noise that what was found explains.
     fn explained_share(&self) -> f64 {
         let BeforeAfter { before, after } = self.holdout_mm;
-        let beyond = before.powi(2) - self.expected_mm().powi(2);
+        let beyond = before.powi(2) - self.floor_mm.powi(2);
         if beyond > 0.0 { ((before.powi(2) - after.powi(2)) / beyond).clamp(0.0, 1.0) } else { 1.0 }
     }
 }

@@ -47,8 +47,8 @@ pub struct DiagnosisConfig {
     pub max_effects: usize,
     /// A dwell is set aside when its left-out residual is as rare as this many sigma; default 5.
     pub outlier_sigma: f64,
-    /// Errors up to this many times what repeatability and the declared noise give are of these: only then may nothing be
-    /// missing; default 1.5.
+    /// Errors up to this many times what the declared noise gives, scattering up to this many times as declared, are of it:
+    /// only then may nothing be missing; default 1.5.
     pub floor_factor: f64,
     /// Most dwells that weigh explanations; of more, as many are drawn evenly over time. All of them take part in
     /// fits. Default 400.

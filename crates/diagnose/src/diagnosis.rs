@@ -175,9 +175,9 @@ pub struct Unexplained {
     pub floor_mm: f64,
     /// Mean error that repeatability alone gives, from poses that were revisited [mm]; none where too few were.
     pub repeatability_mm: Option<f64>,
-    /// The error over the larger of the two; `null` in JSON where no noise is declared.
-    pub times_expected: f64,
-    /// Share of the squared error beyond that which what was found explains.
+    /// The error over what the declared noise gives; `null` in JSON where none is declared.
+    pub times_floor: f64,
+    /// Share of the squared error beyond the declared noise that what was found explains.
     pub explained_share: f64,
     /// In which dwells it is largest, the clearest first; empty where it is alike everywhere.
     pub places: Vec<ErrorPlace>,

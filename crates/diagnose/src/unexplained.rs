@@ -1,20 +1,20 @@
-//! What is neither explained nor of repeatability, in words.
+//! What is neither explained nor of the noise, in words.
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Tried, Unexplained, Verdict};
 use armcal_core::{Severity, Stage, Warning};
 
-/// Code of the warning about what is neither explained nor of repeatability.
+/// Code of the warning about what is neither explained nor of the noise.
 pub const UNEXPLAINED: &str = "unexplained";
-/// Of the squared error beyond repeatability an adequate model explains at least this share.
+/// Of the squared error beyond the declared noise an adequate model explains at least this share.
 const ADEQUATE_SHARE: f64 = 0.5;
 
 impl Unexplained {
-    /// The warning: a result is inadequate where the errors are beyond repeatability and no explanation takes half of that. None
+    /// The warning: a result is inadequate where the errors are beyond the noise and no explanation takes half of that. None
     /// where a name does.
     pub(crate) fn warning(&self, verdict: Verdict, config: &DiagnosisConfig) -> Option<Warning> {
         let alone = verdict == Verdict::Unexplained;
-        let beyond = self.times_expected > config.floor_factor;
+        let beyond = self.times_floor > config.floor_factor;
         let inadequate = beyond && (alone || self.explained_share < ADEQUATE_SHARE);
         if !alone && !inadequate {
             return None;
@@ -25,21 +25,21 @@ impl Unexplained {
         Some(Warning::new(severity, Stage::Diagnose, UNEXPLAINED, "diagnosis", message))
     }
 
-    /// What the errors are compared with: repeatability where that was learnt and is more than the declared noise.
+    /// What the errors are compared with, and beside it how well poses repeat.
     pub fn measure(&self) -> String {
-        match self.repeatability_mm.filter(|repeatability| *repeatability > self.floor_mm) {
-            Some(repeatability) => format!("the repeatability of {repeatability:.3} mm"),
-            None => format!("what the declared noise gives ({:.3} mm)", self.floor_mm),
-        }
+        let repeats = self.repeatability_mm.map_or(String::new(), |repeatability| {
+            format!("; poses that were visited again the same way differ by {repeatability:.3} mm")
+        });
+        format!("what the declared noise gives ({:.3} mm{repeats})", self.floor_mm)
     }
 
     /// How much, where, and what was tried, in one sentence without its capital.
     pub fn sentence(&self) -> String {
-        let much = match self.times_expected.is_finite() {
+        let much = match self.times_floor.is_finite() {
             true => format!(
                 "the mean error of {:.3} mm is {:.1} times {}",
                 self.error_mm,
-                self.times_expected,
+                self.times_floor,
                 self.measure()
             ),
             false => format!("the mean error is {:.3} mm, and no noise is declared", self.error_mm),

@@ -1,7 +1,7 @@
 //! Whether the errors of a run are what its user asked for.
 //!
 //! A tracker that scatters by 0.02 mm sees every arm err by more: whether a result is good enough is a question of what is wanted
-//! (`[accuracy] wanted_mm`), and where nothing is, of whether what lies beyond repeatability is understood.
+//! (`[accuracy] wanted_mm`), and where nothing is, of whether what lies beyond the noise is understood.
 
 use crate::run::Run;
 use armcal_calibrate::{ABOVE_FLOOR, ABOVE_NOISE, OUTLIERS};

@@ -345,7 +345,7 @@ fn one_of(set: &[String]) -> String {
 /// What stands beside the names: how much of the error they leave.
 fn beside(d: &Diagnosis) -> String {
     d.unexplained.as_ref().map_or(String::new(), |u| {
-        format!("; with it {:.3} mm remain, {:.1} times {}", u.error_mm, u.times_expected, u.measure())
+        format!("; with it {:.3} mm remain, {:.1} times {}", u.error_mm, u.times_floor, u.measure())
     })
 }
 

@@ -216,7 +216,7 @@ fn how_much_a_name_explains_is_a_figure_beside_it_and_half_of_it_is_enough() {
         let (before, after) = (erring(before_mm, before_mm), erring(after_mm, after_mm));
         let d = concluded(found(Identified), &before, Some(after));
         let beside = d.unexplained.as_ref().unwrap();
-        assert!(near(beside.times_expected, after_mm) && near(beside.error_mm, after_mm));
+        assert!(near(beside.times_floor, after_mm) && near(beside.error_mm, after_mm));
         assert!(near(beside.explained_share, share) && beside.repeatability_mm.is_none());
         let warning = d.warnings.iter().find(|w| w.code == "unexplained");
         assert_eq!(warning.is_some(), share < 0.5);
@@ -245,7 +245,7 @@ fn noise_declared_smaller_changes_what_remains_and_no_name() {
     assert!(as_it_is.unexplained.is_none());
     let left = smaller.unexplained.unwrap();
     // 1.2 mm of a floor of 0.1; of 16 - 0.01 above it 16 - 1.44 are explained.
-    assert!(near(left.times_expected, 12.0) && near(left.explained_share, 14.56 / 15.99), "{left:?}");
+    assert!(near(left.times_floor, 12.0) && near(left.explained_share, 14.56 / 15.99), "{left:?}");
     assert_eq!(codes_of(&smaller.warnings), ["of-refit"], "half of it and more is explained");
     let nothing = concluded(found(NothingMissing), &declared(0.1, erring(1.2, 1.2)), None);
     assert_eq!(nothing.verdict, Unexplained, "without a name it is not nothing");
@@ -273,21 +273,22 @@ fn repeating(error_mm: f64, scatter_mm: f64) -> Calibration {
 }
 
 #[test]
-fn nothing_is_missing_of_errors_that_are_those_of_repeatability() {
+fn how_well_poses_repeat_is_told_beside_what_remains() {
     // Four visits to each place: n = 4, s^2 = 4 d^2 / (3 x 3), E|e| = s sqrt(8 / pi).
     let expected = |scatter_mm: f64| scatter_mm * (4.0f64 / 9.0).sqrt() * (8.0 / std::f64::consts::PI).sqrt();
-    for (error_mm, scatter_mm) in [(3.0, 2.9), (3.0, 1.9), (3.0, 1.8), (3.0, 1.0), (1.4, 0.1), (1.6, 0.1)] {
+    for (error_mm, scatter_mm) in [(3.0, 2.9), (3.0, 1.0), (1.4, 0.1), (1.6, 0.1)] {
         let mut c = repeating(error_mm, scatter_mm);
-        c.fit.sigma_scale = error_mm;
+        c.fit.sigma_scale = 1.0;
         let d = concluded_of(&revisited(), found(NothingMissing), &c, None);
         assert!(near(d.repeatability_mm.unwrap(), expected(scatter_mm)), "{:?}", d.repeatability_mm);
-        let times = error_mm / expected(scatter_mm).max(1.0);
-        assert_eq!(d.verdict, if times <= 1.5 { NothingMissing } else { Unexplained }, "{times}");
+        assert_eq!(d.verdict, if error_mm <= 1.5 { NothingMissing } else { Unexplained }, "{error_mm}");
         if let Some(left) = d.unexplained {
-            assert!(near(left.times_expected, times) && near(left.floor_mm, 1.0));
-            let measure =
-                if expected(scatter_mm) > 1.0 { "the repeatability of" } else { "what the declared noise" };
-            assert!(left.sentence().contains(measure), "{}", left.sentence());
+            let told = format!("differ by {:.3} mm", expected(scatter_mm));
+            assert!(
+                near(left.times_floor, error_mm) && left.sentence().contains(&told),
+                "{}",
+                left.sentence()
+            );
         }
     }
 }
@@ -376,7 +377,7 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     let alike = crate::diagnosis::Unexplained {
         places: Vec::new(),
         scatter: None,
-        times_expected: f64::INFINITY,
+        times_floor: f64::INFINITY,
         ..unexplained.clone()
     };
     assert_eq!(
