@@ -262,12 +262,15 @@ fn what_moved_against_what_is_told_apart() {
 }
 
 #[test]
-fn an_effect_that_is_allowed_breaks_nothing_and_leaves_a_doubt() {
+fn an_effect_that_is_allowed_breaks_nothing_and_errors_above_what_is_wanted_are_a_doubt() {
     let slip = "kind = \"zero_slip\"\njoint = 2\nslip_deg = 2.8125\nrecording = 2\n";
     let job = Job::hiding(slip);
-    let allowed = job.check("[check]\nallowed_effects = [\"zero_slip:joint2\"]\n");
-    assert_eq!(allowed.code, 3);
+    let allows = "[check]\nallowed_effects = [\"zero_slip:joint2\"]\n";
+    let allowed = job.check(allows);
+    assert_eq!(allowed.code, 0);
     assert!(allowed.failures().is_empty());
+    let wanted = job.check(&format!("{allows}[accuracy]\nwanted_mm = 0.2\n"));
+    assert_eq!((wanted.code, wanted.failures().len()), (3, 0));
     assert!(allowed.last_line().contains("1 of 1 checks hold"), "{}", allowed.last_line());
     let other = job.check("[check]\nallowed_effects = [\"zero_slip:1\", \"backlash\"]\n");
     assert_eq!((other.code, other.broken()), (1, vec!["allowed_effects".to_owned()]));

@@ -29,12 +29,8 @@ impl Costs<'_> {
     pub fn of_entry(self, k: usize) -> f64 {
         let weighed = &self.room.weighed;
         let impossible = !self.room.judge(k, self.config).impossible.is_empty();
-        self.of_amplitudes(weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 })
-    }
-
-    /// Of an entry with so many amplitudes.
-    pub fn of_amplitudes(self, amplitudes: usize) -> f64 {
-        self.of(amplitudes, self.config.prior_catalogue, self.room.weighed.entries.len())
+        let amplitudes = weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 };
+        self.of(amplitudes, self.config.prior_catalogue, weighed.entries.len())
     }
 
     fn of(self, amplitudes: usize, prior: f64, count: usize) -> f64 {

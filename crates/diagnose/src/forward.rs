@@ -305,6 +305,10 @@ fn drop_superseded(
 /// that point, by a margin for each of them.
 fn beats_a_cell(steps: &[Step], config: &DiagnosisConfig) -> bool {
     let Some(from) = steps.iter().position(|s| !s.named_at_once) else { return true };
+    // One alone is judged beside it.
+    if from + 1 == steps.len() {
+        return true;
+    }
     let together: f64 = steps[from..].iter().map(|s| s.gain_nats).sum();
     let cost = config.margin_nats * (steps.len() - from) as f64;
     together - cost >= steps[from].unlisted_nats

@@ -35,7 +35,7 @@ pub(crate) struct Judged {
     /// Score with it in the linearised model, and by how much it is more than that of nothing.
     pub score: Score,
     pub gain: Difference,
-    /// What it costs more than nothing [nats]: what it must gain to be the more probable.
+    /// What it must gain [nats]: the margin for each of its amplitudes.
     pub cost_nats: f64,
     /// Errors on places the fit did not see.
     pub places: HeldOut,
@@ -176,8 +176,7 @@ pub(crate) fn judge(
     let unlisted = Unlisted::beside(room, entry, &score, config);
     let gain = score.above(room.nothing());
     let significance = significance.to_vec();
-    let costs = room.costs(config);
-    let cost_nats = costs.of_amplitudes(weighed.amplitudes(entry)) - costs.of_nothing();
+    let cost_nats = config.margin_nats * weighed.amplitudes(entry) as f64;
     Judged {
         entry,
         significance,

@@ -18,14 +18,12 @@ fn costs_are_three_nats_an_amplitude_and_minus_ln_of_the_prior() {
     let costs = room.costs(&config);
     let entries = room.weighed.entries.len() as f64;
     close(costs.of_nothing(), 2f64.ln());
-    for amplitudes in 0..4 {
-        close(costs.of_amplitudes(amplitudes), 3.0 * amplitudes as f64 - (0.4 / entries).ln());
-    }
     close(costs.of_unlisted(), 12.0 - (0.1 / room.weighed.unlisted.len() as f64).ln());
-    close(costs.of_entry(entry(&room.weighed, "backlash:1")), costs.of_amplitudes(1));
+    let play = costs.of_entry(entry(&room.weighed, "backlash:1"));
+    close(play, 3.0 - (0.4 / entries).ln());
     // Prior times what was said: of what says nothing at all, the priors are left.
     let all = (-costs.of_nothing()).exp()
-        + entries * (-costs.of_amplitudes(0)).exp()
+        + entries * (3.0 - play).exp()
         + room.weighed.unlisted.len() as f64 * (12.0 - costs.of_unlisted()).exp();
     close(all, 1.0);
 }
@@ -43,7 +41,8 @@ fn costs_are_those_of_the_configuration() {
     let room = room(&p, &config);
     let costs = room.costs(&config);
     close(costs.of_nothing(), 5f64.ln());
-    close(costs.of_amplitudes(2), 10.0 - (0.7 / room.weighed.entries.len() as f64).ln());
+    let play = costs.of_entry(entry(&room.weighed, "backlash:1"));
+    close(play, 5.0 - (0.7 / room.weighed.entries.len() as f64).ln());
     close(costs.of_unlisted(), 20.0 - (0.1 / room.weighed.unlisted.len() as f64).ln());
 }
 

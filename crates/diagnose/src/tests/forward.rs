@@ -130,10 +130,10 @@ fn steps_are_confirmed_among_each_other() {
     let unknown = Candidate { spec: "else".into(), family: "else".into(), ..own(&p, "scale:1") };
     steps.insert(0, Step::known(unknown, 1.0));
     assert_eq!(confirmed(&p, steps, &[]), both);
-    // Without a name at once, and not more than a cell: not even tried.
+    // Without a name at once, and alone: judged by itself.
     let doubtful =
         |ln| vec![Step::known(own(&p, "backlash:1"), 1.0), step(own(&p, "zero_drift:2"), ln, false)];
-    assert_eq!(confirmed(&p, doubtful([90.0, 95.0]), &[]), both[..1]);
+    assert_eq!(confirmed(&p, doubtful([90.0, 95.0]), &[]), both);
     assert_eq!(confirmed(&p, doubtful([90.0, 1.0]), &[]), both);
     // More than a cell by itself: what comes later and says less than it costs takes no name from it.
     let first = step(own(&p, "backlash:1"), [10.0, 5.0], false);

@@ -74,13 +74,9 @@ fn what_is_real_needs_score_gate_and_left_out_errors() {
 }
 
 #[test]
-fn what_is_judged_must_gain_what_it_costs_more_than_nothing() {
+fn what_is_judged_must_gain_the_margin_for_each_amplitude() {
     let (_, room, j) = judged();
-    let config = quick();
-    // One amplitude of 3 nats, and one entry of so many that share 0.4, against 0.5.
-    let by_hand = 3.0 - (0.4 / room.weighed.entries.len() as f64).ln() + 0.5f64.ln();
-    assert!((j.cost_nats - by_hand).abs() < 1e-12, "{} {by_hand}", j.cost_nats);
-    assert!(j.cost_nats > config.margin_nats);
+    assert_eq!((j.cost_nats, room.weighed.amplitudes(j.entry)), (quick().margin_nats, 1));
 }
 
 #[test]
