@@ -118,7 +118,8 @@ impl Ranking {
             explanations.extend((!known).then(|| row(alone, p, &score, 0.0, false)));
         }
         let of_answer = |e: &Explanation| e.standing.in_answer;
-        explanations[1..].sort_by(|a, b| {
+        // The answer stays first; where it could not be scored there is none, and there may be nothing at all.
+        explanations[usize::from(scored.is_some())..].sort_by(|a, b| {
             let (p, q) = (&a.standing, &b.standing);
             let behind = p.behind_nats.total_cmp(&q.behind_nats);
             of_answer(b).cmp(&of_answer(a)).then(q.probability.total_cmp(&p.probability)).then(behind)
