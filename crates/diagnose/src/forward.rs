@@ -159,17 +159,13 @@ fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
 
 /// Entries that the weighing likes best, each name once, with their scores: those first that are worth most.
 pub(crate) fn leading(room: &Room, config: &DiagnosisConfig) -> Vec<(usize, Score)> {
-    let Room { problem, weighed, .. } = room;
+    let weighed = &room.weighed;
     let mut names: Vec<usize> = Vec::new();
     for k in weighed.ranking() {
         let new = names.iter().all(|n| !weighed.one_name(*n, k));
         names.extend((new && names.len() < LEADING).then_some(k));
     }
-    let scored = |k: usize| {
-        let columns = weighed.entries[k].candidate.columns.dense(&problem.dwells, 1.0);
-        (k, room.score_with(&columns))
-    };
-    let mut scored: Vec<(usize, Score)> = names.into_iter().map(scored).collect();
+    let mut scored: Vec<(usize, Score)> = names.into_iter().map(|k| (k, room.score_of(k))).collect();
     let worth = |(k, score): &(usize, Score)| score.worth(config.margin_nats * weighed.amplitudes(*k) as f64);
     scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     scored

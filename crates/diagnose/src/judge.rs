@@ -163,7 +163,7 @@ pub(crate) fn judge(
 
     let columns = &candidate.columns;
     let effect = columns.dense(&problem.dwells, 1.0);
-    let score = room.score_with(&effect);
+    let score = room.score_of(entry);
     let places = weighed.gain(problem, (columns, &effect), &room.exam().folds, config);
     let groups = by_recording(problem);
     let noise = (None, weighed.scale);

@@ -38,6 +38,8 @@ pub(crate) struct Room {
     pub weighed: Weighed,
     exam: OnceCell<Exam>,
     nothing: OnceCell<Score>,
+    /// Of the entries that somebody asked about.
+    scores: RefCell<BTreeMap<usize, Score>>,
     /// The best that is not listed, as it stands among all.
     unlisted: OnceCell<Option<(usize, Score)>>,
     significance: OnceCell<Vec<Significance>>,
@@ -46,8 +48,8 @@ pub(crate) struct Room {
 
 impl Room {
     fn new(problem: Problem, weighed: Weighed) -> Room {
-        let (exam, nothing, unlisted, significance, judged) = Default::default();
-        Room { problem, weighed, exam, nothing, unlisted, significance, judged }
+        let (exam, nothing, scores, unlisted, significance, judged) = Default::default();
+        Room { problem, weighed, exam, nothing, scores, unlisted, significance, judged }
     }
 
     /// What is left out in turn: places, or stretches of time where the noise remembers (neighbours in time would tell).
@@ -72,6 +74,17 @@ impl Room {
     /// The score with columns in the linearised model, in the units of the problem.
     pub fn score_with(&self, columns: &DMatrix<f64>) -> Score {
         self.scored(Some(columns))
+    }
+
+    /// The score with an entry, once.
+    pub fn score_of(&self, entry: usize) -> Score {
+        if let Some(known) = self.scores.borrow().get(&entry) {
+            return known.clone();
+        }
+        let columns = self.weighed.entries[entry].candidate.columns.dense(&self.problem.dwells, 1.0);
+        let score = self.score_with(&columns);
+        self.scores.borrow_mut().insert(entry, score.clone());
+        score
     }
 
     /// Of what is not listed, with the freedom these data give it, that which says most of dwells the fit did not see: of

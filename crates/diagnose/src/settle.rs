@@ -129,7 +129,7 @@ fn settled(
 
 /// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.
 fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
-    let Room { problem, weighed, .. } = room;
+    let weighed = &room.weighed;
     let own = found.judged.entry;
     let mut names = vec![own];
     for k in weighed.ranking() {
@@ -139,10 +139,8 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
             && names.iter().all(|n| !weighed.one_name(*n, k));
         names.extend((new && names.len() < ALTERNATIVES).then_some(k));
     }
-    let one_step = |k: &usize| {
-        let columns = weighed.entries[*k].candidate.columns.dense(&problem.dwells, 1.0);
-        (*k, if *k == own { found.judged.score.clone() } else { room.score_with(&columns) })
-    };
+    // Its own may be that of a refit.
+    let one_step = |k: &usize| (*k, if *k == own { found.judged.score.clone() } else { room.score_of(*k) });
     let mut scored: Vec<(usize, Score)> = names.iter().map(one_step).collect();
     scored.sort_by(|a, b| 0f64.total_cmp(&a.1.above(&b.1).nats));
     let gain = found.judged.gain.nats;
