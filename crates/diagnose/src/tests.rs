@@ -78,7 +78,7 @@ pub(crate) fn entry(weighed: &Weighed, spec: &str) -> usize {
 }
 
 /// A candidate weighed as if it were not listed: as a cell, or as a shape without a place and a driver.
-pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64, probability: f64) -> Outside {
+pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64) -> Outside {
     let what = Unlisted {
         channel: cell.then_some(0),
         driver: cell.then_some(0),
@@ -87,7 +87,7 @@ pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64, pro
         columns: own(p, spec).columns,
         unit_si: 1.0,
     };
-    Outside { what, ln_evidence, probability }
+    Outside { what, ln_evidence }
 }
 
 /// A candidate of a problem.

@@ -39,8 +39,6 @@ pub(crate) struct Entry {
     pub candidate: Candidate,
     /// ln Bayes factor against nothing, averaged over noise (and over the grid of a scan).
     pub ln_evidence: f64,
-    /// Posterior probability.
-    pub probability: f64,
     /// Products of its columns under white noise.
     pub white: Gram,
 }
@@ -52,8 +50,6 @@ pub(crate) struct Outside {
     pub what: Unlisted,
     /// ln Bayes factor against nothing, averaged over noise.
     pub ln_evidence: f64,
-    /// Posterior probability.
-    pub probability: f64,
 }
 
 /// Everything weighed.
@@ -139,7 +135,7 @@ fn weigh_at(
     for (candidate, (ln, white)) in problem.candidates.iter().zip(listed) {
         let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
         by_metric.push(plus(&ln, share));
-        entries.push(Entry { candidate: candidate.clone(), ln_evidence, probability: 0.0, white });
+        entries.push(Entry { candidate: candidate.clone(), ln_evidence, white });
     }
     let mut points = Vec::new();
     for (scan, all) in problem.scans.iter().zip(weighed.by_ref().take(problem.scans.len())) {
@@ -155,7 +151,7 @@ fn weigh_at(
             (0..metrics.len()).map(|m| ln_sum_exp(all.iter().map(|ln| ln[m])) - ln_points).collect();
         by_metric.push(plus(&mixed, share));
         let (candidate, white) = (scan.points[best].clone(), of_points[best].clone());
-        entries.push(Entry { candidate, ln_evidence, probability: 0.0, white });
+        entries.push(Entry { candidate, ln_evidence, white });
         let every = of_points.len().div_ceil(KEPT_POINTS).max(1);
         points.push(of_points.into_iter().enumerate().step_by(every).collect());
     }
@@ -167,19 +163,12 @@ fn weigh_at(
         for (what, ln) in family.into_iter().zip(parts) {
             let ln_evidence = ln_sum_exp(ln.iter().copied()) - ln_null;
             by_metric.push(plus(&ln, share));
-            unlisted.push(Outside { what, ln_evidence, probability: 0.0 });
+            unlisted.push(Outside { what, ln_evidence });
         }
     }
 
     let ln_total = ln_sum_exp(by_metric.iter().flatten().copied());
-    let probability = |ln: &[f64]| (ln_sum_exp(ln.iter().copied()) - ln_total).exp();
-    let p_nothing = probability(&by_metric[0]);
-    for (entry, ln) in entries.iter_mut().zip(&by_metric[1..]) {
-        entry.probability = probability(ln);
-    }
-    for (outside, ln) in unlisted.iter_mut().zip(&by_metric[1 + entries.len()..]) {
-        outside.probability = probability(ln);
-    }
+    let p_nothing = (ln_sum_exp(by_metric[0].iter().copied()) - ln_total).exp();
     let of_noise = |m: usize| (ln_sum_exp(by_metric.iter().map(|ln| ln[m])) - ln_total).exp();
     let p_noise = (0..metrics.len()).map(|m| (metrics[m].noise, of_noise(m))).collect();
     let given = problem.candidates.len();

@@ -90,7 +90,7 @@ pub(crate) fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
     r.weighed.p_nothing = 0.01;
     r.weighed.entries.retain(|e| e.candidate.spec == entry.0);
     r.weighed.entries[0].ln_evidence = entry.1;
-    r.weighed.unlisted = unlisted.iter().map(|(s, cell, ln)| outside(&p, s, *cell, *ln, 0.1)).collect();
+    r.weighed.unlisted = unlisted.iter().map(|(s, cell, ln)| outside(&p, s, *cell, *ln)).collect();
     r
 }
 

@@ -157,7 +157,7 @@ fn stretches_are_left_out_where_noise_remembers() {
 fn what_is_not_listed_is_compared_by_its_score_and_known_by_its_shape() {
     let beside = |unlisted: &[(&str, f64)]| {
         let (p, mut room) = play();
-        room.weighed.unlisted = unlisted.iter().map(|(s, ln)| outside(&p, s, true, *ln, 0.1)).collect();
+        room.weighed.unlisted = unlisted.iter().map(|(s, ln)| outside(&p, s, true, *ln)).collect();
         let judged = room.judge(entry(&room.weighed, "backlash:1"), &quick());
         (judged.grade(&quick()), judged.unlisted.clone(), judged.score)
     };
