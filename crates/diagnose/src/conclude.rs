@@ -53,9 +53,11 @@ impl Diagnosis {
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise
-    /// alone gives: then what has no name is too small to be worth a claim.
+    /// alone gives: then what has no name is too small to be worth a claim. Nor is one what takes nothing from errors once it is
+    /// fitted.
     fn settle(&mut self, agrees: bool, noise_alone: bool) {
-        if self.verdict == Verdict::Unknown && (noise_alone || self.unlisted.is_empty()) {
+        let in_vain = self.refitted.is_some() && self.holdout_mm.after >= self.holdout_mm.before;
+        if self.verdict == Verdict::Unknown && (noise_alone || in_vain || self.unlisted.is_empty()) {
             self.unlisted.clear();
             self.unknown = None;
             self.tentative.clear();
@@ -99,7 +101,7 @@ impl Diagnosis {
             .collect();
         let single = single_dwells(&errors, config.floor_factor);
         // Where single dwells are all of it, what the others look like says nothing of it.
-        let scatter = self.noise.correlated().filter(|_| single.is_none());
+        let scatter = self.noise.alike().filter(|_| single.is_none());
         let unexplained = Unexplained {
             error_mm: error_mm(settled),
             floor_mm: settled.noise_floor_m * 1e3,
@@ -107,7 +109,7 @@ impl Diagnosis {
             times_floor: times,
             explained_share: self.explained_share(),
             places: single.map_or_else(|| error_places(&errors, joint_names), |single| vec![single]),
-            scatter: scatter.map(|(kind, _)| kind.to_owned()),
+            scatter,
             tried: Tried { listed: self.candidates.len(), unlisted: self.tried_unlisted },
         };
         self.warnings.extend(unexplained.warning(self.verdict, config));

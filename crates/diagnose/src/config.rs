@@ -16,8 +16,6 @@ pub struct DiagnosisConfig {
     pub prior_catalogue: f64,
     /// Prior weight of "something outside the catalogue"; default 0.1, half cells, half smooth discrepancies.
     pub prior_unknown: f64,
-    /// Prior weight of correlated noise of some kind; default 0.3.
-    pub prior_correlated_noise: f64,
     /// Amplitudes, in units of an effect's typical size, over which the evidence is averaged; default 0.3, 1, 3, 10.
     pub amplitude_scales: Vec<f64>,
     /// Degrees of freedom the declared noise is worth; default 8.
@@ -70,7 +68,6 @@ impl Default for DiagnosisConfig {
             prior_nothing: 0.5,
             prior_catalogue: 0.4,
             prior_unknown: 0.1,
-            prior_correlated_noise: 0.3,
             amplitude_scales: vec![0.3, 1.0, 3.0, 10.0],
             noise_prior_dof: 8.0,
             unlisted_effect_mm: 0.5,
@@ -103,7 +100,6 @@ impl DiagnosisConfig {
             ("prior_nothing", self.prior_nothing),
             ("prior_catalogue", self.prior_catalogue),
             ("prior_unknown", self.prior_unknown),
-            ("prior_correlated_noise", self.prior_correlated_noise),
             ("max_probability_nothing", self.max_probability_nothing),
             ("max_p_adjusted", self.max_p_adjusted),
             ("merge_cosine", self.merge_cosine),

@@ -1,8 +1,7 @@
 //! What cannot be told apart (notes 3 and 4.12, formula 10), and what the data could not have shown (4.1).
 
-use crate::evidence::Metric;
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, eigen};
+use crate::projection::{Gram, Projection, eigen};
 use crate::special::{Z_80, Z_975};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -102,7 +101,7 @@ impl Signature {
     }
 }
 
-/// Several sets of columns under one noise, and their products with each other.
+/// Several sets of columns, and their products with each other.
 #[derive(Debug, Clone)]
 pub(crate) struct Crossed {
     /// The columns of each set among all.
@@ -114,7 +113,7 @@ pub(crate) struct Crossed {
 
 impl Crossed {
     /// Of sets of columns, times a factor that gives them the units of the weighing.
-    pub fn of(columns: &[&Columns], problem: &Problem, factor: f64, metric: &Metric) -> Crossed {
+    pub fn of(columns: &[&Columns], problem: &Problem, factor: f64, base: &Projection) -> Crossed {
         let mut stacked = DMatrix::zeros(problem.rows(), columns.iter().map(|own| own.len()).sum());
         let mut sets = Vec::with_capacity(columns.len());
         let mut at = 0;
@@ -123,7 +122,7 @@ impl Crossed {
             sets.push(at..at + own.len());
             at += own.len();
         }
-        let all = metric.projection.gram(&metric.whitened(stacked));
+        let all = base.gram(&stacked);
         let mut crossed = Crossed { sets, all, reach: Vec::new() };
         crossed.reach = (0..columns.len()).map(|k| Reach::of(&crossed.gram(k))).collect();
         crossed

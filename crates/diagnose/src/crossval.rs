@@ -9,7 +9,6 @@ use crate::held_out::HeldOut;
 use crate::places::units;
 use crate::problem::{DwellRow, Problem};
 use crate::projection::cholesky_upper;
-use crate::whitener::Whitener;
 use armcal_calibrate::gram;
 use armcal_calibrate::grouped_ci95;
 use nalgebra::{DMatrix, DVector};
@@ -22,7 +21,7 @@ pub(crate) const EFFECT_PRECISION: f64 = 0.01;
 
 /// Dwells of a stretch of time that is left out, and of what is left out before and after it.
 const STRETCH: usize = 4;
-const FORGOTTEN: usize = 4;
+const FORGOTTEN: usize = 10;
 
 /// Dwells that are predicted by a fit that did not see them.
 #[derive(Debug, Clone)]
@@ -174,26 +173,16 @@ pub(crate) fn errors_m(problem: &Problem, rows: &DVector<f64>) -> Vec<DwellError
     problem.dwells.iter().map(of).collect()
 }
 
-/// What `effect` columns do to errors on the groups, each predicted without itself. Where the noise remembers, whether
-/// that is chance is asked of what `memory` leaves of the errors: what neighbours in time share is no prediction.
+/// What `effect` columns do to errors on the groups, each predicted without itself.
 pub(crate) fn gain(
     problem: &Problem,
     effect: &DMatrix<f64>,
     groups: &[Group],
-    (memory, scale): (Option<&Whitener>, f64),
+    scale: f64,
     config: &DiagnosisConfig,
 ) -> HeldOut {
-    let both =
-        |p: &Problem, effect| (left_out(p, None, groups, scale), left_out(p, Some(effect), groups, scale));
-    let (before, after) = both(problem, effect);
-    let plain = compare(problem, &before, &after, groups, config);
-    let Some(memory) = memory else { return plain };
-    let forgetful = problem.whitened(memory);
-    let mut effect = effect.clone();
-    memory.apply(&mut effect);
-    let (before, after) = both(&forgetful, &effect);
-    let HeldOut { gain, p, .. } = compare(&forgetful, &before, &after, groups, config);
-    HeldOut { gain, p, ..plain }
+    let [before, after] = [None, Some(effect)].map(|effect| left_out(problem, effect, groups, scale));
+    compare(problem, &before, &after, groups, config)
 }
 
 /// Compares two sets of left-out whitened rows group by group.

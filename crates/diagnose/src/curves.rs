@@ -79,7 +79,7 @@ fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) ->
     });
     let mut own: Vec<&Outside> = own.collect();
     own.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
-    own.into_iter().find(|u| room.predicts_with(&u.what.columns, config))
+    own.into_iter().find(|u| room.predicts(u, config))
 }
 
 /// Whether a joint errs over its own angle.

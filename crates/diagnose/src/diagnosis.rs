@@ -5,9 +5,8 @@ use crate::contrasts::Contrast;
 use crate::error_places::ErrorPlace;
 use crate::held_out::HeldOut;
 use crate::nested::Nested;
-use crate::noise::Noise;
 use crate::ripple::{Peak, Ripple};
-use crate::structure::Structure;
+use crate::scatter::Scatter;
 use armcal_calibrate::Calibration;
 use armcal_core::{DwellId, Unit, Warning};
 use armcal_model::{EffectSpec, Model};
@@ -82,9 +81,7 @@ pub struct Diagnosis {
     /// What to record next, in words.
     pub record_next: Vec<String>,
     /// The noise as found.
-    pub noise: NoiseReport,
-    /// Classical tests of what the base model leaves.
-    pub structure: Structure,
+    pub noise: Scatter,
     /// Probability that nothing is missing, before any effect was added.
     pub p_nothing: f64,
     /// Unlisted shapes that were weighed.
@@ -181,7 +178,7 @@ pub struct Unexplained {
     pub explained_share: f64,
     /// In which dwells it is largest, the clearest first; empty where it is alike everywhere.
     pub places: Vec<ErrorPlace>,
-    /// How the scatter repeats, where that is beyond doubt: `repeated at every visit to a place`.
+    /// What errs alike, where that is beyond doubt: `visits to a place err alike (correlation 0.82): ..`.
     pub scatter: Option<String>,
     /// What was tried and did not explain it.
     pub tried: Tried,
@@ -411,26 +408,6 @@ pub struct ExpressionParameter {
     pub prior: f64,
     /// Bound on its size, either sign.
     pub bound: f64,
-}
-
-/// The noise as found.
-#[derive(Debug, Clone, Serialize)]
-pub struct NoiseReport {
-    /// Residual standard deviation over the declared one, after everything found.
-    pub sigma_ratio: f64,
-    /// Kind of correlation with its probability, most probable first.
-    pub kinds: Vec<(String, f64)>,
-}
-
-/// A kind of noise this probable is beyond doubt.
-const CERTAIN: f64 = 0.95;
-
-impl NoiseReport {
-    /// The kind of correlation that is beyond doubt, with its probability; none of plain noise.
-    pub(crate) fn correlated(&self) -> Option<(&str, f64)> {
-        let (kind, p) = self.kinds.first()?;
-        (*p > CERTAIN && *kind != *Noise::White.word()).then_some((kind.as_str(), *p))
-    }
 }
 
 /// A number of the verdict, in a plain sentence.

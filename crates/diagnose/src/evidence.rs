@@ -2,11 +2,9 @@
 
 use crate::config::DiagnosisConfig;
 use crate::grams::each_gram;
-use crate::noise::Noise;
 use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, Projection, cholesky_upper, eigen};
 use crate::special::ln_sum_exp;
-use crate::whitener::Whitener;
 use nalgebra::{DMatrix, DVector};
 
 /// Above this many columns a factor for each amplitude is cheaper than one eigen-decomposition.
@@ -19,99 +17,36 @@ pub(crate) fn promise(columns: impl Iterator<Item = [f64; 2]>) -> f64 {
     columns.map(|[with_residual, square]| with_residual.powi(2) / (1.0 + square)).sum()
 }
 
-/// The problem under one alternative of the noise.
-#[derive(Debug, Clone)]
-pub(crate) struct Metric {
-    /// Which noise.
-    pub noise: Noise,
-    /// Whitening by it.
-    pub whitener: Whitener,
-    /// Geometry projected out.
-    pub projection: Projection,
-    /// ln of prior x evidence, relative to the white alternative.
-    pub ln_weight: f64,
+/// A problem whose residual noise is `scale` times the declared one, its geometry projected out.
+pub(crate) fn projected(problem: &Problem, scale: f64) -> Projection {
+    let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
+    Projection::new(&problem.geometry / scale, precision, offset, &problem.residual / scale)
 }
 
-impl Metric {
-    /// Products of columns (declared-noise whitened) under this noise.
-    pub fn gram(&self, columns: &DMatrix<f64>) -> Gram {
-        let mut white = columns.clone();
-        self.whitener.apply(&mut white);
-        self.projection.gram(&white)
-    }
-
-    /// Columns whitened by this noise, not projected.
-    pub fn whitened(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
-        self.whitener.apply(&mut columns);
-        columns
-    }
-
-    /// ln Bayes factor of a term against its absence under this noise.
-    pub fn ln_bayes(&self, gram: &Gram, config: &DiagnosisConfig) -> f64 {
-        ln_bayes(gram, self.projection.rss, self.projection.dof(), config)
-    }
-}
-
-impl Metric {
-    pub(crate) fn new(noise: Noise, amplitude: f64, problem: &Problem, scale: f64) -> Metric {
-        let whitener = Whitener::new(noise, amplitude, problem);
-        let mut residual = DMatrix::from_column_slice(problem.rows(), 1, problem.residual.as_slice());
-        let mut geometry = problem.geometry.clone();
-        whitener.apply(&mut residual);
-        whitener.apply(&mut geometry);
-        let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
-        let projection = Projection::new(geometry / scale, precision, offset, residual.column(0) / scale);
-        Metric { noise, whitener, projection, ln_weight: 0.0 }
-    }
-
-    /// ln of its prior times the evidence of nothing in it, against white noise.
-    pub(crate) fn weighed(self, prior: f64, white: Option<&Metric>, config: &DiagnosisConfig) -> Metric {
-        let p = &self.projection;
-        let white = white.map_or(p, |m| &m.projection);
-        let ln_weight = ln_weight(prior, [self.whitener.ln_det, p.ln_det, p.rss], white, config);
-        Metric { ln_weight, ..self }
-    }
-}
-
-/// ln of the prior of a noise times the evidence of nothing in it, against white noise: from ln of the determinants of its
-/// covariance and of what the geometry's freedom costs in it, and the squared residual that it leaves.
-pub(crate) fn ln_weight(
-    prior: f64,
-    [noise_ln_det, geometry_ln_det, rss]: [f64; 3],
-    white: &Projection,
-    config: &DiagnosisConfig,
-) -> f64 {
-    let nu = config.noise_prior_dof;
-    prior.ln()
-        - 0.5 * (noise_ln_det + geometry_ln_det - white.ln_det)
-        - 0.5 * (nu + white.dof()) * ((nu + rss) / (nu + white.rss)).ln()
-}
-
-/// `ln mean_a B(a)` with
+/// ln Bayes factor of a term against its absence: `ln mean_a B(a)` with
 /// `ln B(a) = -1/2 ln det(I + a^2 A) - (nu0 + nu)/2 ln[(nu0 + RSS(a)) / (nu0 + RSS)]`,
 /// `RSS(a) = RSS - g'(A + a^-2 I)^-1 g`.
-pub(crate) fn ln_bayes(gram: &Gram, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
-    let scales = &config.amplitude_scales;
-    let parts = penalised(gram, scales)
-        .into_iter()
-        .map(|(ln_det, drop)| one_amplitude(ln_det, drop, rss, dof, config));
-    ln_sum_exp(parts) - (scales.len() as f64).ln()
+pub(crate) fn ln_bayes(gram: &Gram, base: &Projection, config: &DiagnosisConfig) -> f64 {
+    let of_each = of_amplitudes(gram, base, config);
+    let count = of_each.len() as f64;
+    ln_sum_exp(of_each) - count.ln()
 }
 
 /// The amplitude with the largest evidence.
-pub(crate) fn best_amplitude(gram: &Gram, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
-    let scales = &config.amplitude_scales;
-    let parts = penalised(gram, scales)
-        .into_iter()
-        .map(|(ln_det, drop)| one_amplitude(ln_det, drop, rss, dof, config));
-    let best = parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
-    scales.get(best).copied().unwrap_or(1.0)
+pub(crate) fn best_amplitude(gram: &Gram, base: &Projection, config: &DiagnosisConfig) -> f64 {
+    let of_each = of_amplitudes(gram, base, config);
+    let best = of_each.into_iter().zip(&config.amplitude_scales).max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(1.0, |(_, amplitude)| *amplitude)
 }
 
-fn one_amplitude(ln_det: f64, drop: f64, rss: f64, dof: f64, config: &DiagnosisConfig) -> f64 {
-    let nu0 = config.noise_prior_dof;
-    let left = (rss - drop).max(1e-9 * rss);
-    -0.5 * ln_det - 0.5 * (nu0 + dof) * ((nu0 + left) / (nu0 + rss)).ln()
+/// `ln B(a)` of every amplitude.
+fn of_amplitudes(gram: &Gram, base: &Projection, config: &DiagnosisConfig) -> Vec<f64> {
+    let (nu0, dof, rss) = (config.noise_prior_dof, base.dof(), base.rss);
+    let of = |(ln_det, drop): (f64, f64)| {
+        let left = (rss - drop).max(1e-9 * rss);
+        -0.5 * ln_det - 0.5 * (nu0 + dof) * ((nu0 + left) / (nu0 + rss)).ln()
+    };
+    penalised(gram, &config.amplitude_scales).into_iter().map(of).collect()
 }
 
 /// For each amplitude: `ln det(I + a^2 A)` and `g'(A + a^-2 I)^-1 g`.
@@ -144,20 +79,16 @@ fn penalised(gram: &Gram, scales: &[f64]) -> Vec<(f64, f64)> {
     scales.iter().map(at).collect()
 }
 
-/// ln (weight x Bayes factor) of every term in every metric. `result[term][metric]`.
-pub(crate) fn over_noise(
+/// The [`ln_bayes`] of every term.
+pub(crate) fn of_all(
     terms: &[&Columns],
     problem: &Problem,
     scale: f64,
-    metrics: &[Metric],
+    base: &Projection,
     config: &DiagnosisConfig,
-) -> Vec<Vec<f64>> {
-    let mut result = vec![vec![0.0; metrics.len()]; terms.len()];
-    for (k, metric) in metrics.iter().enumerate() {
-        each_gram(terms, problem, 1.0 / scale, metric, &mut |term, gram| {
-            result[term][k] = metric.ln_weight + metric.ln_bayes(gram, config);
-        });
-    }
+) -> Vec<f64> {
+    let mut result = vec![0.0; terms.len()];
+    each_gram(terms, problem, 1.0 / scale, base, &mut |k, gram| result[k] = ln_bayes(gram, base, config));
     result
 }
 

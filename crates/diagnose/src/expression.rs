@@ -3,7 +3,7 @@
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Expression, ExpressionParameter};
 use crate::drivers::{Driver, DriverKind, moments};
-use crate::evidence::{Metric, best_amplitude, coefficients, over_noise};
+use crate::evidence::{best_amplitude, coefficients, of_all};
 use crate::problem::{Channel, Columns, Problem};
 use crate::weigh::Weighed;
 use nalgebra::DMatrix;
@@ -28,7 +28,6 @@ struct Family {
 pub(crate) fn expression(
     problem: &Problem,
     weighed: &Weighed,
-    metric: &Metric,
     channel: &Channel,
     axis: usize,
     driver: &Driver,
@@ -53,12 +52,13 @@ pub(crate) fn expression(
         })
         .collect();
     let columns: Vec<&Columns> = families.iter().map(|f| &f.2).collect();
-    let weights = over_noise(&columns, problem, weighed.scale, std::slice::from_ref(metric), config);
-    let value = |k: usize| weights[k][0] - metric.ln_weight - families[k].0.ln_tried;
+    let base = &weighed.base;
+    let weights = of_all(&columns, problem, weighed.scale, base, config);
+    let value = |k: usize| weights[k] - families[k].0.ln_tried;
     let best = (0..families.len()).max_by(|a, b| value(*a).total_cmp(&value(*b)))?;
     let (family, unit, columns) = &families[best];
-    let gram = metric.gram(&weighed.dense(columns, problem));
-    let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
+    let gram = base.gram(&weighed.dense(columns, problem));
+    let a = best_amplitude(&gram, base, config);
     let (theta, _) = coefficients(&gram, a);
     let parameters = family
         .terms

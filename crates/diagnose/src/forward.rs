@@ -4,7 +4,6 @@ use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
 use crate::events::moved;
 use crate::judge::{Grade, Judged};
-use crate::pairs::best_pair;
 use crate::problem::{Candidate, Problem};
 use crate::rooms::{Room, Rooms};
 use crate::score::Score;
@@ -84,7 +83,7 @@ pub(crate) fn named(accepted: &[Accepted]) -> Vec<Candidate> {
 
 /// Steps that were confirmed before, with the problem that they leave.
 pub(crate) fn known(names: &[Candidate], rest: &Room) -> Vec<Step> {
-    names.iter().map(|c| Step::known(c.clone(), rest.weighed.metrics[0].projection.rss)).collect()
+    names.iter().map(|c| Step::known(c.clone(), rest.weighed.base.rss)).collect()
 }
 
 /// Judges every step among the others and drops the weakest until all may be named. `cells` stay in the base.
@@ -200,13 +199,6 @@ pub(crate) fn forward(
         let Some((top, _)) = leading(&room, config).into_iter().next() else { break };
         let mut judged = room.judge(top, config);
         let mut named = judged.grade(config) == Grade::Named;
-        if !named && let Some(first) = best_pair(&room.problem, weighed, config).filter(|k| *k != top) {
-            let other = room.judge(first, config);
-            if other.promising(config) {
-                named = other.grade(config) == Grade::Named;
-                judged = other;
-            }
-        }
         let entry = &weighed.entries[judged.entry];
         // Far from the fit one step is short, and an unlisted shape has more of them.
         if !named

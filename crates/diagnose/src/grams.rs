@@ -1,13 +1,12 @@
-//! Products of many columns with each other, the residual and the geometry, under one noise.
+//! Products of many columns with each other, the residual and the geometry.
 //!
 //! Products of a base with functions at the dwells ([`Columns`]) are weighed [by dwell](crate::by_dwell), and not put together row
 //! by row.
 
 use crate::by_dwell::{ByDwell, OnRows};
 use crate::columns::Columns;
-use crate::evidence::Metric;
 use crate::problem::Problem;
-use crate::projection::Gram;
+use crate::projection::{Gram, Projection};
 use armcal_calibrate::inner;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -21,7 +20,7 @@ pub(crate) fn each_gram(
     terms: &[&Columns],
     problem: &Problem,
     factor: f64,
-    metric: &Metric,
+    projection: &Projection,
     each: &mut dyn FnMut(usize, &Gram),
 ) {
     let mut rest = Vec::new();
@@ -36,19 +35,19 @@ pub(crate) fn each_gram(
         }
     }
     if !of_bases.is_empty() {
-        let on_rows = OnRows::of(metric, problem);
+        let on_rows = OnRows { dwells: &problem.dwells, projection };
         for (base, own) in of_bases {
-            let by_dwell = ByDwell::of(base.as_ref() * factor, &on_rows);
-            let is_event = |k: &usize| by_dwell.is_sum() && matches!(terms[*k], Columns::Within { .. });
+            let by_dwell = ByDwell::of(&(base.as_ref() * factor), &on_rows);
+            let is_event = |k: &usize| matches!(terms[*k], Columns::Within { .. });
             let (events, functions): (Vec<usize>, Vec<usize>) = own.into_iter().partition(is_event);
             by_dwell.of_events(terms, &events, each);
-            for block in blocks(terms, &functions, by_dwell.height()) {
+            for block in blocks(terms, &functions, problem.dwells.len()) {
                 by_dwell.of_functions(terms, block, each);
             }
         }
     }
     for block in blocks(terms, &rest, problem.rows()) {
-        dense(terms, block, problem, factor, metric, each);
+        dense(terms, block, problem, factor, projection, each);
     }
 }
 
@@ -74,7 +73,7 @@ fn dense(
     block: &[usize],
     problem: &Problem,
     factor: f64,
-    metric: &Metric,
+    projection: &Projection,
     each: &mut dyn FnMut(usize, &Gram),
 ) {
     let width = block.iter().map(|k| terms[*k].len()).sum();
@@ -84,14 +83,12 @@ fn dense(
         t.write(&problem.dwells, factor, stacked.columns_mut(at, t.len()));
         at += t.len();
     }
-    let white = metric.whitened(stacked);
-    let projection = &metric.projection;
-    let spent = inner(&projection.q, &white);
-    let score = white.tr_mul(&projection.residual) - spent.tr_mul(&projection.z);
+    let spent = inner(&projection.q, &stacked);
+    let score = stacked.tr_mul(&projection.residual) - spent.tr_mul(&projection.z);
     let mut at = 0;
     for k in block {
         let m = terms[*k].len();
-        let (x, c) = (white.columns(at, m), spent.columns(at, m));
+        let (x, c) = (stacked.columns(at, m), spent.columns(at, m));
         let full = inner(&x, &x);
         let raw = full.diagonal();
         let (a, g) = (full - inner(&c, &c), score.rows(at, m).into_owned());

@@ -3,8 +3,8 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
-    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NoiseReport, NotTestable,
-    Rival, UnknownReport, Verdict,
+    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NotTestable, Rival,
+    UnknownReport, Verdict,
 };
 use crate::events::{passing, together};
 use crate::explain::explanations;
@@ -17,9 +17,9 @@ use crate::ranking::Ranking;
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters};
 use crate::rooms::{Room, Rooms};
+use crate::scatter::Scatter;
 use crate::search::{Search, from_nothing, search};
 use crate::settle::{Instead, settle};
-use crate::structure::{Structure, structure};
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
 use crate::{DiagnoseError, next};
@@ -98,7 +98,6 @@ struct Before {
     candidates: Vec<CandidateReport>,
     cannot_tell_apart: Vec<[String; 2]>,
     not_testable: Vec<NotTestable>,
-    structure: Structure,
     floor_mm: f64,
     error_mm: f64,
 }
@@ -116,7 +115,6 @@ impl Before {
             candidates: candidate_reports(room, &ranking.explanations, top, config),
             cannot_tell_apart: confused(problem, weighed, config),
             not_testable: not_testable(problem, weighed),
-            structure: structure(problem, config),
             floor_mm: floor_mm(problem),
             error_mm: error_mm(problem, weighed),
         }
@@ -137,7 +135,8 @@ fn assemble(
         unlisted.extend(unknown_report(rest, config));
     }
     let probability = if search.left_over { before.p_unlisted } else { before.p_nothing };
-    let noise = noise(&with_curves.weighed);
+    let left = with_curves.weighed.base.projected_residual();
+    let noise = Scatter::of(&with_curves.problem, &with_curves.weighed, &left);
     let mut diagnosis = Diagnosis {
         verdict,
         names: Vec::new(),
@@ -147,7 +146,6 @@ fn assemble(
         cannot_tell_apart: before.cannot_tell_apart,
         not_testable: before.not_testable,
         record_next: Vec::new(),
-        structure: before.structure,
         p_nothing: before.p_nothing,
         tried_unlisted: before.tried_unlisted,
         rest_may_be_shape: search.may_be_shape,
@@ -235,7 +233,7 @@ fn rival(a: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
         name: weighed.entries[k].candidate.spec.clone(),
         behind_nats: behind.nats,
         behind_se: behind.se,
-        places: weighed.gain(problem, (columns, &effect), &a.room.exam().folds, config),
+        places: weighed.gain(problem, &effect, &a.room.exam().folds, config),
     })
 }
 
@@ -245,7 +243,7 @@ fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
     let width = |k: usize| weighed.entries[k].candidate.columns.len();
     let mut pairs = Vec::new();
     for k in 0..weighed.entries.len() {
-        if weighed.entries[k].candidate.is_group() || weighed.entries[k].white.a.trace() < config.min_delta {
+        if weighed.entries[k].candidate.is_group() || weighed.entries[k].gram.a.trace() < config.min_delta {
             continue;
         }
         let theta = DVector::from_element(width(k), 1.0);
@@ -259,16 +257,8 @@ fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
     pairs
 }
 
-fn noise(rest: &Weighed) -> NoiseReport {
-    let p = &rest.metrics[0].projection;
-    let mut kinds: Vec<(String, f64)> =
-        rest.p_noise.iter().map(|(n, p)| (n.word().to_string(), *p)).collect();
-    kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
-    NoiseReport { sigma_ratio: (p.rss / p.dof()).sqrt() * rest.scale, kinds }
-}
-
 fn warnings(
-    noise: &NoiseReport,
+    noise: &Scatter,
     set_aside: &[DwellId],
     dwells: usize,
     search: &Search,
@@ -294,8 +284,11 @@ fn warnings(
             "scatter-larger",
             "noise".to_string(),
             format!(
-                "what remains scatters {:.1} times as much as declared; check the declared noise, the seats and the sensor",
-                noise.sigma_ratio
+                "what remains scatters {:.1} times as much as declared{}; check the declared noise, the seats and the sensor",
+                noise.sigma_ratio,
+                noise.tracked_ratio.zip(noise.seated_ratio).map_or(String::new(), |(tracked, seated)| format!(
+                    " ({tracked:.1} times where the tip was tracked, {seated:.1} times where it was seated)"
+                ))
             ),
         );
     }
@@ -307,9 +300,8 @@ fn warnings(
         );
         add(Severity::Notice, "noise-overdeclared", "noise".to_string(), message);
     }
-    if let Some((kind, p)) = noise.correlated() {
-        let message =
-            format!("the scatter is {kind} (probability {p:.2}); more repeats of the same kind average less");
+    if let Some(alike) = noise.alike() {
+        let message = format!("{alike}; more repeats of the same kind average less");
         add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
     }
     let names: Vec<&str> = search.accepted.iter().map(|a| a.candidate.spec.as_str()).collect();
@@ -389,7 +381,7 @@ fn one_load(problem: &Problem) -> bool {
 /// Dwells whose arrival direction an accepted direction effect contradicts.
 fn direction_suspects(a: &Accepted) -> Vec<DwellId> {
     let (problem, weighed) = (&a.room.problem, &a.room.weighed);
-    let projection = &weighed.metrics[0].projection;
+    let projection = &weighed.base;
     let columns = a.candidate.columns.dense(&problem.dwells, 1.0 / weighed.scale);
     let fitted = crate::confusion::one_step(&projection.gram(&columns), 1.0);
     let signature = &columns * &fitted.estimate;

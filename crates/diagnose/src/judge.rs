@@ -4,20 +4,20 @@ use crate::bootstrap::{Direction, Significance, wild_cluster};
 use crate::config::DiagnosisConfig;
 use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
-use crate::crossval::{by_recording, gain};
+use crate::crossval::by_recording;
 use crate::evidence::{best_amplitude, coefficients};
 use crate::held_out::HeldOut;
-use crate::noise::Noise;
 use crate::places::units;
 use crate::problem::{Amplitude, Problem};
 use crate::projection::Gram;
 use crate::rooms::Room;
+use crate::scatter::Scatter;
 use crate::score::{Difference, Score};
 use crate::weigh::Weighed;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Dwells of a block when the noise has memory.
+/// Dwells of a block when errors are like those before them.
 const BLOCK: usize = 8;
 /// Fewest clusters for clustering by place alone.
 const MIN_CLUSTERS: usize = 12;
@@ -47,7 +47,7 @@ pub(crate) struct Judged {
     pub contrast: Option<Contrast>,
     /// Amplitudes that are negative and cannot be.
     pub impossible: Vec<String>,
-    /// Products of its columns under white noise.
+    /// Products of its columns.
     pub gram: Gram,
 }
 
@@ -132,16 +132,12 @@ pub(crate) enum Grade {
     Named,
 }
 
-/// The significance of every entry of a weighed problem, among all that was tried.
-pub(crate) fn significance(
-    problem: &Problem,
-    weighed: &Weighed,
-    config: &DiagnosisConfig,
-) -> Vec<Significance> {
+/// The significance of every entry of a room, among all that was tried.
+pub(crate) fn significance(room: &Room, config: &DiagnosisConfig) -> Vec<Significance> {
+    let Room { problem, weighed, .. } = room;
     let directions = gate_directions(problem, weighed);
-    let clusters = clusters(problem, weighed);
-    let projection = &weighed.metrics[0].projection;
-    let mut all = wild_cluster(projection, &directions, (&problem.dwells, &clusters), config);
+    let clusters = clusters(problem, &room.scatter);
+    let mut all = wild_cluster(&weighed.base, &directions, (&problem.dwells, &clusters), config);
     all.truncate(weighed.entries.len());
     all
 }
@@ -154,8 +150,8 @@ pub(crate) fn judge(
     config: &DiagnosisConfig,
 ) -> Judged {
     let Room { problem, weighed, .. } = room;
-    let projection = &weighed.metrics[0].projection;
-    let gram = weighed.entries[entry].white.clone();
+    let projection = &weighed.base;
+    let gram = weighed.entries[entry].gram.clone();
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let candidate = &weighed.entries[entry].candidate;
@@ -164,10 +160,9 @@ pub(crate) fn judge(
     let columns = &candidate.columns;
     let effect = columns.dense(&problem.dwells, 1.0);
     let score = room.score_of(entry);
-    let places = weighed.gain(problem, (columns, &effect), &room.exam().folds, config);
+    let places = weighed.gain(problem, &effect, &room.exam().folds, config);
     let groups = by_recording(problem);
-    let noise = (None, weighed.scale);
-    let recordings = (groups.len() > 1).then(|| gain(problem, &effect, &groups, noise, config));
+    let recordings = (groups.len() > 1).then(|| weighed.gain(problem, &effect, &groups, config));
 
     let theta = &fitted.estimate;
     let theta_sigma = relative_sigma(&fitted, residual_variance);
@@ -197,14 +192,13 @@ impl Unlisted {
     fn beside(room: &Room, entry: usize, own: &Score, config: &DiagnosisConfig) -> Option<Unlisted> {
         let Room { problem, weighed, .. } = room;
         let (best, score) = room.best_unlisted(config)?;
-        let (metric, above) = (&weighed.metrics[0], score.above(own));
+        let above = score.above(own);
         let columns = weighed.dense(&best.what.columns, problem);
-        let gram = metric.projection.gram(&columns);
-        let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
-        let (theta, _) = coefficients(&gram, a);
+        let gram = weighed.base.gram(&columns);
+        let (theta, _) = coefficients(&gram, best_amplitude(&gram, &weighed.base, config));
         let name = &weighed.entries[entry];
         let of_name = weighed.dense(&name.candidate.columns, problem);
-        let cosine = Signature::new(&columns, &gram, &theta).likeness(&of_name, &name.white, 1.0).cosine;
+        let cosine = Signature::new(&columns, &gram, &theta).likeness(&of_name, &name.gram, 1.0).cosine;
         Some(Unlisted { score, above, cosine })
     }
 }
@@ -227,7 +221,7 @@ fn impossible(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<
 
 /// Projected directions of all entries, then of some points of the scans: the maximum runs over all of them.
 fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direction<'p>> {
-    let entries = weighed.entries.iter().map(|e| (&e.candidate.columns, &e.white));
+    let entries = weighed.entries.iter().map(|e| (&e.candidate.columns, &e.gram));
     let points =
         problem.scans.iter().zip(&weighed.points).flat_map(|(scan, points)| {
             points.iter().map(|(point, white)| (&scan.points[*point].columns, white))
@@ -238,21 +232,15 @@ fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direct
         .collect()
 }
 
-/// Dwells that keep their sign together: as the noise seems to repeat.
-pub(crate) fn clusters(problem: &Problem, weighed: &Weighed) -> Vec<Vec<usize>> {
+/// Dwells that keep their sign together: as errors seem to repeat.
+pub(crate) fn clusters(problem: &Problem, scatter: &Scatter) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-    let by_place = weighed.probably(&[Noise::Place, Noise::TrackedAndPlace]);
-    let by_visit = weighed.probably(&[Noise::Visit]);
-    let unit = if by_place || by_visit { units(problem) } else { Vec::new() };
+    let unit = if scatter.repeats() { units(problem) } else { Vec::new() };
     for (i, d) in problem.dwells.iter().enumerate() {
-        let key = if weighed.remembers() {
-            (d.id.recording, d.id.dwell / BLOCK)
-        } else if by_place {
-            (0, unit[i])
-        } else if by_visit {
-            (d.id.recording, unit[i])
-        } else {
-            (d.id.recording, i)
+        let key = match unit.get(i) {
+            _ if scatter.remembers() => (d.id.recording, d.id.dwell / BLOCK),
+            Some(unit) => (0, *unit),
+            None => (d.id.recording, i),
         };
         groups.entry(key).or_default().push(i);
     }

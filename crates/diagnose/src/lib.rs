@@ -6,10 +6,10 @@
 //!
 //! * `columns`, `grams`: what might be missing as columns, and what is asked of thousands of them;
 //! * `projection`: what the geometry could do is taken out, prior rows and all;
-//! * `noise`, `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete under every kind of noise;
+//! * `evidence`, `cells`, `weigh`: nothing, the catalogue and the unlisted compete; `scatter` says how errors repeat;
 //! * `knowledge`: what the user says of the arm decides which of the catalogue are tried;
 //! * `outliers`: accidents are set aside and reported;
-//! * `search`, `forward`, `pairs`, `fewer`: one effect after the other while they are promising, and no more than needed;
+//! * `search`, `forward`, `fewer`: one effect after the other while they are promising, and no more than needed;
 //! * `density`, `score`: what an explanation says of dwells that its fit did not see, the one number by which all are compared;
 //! * `judge`: each among the others: `bootstrap` is the gate, `score` what it predicts, `contrasts` pairs of visits, `confusion` what
 //!   is the same to these data;
@@ -60,10 +60,8 @@ mod knowledge;
 mod model_refit;
 mod nested;
 mod next;
-mod noise;
 mod observed;
 mod outliers;
-mod pairs;
 mod places;
 mod plan;
 mod problem;
@@ -76,21 +74,18 @@ mod rests;
 mod ripple;
 mod rooms;
 mod scans;
+mod scatter;
 mod score;
 mod search;
 mod settle;
 mod signs;
-mod sizes;
 mod special;
 mod stretches;
-mod structure;
 mod suggestion;
-mod trials;
 mod unexplained;
 mod unknown;
 mod view;
 mod weigh;
-mod whitener;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
@@ -117,5 +112,5 @@ pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 pub use refit::{LinearRefit, Refit};
 pub use ripple::Ripple;
-pub use structure::{LackOfFit, Structure};
+pub use scatter::{Correlation, Scatter};
 pub use unexplained::UNEXPLAINED;

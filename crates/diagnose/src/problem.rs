@@ -4,7 +4,6 @@ use crate::DiagnoseError;
 pub use crate::columns::Columns;
 use crate::columns::Cut;
 use crate::crossval::EFFECT_PRECISION;
-use crate::whitener::Whitener;
 use armcal_core::{DwellId, Measured, Unit};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector, Matrix3xX};
@@ -310,24 +309,6 @@ impl Problem {
         self.candidates.retain(|c| c.spec == spec);
         self.channels.clear();
         self
-    }
-
-    /// The rows under another noise, without anything to weigh.
-    pub(crate) fn whitened(&self, by: &Whitener) -> Problem {
-        let mut residual = DMatrix::from_column_slice(self.rows(), 1, self.residual.as_slice());
-        let mut geometry = self.geometry.clone();
-        by.apply(&mut residual);
-        by.apply(&mut geometry);
-        Problem {
-            dwells: self.dwells.clone(),
-            residual: residual.column(0).into_owned(),
-            geometry,
-            geometry_precision: self.geometry_precision.clone(),
-            geometry_offset: self.geometry_offset.clone(),
-            candidates: Vec::new(),
-            scans: Vec::new(),
-            channels: Vec::new(),
-        }
     }
 
     /// The same problem without some dwells (`keep[i]` false).

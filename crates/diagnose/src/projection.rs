@@ -8,8 +8,7 @@
 //! ```
 //!
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
-//! 2015), which is as orthogonal as Householder's and a matrix product fast. To choose among many kinds and sizes of noise one
-//! factor is enough, and Q itself is not put together ([`Rough`]): with `R'R = J'J + P`, `Q'g = R'^-1 J'g`.
+//! 2015), which is as orthogonal as Householder's and a matrix product fast.
 
 use armcal_calibrate::{gram, inner};
 use nalgebra::{DMatrix, DVector};
@@ -27,8 +26,6 @@ pub(crate) struct Projection {
     pub rss: f64,
     /// Effective number of parameters: what the data, not the prior, decide.
     pub effective_parameters: f64,
-    /// `ln det(I + J P^-1 J')`, P the prior precision: how much the geometry's freedom costs.
-    pub ln_det: f64,
 }
 
 /// Products of some columns with themselves and with the residual, geometry projected out.
@@ -68,11 +65,9 @@ impl Projection {
         let root = precision.map(|v| v.max(1e-12).sqrt());
         let mut data = geometry;
         let mut prior = DMatrix::from_diagonal(&root);
-        let mut ln_det = -2.0 * root.iter().map(|v| v.ln()).sum::<f64>();
         for _ in 0..2 {
             let normal = gram(&data) + gram(&prior);
             let factor = cholesky_upper(normal);
-            ln_det += 2.0 * factor.diagonal().iter().map(|v| v.ln()).sum::<f64>();
             let inverse = factor
                 .solve_upper_triangular(&DMatrix::identity(p, p))
                 .unwrap_or_else(|| DMatrix::identity(p, p));
@@ -83,7 +78,7 @@ impl Projection {
         let z = data.tr_mul(&residual) + prior.tr_mul(&prior_residual);
         let rss = residual.norm_squared() + prior_residual.norm_squared() - z.norm_squared();
         let effective_parameters = data.norm_squared();
-        Projection { q: data, z, rss: rss.max(1e-12), effective_parameters, ln_det, residual }
+        Projection { q: data, z, rss: rss.max(1e-12), effective_parameters, residual }
     }
 
     /// Variance of the residual (declared noise = 1) once something took so much of its square.
@@ -93,7 +88,7 @@ impl Projection {
 
     /// Degrees of freedom left.
     pub fn dof(&self) -> f64 {
-        dof(self.residual.len(), self.effective_parameters)
+        (self.residual.len() as f64 - self.effective_parameters).max(1.0)
     }
 
     /// Data rows of the projected residual.
@@ -117,70 +112,6 @@ impl Projection {
             spent: c,
         }
     }
-}
-
-/// The same without Q, from products alone: a fraction of the work, good to about 1e-6.
-pub(crate) struct Rough {
-    /// `R'^-1`.
-    back: DMatrix<f64>,
-    z: DVector<f64>,
-    /// As of a [`Projection`].
-    pub rss: f64,
-    /// As of a [`Projection`].
-    pub effective_parameters: f64,
-    /// As of a [`Projection`].
-    pub ln_det: f64,
-}
-
-impl Rough {
-    /// From `J'J` of the geometry, `J'e` and `e'e` of the residual, and the prior's precision and offsets.
-    pub fn new(
-        geometry: DMatrix<f64>,
-        (with_residual, residual): (DVector<f64>, f64),
-        precision: &DVector<f64>,
-        offset: &DVector<f64>,
-    ) -> Rough {
-        let p = geometry.ncols();
-        let precision = precision.map(|v| v.max(1e-12));
-        let factor = cholesky_upper(geometry + DMatrix::from_diagonal(&precision));
-        let ln_det = factor.diagonal().iter().zip(&precision).map(|(r, v)| 2.0 * r.ln() - v.ln()).sum();
-        let back = factor
-            .transpose()
-            .solve_lower_triangular(&DMatrix::identity(p, p))
-            .unwrap_or_else(|| DMatrix::identity(p, p));
-        let z = &back * (with_residual - offset.component_mul(&precision));
-        let prior = offset.component_mul(offset).dot(&precision);
-        let rss = (residual + prior - z.norm_squared()).max(1e-12);
-        // The trace of J (J'J + P)^-1 J'.
-        let held: f64 = back.column_iter().zip(&precision).map(|(c, v)| v * c.norm_squared()).sum();
-        Rough { back, z, rss, effective_parameters: p as f64 - held, ln_det }
-    }
-
-    /// Degrees of freedom left of so many rows.
-    pub fn dof(&self, rows: usize) -> f64 {
-        dof(rows, self.effective_parameters)
-    }
-
-    /// Of columns X, from `J'X`, `X'e` and `X'X`.
-    pub fn gram(
-        &self,
-        with_geometry: &DMatrix<f64>,
-        with_residual: &DVector<f64>,
-        square: DMatrix<f64>,
-    ) -> Gram {
-        let spent = &self.back * with_geometry;
-        Gram {
-            raw: square.diagonal(),
-            a: square - spent.tr_mul(&spent),
-            g: with_residual - spent.tr_mul(&self.z),
-            spent,
-        }
-    }
-}
-
-/// Degrees of freedom that so many parameters leave of so many rows.
-fn dof(rows: usize, effective_parameters: f64) -> f64 {
-    (rows as f64 - effective_parameters).max(1.0)
 }
 
 /// Upper Cholesky factor of a positive semi-definite matrix, with a ridge that grows until it exists.

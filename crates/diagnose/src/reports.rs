@@ -22,7 +22,7 @@ const ABSORBED: f64 = 0.9;
 /// Sizes of a judged entry from the metric that explains it under white noise, and what is determined of them together.
 pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> (Vec<ParameterReport>, Option<Combination>) {
     let entry = &weighed.entries[judged.entry];
-    let projection = &weighed.metrics[0].projection;
+    let projection = &weighed.base;
     let variance = projection.variance_without(judged.own().score);
     let fitted = one_step(&judged.gram, 1.0);
     let (amplitudes, covariance) = (&entry.candidate.amplitudes, fitted.covariance * variance);
@@ -105,10 +105,10 @@ fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
 /// One entry by itself: its sizes in one step, and what these data could show of it.
 fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
     let Room { weighed, .. } = room;
-    let projection = &weighed.metrics[0].projection;
+    let projection = &weighed.base;
     let entry = &weighed.entries[k];
     let c = &entry.candidate;
-    let fitted = one_step(&entry.white, 1.0);
+    let fitted = one_step(&entry.gram, 1.0);
     let none = Significance { score: 0.0, surprise: 0.0, p_raw: 1.0, p_adjusted: 1.0 };
     let significance = top.map_or(none, |t| t.significance[k]);
     let own_variance = projection.variance_without(significance.score);
@@ -122,7 +122,7 @@ fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
         p_adjusted: significance.p_adjusted,
         holdout_mm: None,
         absorbed: fitted.absorbed,
-        smallest_seen: smallest_seen(&entry.white, projection.rss / projection.dof(), weighed.entries.len()),
+        smallest_seen: smallest_seen(&entry.gram, projection.rss / projection.dof(), weighed.entries.len()),
         same_to_the_data: c.aliases.clone(),
     }
 }
@@ -131,12 +131,12 @@ fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
 fn alike(room: &Room, k: usize, config: &DiagnosisConfig) -> Vec<String> {
     let Room { problem, weighed, .. } = room;
     let entry = &weighed.entries[k];
-    let projection = &weighed.metrics[0].projection;
+    let projection = &weighed.base;
     // What these motions do not show at any size looks like everything and like nothing.
-    if !smallest_seen(&entry.white, projection.rss / projection.dof(), weighed.entries.len()).is_finite() {
+    if !smallest_seen(&entry.gram, projection.rss / projection.dof(), weighed.entries.len()).is_finite() {
         return Vec::new();
     }
-    let (crossed, theta) = (weighed.crossed(problem), one_step(&entry.white, 1.0).estimate);
+    let (crossed, theta) = (weighed.crossed(problem), one_step(&entry.gram, 1.0).estimate);
     let same = |l: &usize| *l != k && crossed.likeness(k, &theta, *l, 1.0).cosine > config.merge_cosine;
     let others = weighed.ranking().into_iter().filter(same);
     others.map(|l| weighed.entries[l].candidate.spec.clone()).collect()
@@ -163,16 +163,16 @@ impl CandidateReport {
 
 /// Entries whose smallest visible size exceeds the typical one.
 pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTestable> {
-    let projection = &weighed.metrics[0].projection;
+    let projection = &weighed.base;
     // What the best explanation leaves is the noise against which sizes are seen.
     let best = weighed.ranking().first().map_or(0.0, |k| {
-        let gram = &weighed.entries[*k].white;
+        let gram = &weighed.entries[*k].gram;
         one_step(gram, 1.0).estimate.dot(&gram.g).max(0.0)
     });
     let variance = projection.variance_without(best);
     let mut all = Vec::new();
     for entry in weighed.entries.iter().filter(|e| !e.candidate.is_group()) {
-        let (c, gram) = (&entry.candidate, &entry.white);
+        let (c, gram) = (&entry.candidate, &entry.gram);
         let smallest = smallest_seen(gram, variance, weighed.entries.len());
         if smallest <= 1.0 {
             continue;

@@ -7,15 +7,18 @@
 
 use crate::diagnosis::{Diagnosis, Refitted};
 use crate::implied::{BLURRED, ImpliedError, implied_joint_errors};
-use crate::noise::Noise;
 use crate::observed::Calibrated;
 use crate::problem::Candidate;
+use crate::special::ln_f_tail;
+use armcal_calibrate::PositionNoise;
 use armcal_core::robust::median;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_model::EffectSpec;
 
 /// The shape of an effect that says how much of its gap a joint rests in.
 const REST: &str = "rest";
+/// So improbable by chance is beyond doubt.
+const IMPROBABLE: f64 = 1e-3;
 /// A part of the gap below which it makes no difference.
 const NEGLIGIBLE: f64 = 0.1;
 /// No joint rests in more than its gap; how wide that is, the directions of arrival tell.
@@ -30,7 +33,7 @@ impl Diagnosis {
     /// The calibration with what was found, joints resting in gaps that were found where the scatter is theirs. Names
     /// follow it.
     pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, found: Refitted) -> Refitted {
-        let Some((spec, joint)) = self.loose(&found) else { return found };
+        let Some((spec, joint)) = self.loose(calibrated, &found) else { return found };
         let Some((part, refitted)) = settled(calibrated, &found, &spec, joint) else { return found };
         let (old, new) = (spec.to_string(), spec.with(REST, part).to_string());
         let names = self.effects.iter_mut().flat_map(|e| std::iter::once(&mut e.name).chain(&mut e.set));
@@ -54,16 +57,39 @@ impl Diagnosis {
         Refitted { warnings, ..refitted }
     }
 
-    /// A gap that was found, and its joint, where the scatter that is left is certainly of that joint.
-    fn loose(&self, found: &Refitted) -> Option<(EffectSpec, usize)> {
-        let (kind, _) = self.noise.correlated()?;
-        let gaps = found.model.gaps(&found.calibration.fit.values()).into_iter();
+    /// A gap that was found, and its joint, where the errors that are left are beyond doubt of that joint.
+    fn loose(&self, calibrated: &Calibrated<'_>, found: &Refitted) -> Option<(EffectSpec, usize)> {
+        let values = found.calibration.fit.values();
+        let gaps = found.model.gaps(&values).into_iter();
         // A link that leads in the hand of a servo is no link in a gap.
-        gaps.filter(|(spec, _, width)| *width > 0.0 || spec.shape.is_empty())
-            .filter(|(spec, joint, _)| *Noise::Slack(*joint).word() == *kind && found.effects.contains(spec))
-            .find(|(spec, ..)| spec.shape.iter().all(|(name, _)| name != REST))
-            .map(|(spec, joint, _)| (spec, joint))
+        let mut gaps = gaps
+            .filter(|(spec, _, width)| *width > 0.0 || spec.shape.is_empty())
+            .filter(|(spec, ..)| found.effects.contains(spec))
+            .filter(|(spec, ..)| spec.shape.iter().all(|(name, _)| name != REST))
+            .peekable();
+        gaps.peek()?;
+        let (joint, p) = most_of(calibrated, found, &values)?;
+        gaps.find(|(_, at, _)| *at == joint && p < IMPROBABLE).map(|(spec, joint, _)| (spec, joint))
     }
+}
+
+/// The joint along which errors are largest against those across it, and how improbable that is of errors alike in every direction
+/// (F test).
+fn most_of(calibrated: &Calibrated<'_>, found: &Refitted, values: &[f64]) -> Option<(usize, f64)> {
+    let Refitted { model, calibration, .. } = found;
+    let mut sums = vec![[0.0; 3]; model.joint_count()];
+    for (r, o) in calibration.judged_pairs(calibrated.observations) {
+        let Some(noise) = PositionNoise::of(model, values, o) else { continue };
+        let all = noise.weigh(&r.fitted_m).dot(&r.fitted_m);
+        for (sum, of) in sums.iter_mut().zip(implied_joint_errors(model, values, o, &r.fitted_m)) {
+            let Some(ImpliedError { error, sigma }) = of else { continue };
+            let along = (error / sigma).powi(2);
+            *sum = [sum[0] + along, sum[1] + 0.5 * (all - along), sum[2] + 1.0];
+        }
+    }
+    let p = |[along, across, n]: &[f64; 3]| ln_f_tail(along / across.max(1e-300), *n, 2.0 * n);
+    let by_joint = sums.iter().map(p).enumerate().filter(|(_, ln_p)| ln_p.is_finite());
+    by_joint.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(joint, ln_p)| (joint, ln_p.exp()))
 }
 
 /// The part of the gap in which its joint rests, and the fit that weighs its dwells by that; none where that is

@@ -7,11 +7,11 @@ use crate::columns::Cut;
 use crate::config::DiagnosisConfig;
 use crate::costs::Costs;
 use crate::crossval::{by_place, by_stretch, left_out};
-use crate::evidence::Metric;
+use crate::evidence::{ln_bayes, projected};
 use crate::judge::{Judged, judge, significance};
-use crate::noise::Noise;
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
+use crate::scatter::Scatter;
 use crate::score::{Exam, Score};
 use crate::weigh::{Outside, Weighed, weigh_among};
 use armcal_model::Toggle;
@@ -36,6 +36,8 @@ pub(crate) struct Room {
     pub problem: Problem,
     /// Weighed.
     pub weighed: Weighed,
+    /// How errors scatter beside what explains most.
+    pub scatter: Scatter,
     exam: OnceCell<Exam>,
     nothing: OnceCell<Score>,
     /// Of the entries that somebody asked about.
@@ -47,14 +49,15 @@ pub(crate) struct Room {
 }
 
 impl Room {
-    fn new(problem: Problem, weighed: Weighed) -> Room {
+    fn new(problem: Problem, weighed: Weighed, config: &DiagnosisConfig) -> Room {
+        let scatter = weighed.scatter(&problem, config);
         let (exam, nothing, scores, unlisted, significance, judged) = Default::default();
-        Room { problem, weighed, exam, nothing, scores, unlisted, significance, judged }
+        Room { problem, weighed, scatter, exam, nothing, scores, unlisted, significance, judged }
     }
 
     /// What is left out in turn: places, or stretches of time where the noise remembers (neighbours in time would tell).
     pub fn exam(&self) -> &Exam {
-        let of = |problem| match self.weighed.remembers() {
+        let of = |problem| match self.scatter.remembers() {
             true => Exam::by_time(problem, by_stretch(problem)),
             false => Exam::by_pose(problem, by_place(problem)),
         };
@@ -116,18 +119,20 @@ impl Room {
         if let Some(done) = self.judged.borrow().get(&entry) {
             return done.clone();
         }
-        let significance =
-            self.significance.get_or_init(|| significance(&self.problem, &self.weighed, config));
+        let significance = self.significance.get_or_init(|| significance(self, config));
         let judged = judge(self, significance, entry, config);
         self.judged.borrow_mut().insert(entry, judged.clone());
         judged
     }
 
-    /// Whether columns help on groups the fit did not see.
-    pub fn predicts_with(&self, columns: &Columns, config: &DiagnosisConfig) -> bool {
-        let effect = self.weighed.tamed(columns, &self.problem, config);
-        let gain = self.weighed.gain(&self.problem, (columns, &effect), &self.exam().folds, config);
-        gain.p <= config.max_p_adjusted
+    /// Whether something that is not listed says clearly more than nothing, and than what it costs, of dwells that the fit did not
+    /// see; and not by a few folds alone, as accidents let it.
+    pub fn predicts(&self, unlisted: &Outside, config: &DiagnosisConfig) -> bool {
+        let (costs, Room { problem, weighed, .. }) = (self.costs(config), self);
+        let effect = weighed.tamed(&unlisted.what.columns, problem, config);
+        let score = self.score_with(&effect).above(self.nothing());
+        score.is_clear(costs.of_unlisted() - costs.of_nothing())
+            && weighed.gain(problem, &effect, &self.exam().folds, config).p <= config.max_p_adjusted
     }
 }
 
@@ -158,7 +163,7 @@ impl<'a> Rooms<'a> {
         first: (Problem, Weighed),
         config: &'a DiagnosisConfig,
     ) -> Rooms<'a> {
-        let room = Rc::new(Room::new(first.0, first.1));
+        let room = Rc::new(Room::new(first.0, first.1, config));
         let dependences = room.weighed.dependences.clone();
         let (cut, known, last, scores, dropped) = Default::default();
         let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last, scores, dropped };
@@ -174,7 +179,7 @@ impl<'a> Rooms<'a> {
         }
         let problem = self.bare(accepted)?;
         let weighed = weigh_among(&problem, self.dependences.clone(), self.config);
-        let room = Rc::new(Room::new(problem, weighed));
+        let room = Rc::new(Room::new(problem, weighed, self.config));
         self.known.retain(|(_, room)| room.strong_count() > 0);
         self.remember(names, &room);
         Ok(room)
@@ -208,7 +213,7 @@ impl<'a> Rooms<'a> {
 
     /// The score of a refit with these effects, in the exam of a room; none where they cannot be fitted.
     pub fn score(&mut self, accepted: &[Candidate], room: &Room) -> Option<Score> {
-        let key = (names(accepted), room.weighed.remembers());
+        let key = (names(accepted), room.scatter.remembers());
         if let Some(known) = self.scores.get(&key) {
             return known.clone();
         }
@@ -223,15 +228,15 @@ impl<'a> Rooms<'a> {
         score
     }
 
-    /// What speaks for a candidate beside others, under white noise alone: its ln Bayes factor; none where the problem without
+    /// What speaks for a candidate beside others: its ln Bayes factor; none where the problem without
     /// it does not have it.
     pub fn ln_bayes(&mut self, others: &[Candidate], own: &Candidate) -> Result<Option<f64>, DiagnoseError> {
         let problem = self.refit.problem_of(others, own)?;
         let problem = self.kept(problem)?;
         let Some(own) = problem.candidates.first() else { return Ok(None) };
-        let white = Metric::new(Noise::White, 0.0, &problem, 1.0);
-        let gram = white.gram(&own.columns.dense(&problem.dwells, 1.0));
-        Ok(Some(white.ln_bayes(&gram, self.config)))
+        let base = projected(&problem, 1.0);
+        let gram = base.gram(&own.columns.dense(&problem.dwells, 1.0));
+        Ok(Some(ln_bayes(&gram, &base, self.config)))
     }
 
     /// A problem without the dwells that do not count.

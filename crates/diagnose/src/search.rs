@@ -135,18 +135,11 @@ fn beside_curves(
     confirm(rooms, known(&steps, rest), &[], config)
 }
 
-/// Whether something is missing: improbable as nothing, and an explanation helps where the fit did not look: the best of
-/// all, the best that has a place and a driver, or the best listed one.
+/// Whether something without a name is missing: improbable as nothing, and a shape that is not listed says more of dwells that the
+/// fit did not see.
 pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
-    let weighed = &room.weighed;
-    if weighed.p_nothing >= config.max_probability_nothing {
-        return false;
-    }
-    let best = weighed.best().map(|b| b.0);
-    let cell = weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats).map(|c| &c.what.columns);
-    let listed = weighed.ranking().first().map(|k| &weighed.entries[*k]);
-    let listed = listed.filter(|e| e.ln_evidence >= config.margin_nats).map(|e| &e.candidate.columns);
-    best.into_iter().chain(cell).chain(listed).any(|columns| room.predicts_with(columns, config))
+    room.weighed.p_nothing < config.max_probability_nothing
+        && room.best_unlisted(config).is_some_and(|(best, _)| room.predicts(best, config))
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ impl Unexplained {
             true => "about alike in all recordings, joint ranges and directions".to_owned(),
             false => format!("largest against their noise in {}", places.join(" and in ")),
         };
-        let scatter = self.scatter.as_ref().map_or(String::new(), |kind| format!("; the scatter is {kind}"));
+        let scatter = self.scatter.as_ref().map_or(String::new(), |alike| format!("; {alike}"));
         let Tried { listed, unlisted } = self.tried;
         format!(
             "{much}, {places}{scatter}; {listed} listed effects and {unlisted} unlisted shapes were tried, and none predicts it clear \

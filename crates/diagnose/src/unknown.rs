@@ -35,14 +35,13 @@ pub(crate) fn unknown_report(room: &Room, config: &DiagnosisConfig) -> Option<Un
 pub(crate) fn described(room: &Room, outside: &Outside, config: &DiagnosisConfig) -> Option<UnknownReport> {
     let Room { problem, weighed, .. } = room;
     let (best, ln) = (&outside.what, outside.ln_evidence);
-    let metric = weighed.metric_of(&best.columns, problem, config);
-    let gram = metric.gram(&weighed.dense(&best.columns, problem));
-    let a = best_amplitude(&gram, metric.projection.rss, metric.projection.dof(), config);
+    let gram = weighed.base.gram(&weighed.dense(&best.columns, problem));
+    let a = best_amplitude(&gram, &weighed.base, config);
     let (theta, covariance) = coefficients(&gram, a);
     let drop = theta.dot(&gram.g);
-    let variance = metric.projection.variance_without(drop);
+    let variance = weighed.base.variance_without(drop);
     let effect = weighed.tamed(&best.columns, problem, config);
-    let places = weighed.gain(problem, (&best.columns, &effect), &room.exam().folds, config);
+    let places = weighed.gain(problem, &effect, &room.exam().folds, config);
     let score = room.score_with(&effect);
     let listed = leading(room, config).into_iter().next();
     let costs = room.costs(config);
@@ -75,10 +74,10 @@ pub(crate) fn described(room: &Room, outside: &Outside, config: &DiagnosisConfig
     let formula = pasted.and_then(|u| {
         let (channel, driver) =
             (&problem.channels[u.what.channel?], &weighed.dependences.drivers[u.what.driver?]);
-        let gram = metric.gram(&weighed.dense(&u.what.columns, problem));
+        let gram = weighed.base.gram(&weighed.dense(&u.what.columns, problem));
         let (theta, _) = coefficients(&gram, a);
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
-        let mut e = expression(problem, weighed, metric, channel, axis, driver, config)?;
+        let mut e = expression(problem, weighed, channel, axis, driver, config)?;
         e.share_of_shape = if drop > 0.0 { (e.share_of_shape / drop).clamp(0.0, 1.0) } else { 0.0 };
         Some(e)
     });

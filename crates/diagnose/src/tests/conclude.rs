@@ -6,7 +6,7 @@ use super::*;
 use crate::LinearRefit;
 use crate::diagnose_problem;
 use crate::diagnosis::{UnknownReport, Verdict::*};
-use crate::tests::{planar_arm, planted, quick};
+use crate::tests::{planar_arm, planted, quick, scatter};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{Arrival, DwellId, ErrorStats, Reference, Unit};
 use armcal_model::EffectSpec;
@@ -70,8 +70,7 @@ fn found(verdict: Verdict) -> Diagnosis {
     });
     assert_eq!((play.verdict, play.effects.len()), (Identified, 1));
     let mut d = play.clone();
-    (d.verdict, d.p_nothing, d.noise.sigma_ratio, d.probability) = (verdict, 0.5, 1.0, Some(0.99));
-    d.noise.kinds.clear();
+    (d.verdict, d.p_nothing, d.noise, d.probability) = (verdict, 0.5, scatter(1.0, 0.0), Some(0.99));
     if matches!(verdict, NothingMissing | Unknown) {
         d.effects.clear();
         d.names.clear();
@@ -335,7 +334,7 @@ fn single_dwells_that_err_are_told_and_no_scatter_beside_them() {
     c.residuals.iter_mut().take(2).for_each(|r| r.fitted_m *= 30.0);
     c.holdout.fitted = of_residuals(&c);
     let mut d = found(NothingMissing);
-    d.noise.kinds = vec![("repeated at every place".to_owned(), 0.99)];
+    d.noise = scatter(1.0, 0.5);
     let d = concluded(d, &c, None);
     let sentence = d.unexplained.as_ref().unwrap().sentence();
     let told = "largest against their noise in recording 0 dwell 0, recording 0 dwell 1 (2 dwells, 30.000 mm, 30.0 times; elsewhere \
@@ -352,7 +351,7 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     c.residuals.iter_mut().skip(N / 2).for_each(|r| r.fitted_m *= 3.0);
     c.holdout.fitted = of_residuals(&c);
     let mut d = found(NothingMissing);
-    d.noise.kinds = vec![("repeated at every place".to_owned(), 0.99)];
+    d.noise = scatter(1.0, 0.5);
     (d.tried_unlisted, d.candidates) = (77, Vec::new());
     let d = concluded(d, &c, None);
     let unexplained = d.unexplained.as_ref().unwrap();
@@ -363,7 +362,7 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
         "the mean error of 4.000 mm is 4.0 times what the declared noise gives (1.000 mm), largest against their noise in recording 1 \
          (20 dwells, 6.000 mm, 6.0 times"
     );
-    let tail = "; the scatter is repeated at every place; 0 listed effects and 77 unlisted shapes were tried, and none \
+    let tail = "; visits to a place err alike (correlation 0.50): seats and cavities off their place do that; 0 listed effects and 77 unlisted shapes were tried, and none \
                 predicts it clear of chance";
     assert!(unexplained.sentence().ends_with(tail), "{}", unexplained.sentence());
     let warning = d.warnings.iter().find(|w| w.code == "unexplained").unwrap();

@@ -301,7 +301,7 @@ pub(crate) fn beside(outside: &str, spec: &str, size: f64) -> Problem {
 fn doubtful_steps_are_given_a_few_more() {
     // Play that grows with the angle: plain play is a part of it, without a name. The play of another joint says less, and has
     // none either beside what is left of it.
-    let (steps, _) = stepped(&beside("worn", "backlash:3", 0.4), Vec::new(), &quick());
+    let (steps, _) = stepped(&beside("worn", "backlash:3", 0.8), Vec::new(), &quick());
     assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
     assert_eq!(names(&steps), ["backlash:1", "backlash:3"]);
 }

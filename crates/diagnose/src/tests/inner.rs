@@ -6,9 +6,8 @@ use super::*;
 use crate::problem::{Candidate, Columns};
 use crate::settle::{Instead, Scored};
 use crate::tests::arm::SIGMA_M;
-use crate::tests::{arm, entry, in_rooms, own, planted, quick, room};
+use crate::tests::{arm, entry, in_rooms, own, planted, quick, room, scatter};
 use armcal_core::DwellId;
-use std::rc::Rc;
 use std::sync::Arc;
 
 /// The entry of a problem's first room as it would be accepted.
@@ -172,30 +171,17 @@ fn alike_signatures_are_listed_as_pairs() {
 }
 
 #[test]
-fn noise_is_reported_in_declared_units_the_likeliest_kind_first() {
-    let p = planted(&[], 0, 5);
-    let mut r = Rc::try_unwrap(room(&p, &quick())).expect("nobody else has the room");
-    r.weighed.p_noise = vec![(crate::noise::Noise::White, 0.2), (crate::noise::Noise::Place, 0.8)];
-    r.weighed.scale = 3.0;
-    let n = noise(&r.weighed);
-    let white = &r.weighed.metrics[0].projection;
-    assert!((n.sigma_ratio - 3.0 * (white.rss / white.dof()).sqrt()).abs() < 1e-12);
-    assert_eq!(n.kinds[0], (crate::noise::Noise::Place.word().to_string(), 0.8));
-}
-
-#[test]
 fn noise_that_is_declared_wrongly_is_a_notice() {
     let s = searched(&planted(&[], 0, 5));
-    let of = |sigma_ratio: f64, kinds: Vec<(String, f64)>| {
-        let noise = NoiseReport { sigma_ratio, kinds };
-        let all = warnings(&noise, &[], 198, &s, &quick());
+    let of = |sigma_ratio: f64, places: f64| {
+        let all = warnings(&scatter(sigma_ratio, places), &[], 198, &s, &quick());
         codes(&all).iter().map(|c| c.to_string()).collect::<Vec<_>>()
     };
-    assert!(of(1.0, vec![]).is_empty() && of(1.4, vec![]).is_empty() && of(0.5, vec![]).is_empty());
-    assert_eq!(of(1.41, vec![]), ["scatter-larger"]);
-    assert_eq!(of(0.49, vec![]), ["noise-overdeclared"]);
-    assert_eq!(of(1.0, vec![("repeated".into(), 0.999)]), ["scatter-correlated"]);
-    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    assert!(of(1.0, 0.1).is_empty() && of(1.4, 0.1).is_empty() && of(0.5, 0.1).is_empty());
+    assert_eq!(of(1.41, 0.1), ["scatter-larger"]);
+    assert_eq!(of(0.49, 0.1), ["noise-overdeclared"]);
+    assert_eq!(of(1.0, 0.5), ["scatter-correlated"]);
+    let noise = scatter(1.0, 0.0);
     let id = DwellId { recording: 1, dwell: 5 };
     let all = warnings(&noise, &[id], 198, &s, &quick());
     assert_eq!(codes(&all), ["suspect-dwell"]);
@@ -205,7 +191,7 @@ fn noise_that_is_declared_wrongly_is_a_notice() {
 #[test]
 fn a_change_between_recordings_may_be_a_load_that_is_not_declared() {
     let mut p = planted(&[("tool_shift@1", 1.0)], 0, 3);
-    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    let noise = scatter(1.0, 0.0);
     let of = |p: &Problem, spec: &str| {
         let mut s = searched(&planted(&[], 0, 5));
         s.accepted = vec![accepted(p, spec)];
@@ -237,7 +223,7 @@ fn directions_that_a_play_contradicts_are_named() {
     assert_eq!(wrong, turned.map(|i| p.dwells[i].id));
     let mut s = searched(&planted(&[], 0, 5));
     s.accepted = vec![a];
-    let noise = NoiseReport { sigma_ratio: 1.0, kinds: Vec::new() };
+    let noise = scatter(1.0, 0.0);
     let all = warnings(&noise, &[], 198, &s, &quick());
     assert_eq!(codes(&all), ["suspect-direction"]);
     assert!(all[0].message.starts_with("3 dwells fit backlash:1"), "{}", all[0].message);

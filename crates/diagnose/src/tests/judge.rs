@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::tests::{entry, outside, own, planted, quick, room};
+use crate::scatter::Correlation;
+use crate::tests::{entry, outside, own, planted, quick, room, scatter};
 use crate::weigh::weigh;
+
 use armcal_core::DwellId;
 use nalgebra::DMatrix;
 use std::rc::Rc;
@@ -32,7 +34,7 @@ fn a_planted_play_is_judged_as_what_it_is() {
     assert_eq!((j.places.groups, j.recordings.unwrap().groups), (33, 3));
     assert!(j.contrast.as_ref().unwrap().agrees);
     let columns = own(&p, "backlash:1").columns.dense(&p.dwells, 1.0);
-    let own = room.weighed.metrics[0].projection.gram(&columns);
+    let own = room.weighed.base.gram(&columns);
     assert!((&j.gram.a - own.a).amax() < 1e-9 && (&j.gram.g - own.g).amax() < 1e-9);
     assert_eq!(j.significance.len(), room.weighed.entries.len());
     assert_eq!(j.gain, room.score_with(&columns).above(room.nothing()));
@@ -113,21 +115,23 @@ fn a_name_needs_what_is_real_and_listed_and_beats_the_rest() {
 #[test]
 fn dwells_keep_their_sign_together_as_the_noise_repeats() {
     let p = planted(&[], 0, 1);
-    let mut weighed = weigh(&p, &quick());
-    let mut under = |noise| {
-        weighed.p_noise = vec![(noise, 0.9)];
-        clusters(&p, &weighed)
-    };
+    let plain = scatter(1.0, 0.0);
     // 198 dwells of 33 cavities, visited twice in each of three recordings of 66.
-    assert_eq!(under(Noise::White).len(), 198);
-    let places = under(Noise::Place);
+    assert_eq!(clusters(&p, &plain).len(), 198);
+    let places = clusters(&p, &scatter(1.0, 0.5));
     assert_eq!((places.len(), places[0].len()), (33, 6));
-    let visits = under(Noise::Visit);
-    assert_eq!((visits.len(), visits[0].len()), (99, 2));
-    for noise in [Noise::Memory, Noise::Sensor, Noise::SensorAndPlace] {
-        let blocks = under(noise);
+    let alike = Some(Correlation { value: 0.5, p: 1e-9, pairs: 90 });
+    for tracked in [true, false] {
+        let mut s = scatter(1.0, 0.5);
+        *(if tracked { &mut s.tracked_neighbours } else { &mut s.seated_neighbours }) = alike;
+        let blocks = clusters(&p, &s);
         assert_eq!((blocks.len(), &blocks[0][..], blocks[8].len()), (27, &[0, 1, 2, 3, 4, 5, 6, 7][..], 2));
     }
+}
+
+/// Errors like those before them.
+fn remembering() -> Scatter {
+    Scatter { tracked_neighbours: Some(Correlation { value: 0.5, p: 1e-9, pairs: 90 }), ..scatter(1.0, 0.0) }
 }
 
 #[test]
@@ -136,20 +140,18 @@ fn too_few_clusters_are_dwells_by_themselves() {
     let of = |dwells: usize| {
         let mut p = p.without(&(0..198).map(|i| i < dwells).collect::<Vec<_>>());
         p.dwells.iter_mut().enumerate().for_each(|(i, d)| d.id = DwellId { recording: 0, dwell: i });
-        let mut weighed = weigh(&p, &quick());
-        weighed.p_noise = vec![(Noise::Memory, 0.9)];
-        clusters(&p, &weighed).len()
+        clusters(&p, &remembering()).len()
     };
     assert_eq!((of(96), of(88)), (12, 88), "eleven blocks of eight are too few");
 }
 
 #[test]
-fn stretches_are_left_out_where_noise_remembers() {
+fn stretches_are_left_out_where_errors_are_like_those_before_them() {
     let p = planted(&[], 0, 1);
     let fresh = || Rc::try_unwrap(room(&p, &quick())).expect("nobody else has the room");
     assert_eq!(fresh().exam().folds.len(), 33);
     let mut r = fresh();
-    r.weighed.p_noise = vec![(Noise::Memory, 0.9)];
+    r.scatter = remembering();
     assert!(r.exam().folds.iter().any(|g| g.unseen.len() > g.scored.len()));
 }
 
@@ -249,7 +251,7 @@ fn an_estimate_is_as_uncertain_as_its_covariance_along_itself() {
 #[test]
 fn what_is_left_is_the_residual_without_its_part() {
     let weighed = play().1.weighed;
-    let white = &weighed.metrics[0].projection;
+    let white = &weighed.base;
     assert!((white.variance_without(0.4 * white.rss) - 0.6 * white.rss / white.dof()).abs() < 1e-12);
     assert_eq!(white.variance_without(2.0 * white.rss), 0.0);
 }

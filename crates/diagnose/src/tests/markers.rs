@@ -1,8 +1,7 @@
 //! Several markers a pose: their rows share the encoders' noise, and one that came loose is told from all else.
 
-use super::{assert_whitens, quick};
+use super::quick;
 use crate::knowledge::Knowledge;
-use crate::noise::Noise;
 use crate::view::View;
 use crate::{Calibrated, Candidate, Diagnosis, Problem, Verdict, diagnose};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
@@ -200,25 +199,6 @@ fn a_joint_that_is_off_moves_all_rows_of_its_pose() {
         let found = raw * channel.columns.rows(d.first_row, d.rows).column(0);
         assert!((&found - &fall).amax() < 1e-6, "{found} {fall}");
     }
-}
-
-#[test]
-fn noise_that_remembers_is_that_of_each_marker_and_goes_on_while_it_is_hidden() {
-    let mut rig = rig(4, 25, None);
-    rig.observations.retain(|o| !(o.feature == FeatureId(2) && (8..11).contains(&o.dwell.dwell)));
-    let p = rig.problem();
-    let of: Vec<(usize, FeatureId, usize)> = p
-        .dwells
-        .iter()
-        .flat_map(|d| d.parts.iter().flat_map(|part| (0..3).map(|axis| (d.id.dwell, part.what.0, axis))))
-        .collect();
-    let b: f64 = 1.7;
-    let c = DMatrix::from_fn(p.rows(), p.rows(), |i, k| {
-        let same = of[i].1 == of[k].1 && of[i].2 == of[k].2;
-        let memory = (-(of[i].0.abs_diff(of[k].0) as f64) / 3.0).exp();
-        (f64::from(i == k) + if same { b * b * memory } else { 0.0 }) / (1.0 + b * b)
-    });
-    assert_whitens(Noise::Memory, b, &p, c);
 }
 
 #[test]
