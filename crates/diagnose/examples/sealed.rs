@@ -175,7 +175,7 @@ fn main() {
             for e in &d.explanations {
                 println!("  {}: {}", e.number, e.sentence);
             }
-            println!("  {:?}", d.structure);
+            println!("  {:?}", d.noise);
         }
         "robot" => {
             for seed in 0..seeds {

@@ -44,15 +44,6 @@ pub(crate) fn half_width(sigma: f64) -> f64 {
     Z_975 * sigma
 }
 
-/// How alike two candidates are, k at its fitted size.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Likeness {
-    /// Cosine between k's fitted signature and the closest one the other can make.
-    pub cosine: f64,
-    /// `|(I - B_l B_l') G~_k theta|^2 / variance`: twice the expected log-likelihood ratio.
-    pub delta: f64,
-}
-
 /// What columns can make in the projected space: the eigenvalues and eigenvectors of their products.
 #[derive(Debug, Clone)]
 struct Reach(DVector<f64>, DMatrix<f64>);
@@ -64,18 +55,16 @@ impl Reach {
         Reach(w, v)
     }
 
-    /// How near these columns come to a signature of this squared length, given their products with it, both projected.
-    fn likeness(&self, power: f64, cross: &DVector<f64>, variance: f64) -> Likeness {
+    /// Cosine between a signature of this squared length and the closest that these columns can make, given their products with
+    /// it, both projected.
+    fn cosine(&self, power: f64, cross: &DVector<f64>) -> f64 {
         if power <= 0.0 {
-            return Likeness { cosine: 1.0, delta: 0.0 };
+            return 1.0;
         }
         let Reach(w, v) = self;
         let t = v.tr_mul(cross);
         let shared: f64 = w.iter().zip(t.iter()).filter(|(w, _)| **w > 0.0).map(|(w, t)| t * t / w).sum();
-        Likeness {
-            cosine: (shared / power).clamp(0.0, 1.0).sqrt(),
-            delta: (power - shared).max(0.0) / variance,
-        }
+        (shared / power).clamp(0.0, 1.0).sqrt()
     }
 }
 
@@ -95,9 +84,9 @@ impl Signature {
     }
 
     /// Compares it with everything that other whitened columns, whose products these are, can do.
-    pub fn likeness(&self, columns: &DMatrix<f64>, gram: &Gram, variance: f64) -> Likeness {
+    pub fn cosine(&self, columns: &DMatrix<f64>, gram: &Gram) -> f64 {
         let cross = columns.tr_mul(&self.rows) - gram.spent.tr_mul(&self.spent);
-        Reach::of(gram).likeness(self.power, &cross, variance)
+        Reach::of(gram).cosine(self.power, &cross)
     }
 }
 
@@ -141,13 +130,13 @@ impl Crossed {
     }
 
     /// Compares `k` at coefficients `theta` with everything `l` can do.
-    pub fn likeness(&self, k: usize, theta: &DVector<f64>, l: usize, variance: f64) -> Likeness {
+    pub fn cosine(&self, k: usize, theta: &DVector<f64>, l: usize) -> f64 {
         let block = |l: usize| {
             self.all
                 .a
                 .view((self.sets[l].start, self.sets[k].start), (self.sets[l].len(), self.sets[k].len()))
         };
         let power = theta.dot(&(block(k) * theta)).max(0.0);
-        self.reach[l].likeness(power, &(block(l) * theta), variance)
+        self.reach[l].cosine(power, &(block(l) * theta))
     }
 }

@@ -101,19 +101,18 @@ pub(crate) fn confirm(
     loop {
         let mut judged = Vec::new();
         let mut weakest: Option<(f64, usize)> = None;
-        for k in 0..steps.len() {
-            let mut others: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
-            let own = others.remove(k);
-            others.extend_from_slice(cells);
+        let all: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
+        for (k, own) in all.iter().enumerate() {
+            let others = [all_but(&all, k), cells.to_vec()].concat();
             let room = rooms.with(&others)?;
             let weighed = &room.weighed;
-            let Some(entry) = entry_of(weighed, &own) else {
+            let Some(entry) = entry_of(weighed, own) else {
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
             let mut verdict = room.judge(entry, config);
             if verdict.grade(config) < Grade::Named
-                && let Some(score) = rooms.score(&[others, vec![own]].concat(), &room)
+                && let Some(score) = rooms.score(&[others, vec![own.clone()]].concat(), &room)
             {
                 verdict.refitted(score, room.nothing());
             }
@@ -229,7 +228,7 @@ pub(crate) fn forward(
         let step = Step { candidate, named_at_once: named, gain_nats, unlisted_nats, fall };
         steps.extend(one_by_one(step, &room.problem));
         if cells.is_empty() {
-            drop_superseded(&mut steps, rooms, config)?;
+            drop_superseded(&mut steps, rooms, &room, config);
         }
         let mut names: Vec<String> = steps.iter().map(|s| s.candidate.spec.clone()).collect();
         names.sort();
@@ -269,24 +268,24 @@ fn one_by_one(step: Step, problem: &Problem) -> Vec<Step> {
     members.into_iter().map(one).collect()
 }
 
-/// Backward drop: an earlier effect that the later ones made superfluous leaves.
-fn drop_superseded(
-    steps: &mut Vec<Step>,
-    rooms: &mut Rooms<'_>,
-    config: &DiagnosisConfig,
-) -> Result<(), DiagnoseError> {
+/// Backward drop: an earlier effect without which, the later ones in the model, a refit says as much leaves.
+fn drop_superseded(steps: &mut Vec<Step>, rooms: &mut Rooms<'_>, room: &Room, config: &DiagnosisConfig) {
     let mut k = 0;
-    while steps.len() > 1 && k + 1 < steps.len() {
-        let mut others: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
-        let own = others.remove(k);
-        let Some(ln_bayes) = rooms.ln_bayes(&others, &own)? else { break };
-        if ln_bayes < config.margin_nats {
+    while k + 1 < steps.len() {
+        let all: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
+        let without = rooms.score(&all_but(&all, k), room);
+        let Some((with, without)) = rooms.score(&all, room).zip(without) else { break };
+        if with.above(&without).nats < config.margin_nats {
             steps.remove(k);
         } else {
             k += 1;
         }
     }
-    Ok(())
+}
+
+/// All but one of them.
+pub(crate) fn all_but(names: &[Candidate], k: usize) -> Vec<Candidate> {
+    [&names[..k], &names[k + 1..]].concat()
 }
 
 /// Whether the steps from the first one that could not be named alone say more than the best single unlisted shape at

@@ -248,7 +248,7 @@ fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
         }
         let theta = DVector::from_element(width(k), 1.0);
         for l in k + 1..weighed.entries.len() {
-            if width(k) == width(l) && crossed.likeness(k, &theta, l, 1.0).cosine > config.merge_cosine {
+            if width(k) == width(l) && crossed.cosine(k, &theta, l) > config.merge_cosine {
                 let name = |i: usize| weighed.entries[i].candidate.spec.clone();
                 pairs.push([name(k), name(l)]);
             }

@@ -78,9 +78,14 @@ impl Judged {
         self.own().p_raw <= config.max_p_heldout && self.predicts(config)
     }
 
-    /// Whether it says more than nothing of dwells that the fit did not see.
+    /// Whether it says more than nothing of dwells that the fit did not see: clearly over the groups, or, as an event of a few
+    /// dwells does, in places that are few but agree.
     fn predicts(&self, config: &DiagnosisConfig) -> bool {
-        self.gain.nats >= self.cost_nats.max(self.gain.se) && self.places.p < config.max_p_heldout
+        let in_few = self.gain.nats >= self.cost_nats.max(self.gain.se);
+        match self.gain.is_clear(self.cost_nats) {
+            true => self.places.p < config.max_p_heldout,
+            false => in_few && self.places.p <= config.max_p_adjusted,
+        }
     }
 
     /// The best that is not listed and has another shape.
@@ -198,7 +203,7 @@ impl Unlisted {
         let (theta, _) = coefficients(&gram, best_amplitude(&gram, &weighed.base, config));
         let name = &weighed.entries[entry];
         let of_name = weighed.dense(&name.candidate.columns, problem);
-        let cosine = Signature::new(&columns, &gram, &theta).likeness(&of_name, &name.gram, 1.0).cosine;
+        let cosine = Signature::new(&columns, &gram, &theta).cosine(&of_name, &name.gram);
         Some(Unlisted { score, above, cosine })
     }
 }

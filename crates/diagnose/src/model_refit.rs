@@ -155,21 +155,6 @@ impl Refit for ModelRefit<'_> {
         self.view(&fitted.model, &fitted.values).problem_at()
     }
 
-    fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
-        let base = names(accepted);
-        let own_spec = self.model.effect(&own.spec)?;
-        if !self.fits.contains_key(&base) {
-            // All of them together are asked for next, or were.
-            let _ = self.fitted(&names(&[accepted, std::slice::from_ref(own)].concat()));
-            let model = self.model_with(&base)?;
-            if let Some((values, _)) = self.near_more(&base, &model) {
-                return self.view(&model, &values).problem_of(&own_spec);
-            }
-        }
-        let fitted = self.fitted(&base)?;
-        self.view(&fitted.model, &fitted.values).problem_of(&own_spec)
-    }
-
     fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
         let [_] = candidate.amplitudes.as_slice() else { return Ok(false) };
         if candidate.is_group() || self.sizes.contains_key(&candidate.spec) {

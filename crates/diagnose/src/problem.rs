@@ -302,15 +302,6 @@ impl Problem {
         self
     }
 
-    /// The same with nothing to weigh but the candidate of this name.
-    pub(crate) fn with_only(mut self, spec: &str) -> Problem {
-        let points = std::mem::take(&mut self.scans).into_iter().flat_map(|scan| scan.points);
-        self.candidates.extend(points);
-        self.candidates.retain(|c| c.spec == spec);
-        self.channels.clear();
-        self
-    }
-
     /// The same problem without some dwells (`keep[i]` false).
     pub fn without(&self, keep: &[bool]) -> Problem {
         self.cut_to(keep, &mut Cut::default())

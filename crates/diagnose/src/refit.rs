@@ -8,11 +8,6 @@ pub trait Refit {
     /// The problem whose geometry includes the accepted effects, linearised at the fit with them.
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError>;
 
-    /// The same with nothing to weigh but one candidate, where this problem has it.
-    fn problem_of(&mut self, accepted: &[Candidate], own: &Candidate) -> Result<Problem, DiagnoseError> {
-        Ok(self.problem(accepted)?.with_only(&own.spec))
-    }
-
     /// The same with nothing to weigh.
     fn base(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let problem = self.problem(accepted)?;

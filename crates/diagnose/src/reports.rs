@@ -137,7 +137,7 @@ fn alike(room: &Room, k: usize, config: &DiagnosisConfig) -> Vec<String> {
         return Vec::new();
     }
     let (crossed, theta) = (weighed.crossed(problem), one_step(&entry.gram, 1.0).estimate);
-    let same = |l: &usize| *l != k && crossed.likeness(k, &theta, *l, 1.0).cosine > config.merge_cosine;
+    let same = |l: &usize| *l != k && crossed.cosine(k, &theta, *l) > config.merge_cosine;
     let others = weighed.ranking().into_iter().filter(same);
     others.map(|l| weighed.entries[l].candidate.spec.clone()).collect()
 }

@@ -7,7 +7,6 @@ use crate::columns::Cut;
 use crate::config::DiagnosisConfig;
 use crate::costs::Costs;
 use crate::crossval::{by_place, by_stretch, left_out};
-use crate::evidence::{ln_bayes, projected};
 use crate::judge::{Judged, judge, significance};
 use crate::problem::{Candidate, Columns, Problem};
 use crate::refit::Refit;
@@ -226,17 +225,6 @@ impl<'a> Rooms<'a> {
         }
         self.scores.insert(key, score.clone());
         score
-    }
-
-    /// What speaks for a candidate beside others: its ln Bayes factor; none where the problem without
-    /// it does not have it.
-    pub fn ln_bayes(&mut self, others: &[Candidate], own: &Candidate) -> Result<Option<f64>, DiagnoseError> {
-        let problem = self.refit.problem_of(others, own)?;
-        let problem = self.kept(problem)?;
-        let Some(own) = problem.candidates.first() else { return Ok(None) };
-        let base = projected(&problem, 1.0);
-        let gram = base.gram(&own.columns.dense(&problem.dwells, 1.0));
-        Ok(Some(ln_bayes(&gram, &base, self.config)))
     }
 
     /// A problem without the dwells that do not count.

@@ -6,7 +6,7 @@
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
-use crate::forward::{Accepted, confirm, known, named};
+use crate::forward::{Accepted, all_but, confirm, known, named};
 use crate::judge::Grade;
 use crate::problem::Candidate;
 use crate::rooms::{Room, Rooms};
@@ -69,14 +69,11 @@ fn names_settled(
     config: &DiagnosisConfig,
 ) -> Result<(), DiagnoseError> {
     let curves: Vec<Candidate> = search.curves.iter().map(|c| c.candidate.clone()).collect();
-    let beside = |all: &[Accepted], i: usize| {
-        let others = all.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, a)| a.candidate.clone());
-        others.chain(curves.iter().cloned()).collect::<Vec<Candidate>>()
-    };
+    let beside = |all: &[Accepted], i: usize| [all_but(&named(all), i), curves.clone()].concat();
     let all = search.tentative.iter().enumerate();
     let tentative = all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), rooms, config));
     search.tentative = tentative.collect();
-    for _ in 0..ROUNDS {
+    for round in 1..=ROUNDS {
         let before = specs(&search.accepted);
         let mut settled_all = Vec::new();
         for i in 0..search.accepted.len() {
@@ -84,8 +81,9 @@ fn names_settled(
         }
         let fallen = settled_all.iter().any(Option::is_none);
         search.accepted = settled_all.into_iter().flatten().collect();
-        if specs(&search.accepted) == before || (!fallen && search.accepted.len() < 2) {
-            return Ok(());
+        let alone = !fallen && search.accepted.len() < 2;
+        if specs(&search.accepted) == before || alone || round == ROUNDS {
+            break;
         }
         // Beside another name one of them may be needed no longer.
         let steps = known(&named(&search.accepted), &search.rest);
@@ -98,7 +96,7 @@ fn specs(accepted: &[Accepted]) -> Vec<String> {
     accepted.iter().map(|a| a.candidate.spec.clone()).collect()
 }
 
-/// One of them beside the others; none where no refit says more than nothing.
+/// One of them beside the others; none where no refit says more than nothing, or nothing is the most probable.
 fn settled(
     found: &Accepted,
     others: &[Candidate],
@@ -123,6 +121,10 @@ fn settled(
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);
+    let nothing = ranked.iter().find(|scored| scored.what == Instead::Nothing);
+    if nothing.is_some_and(|scored| scored.weight > 0.5) {
+        return None;
+    }
     let candidate = room.weighed.entries[judged.entry].candidate.clone();
     Some(Accepted { candidate, judged, room, grade, set, instead_of, ranked })
 }

@@ -47,14 +47,6 @@ impl View<'_> {
         Ok(Problem { scans, channels, ..problem })
     }
 
-    /// [`View::problem`] with one candidate alone.
-    pub fn problem_of(&self, spec: &EffectSpec) -> Result<Problem, DiagnoseError> {
-        let base = self.base()?;
-        let tried = std::slice::from_ref(spec).iter().filter(|spec| self.tried(spec)).cloned();
-        let candidates = self.candidates(&tried.collect::<Vec<_>>(), &base)?;
-        Ok(self.of(&base, candidates))
-    }
-
     /// [`View::problem`] with nothing to weigh.
     pub fn problem_at(&self) -> Result<Problem, DiagnoseError> {
         Ok(self.of(&self.base()?, Vec::new()))

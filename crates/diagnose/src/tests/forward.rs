@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::Scan;
 use crate::problem::Columns;
 use crate::refit::LinearRefit;
 use crate::tests::{arm, in_rooms, outside, own, quick, room};
@@ -100,7 +99,10 @@ fn an_earlier_step_that_later_ones_made_superfluous_leaves() {
     let config = quick();
     let left = |specs: &[&str]| {
         let mut steps = strong(&p, specs);
-        in_rooms(&p, &config, |rooms| drop_superseded(&mut steps, rooms, &config)).unwrap();
+        in_rooms(&p, &config, |rooms| {
+            let room = rooms.with(&[]).unwrap();
+            drop_superseded(&mut steps, rooms, &room, &config);
+        });
         steps.into_iter().map(|s| s.candidate.spec).collect::<Vec<_>>()
     };
     assert_eq!(left(&["scale:2", "backlash:1", "zero_drift:2"]), ["backlash:1", "zero_drift:2"]);
@@ -271,19 +273,6 @@ fn only_what_has_no_name_at_once_is_tried_at_its_own_size() {
     let strict = DiagnosisConfig { max_p_adjusted: 1e-6, ..quick() };
     let (asked, _) = asked(&strict);
     assert_eq!(asked[..2], ["backlash:1", "backlash:1"]);
-}
-
-#[test]
-fn a_point_of_a_scan_is_listed_too() {
-    let mut p = planted(&[], 0, 1);
-    let point = Candidate { spec: "scale:2,shape=3".into(), ..own(&p, "scale:2") };
-    let only = |p: &Problem, spec: &str| {
-        p.clone().with_only(spec).candidates.iter().map(|c| c.spec.clone()).collect::<Vec<_>>()
-    };
-    assert!(only(&p, &point.spec).is_empty());
-    p.scans.push(Scan::of("scale:2", vec![point.clone()]));
-    assert_eq!(only(&p, &point.spec), [point.spec.as_str()]);
-    assert_eq!(only(&p, "scale:3"), ["scale:3"]);
 }
 
 /// A listed effect beside twice the size of one that is not.

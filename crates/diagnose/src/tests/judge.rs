@@ -61,12 +61,15 @@ fn what_is_real_needs_score_gate_and_left_out_errors() {
         j.places.p = places_p;
         (j.real(&config), j.promising(&config))
     };
-    assert_eq!(with([3.0, 1.0], 0.01, 0.05, 0.049), (true, true));
-    assert_eq!(with([2.9, 1.0], 0.01, 0.05, 0.049), (false, false));
-    assert_eq!(with([5.0, 5.1], 0.01, 0.05, 0.049), (false, false), "no more than its standard error");
-    assert_eq!(with([3.0, 1.0], 0.02, 0.05, 0.049), (false, true));
-    assert_eq!(with([3.0, 1.0], 0.01, 0.06, 0.049), (true, false));
-    assert_eq!(with([3.0, 1.0], 0.01, 0.05, 0.05), (false, false));
+    assert_eq!(with([4.1, 1.0], 0.01, 0.05, 0.049), (true, true));
+    assert_eq!(with([2.9, 1.0], 0.01, 0.05, 0.009), (false, false), "less than it costs");
+    assert_eq!(with([4.1, 1.0], 0.02, 0.05, 0.049), (false, true));
+    assert_eq!(with([4.1, 1.0], 0.01, 0.06, 0.049), (true, false));
+    assert_eq!(with([4.1, 1.0], 0.01, 0.05, 0.05), (false, false));
+    // Not clear over the groups: then places must agree beyond doubt.
+    assert_eq!(with([5.0, 3.0], 0.01, 0.05, 0.011), (false, false));
+    assert_eq!(with([5.0, 3.0], 0.01, 0.05, 0.01), (true, true));
+    assert_eq!(with([5.0, 5.1], 0.01, 0.05, 0.001), (false, false), "no more than its standard error");
     j.cost_nats = 8.0;
     let mut real = |nats: f64| {
         (j.gain.nats, j.places.p, j.significance[j.entry].p_adjusted) = (nats, 0.01, 0.01);
