@@ -117,6 +117,11 @@ pub(crate) struct Difference {
 }
 
 impl Difference {
+    /// Less so many nats.
+    pub fn less(self, nats: f64) -> Difference {
+        Difference { nats: self.nats - nats, ..self }
+    }
+
     /// Whether the first is better by more than chance, and by more than `detail` [nats].
     pub fn is_clear(self, detail: f64) -> bool {
         self.nats > (CLEAR * self.se).max(SMALL_NATS).max(detail)

@@ -184,8 +184,12 @@ fn answer(
     let of = |k: usize| &room.weighed.entries[k].candidate;
     let best = refits.iter().map(|(_, score)| score.above(nothing).nats).fold(0.0, f64::max);
     let detail = config.leftover_share * best;
+    let costs = room.costs(config);
     let stands = |(k, score): &&(usize, Score)| {
-        let beaten = refits.iter().any(|(_, other)| other.above(score).is_clear(detail));
+        // What has more freedom must say more by what that costs, too.
+        let freedom = |other: usize| (costs.of_entry(other) - costs.of_entry(*k)).max(0.0);
+        let beats = |(l, other): &(usize, Score)| other.above(score).less(freedom(*l)).is_clear(detail);
+        let beaten = refits.iter().any(beats);
         let real = *k == found.judged.entry || room.judge(*k, config).grade(config) > Grade::Refused;
         !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
