@@ -20,6 +20,9 @@ mod init;
 /// Are joints and bodies found inside messages of types that nobody told armcal?
 mod init_fields;
 
+/// Does every answer obey the laws of the verdict, whatever is true, and on real arms whatever noise is declared?
+mod laws;
+
 /// Does a proposed pipeline take every tracked body for what it is?
 mod init_roles;
 

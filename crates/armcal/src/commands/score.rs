@@ -3,7 +3,7 @@
 use super::{Outcome, may_write, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::score::{Campaign, Judgement, Reliability, Way, page, rows, score, table};
+use crate::score::{Campaign, Judgement, Reliability, Way, laws, page, rows, score, table};
 use armcal_lab::LabError;
 use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs};
 use armcal_recording::atomic;
@@ -43,6 +43,9 @@ pub struct Request {
     /// For the page: so many of the seeds of what is in the catalogue also the whole way, as recordings on disk.
     #[arg(long, default_value_t = 0, requires = "page", conflicts_with = "sealed")]
     pub sealed_seeds: u64,
+    /// Ask the laws of every answer instead, each scenario seen in five ways: with `--page`, docs/laws.md.
+    #[arg(long, conflicts_with_all = ["sealed", "sealed_seeds", "noise_factor", "json"])]
+    pub laws: bool,
     /// Print JSON, every scenario with its answer.
     #[arg(long)]
     pub json: bool,
@@ -59,6 +62,16 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         let n = finished.fetch_add(1, Ordering::Relaxed) + 1;
         progress.step(&format!("scenario {n} of {all}"));
     };
+    if request.laws {
+        let laws = laws(&scenarios, &done)?;
+        progress.finish();
+        let text = laws.page(&command(request));
+        if let Some(file) = &request.page {
+            atomic::write(file, text.as_bytes()).map_err(Error::Output)?;
+        }
+        print(&text)?;
+        return Ok(Outcome::Done);
+    }
     let noise_factor = request.noise_factor;
     let way = if request.sealed { Way::Recorded } else { Way::Observed { noise_factor } };
     let scored = score(&scenarios, way, &done)?;
@@ -148,7 +161,9 @@ fn command(request: &Request) -> String {
         words.push(format!("--sealed-seeds {}", request.sealed_seeds));
     }
     // Where it was written to is no part of what was found.
-    words.push("--page docs/confusion.md".to_owned());
+    words.push(
+        if request.laws { "--laws --page docs/laws.md" } else { "--page docs/confusion.md" }.to_owned(),
+    );
     words.join(" ")
 }
 

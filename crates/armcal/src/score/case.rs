@@ -5,6 +5,7 @@ use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_core::Observation;
 use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
@@ -51,7 +52,16 @@ pub struct Answer {
 /// The observations handed over as the pipeline would have made them, their noise declared so many times as large.
 pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), Error> {
     let observed = scenario.observe()?.declaring(noise_factor);
-    let (model, observations) = (nominal_model(&observed.nominal)?, &observed.observations);
+    let (answer, _) = diagnosed(&observed.nominal, &observed.observations)?;
+    Ok((answer, observed.truth.hidden))
+}
+
+/// What is told of observations of a nominal arm.
+pub(super) fn diagnosed(
+    nominal: &Nominal,
+    observations: &[Observation],
+) -> Result<(Answer, Diagnosis), Error> {
+    let model = nominal_model(nominal)?;
     let (fit, session) = (FitConfig::default(), Session::of(observations));
     let holdout = match observations.iter().any(|o| o.cavity().is_some()) {
         true => HoldoutConfig::CavityFolds { k: FOLDS },
@@ -61,7 +71,6 @@ pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidd
     let calibration = calibrate(&model, observations, &fit, &holdout)?;
     let calibration_seconds = begin.elapsed().as_secs_f64();
     let begin = std::time::Instant::now();
-    let config = DiagnosisConfig::default();
     let calibrated = Calibrated {
         model: &model,
         calibration: &calibration,
@@ -70,10 +79,10 @@ pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidd
         fit: &fit,
         holdout: &holdout,
     };
-    let diagnosis = diagnose(&calibrated, &config)?;
+    let diagnosis = diagnose(&calibrated, &DiagnosisConfig::default())?;
     let seconds = begin.elapsed().as_secs_f64();
     let answer = answer(&diagnosis, &calibrated)?;
-    Ok((Answer { seconds, calibration_seconds, ..answer }, observed.truth.hidden))
+    Ok((Answer { seconds, calibration_seconds, ..answer }, diagnosis))
 }
 
 /// Recordings on disk and the whole pipeline; the truth lies in another folder and is read last.

@@ -2,11 +2,12 @@
 //!
 //! `Scenario -> case (calibrated and diagnosed without the truth) -> judge (with it) -> table, page`. The quick way hands the
 //! observations over as the pipeline would have made them; the sealed way writes recordings to disk and runs the whole
-//! pipeline on them.
+//! pipeline on them. `Scenario -> laws` asks what must hold of every answer, whatever is true.
 
 mod case;
 mod interval;
 mod judge;
+mod laws;
 mod nothing;
 mod page;
 mod reliability;
@@ -14,11 +15,13 @@ mod table;
 
 pub use case::{Answer, nominal_model, quick, sealed};
 pub use judge::{Judgement, judge};
+pub use laws::{Laws, laws};
 pub use page::{Campaign, page};
 pub use reliability::Reliability;
 pub use table::{Row, rows, table};
 
 use crate::error::Error;
+use armcal_diagnose::NOT_LISTED;
 use armcal_lab::scenario::{Hidden, Scenario};
 use rayon::prelude::*;
 use serde::Serialize;
