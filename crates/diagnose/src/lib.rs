@@ -1,6 +1,6 @@
 //! Which physical effect is missing from a calibrated model, with error control and honest refusals.
 //!
-//! Two rooms. The inner one ([`diagnose_problem`], [`plan()`]) is linear algebra on a [`Problem`]: whitened residuals, what
+//! Two rooms. The inner one ([`diagnose_problem`]) is linear algebra on a [`Problem`]: whitened residuals, what
 //! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`]) builds problems from
 //! a model and refits it. In the order of the story:
 //!
@@ -21,7 +21,7 @@
 //! * `rests`: where a joint rests in a gap that was found;
 //! * `implied`: what each dwell says about each joint, for the eye;
 //! * `nested`: the choice made again without each part of the hold-out;
-//! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
+//! * `compare`: before against after.
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
 
@@ -63,7 +63,6 @@ mod next;
 mod observed;
 mod outliers;
 mod places;
-mod plan;
 mod problem;
 mod projection;
 mod ranking;
@@ -108,7 +107,6 @@ pub use inner::diagnose_problem;
 pub use knowledge::Knowledge;
 pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
-pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 pub use refit::{LinearRefit, Refit};
 pub use ripple::Ripple;

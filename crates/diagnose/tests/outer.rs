@@ -1,15 +1,14 @@
-//! From a model and observations: the real catalogue, real refits, and a plan.
+//! From a model and observations: the real catalogue, and real refits.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, linearise};
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
 use armcal_diagnose::{
-    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, PoolDwell, Survivor, Verdict, compare_heldout,
-    diagnose, nested, plan,
+    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, compare_heldout, diagnose, nested,
 };
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -391,43 +390,6 @@ fn nothing_is_missing_only_at_the_floor_whatever_the_scatter() {
         let silent = d.verdict == Verdict::NothingMissing;
         assert!(!silent || before.times_floor() <= 1.5, "seed {seed}: {} floors", before.times_floor());
     }
-}
-
-#[test]
-fn a_plan_separates_two_effects_that_few_poses_leave_standing() {
-    let (model, observations) = observed(&["gear_ratio:2"], 1.0, 3);
-    let few: Vec<Observation> = observations
-        .into_iter()
-        .filter(|o| o.joint_rad[1].abs() < 0.25 && o.joint_rad[2].abs() < 0.5)
-        .collect();
-    let effects = ["gear_ratio:2", "eccentricity:2"].map(|s| model.effect(s).unwrap());
-    let full = model.with_effects(&effects, &Session::of(&few)).unwrap();
-    let mut values = calibration(&model, &few).fit.values();
-    values.extend(&full.nominal()[values.len()..]);
-    let linear = |of: &[Observation]| linearise(&full, of, &values, &FitConfig::default()).unwrap();
-    let (data, more) = (linear(&few), linear(&poses(120, &mut ChaCha8Rng::seed_from_u64(9))));
-    let own = |parameters: std::ops::Range<usize>| -> Vec<usize> {
-        (0..data.axes.len()).filter(|c| parameters.contains(&data.axes[*c].index)).collect()
-    };
-    let (geometry, columns) =
-        (own(0..model.parameters().len()), full.effects().iter().map(|e| own(e.parameters.clone())));
-    let columns: Vec<Vec<usize>> = columns.collect();
-    let standing = |(effect, columns): (&EffectSpec, &Vec<usize>)| Survivor {
-        name: effect.to_string(),
-        columns: -data.jacobian.select_columns(columns),
-        theta: DVector::from_element(columns.len(), 1.0),
-    };
-    let survivors: Vec<Survivor> = effects.iter().zip(&columns).map(standing).collect();
-    let possible = |rows: &std::ops::Range<usize>| {
-        let block = -more.jacobian.rows(rows.start, rows.len());
-        let effects = columns.iter().map(|own| block.select_columns(own)).collect();
-        PoolDwell { geometry: block.select_columns(&geometry), effects }
-    };
-    let pool: Vec<PoolDwell> = more.rows.iter().map(possible).collect();
-    let precision = DVector::from_iterator(geometry.len(), geometry.iter().map(|c| data.axes[*c].precision));
-    let plan = plan(&-data.jacobian.select_columns(&geometry), &precision, &survivors, &pool, 6, &config());
-    assert!(plan.pairs[0].delta_after > plan.pairs[0].delta_before, "{plan:?}");
-    assert!(!plan.chosen.is_empty() && !plan.sentence.is_empty(), "{plan:?}");
 }
 
 /// The same readings with the noise declared so many times as large.
