@@ -16,6 +16,8 @@
 //! * priors that nobody declared: `priors` learns how far lengths, angles and joint zeros of this arm are from nominal;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
+//! * what is seen in the errors: before against after on dwells that neither fit saw, `compare`, `held_out`, `sign_flips`; in which
+//!   dwells they are largest, `error_places`; what each dwell says about each joint, for the eye, `implied`;
 //! * many recordings of one arm, each with parameters of its own ([`armcal_model::Model::with_own`]): their columns are eliminated
 //!   recording by recording ([`problem::Problem::known`]), so that work and memory grow with the number of recordings;
 //! * observations that shards hold, each asked for the sums of its recordings: `elsewhere`, [`calibrate_elsewhere`];
@@ -23,16 +25,20 @@
 
 mod alignment;
 mod calibration;
+mod compare;
 mod config;
 mod covariance;
 mod elsewhere;
 mod ended;
 mod error;
+mod error_places;
 mod export;
 mod fit;
 mod fit_warnings;
 mod frames;
+mod held_out;
 mod holdout;
+mod implied;
 mod joined;
 mod linearise;
 mod loss;
@@ -50,6 +56,7 @@ mod remembered;
 mod rigid_fit;
 mod robust;
 mod rows;
+mod sign_flips;
 mod solver;
 mod statistics;
 mod structure;
@@ -63,15 +70,19 @@ mod words;
 mod tests;
 
 pub use calibration::{calibrate, calibrate_beside, calibrate_elsewhere, holdout_turns};
+pub use compare::{compare_errors, compare_heldout, held_out_errors_m, mean_by_dwell};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use covariance::Covariance;
 pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use ended::{Ended, fitted_values};
 pub use error::CalibrateError;
+pub use error_places::{DwellError, ErrorPlace, error_places, single_dwells};
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
 pub use fit_warnings::{ABOVE_FLOOR, ABOVE_NOISE, INADEQUATE, OUTLIERS};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
+pub use held_out::HeldOut;
+pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use linearise::{LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 pub use model_problem::{ModelProblem, PositionNoise, position_covariance_m2};
 pub use noise::expected_norm_m;
@@ -79,3 +90,4 @@ pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
 pub use poses::measured_together;
 pub use products::{gram, inner};
+pub use sign_flips::SignFlips;

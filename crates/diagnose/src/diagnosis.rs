@@ -2,12 +2,10 @@
 
 use crate::combination::Combination;
 use crate::contrasts::Contrast;
-use crate::error_places::ErrorPlace;
-use crate::held_out::HeldOut;
 use crate::nested::Nested;
 use crate::ripple::{Peak, Ripple};
 use crate::scatter::Scatter;
-use armcal_calibrate::Calibration;
+use armcal_calibrate::{Calibration, ErrorPlace, HeldOut};
 use armcal_core::{DwellId, Unit, Warning};
 use armcal_model::{EffectSpec, Model};
 use serde::{Deserialize, Serialize};

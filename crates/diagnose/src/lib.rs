@@ -17,11 +17,9 @@
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
-//! * `conclude`, `repeatability`, `error_places`: the verdict once what was found is in the model, what remains, and where;
+//! * `conclude`, `repeatability`: the verdict once what was found is in the model, and what remains;
 //! * `rests`: where a joint rests in a gap that was found;
-//! * `implied`: what each dwell says about each joint, for the eye;
-//! * `nested`: the choice made again without each part of the hold-out;
-//! * `compare`: before against after.
+//! * `nested`: the choice made again without each part of the hold-out.
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
 
@@ -31,7 +29,6 @@ mod cells;
 mod channels;
 mod columns;
 mod combination;
-mod compare;
 mod conclude;
 mod config;
 mod confusion;
@@ -43,7 +40,6 @@ mod density;
 mod diagnosis;
 mod drivers;
 mod error;
-mod error_places;
 mod events;
 mod evidence;
 mod explain;
@@ -52,8 +48,6 @@ mod fewer;
 mod forward;
 mod grams;
 mod group;
-mod held_out;
-mod implied;
 mod inner;
 mod judge;
 mod knowledge;
@@ -95,14 +89,10 @@ extern crate self as armcal_diagnose;
 
 pub use armcal_model::Toggle;
 pub use combination::{Combination, Term};
-pub use compare::{compare_errors, compare_heldout, mean_by_dwell};
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;
 pub use diagnosis::*;
 pub use error::DiagnoseError;
-pub use error_places::ErrorPlace;
-pub use held_out::HeldOut;
-pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
 pub use knowledge::Knowledge;
 pub use nested::{Nested, nested};

@@ -5,12 +5,12 @@
 //! every turn of the hold-out is diagnosed without its points, with a hold-out of its own inside, and what that finds
 //! predicts them.
 
-use crate::compare::{compare_errors, held_out_errors_m};
 use crate::config::DiagnosisConfig;
-use crate::held_out::HeldOut;
 use crate::observed::{Calibrated, diagnose};
 use crate::{DiagnoseError, Diagnosis};
-use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
+use armcal_calibrate::{
+    Calibration, HeldOut, HoldoutConfig, calibrate, compare_errors, held_out_errors_m, holdout_turns,
+};
 use armcal_core::{DwellId, Observation};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -73,7 +73,7 @@ pub fn nested(
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     let after: BTreeMap<DwellId, f64> =
         done.iter().flat_map(|t| t.errors_m.iter().map(|(d, e)| (*d, *e))).collect();
-    let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, &config);
+    let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, config.flips());
     Ok(held_out.map(|held_out| Nested {
         held_out,
         chosen_on_all_mm: refitted.calibration.holdout.fitted.mean_m * 1e3,

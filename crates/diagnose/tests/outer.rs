@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, compare_heldout};
 use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
-use armcal_diagnose::{
-    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, compare_heldout, diagnose, nested,
-};
+use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, diagnose, nested};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -111,7 +109,7 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
     assert_eq!(d.effects.len(), 1, "{:?}", d.names);
     let extended = model.with_effects(&[model.effect("backlash:2").unwrap()], &session).unwrap();
     let after = calibration(&extended, &observations);
-    let held = compare_heldout(&before, &after, &observations, &config()).unwrap();
+    let held = compare_heldout(&before, &after, &observations, config().flips()).unwrap();
     assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
     let left = diagnosed(&extended, &after, &observations);
     assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
