@@ -172,9 +172,6 @@ fn main() {
                     e.set, e.probability, e.gain_nats, e.gain_se, e.contrast
                 );
             }
-            for e in &d.explanations {
-                println!("  {}: {}", e.number, e.sentence);
-            }
             println!("  {:?}", d.noise);
         }
         "robot" => {

@@ -5,7 +5,6 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
-use crate::explain::explanations;
 use crate::next::lead;
 use crate::repeatability::repeatability_m;
 use armcal_calibrate::{Calibration, DwellError, compare_heldout, error_places, single_dwells};
@@ -47,7 +46,6 @@ impl Diagnosis {
         self.settle(agrees, noise_alone);
         self.tell_unexplained(before, observations, joint_names, config);
         lead(self, observations, joint_names);
-        self.explanations = explanations(self, config);
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise

@@ -3,11 +3,10 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
-    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NotTestable, Rival,
+    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, Gate, JudgedOn, NOT_LISTED, NotTestable, Rival,
     UnknownReport, Verdict,
 };
 use crate::events::{passing, together};
-use crate::explain::explanations;
 use crate::forward::{Accepted, named};
 use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
@@ -165,13 +164,13 @@ fn assemble(
         effects,
         unknown: unlisted.first().cloned(),
         unlisted,
-        explanations: Vec::new(),
+        gate: Gate { resamplings: config.resamplings, max_p_adjusted: config.max_p_adjusted },
         nested: None,
+        not_chosen_again: None,
     };
     diagnosis.name_again();
     // The dwells are the same in all rooms.
     diagnosis.record_next = next::record_next(&rest.problem, &diagnosis);
-    diagnosis.explanations = explanations(&diagnosis, config);
     diagnosis
 }
 

@@ -16,7 +16,7 @@
 //! * `settle`, `costs`, `ranking`: names against all that predicts as much, each refitted; the order of all explanations;
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
-//! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
+//! * `inner`, `reports`, `combination`, `next`: the verdict in numbers, and what to record next;
 //! * `conclude`, `repeatability`: the verdict once what was found is in the model, and what remains;
 //! * `rests`: where a joint rests in a gap that was found;
 //! * `nested`: the choice made again without each part of the hold-out.
@@ -42,7 +42,6 @@ mod drivers;
 mod error;
 mod events;
 mod evidence;
-mod explain;
 mod expression;
 mod fewer;
 mod forward;

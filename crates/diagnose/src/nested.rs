@@ -32,29 +32,6 @@ pub struct Nested {
     pub chosen: Vec<Vec<String>>,
 }
 
-impl Nested {
-    /// In one sentence.
-    pub fn sentence(&self) -> String {
-        let turns = self.chosen.len();
-        // The order in which they were found is no other choice.
-        let named = |effects: &Vec<String>| {
-            let mut names = effects.clone();
-            names.sort();
-            if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
-        };
-        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-        self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
-        let chosen: Vec<String> =
-            counts.iter().map(|(names, count)| format!("{names} in {count} of {turns}")).collect();
-        format!(
-            "chosen without the held-out points ({}), it {}; chosen with them, to {:.3} mm",
-            chosen.join(", "),
-            self.held_out.change_text(),
-            self.chosen_on_all_mm
-        )
-    }
-}
-
 /// Chooses again in every turn of the hold-out; none where nothing was found, or nothing is held out.
 ///
 /// # Errors
