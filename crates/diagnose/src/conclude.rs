@@ -6,8 +6,9 @@
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
 use crate::next::lead;
-use crate::repeatability::repeatability_m;
-use armcal_calibrate::{Calibration, DwellError, compare_heldout, error_places, single_dwells};
+use armcal_calibrate::{
+    Calibration, DwellError, compare_heldout, error_places, repeatability_m, single_dwells,
+};
 use armcal_core::{Observation, Severity, Stage, Warning, listed};
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).

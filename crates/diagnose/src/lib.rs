@@ -17,7 +17,7 @@
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
 //! * `inner`, `reports`, `combination`, `next`: the verdict in numbers, and what to record next;
-//! * `conclude`, `repeatability`: the verdict once what was found is in the model, and what remains;
+//! * `conclude`: the verdict once what was found is in the model, and what remains;
 //! * `rests`: where a joint rests in a gap that was found;
 //! * `nested`: the choice made again without each part of the hold-out.
 //!
@@ -60,7 +60,6 @@ mod problem;
 mod projection;
 mod ranking;
 mod refit;
-mod repeatability;
 mod reports;
 mod rests;
 mod ripple;
@@ -70,8 +69,6 @@ mod scatter;
 mod score;
 mod search;
 mod settle;
-mod signs;
-mod special;
 mod stretches;
 mod suggestion;
 mod unexplained;

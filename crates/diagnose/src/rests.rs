@@ -8,7 +8,7 @@
 use crate::diagnosis::{Diagnosis, Refitted};
 use crate::observed::Calibrated;
 use crate::problem::Candidate;
-use crate::special::ln_f_tail;
+use armcal_calibrate::tails::ln_f_tail;
 use armcal_calibrate::{BLURRED, ImpliedError, PositionNoise, implied_joint_errors};
 use armcal_core::robust::median;
 use armcal_core::{Severity, Stage, Warning};
