@@ -7,8 +7,8 @@
 #[path = "../tests/arm/mod.rs"]
 mod arm;
 
-use arm::{Noise, catalogue, design, outside, problem, rng};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Verdict, diagnose_problem};
+use arm::{LinearRefit, Noise, catalogue, design, outside, problem, rng};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, diagnose_problem};
 use std::time::Instant;
 
 fn run(p: armcal_diagnose::Problem) -> Diagnosis {

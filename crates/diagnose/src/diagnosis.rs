@@ -390,8 +390,6 @@ pub struct Expression {
     pub unit: Unit,
     /// Parameters: name, start value, bound on the size.
     pub parameters: Vec<ExpressionParameter>,
-    /// ln Bayes factor against nothing.
-    pub log_evidence: f64,
     /// Share of what the free shape removes that the formula removes too.
     pub share_of_shape: f64,
 }

@@ -82,6 +82,8 @@ mod tests;
 
 #[cfg(test)]
 extern crate self as armcal_diagnose;
+#[cfg(test)]
+use tests::arm::LinearRefit;
 
 pub use armcal_model::Toggle;
 pub use combination::{Combination, Term};
@@ -94,7 +96,7 @@ pub use knowledge::Knowledge;
 pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
-pub use refit::{LinearRefit, Refit};
+pub use refit::Refit;
 pub use ripple::Ripple;
 pub use scatter::{Correlation, Scatter};
 pub use unexplained::UNEXPLAINED;

@@ -4,8 +4,8 @@
 
 mod arm;
 
-use arm::{Noise, catalogue, design, on_joint, outside, overconfident, problem, rng};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Problem, Scan, Verdict, diagnose_problem};
+use arm::{LinearRefit, Noise, catalogue, design, on_joint, outside, overconfident, problem, rng};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Problem, Scan, Verdict, diagnose_problem};
 
 fn run(p: Problem) -> Diagnosis {
     let config = DiagnosisConfig { resamplings: 199, ..Default::default() };
