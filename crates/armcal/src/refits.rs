@@ -34,12 +34,11 @@ fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &Progress) {
             "a run does so for up to {CHOSEN_AGAIN_OBSERVATIONS} poses and {CHOSEN_AGAIN_PARTS} parts of the hold-out, here \
              are {poses} and {parts}{any}"
         );
-        diagnosis.chosen_again(Err(why));
+        diagnosis.not_chosen_again = Some(why);
     } else {
         match chosen_again(pipeline, &calibrated(run, pipeline), &diagnosis, progress) {
-            Ok(Some(nested)) => diagnosis.chosen_again(Ok(nested)),
-            Ok(None) => {}
-            Err(e) => diagnosis.chosen_again(Err(e.to_string())),
+            Ok(nested) => diagnosis.nested = nested,
+            Err(e) => diagnosis.not_chosen_again = Some(e.to_string()),
         }
     }
     run.diagnosis = Some(diagnosis);

@@ -16,23 +16,31 @@
 //! * priors that nobody declared: `priors` learns how far lengths, angles and joint zeros of this arm are from nominal;
 //! * start values of frames nobody knows: [`align_frames`], [`fit_frames`];
 //! * hold-out and the whole calibration: [`HoldoutConfig`], [`calibrate`];
+//! * what is seen in the errors: before against after on dwells that neither fit saw, `compare`, `held_out`, `sign_flips`; signs
+//!   for very many sums at once, `signs`; probabilities of what is rare, [`tails`]; how visits to one pose repeat, `repeatability`;
+//!   in which dwells errors are largest, `error_places`; what each dwell says about each joint, for the eye, `implied`;
 //! * many recordings of one arm, each with parameters of its own ([`armcal_model::Model::with_own`]): their columns are eliminated
 //!   recording by recording ([`problem::Problem::known`]), so that work and memory grow with the number of recordings;
 //! * observations that shards hold, each asked for the sums of its recordings: `elsewhere`, [`calibrate_elsewhere`];
 //! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
 mod alignment;
+mod alike;
 mod calibration;
+mod compare;
 mod config;
 mod covariance;
 mod elsewhere;
 mod ended;
 mod error;
+mod error_places;
 mod export;
 mod fit;
 mod fit_warnings;
 mod frames;
+mod held_out;
 mod holdout;
+mod implied;
 mod joined;
 mod linearise;
 mod loss;
@@ -47,12 +55,16 @@ mod priors;
 pub mod problem;
 mod products;
 mod remembered;
+mod repeatability;
 mod rigid_fit;
 mod robust;
 mod rows;
+mod sign_flips;
+mod signs;
 mod solver;
 mod statistics;
 mod structure;
+pub mod tails;
 mod undetermined;
 mod whitened;
 mod wider;
@@ -62,20 +74,28 @@ mod words;
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]
 mod tests;
 
+pub use alike::AlikePoses;
 pub use calibration::{calibrate, calibrate_beside, calibrate_elsewhere, holdout_turns};
+pub use compare::{compare_errors, compare_heldout, held_out_errors_m, mean_by_dwell};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
 pub use covariance::Covariance;
 pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use ended::{Ended, fitted_values};
 pub use error::CalibrateError;
+pub use error_places::{DwellError, ErrorPlace, error_places, single_dwells};
 pub use export::{WhitenedProblem, whitened_problem};
 pub use fit::{fit, fit_problem};
 pub use fit_warnings::{ABOVE_FLOOR, ABOVE_NOISE, INADEQUATE, OUTLIERS};
 pub use frames::{align_frames, fit_frames, fit_frames_from};
+pub use held_out::HeldOut;
+pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use linearise::{LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 pub use model_problem::{ModelProblem, PositionNoise, position_covariance_m2};
 pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
-pub use poses::measured_together;
+pub use poses::{SAME_POSE_RAD, measured_together};
 pub use products::{gram, inner};
+pub use repeatability::repeatability_m;
+pub use sign_flips::SignFlips;
+pub use signs::Signs;

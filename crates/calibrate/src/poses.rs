@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// Joint difference, in every joint, below which two dwells are of one pose [rad] (sliding: [m]): what a hand that leads the
 /// arm back, or a controller, leaves over; far above the noise of encoders.
-const SAME_POSE_RAD: f64 = 0.01;
+pub const SAME_POSE_RAD: f64 = 0.01;
 
 /// The runs of observations that are what was measured in one dwell, each of another feature or against another place, in the
 /// order given. They share the readings of the joints, and with them the encoders' noise.

@@ -7,8 +7,8 @@
 #[path = "../tests/arm/mod.rs"]
 mod arm;
 
-use arm::{Noise, catalogue, design, outside, problem, rng};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Verdict, diagnose_problem};
+use arm::{LinearRefit, Noise, catalogue, design, outside, problem, rng};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, diagnose_problem};
 use std::time::Instant;
 
 fn run(p: armcal_diagnose::Problem) -> Diagnosis {
@@ -171,9 +171,6 @@ fn main() {
                     "  {:?} P {:.3} gain {:.1} +- {:.1} {:?}",
                     e.set, e.probability, e.gain_nats, e.gain_se, e.contrast
                 );
-            }
-            for e in &d.explanations {
-                println!("  {}: {}", e.number, e.sentence);
             }
             println!("  {:?}", d.noise);
         }

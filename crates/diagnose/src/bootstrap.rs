@@ -11,9 +11,8 @@
 use crate::config::DiagnosisConfig;
 use crate::problem::{Columns, DwellRow};
 use crate::projection::{Gram, Projection, eigen};
-use crate::signs::Signs;
-use crate::special::ln_f_tail;
-use armcal_calibrate::gram;
+use armcal_calibrate::tails::ln_f_tail;
+use armcal_calibrate::{Signs, gram};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -158,7 +157,7 @@ pub(crate) fn wild_cluster(
         power[(0, g)] = u.norm_squared();
         rows.iter().zip(u.iter()).for_each(|(row, u)| drawn.u[*row] = *u);
     }
-    let signs = Signs::new(clusters.len(), config);
+    let signs = Signs::new(clusters.len(), config.flips());
     let of_geometry = drawn.of_clusters(&projection.q);
     let spent = signs.times(&of_geometry);
     let total = signs.squared_times(&power);

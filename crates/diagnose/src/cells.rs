@@ -7,7 +7,7 @@
 //! geometry (Brynjarsdottir and O'Hagan 2014 on why it must be).
 
 use crate::config::DiagnosisConfig;
-use crate::drivers::{Driver, DriverKind, drivers, moments, standardised_joints, varies};
+use crate::drivers::{Driver, DriverKind, drivers, moments, range, standardised_joints, varies};
 use crate::problem::{Columns, Problem};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -110,8 +110,8 @@ fn smooth(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
     let pose = pose_kernel(problem);
     let time: Vec<f64> = problem.dwells.iter().map(|d| d.time_s).collect();
     let load: Vec<f64> = problem.dwells.iter().map(|d| d.load_kg).collect();
-    let span = time.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-        - time.iter().copied().fold(f64::INFINITY, f64::min);
+    let (start, end) = range(&time);
+    let span = end - start;
     let mut all = Vec::new();
     let mut add = |name: &'static str, kernel: &dyn Fn(usize, usize) -> f64| {
         let functions = low_rank(n, kernel);

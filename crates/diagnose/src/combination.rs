@@ -2,7 +2,7 @@
 
 use crate::confusion::half_width;
 use crate::problem::Amplitude;
-use crate::special::Z_975;
+use armcal_calibrate::tails::Z_975;
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;

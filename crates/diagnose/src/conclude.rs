@@ -3,14 +3,12 @@
 //! Names are the judge's ([`crate::settle`]); calibrations with and without them give the figures beside. Whether *nothing* is
 //! missing is the one question of the noise: the errors must be those that it gives.
 
-use crate::compare::compare_heldout;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
-use crate::error_places::{DwellError, error_places, single_dwells};
-use crate::explain::explanations;
 use crate::next::lead;
-use crate::repeatability::repeatability_m;
-use armcal_calibrate::Calibration;
+use armcal_calibrate::{
+    Calibration, DwellError, compare_heldout, error_places, repeatability_m, single_dwells,
+};
 use armcal_core::{Observation, Severity, Stage, Warning, listed};
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
@@ -49,7 +47,6 @@ impl Diagnosis {
         self.settle(agrees, noise_alone);
         self.tell_unexplained(before, observations, joint_names, config);
         lead(self, observations, joint_names);
-        self.explanations = explanations(self, config);
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise
@@ -150,7 +147,7 @@ fn errs_more(
     observations: &[Observation],
     config: &DiagnosisConfig,
 ) -> Option<Warning> {
-    let held = compare_heldout(before, &refitted.calibration, observations, config)?;
+    let held = compare_heldout(before, &refitted.calibration, observations, config.flips())?;
     let names: Vec<String> = refitted.effects.iter().map(ToString::to_string).collect();
     let message = format!(
         "{} predicts dwells that were left out place by place, but on this hold-out it {}: what it predicts does not reach \

@@ -1,6 +1,7 @@
 //! The `[diagnosis]` section of a pipeline. Every threshold of the verdict is here, and the report prints them.
 
 use crate::DiagnoseError;
+use armcal_calibrate::SignFlips;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -93,6 +94,11 @@ impl Default for DiagnosisConfig {
 }
 
 impl DiagnosisConfig {
+    /// The sign flips of groups.
+    pub fn flips(&self) -> SignFlips {
+        SignFlips { draws: self.resamplings, seed: self.seed }
+    }
+
     /// Refuses impossible values.
     pub fn check(&self) -> Result<(), DiagnoseError> {
         let refuse = |key, value: String, why| Err(DiagnoseError::BadConfig { key, value, why });

@@ -2,7 +2,7 @@
 
 use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, Projection, eigen};
-use crate::special::{Z_80, Z_975};
+use armcal_calibrate::tails::{Z_80, Z_975};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::ops::Range;

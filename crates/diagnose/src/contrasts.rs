@@ -1,7 +1,6 @@
 //! Paired contrasts: two visits to one pose that differ in a driver carry no geometry (notes 4.9).
 
 use crate::config::DiagnosisConfig;
-use crate::crossval::sign_flip;
 use crate::events::moment;
 use crate::problem::{Candidate, DwellRow, Problem};
 use armcal_model::Toggle;
@@ -64,7 +63,7 @@ pub(crate) fn contrast(
     let ratio = xy / xx;
     let rows = pairs.iter().map(|(a, _)| problem.dwells[*a].rows).sum::<usize>() as f64;
     let ratio_sigma = ((yy - xy * xy / xx).max(0.0) / (rows - 1.0).max(1.0) / xx).sqrt();
-    let p = sign_flip(&parts.iter().map(|p| p.1).collect::<Vec<_>>(), config);
+    let p = config.flips().p(&parts.iter().map(|p| p.1).collect::<Vec<_>>());
     // Three, not two: a name is not given up for what one true effect in twenty does by chance.
     let tolerance = 3.0 * (ratio_sigma.powi(2) + theta_sigma.powi(2)).sqrt();
     // A tenth of the size is the curvature and gap a linear pair cannot show.

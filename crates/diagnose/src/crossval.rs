@@ -5,15 +5,11 @@
 //! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
 
 use crate::config::DiagnosisConfig;
-use crate::held_out::HeldOut;
 use crate::places::units;
 use crate::problem::{DwellRow, Problem};
 use crate::projection::cholesky_upper;
-use armcal_calibrate::gram;
-use armcal_calibrate::grouped_ci95;
+use armcal_calibrate::{HeldOut, gram, grouped_ci95};
 use nalgebra::{DMatrix, DVector};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Prior precision of an effect's amplitude while it is fitted: ten typical sizes.
@@ -214,19 +210,7 @@ pub(crate) fn compare(
         after: mean(&to),
         change_ci95: grouped_ci95(&changes),
         gain: if total_before > 0.0 { fall.iter().sum::<f64>() / total_before } else { 0.0 },
-        p: sign_flip(&fall, config),
+        p: config.flips().p(&fall),
         groups: groups.len(),
     }
-}
-
-/// P(mean >= observed) when the sign of every group is chance; at least 999 draws.
-pub(crate) fn sign_flip(values: &[f64], config: &DiagnosisConfig) -> f64 {
-    let observed: f64 = values.iter().sum();
-    let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x5167_f11b);
-    let mut above = 0usize;
-    for _ in 0..config.resamplings {
-        let drawn: f64 = values.iter().map(|v| if rng.random::<bool>() { *v } else { -*v }).sum();
-        above += usize::from(drawn >= observed);
-    }
-    (1.0 + above as f64) / (config.resamplings as f64 + 1.0)
 }

@@ -2,12 +2,10 @@
 
 use crate::combination::Combination;
 use crate::contrasts::Contrast;
-use crate::error_places::ErrorPlace;
-use crate::held_out::HeldOut;
 use crate::nested::Nested;
 use crate::ripple::{Peak, Ripple};
 use crate::scatter::Scatter;
-use armcal_calibrate::Calibration;
+use armcal_calibrate::{Calibration, ErrorPlace, HeldOut};
 use armcal_core::{DwellId, Unit, Warning};
 use armcal_model::{EffectSpec, Model};
 use serde::{Deserialize, Serialize};
@@ -103,10 +101,12 @@ pub struct Diagnosis {
     pub set_aside: Vec<DwellId>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
-    /// Each number of the verdict in a plain sentence.
-    pub explanations: Vec<Explanation>,
+    /// What the gate asked of a name.
+    pub gate: Gate,
     /// What the choice is worth on points that had no part in it, where it was made again ([`crate::nested`]).
     pub nested: Option<Nested>,
+    /// Why that was not asked, where a user should know.
+    pub not_chosen_again: Option<String>,
     /// The calibration with everything that was found; none where nothing was, or where it cannot be fitted.
     #[serde(skip)]
     pub refitted: Option<Box<Refitted>>,
@@ -128,16 +128,15 @@ impl Diagnosis {
             (self.probability, self.p_adjusted) = (Some(probability), p_adjusted);
         }
     }
+}
 
-    /// Keeps what the choice is worth on points that had no part in it, or says why that was not asked.
-    pub fn chosen_again(&mut self, nested: Result<Nested, String>) {
-        let sentence = match &nested {
-            Ok(nested) => nested.sentence(),
-            Err(why) => format!("not chosen again without the held-out points: {why}"),
-        };
-        self.explanations.push(Explanation { number: "nested".to_owned(), sentence });
-        self.nested = nested.ok();
-    }
+/// The bootstrap that a name must pass.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gate {
+    /// Sign-flipped copies of the data.
+    pub resamplings: usize,
+    /// The largest family-wise p-value of a name.
+    pub max_p_adjusted: f64,
 }
 
 /// Which errors a number is about.
@@ -391,8 +390,6 @@ pub struct Expression {
     pub unit: Unit,
     /// Parameters: name, start value, bound on the size.
     pub parameters: Vec<ExpressionParameter>,
-    /// ln Bayes factor against nothing.
-    pub log_evidence: f64,
     /// Share of what the free shape removes that the formula removes too.
     pub share_of_shape: f64,
 }
@@ -408,13 +405,4 @@ pub struct ExpressionParameter {
     pub prior: f64,
     /// Bound on its size, either sign.
     pub bound: f64,
-}
-
-/// A number of the verdict, in a plain sentence.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Explanation {
-    /// Which number: `probability`, `p_adjusted`.
-    pub number: String,
-    /// What it says.
-    pub sentence: String,
 }

@@ -60,6 +60,13 @@ pub(crate) struct Driver {
     pub kernel: Option<Kernel>,
 }
 
+impl Driver {
+    /// One that takes a few values, with functions at the dwells alone.
+    fn switched(name: &str, kind: DriverKind, value: Vec<f64>, basis: DMatrix<f64>) -> Driver {
+        Driver { name: name.to_owned(), kind, value, basis: Arc::new(basis), kernel: None }
+    }
+}
+
 /// All drivers that vary in a problem.
 pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     let joints = problem.joints();
@@ -87,23 +94,16 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     for j in 0..joints {
         let value = column(&|d| d.arrival[j]);
         if varies(&value) {
-            let basis = Arc::new(with_pose(&value));
-            let kind = DriverKind::Direction(j);
-            all.push(Driver { name: format!("s{}", j + 1), kind, value, basis, kernel: None });
+            let basis = with_pose(&value);
+            all.push(Driver::switched(&format!("s{}", j + 1), DriverKind::Direction(j), value, basis));
             all.extend(direction_along(problem, j));
         }
     }
     let load = column(&|d| d.load_kg);
     if varies(&load) {
         let (mean, sd) = moments(&load);
-        let basis = Arc::new(with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>()));
-        all.push(Driver {
-            name: "load".to_string(),
-            kind: DriverKind::Load,
-            value: load,
-            basis,
-            kernel: None,
-        });
+        let basis = with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>());
+        all.push(Driver::switched("load", DriverKind::Load, load, basis));
     }
     let recordings: BTreeSet<usize> = problem.dwells.iter().map(|d| d.id.recording).collect();
     if recordings.len() > 1 {
@@ -111,13 +111,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
             f64::from(recordings.iter().nth(k) == Some(&problem.dwells[i].id.recording))
         });
         let value = column(&|d| d.id.recording as f64);
-        all.push(Driver {
-            name: "recording".to_string(),
-            kind: DriverKind::Recording,
-            value,
-            basis: Arc::new(basis),
-            kernel: None,
-        });
+        all.push(Driver::switched("recording", DriverKind::Recording, value, basis));
     }
     all
 }
@@ -147,6 +141,13 @@ pub(crate) fn varies(value: &[f64]) -> bool {
     value.iter().any(|v| (v - value[0]).abs() > 1e-9 * (1.0 + value[0].abs()))
 }
 
+/// The smallest and the largest value.
+pub(crate) fn range(value: &[f64]) -> (f64, f64) {
+    let of = value.iter().copied();
+    (of.clone().fold(f64::INFINITY, f64::min), of.fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// Mean and standard deviation.
 pub(crate) fn moments(value: &[f64]) -> (f64, f64) {
     let n = value.len().max(1) as f64;
     let mean = value.iter().sum::<f64>() / n;
@@ -188,8 +189,7 @@ pub(crate) struct Kernel {
 
 impl Kernel {
     fn new(value: &[f64], lengths: [f64; 2], bins: usize, functions: usize) -> Kernel {
-        let low = value.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = range(value);
         let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
         let grid: Vec<f64> = (0..bins).map(|k| -1.0 + 2.0 * k as f64 / (bins - 1) as f64).collect();
         // A floor keeps empty stretches of the range in the basis.

@@ -4,7 +4,7 @@ use crate::config::DiagnosisConfig;
 use crate::grams::each_gram;
 use crate::problem::{Columns, Problem};
 use crate::projection::{Gram, Projection, cholesky_upper, eigen};
-use crate::special::ln_sum_exp;
+use armcal_calibrate::tails::ln_sum_exp;
 use nalgebra::{DMatrix, DVector};
 
 /// Above this many columns a factor for each amplitude is cheaper than one eigen-decomposition.

@@ -2,7 +2,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Expression, ExpressionParameter};
-use crate::drivers::{Driver, DriverKind, moments};
+use crate::drivers::{Driver, DriverKind, moments, range};
 use crate::evidence::{best_amplitude, coefficients, of_all};
 use crate::problem::{Channel, Columns, Problem};
 use crate::weigh::Weighed;
@@ -79,7 +79,6 @@ pub(crate) fn expression(
         acts_on: acts_on.clone(),
         unit: channel.unit,
         parameters,
-        log_evidence: value(best),
         share_of_shape: theta.dot(&gram.g),
     })
 }
@@ -102,8 +101,7 @@ fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
 /// Polynomials, harmonics, a smooth step, a bump, a warm-up.
 fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
     let value = &driver.value;
-    let low = value.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = range(value);
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
     let x = if name.contains('+') { format!("({name})") } else { name.to_owned() };
     // Every parameter then has the channel's unit: the numbers carry the driver's.

@@ -14,10 +14,9 @@ use crate::search::{Found, going_on};
 /// The same with one name for several of a target, wherever that says as much.
 pub(crate) fn fewer(
     rooms: &mut Rooms<'_>,
-    found: Found,
+    mut found: Found,
     config: &DiagnosisConfig,
 ) -> Result<Found, DiagnoseError> {
-    let mut found = found;
     while let Some(simpler) = simpler(rooms, &found.accepted, config)? {
         found = simpler;
     }

@@ -3,11 +3,10 @@
 use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
-    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NotTestable, Rival,
+    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, Gate, JudgedOn, NOT_LISTED, NotTestable, Rival,
     UnknownReport, Verdict,
 };
 use crate::events::{passing, together};
-use crate::explain::explanations;
 use crate::forward::{Accepted, named};
 use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
@@ -165,13 +164,13 @@ fn assemble(
         effects,
         unknown: unlisted.first().cloned(),
         unlisted,
-        explanations: Vec::new(),
+        gate: Gate { resamplings: config.resamplings, max_p_adjusted: config.max_p_adjusted },
         nested: None,
+        not_chosen_again: None,
     };
     diagnosis.name_again();
     // The dwells are the same in all rooms.
     diagnosis.record_next = next::record_next(&rest.problem, &diagnosis);
-    diagnosis.explanations = explanations(&diagnosis, config);
     diagnosis
 }
 
@@ -265,8 +264,8 @@ fn warnings(
     config: &DiagnosisConfig,
 ) -> Vec<Warning> {
     let mut all = Vec::new();
-    let mut add = |severity, code, subject: String, message: String| {
-        all.push(Warning::new(severity, Stage::Calibrate, code, subject, message));
+    let mut add = |code, subject: String, message: String| {
+        all.push(Warning::new(Severity::Notice, Stage::Calibrate, code, subject, message));
     };
     if !set_aside.is_empty() {
         let names: Vec<String> = set_aside.iter().map(ToString::to_string).collect();
@@ -276,11 +275,10 @@ fn warnings(
             names.len(),
             config.outlier_sigma
         );
-        add(Severity::Notice, "suspect-dwell", listed(&names), message);
+        add("suspect-dwell", listed(&names), message);
     }
     if noise.sigma_ratio > SIGMA_RATIO {
         add(
-            Severity::Notice,
             "scatter-larger",
             "noise".to_string(),
             format!(
@@ -298,11 +296,11 @@ fn warnings(
              below it; declare what the sensor and the seats scatter",
             noise.sigma_ratio
         );
-        add(Severity::Notice, "noise-overdeclared", "noise".to_string(), message);
+        add("noise-overdeclared", "noise".to_string(), message);
     }
     if let Some(alike) = noise.alike() {
         let message = format!("{alike}; more repeats of the same kind average less");
-        add(Severity::Notice, "scatter-correlated", "noise".to_string(), message);
+        add("scatter-correlated", "noise".to_string(), message);
     }
     let names: Vec<&str> = search.accepted.iter().map(|a| a.candidate.spec.as_str()).collect();
     for of_one in together(&names) {
@@ -310,7 +308,7 @@ fn warnings(
             "{} tell of one moment: one event, such as a collision, a restart or a remounted part, may have done all of it",
             of_one.join(" and ")
         );
-        add(Severity::Notice, "one-event", of_one[0].to_owned(), message);
+        add("one-event", of_one[0].to_owned(), message);
     }
     for a in &search.accepted {
         if let Some(reason) = a.candidate.known.as_ref().filter(|_| !a.instead_of.is_empty()) {
@@ -319,7 +317,7 @@ fn warnings(
                 a.candidate.spec,
                 listed(&a.instead_of)
             );
-            add(Severity::Notice, "named-as-known", a.candidate.spec.clone(), message);
+            add("named-as-known", a.candidate.spec.clone(), message);
         }
         if !a.judged.impossible.is_empty() {
             let message = format!(
@@ -327,7 +325,7 @@ fn warnings(
                 a.candidate.spec,
                 listed(&a.judged.impossible)
             );
-            add(Severity::Notice, "negative-size", a.candidate.spec.clone(), message);
+            add("negative-size", a.candidate.spec.clone(), message);
         }
         if seen_by_the_sensor_alone(a) {
             let message = format!(
@@ -335,7 +333,7 @@ fn warnings(
                  knocked meanwhile displace as much; look at the sensor's own recording of these dwells",
                 a.candidate.spec
             );
-            add(Severity::Notice, "event-or-sensor", a.candidate.spec.clone(), message);
+            add("event-or-sensor", a.candidate.spec.clone(), message);
         }
         if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
             let message = format!(
@@ -343,7 +341,7 @@ fn warnings(
                  changes them too: check `load_kg`, and that all recordings are of this arm with this tool",
                 a.candidate.spec
             );
-            add(Severity::Notice, "event-or-load", a.candidate.spec.clone(), message);
+            add("event-or-load", a.candidate.spec.clone(), message);
         }
         if a.candidate.toggle == Toggle::Direction {
             let wrong = direction_suspects(a);
@@ -355,7 +353,7 @@ fn warnings(
                     wrong.len(),
                     a.candidate.spec
                 );
-                add(Severity::Notice, "suspect-direction", a.candidate.spec.clone(), message);
+                add("suspect-direction", a.candidate.spec.clone(), message);
             }
         }
     }

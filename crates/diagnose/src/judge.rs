@@ -6,7 +6,6 @@ use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
 use crate::crossval::by_recording;
 use crate::evidence::{best_amplitude, coefficients};
-use crate::held_out::HeldOut;
 use crate::places::units;
 use crate::problem::{Amplitude, Problem};
 use crate::projection::Gram;
@@ -14,6 +13,7 @@ use crate::rooms::Room;
 use crate::scatter::Scatter;
 use crate::score::{Difference, Score};
 use crate::weigh::Weighed;
+use armcal_calibrate::HeldOut;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
 //! Which physical effect is missing from a calibrated model, with error control and honest refusals.
 //!
-//! Two rooms. The inner one ([`diagnose_problem`], [`plan()`]) is linear algebra on a [`Problem`]: whitened residuals, what
+//! Two rooms. The inner one ([`diagnose_problem`]) is linear algebra on a [`Problem`]: whitened residuals, what
 //! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`]) builds problems from
 //! a model and refits it. In the order of the story:
 //!
@@ -16,12 +16,10 @@
 //! * `settle`, `costs`, `ranking`: names against all that predicts as much, each refitted; the order of all explanations;
 //! * `curves`: joints that err over their own angle, all at once, and what is left beside them;
 //! * `unknown`, `expression`: where the unlisted enters, on what it depends, its shape, a formula to paste;
-//! * `inner`, `reports`, `combination`, `explain`, `next`: the verdict in numbers and sentences;
-//! * `conclude`, `repeatability`, `error_places`: the verdict once what was found is in the model, what remains, and where;
+//! * `inner`, `reports`, `combination`, `next`: the verdict in numbers, and what to record next;
+//! * `conclude`: the verdict once what was found is in the model, and what remains;
 //! * `rests`: where a joint rests in a gap that was found;
-//! * `implied`: what each dwell says about each joint, for the eye;
-//! * `nested`: the choice made again without each part of the hold-out;
-//! * `plan`: what to record to tell the survivors apart; `compare`: before against after.
+//! * `nested`: the choice made again without each part of the hold-out.
 //!
 //! Formulas, thresholds and their sources: `notes/diagnosis.md` of the project.
 
@@ -31,7 +29,6 @@ mod cells;
 mod channels;
 mod columns;
 mod combination;
-mod compare;
 mod conclude;
 mod config;
 mod confusion;
@@ -43,17 +40,13 @@ mod density;
 mod diagnosis;
 mod drivers;
 mod error;
-mod error_places;
 mod events;
 mod evidence;
-mod explain;
 mod expression;
 mod fewer;
 mod forward;
 mod grams;
 mod group;
-mod held_out;
-mod implied;
 mod inner;
 mod judge;
 mod knowledge;
@@ -63,12 +56,10 @@ mod next;
 mod observed;
 mod outliers;
 mod places;
-mod plan;
 mod problem;
 mod projection;
 mod ranking;
 mod refit;
-mod repeatability;
 mod reports;
 mod rests;
 mod ripple;
@@ -78,8 +69,6 @@ mod scatter;
 mod score;
 mod search;
 mod settle;
-mod signs;
-mod special;
 mod stretches;
 mod suggestion;
 mod unexplained;
@@ -93,24 +82,21 @@ mod tests;
 
 #[cfg(test)]
 extern crate self as armcal_diagnose;
+#[cfg(test)]
+use tests::arm::LinearRefit;
 
 pub use armcal_model::Toggle;
 pub use combination::{Combination, Term};
-pub use compare::{compare_errors, compare_heldout, mean_by_dwell};
 pub use config::DiagnosisConfig;
 pub use contrasts::Contrast;
 pub use diagnosis::*;
 pub use error::DiagnoseError;
-pub use error_places::ErrorPlace;
-pub use held_out::HeldOut;
-pub use implied::{BLURRED, ImpliedError, implied_joint_errors};
 pub use inner::diagnose_problem;
 pub use knowledge::Knowledge;
 pub use nested::{Nested, nested};
 pub use observed::{Calibrated, diagnose};
-pub use plan::{Plan, PlannedPair, PoolDwell, Survivor, plan};
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
-pub use refit::{LinearRefit, Refit};
+pub use refit::Refit;
 pub use ripple::Ripple;
 pub use scatter::{Correlation, Scatter};
 pub use unexplained::UNEXPLAINED;

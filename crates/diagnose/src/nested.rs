@@ -5,12 +5,12 @@
 //! every turn of the hold-out is diagnosed without its points, with a hold-out of its own inside, and what that finds
 //! predicts them.
 
-use crate::compare::{compare_errors, held_out_errors_m};
 use crate::config::DiagnosisConfig;
-use crate::held_out::HeldOut;
 use crate::observed::{Calibrated, diagnose};
 use crate::{DiagnoseError, Diagnosis};
-use armcal_calibrate::{Calibration, HoldoutConfig, calibrate, holdout_turns};
+use armcal_calibrate::{
+    Calibration, HeldOut, HoldoutConfig, calibrate, compare_errors, held_out_errors_m, holdout_turns,
+};
 use armcal_core::{DwellId, Observation};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -32,29 +32,6 @@ pub struct Nested {
     pub chosen: Vec<Vec<String>>,
 }
 
-impl Nested {
-    /// In one sentence.
-    pub fn sentence(&self) -> String {
-        let turns = self.chosen.len();
-        // The order in which they were found is no other choice.
-        let named = |effects: &Vec<String>| {
-            let mut names = effects.clone();
-            names.sort();
-            if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
-        };
-        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-        self.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
-        let chosen: Vec<String> =
-            counts.iter().map(|(names, count)| format!("{names} in {count} of {turns}")).collect();
-        format!(
-            "chosen without the held-out points ({}), it {}; chosen with them, to {:.3} mm",
-            chosen.join(", "),
-            self.held_out.change_text(),
-            self.chosen_on_all_mm
-        )
-    }
-}
-
 /// Chooses again in every turn of the hold-out; none where nothing was found, or nothing is held out.
 ///
 /// # Errors
@@ -73,7 +50,7 @@ pub fn nested(
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     let after: BTreeMap<DwellId, f64> =
         done.iter().flat_map(|t| t.errors_m.iter().map(|(d, e)| (*d, *e))).collect();
-    let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, &config);
+    let held_out = compare_errors(&held_out_errors_m(calibration), &after, observations, config.flips());
     Ok(held_out.map(|held_out| Nested {
         held_out,
         chosen_on_all_mm: refitted.calibration.holdout.fitted.mean_m * 1e3,

@@ -2,14 +2,12 @@
 
 use crate::config::DiagnosisConfig;
 use crate::problem::{DwellRow, Problem};
-use armcal_calibrate::{MIN_CAVITIES, measured_together};
+use armcal_calibrate::{AlikePoses, MIN_CAVITIES, SAME_POSE_RAD, measured_together};
 use armcal_core::Observation;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-/// Joint difference below which two tracked dwells are visits to the same pose [rad].
-const SAME_POSE_RAD: f64 = 0.01;
 /// Poses this close in every joint predict one another whatever is missing: they are left out together [rad]
 /// (3 deg; half the length over which joint error curves of real arms stay alike).
 const ALIKE_RAD: f64 = 0.052;
@@ -24,44 +22,12 @@ pub(crate) fn units(problem: &Problem) -> Vec<usize> {
     // Where places are few, the poses at them are the sample: a ball in one of two sockets says nothing about the
     // socket, everything about the arm.
     let enough = known.len() >= MIN_CAVITIES;
-    let mut poses = Alike::within(ALIKE_RAD);
+    let mut poses = AlikePoses::within(ALIKE_RAD);
     let unit = |d: &DwellRow| match d.place.as_deref().filter(|_| enough) {
         Some(place) => known[place],
         None => known.len() + poses.group_of(&d.joint_rad),
     };
     problem.dwells.iter().map(unit).collect()
-}
-
-/// Poses in groups: each with the first one before it that is alike in every joint, if there is one.
-struct Alike {
-    reach_rad: f64,
-    first: Vec<Vec<f64>>,
-    /// Groups by the cell of their first pose's first two joints, as wide as the reach.
-    cells: BTreeMap<[i64; 2], Vec<usize>>,
-}
-
-impl Alike {
-    fn within(reach_rad: f64) -> Alike {
-        Alike { reach_rad, first: Vec::new(), cells: BTreeMap::new() }
-    }
-
-    /// The group of the next pose.
-    fn group_of(&mut self, joint_rad: &[f64]) -> usize {
-        let cell = [0, 1].map(|j| joint_rad.get(j).map_or(0, |q| (q / self.reach_rad).floor() as i64));
-        let near = (-1..=1)
-            .flat_map(|i| (-1..=1).map(move |j| [cell[0].saturating_add(i), cell[1].saturating_add(j)]));
-        let near = near.filter_map(|cell| self.cells.get(&cell)).flatten().copied();
-        let is_alike = |group: &usize| {
-            let first = &self.first[*group];
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() < self.reach_rad;
-            first.len() == joint_rad.len() && first.iter().zip(joint_rad).all(close)
-        };
-        near.filter(is_alike).min().unwrap_or_else(|| {
-            self.first.push(joint_rad.to_vec());
-            self.cells.entry(cell).or_default().push(self.first.len() - 1);
-            self.first.len() - 1
-        })
-    }
 }
 
 /// The observations of at most `max_weighed` poses: one drawn from each of as many equal stretches of time, so that every
@@ -81,12 +47,6 @@ pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisCon
     drawn.into_iter().flat_map(|i| &observations[poses[i].clone()]).collect()
 }
 
-/// The pose of each observation: the same number for those that are alike in every joint.
-pub(crate) fn poses(observations: &[Observation]) -> Vec<usize> {
-    let mut poses = Alike::within(SAME_POSE_RAD);
-    observations.iter().map(|o| poses.group_of(&o.joint_rad)).collect()
-}
-
 /// [`places`] of each pose of these observations.
 pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String>> {
     let poses = measured_together(observations);
@@ -95,10 +55,10 @@ pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String
 
 /// The cavity; for a tracked pose the pose itself, where it was visited more than once. One observation of each pose is asked.
 pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
-    let mut poses = Alike::within(SAME_POSE_RAD);
+    let mut poses = AlikePoses::within(SAME_POSE_RAD);
     let pose = |o: &&Observation| o.cavity().is_none().then(|| poses.group_of(&o.joint_rad));
     let member: Vec<Option<usize>> = observations.iter().map(pose).collect();
-    let mut visits = vec![0; poses.first.len()];
+    let mut visits = vec![0; poses.groups()];
     member.iter().flatten().for_each(|k| visits[*k] += 1);
     let name = |(o, member): (&&Observation, Option<usize>)| match (o.cavity(), member) {
         (Some(cavity), _) => Some(cavity.to_owned()),
@@ -107,7 +67,3 @@ pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
     };
     observations.iter().zip(member).map(name).collect()
 }
-
-#[cfg(test)]
-#[path = "tests/places.rs"]
-mod tests;

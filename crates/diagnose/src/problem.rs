@@ -288,7 +288,7 @@ impl Problem {
     }
 
     /// The same problem with more columns among the geometry, each with the prior of an effect's amplitude.
-    pub(crate) fn with_columns(mut self, columns: &DMatrix<f64>) -> Problem {
+    pub fn with_columns(mut self, columns: &DMatrix<f64>) -> Problem {
         let (from, m) = (self.geometry.ncols(), columns.ncols());
         let mut geometry = DMatrix::zeros(self.rows(), from + m);
         geometry.columns_mut(0, from).copy_from(&self.geometry);

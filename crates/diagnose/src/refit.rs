@@ -22,33 +22,3 @@ pub trait Refit {
         Ok(false)
     }
 }
-
-/// Stays with one linearisation: accepted columns join the geometry.
-#[derive(Debug, Clone)]
-pub struct LinearRefit {
-    base: Problem,
-}
-
-impl LinearRefit {
-    /// Around a problem.
-    pub fn new(base: Problem) -> LinearRefit {
-        LinearRefit { base }
-    }
-}
-
-impl Refit for LinearRefit {
-    fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
-        let mut problem = self.base.clone();
-        for candidate in accepted {
-            // By name: a candidate may come back with dwells cut out.
-            let own = self.base.candidates.iter().chain(self.base.scans.iter().flat_map(|s| &s.points));
-            let own = own.into_iter().find(|c| c.spec == candidate.spec).unwrap_or(candidate);
-            let columns = own.columns.dense(&problem.dwells, 1.0);
-            problem = problem.with_columns(&columns);
-        }
-        let taken = |c: &Candidate| accepted.iter().any(|a| a.spec == c.spec);
-        problem.candidates.retain(|c| !taken(c));
-        problem.scans.retain(|s| !s.points.iter().any(taken));
-        Ok(problem)
-    }
-}

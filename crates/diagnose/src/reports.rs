@@ -7,7 +7,7 @@ use crate::confusion::{half_width, one_step, smallest_seen};
 use crate::crossval::{by_place, compare, left_out};
 use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
 use crate::judge::Judged;
-use crate::problem::{Amplitude, Candidate, Problem};
+use crate::problem::{Amplitude, Candidate, Columns, Problem};
 use crate::ranking::Explanation;
 use crate::rooms::Room;
 use crate::weigh::Weighed;
@@ -77,11 +77,9 @@ pub(crate) fn candidate_reports(
         report.p_adjusted = explanation.p_adjusted;
         let whole = if alone.is_some() { vec![of] } else { members };
         if rank < SHOWN {
-            let parts: Vec<DMatrix<f64>> = whole
-                .iter()
-                .map(|k| weighed.entries[*k].candidate.columns.dense(&problem.dwells, 1.0))
-                .collect();
-            let after = left_out(problem, Some(&side_by_side(&parts)), &groups, weighed.scale);
+            let columns = |k: &usize| weighed.entries[*k].candidate.columns.clone();
+            let together = Columns::Together(whole.iter().map(columns).collect()).dense(&problem.dwells, 1.0);
+            let after = left_out(problem, Some(&together), &groups, weighed.scale);
             let held = compare(problem, &before, &after, &groups, config);
             report.holdout_mm = Some(BeforeAfter { before: held.before, after: held.after });
             report.same_to_the_data.extend(alike(room, of, config));
@@ -95,11 +93,6 @@ pub(crate) fn candidate_reports(
     let rest = weighed.ranking().into_iter().map(|k| of_entry(room, k, top));
     reports.extend(rest.filter(|r| !taken.contains(&r.spec)));
     reports
-}
-
-fn side_by_side(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
-    let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter()).collect();
-    DMatrix::from_columns(&columns)
 }
 
 /// One entry by itself: its sizes in one step, and what these data could show of it.

@@ -6,11 +6,10 @@
 //! weights of the fit know of it. A scatter larger than the gap is something else.
 
 use crate::diagnosis::{Diagnosis, Refitted};
-use crate::implied::{BLURRED, ImpliedError, implied_joint_errors};
 use crate::observed::Calibrated;
 use crate::problem::Candidate;
-use crate::special::ln_f_tail;
-use armcal_calibrate::PositionNoise;
+use armcal_calibrate::tails::ln_f_tail;
+use armcal_calibrate::{BLURRED, ImpliedError, PositionNoise, implied_joint_errors};
 use armcal_core::robust::median;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_model::EffectSpec;

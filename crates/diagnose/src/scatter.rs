@@ -1,8 +1,8 @@
 //! How what a fit leaves scatters: sizes and correlations, which say nothing of causes.
 
 use crate::problem::{DwellRow, Problem};
-use crate::special::chi2_tail;
 use crate::weigh::Weighed;
+use armcal_calibrate::tails::chi2_tail;
 use nalgebra::DVector;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -12,7 +12,7 @@ use crate::config::DiagnosisConfig;
 use crate::crossval::Group;
 use crate::density::ln_by_group;
 use crate::problem::Problem;
-use crate::special::ln_sum_exp;
+use armcal_calibrate::tails::ln_sum_exp;
 use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -173,56 +173,6 @@ fn leave_group_out_is_a_refit_without_the_group() {
 }
 
 #[test]
-fn planned_delta_is_the_dense_one() {
-    // Formula (11) written out: Delta = |g|^2 - b'A^-1 b with the chosen dwells among the data.
-    let mut r = rng(4);
-    let poses = design(60, &mut r);
-    let board: Vec<_> = poses.iter().filter(|p| p.recording < 3).cloned().collect();
-    let p = problem(&board, &[], arm::Noise::White, &mut r, false);
-    let whole = problem(&poses, &[], arm::Noise::White, &mut r, false);
-    let names = ["coupling:3", "scale:3"];
-    let columns = |p: &Problem, name: &str| {
-        p.candidates.iter().find(|c| c.spec == name).unwrap().columns.dense(&p.dwells, 1.0)
-    };
-    let theta = DVector::from_element(1, 1.0);
-    let survivors: Vec<_> = names
-        .iter()
-        .map(|n| crate::Survivor { name: n.to_string(), columns: columns(&p, n), theta: theta.clone() })
-        .collect();
-    let free: Vec<usize> = (0..poses.len()).filter(|i| poses[*i].recording == 3).collect();
-    let pool: Vec<_> = free
-        .iter()
-        .map(|i| crate::PoolDwell {
-            geometry: whole.geometry.rows(3 * i, 3).into_owned(),
-            effects: names.iter().map(|n| columns(&whole, n).rows(3 * i, 3).into_owned()).collect(),
-        })
-        .collect();
-    let config = DiagnosisConfig::default();
-    let plan = crate::plan(&p.geometry, &p.geometry_precision, &survivors, &pool, 6, &config);
-    assert!(!plan.chosen.is_empty() && plan.pairs[0].separable, "{plan:?}");
-    assert!(plan.pairs[0].delta_before < config.min_delta, "{plan:?}");
-    let keep: Vec<bool> = (0..poses.len())
-        .map(|i| poses[i].recording < 3 || plan.chosen.iter().any(|c| free[*c] == i))
-        .collect();
-    let with = whole.without(&keep);
-    let delta = |k: usize, l: usize| {
-        let (g, rival) = (columns(&with, names[k]), columns(&with, names[l]));
-        let n = with.geometry.ncols();
-        let mut x = DMatrix::zeros(with.rows(), n + 1);
-        x.columns_mut(0, n).copy_from(&with.geometry);
-        x.columns_mut(n, 1).copy_from(&rival);
-        let mut a = x.tr_mul(&x);
-        (0..n).for_each(|j| a[(j, j)] += 1.0);
-        a[(n, n)] += crate::crossval::EFFECT_PRECISION;
-        let b = x.tr_mul(&g);
-        g.norm_squared() - (b.transpose() * a.cholesky().unwrap().solve(&b))[(0, 0)]
-    };
-    let dense = delta(0, 1).min(delta(1, 0));
-    let found = plan.pairs[0].delta_after;
-    assert!((found - dense).abs() < 1e-5 * dense, "{found} {dense}");
-}
-
-#[test]
 fn bootstrap_p_values_are_uniform_under_noise() {
     // Of 60 data sets of pure noise, about 5 % have an adjusted p-value of at most 5 % somewhere; 13 % would be a
     // one in a hundred accident.

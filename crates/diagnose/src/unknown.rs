@@ -3,7 +3,7 @@
 use crate::cells::Unlisted;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Series, ShapePoint, UnknownReport};
-use crate::drivers::{Driver, DriverKind};
+use crate::drivers::{Driver, DriverKind, range};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::expression::{expression, to_digits};
 use crate::forward::leading;
@@ -141,8 +141,7 @@ fn points(
         value: best.unit_si * basis.dot(&own),
         sigma: best.unit_si * (basis.transpose() * spread * &basis)[(0, 0)].max(0.0).sqrt(),
     };
-    let low = driver.value.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = driver.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = range(&driver.value);
     match (&driver.kernel, driver.kind) {
         (Some(kernel), _) => {
             let points = FEWEST_POINTS.max(POINTS_A_FUNCTION * per + 1);

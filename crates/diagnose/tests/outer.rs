@@ -1,15 +1,12 @@
-//! From a model and observations: the real catalogue, real refits, and a plan.
+//! From a model and observations: the real catalogue, and real refits.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, linearise};
+use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, compare_heldout};
 use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
-use armcal_diagnose::{
-    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, PoolDwell, Survivor, Verdict, compare_heldout,
-    diagnose, nested, plan,
-};
+use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, diagnose, nested};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -112,7 +109,7 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
     assert_eq!(d.effects.len(), 1, "{:?}", d.names);
     let extended = model.with_effects(&[model.effect("backlash:2").unwrap()], &session).unwrap();
     let after = calibration(&extended, &observations);
-    let held = compare_heldout(&before, &after, &observations, &config()).unwrap();
+    let held = compare_heldout(&before, &after, &observations, config().flips()).unwrap();
     assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
     let left = diagnosed(&extended, &after, &observations);
     assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
@@ -240,7 +237,6 @@ fn a_choice_made_without_the_held_out_points_is_no_better_on_them_than_one_made_
         again.held_out.after < 1.1 * d.holdout_mm.after && again.held_out.change_ci95[1] < 0.0,
         "{again:?}"
     );
-    assert!(again.sentence().contains("in 5 of 5"), "{}", again.sentence());
 
     let (model, observations) = observed(&[], 0.0, 2);
     let complete = calibration(&model, &observations);
@@ -391,43 +387,6 @@ fn nothing_is_missing_only_at_the_floor_whatever_the_scatter() {
         let silent = d.verdict == Verdict::NothingMissing;
         assert!(!silent || before.times_floor() <= 1.5, "seed {seed}: {} floors", before.times_floor());
     }
-}
-
-#[test]
-fn a_plan_separates_two_effects_that_few_poses_leave_standing() {
-    let (model, observations) = observed(&["gear_ratio:2"], 1.0, 3);
-    let few: Vec<Observation> = observations
-        .into_iter()
-        .filter(|o| o.joint_rad[1].abs() < 0.25 && o.joint_rad[2].abs() < 0.5)
-        .collect();
-    let effects = ["gear_ratio:2", "eccentricity:2"].map(|s| model.effect(s).unwrap());
-    let full = model.with_effects(&effects, &Session::of(&few)).unwrap();
-    let mut values = calibration(&model, &few).fit.values();
-    values.extend(&full.nominal()[values.len()..]);
-    let linear = |of: &[Observation]| linearise(&full, of, &values, &FitConfig::default()).unwrap();
-    let (data, more) = (linear(&few), linear(&poses(120, &mut ChaCha8Rng::seed_from_u64(9))));
-    let own = |parameters: std::ops::Range<usize>| -> Vec<usize> {
-        (0..data.axes.len()).filter(|c| parameters.contains(&data.axes[*c].index)).collect()
-    };
-    let (geometry, columns) =
-        (own(0..model.parameters().len()), full.effects().iter().map(|e| own(e.parameters.clone())));
-    let columns: Vec<Vec<usize>> = columns.collect();
-    let standing = |(effect, columns): (&EffectSpec, &Vec<usize>)| Survivor {
-        name: effect.to_string(),
-        columns: -data.jacobian.select_columns(columns),
-        theta: DVector::from_element(columns.len(), 1.0),
-    };
-    let survivors: Vec<Survivor> = effects.iter().zip(&columns).map(standing).collect();
-    let possible = |rows: &std::ops::Range<usize>| {
-        let block = -more.jacobian.rows(rows.start, rows.len());
-        let effects = columns.iter().map(|own| block.select_columns(own)).collect();
-        PoolDwell { geometry: block.select_columns(&geometry), effects }
-    };
-    let pool: Vec<PoolDwell> = more.rows.iter().map(possible).collect();
-    let precision = DVector::from_iterator(geometry.len(), geometry.iter().map(|c| data.axes[*c].precision));
-    let plan = plan(&-data.jacobian.select_columns(&geometry), &precision, &survivors, &pool, 6, &config());
-    assert!(plan.pairs[0].delta_after > plan.pairs[0].delta_before, "{plan:?}");
-    assert!(!plan.chosen.is_empty() && !plan.sentence.is_empty(), "{plan:?}");
 }
 
 /// The same readings with the noise declared so many times as large.

@@ -4,8 +4,8 @@
 
 mod arm;
 
-use arm::{Noise, catalogue, design, on_joint, outside, overconfident, problem, rng};
-use armcal_diagnose::{Diagnosis, DiagnosisConfig, LinearRefit, Problem, Scan, Verdict, diagnose_problem};
+use arm::{LinearRefit, Noise, catalogue, design, on_joint, outside, overconfident, problem, rng};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Problem, Scan, Verdict, diagnose_problem};
 
 fn run(p: Problem) -> Diagnosis {
     let config = DiagnosisConfig { resamplings: 199, ..Default::default() };
@@ -40,7 +40,7 @@ fn one_cause_is_named_and_the_error_falls_to_the_noise() {
         assert!(d.effects.iter().any(|e| e.set.iter().any(|n| n == name)), "{name}: {:?}", d.names);
         assert_eq!(d.effects.len(), 1, "{name}: {:?}", d.names);
         assert!(d.holdout_mm.after < 0.5 && d.holdout_mm.after < d.holdout_mm.before, "{:?}", d.holdout_mm);
-        assert!(d.p_adjusted <= 0.01 && d.explanations.len() >= 6);
+        assert!(d.p_adjusted <= 0.01);
     }
 }
 

@@ -5,10 +5,11 @@
 
 mod arm;
 
+use arm::LinearRefit;
 use armcal_core::{DwellId, FeatureId, Unit};
 use armcal_diagnose::{
-    Amplitude, Candidate, Columns, Diagnosis, DiagnosisConfig, DwellRow, LinearRefit, Part, Problem, Toggle,
-    Verdict, diagnose_problem,
+    Amplitude, Candidate, Columns, Diagnosis, DiagnosisConfig, DwellRow, Part, Problem, Toggle, Verdict,
+    diagnose_problem,
 };
 use nalgebra::{DMatrix, DVector, Matrix3xX};
 use rand_distr::{Distribution, Exp1};

@@ -1,6 +1,7 @@
 //! The `diagnosis` of `summary.json`: names as in the contract; whatever else the diagnosis knows follows them.
 
 use crate::diagnosis_text::pasted;
+use crate::explanations::explanations;
 use armcal_diagnose::{BeforeAfter, CandidateReport, Diagnosis, ParameterReport, UnknownReport};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -29,7 +30,7 @@ pub(crate) fn diagnosis_summary(d: &Diagnosis) -> Value {
         "unexplained": d.unexplained,
         "sigma_ratio": d.noise.sigma_ratio,
         "effects": d.effects,
-        "explanations": d.explanations,
+        "explanations": explanations(d),
         // The choice made again without each part of the hold-out; `null` where it was not.
         "nested": d.nested,
     })

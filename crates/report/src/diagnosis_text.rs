@@ -1,5 +1,6 @@
 //! What is missing, for a person in the terminal.
 
+use crate::explanations::{explanations, nested_sentence};
 use crate::findings::shown_unlisted;
 use crate::look_at::look_at;
 use crate::past_run::PastRun;
@@ -8,8 +9,9 @@ use crate::recording_names::RecordingNames;
 use crate::run::Run;
 use crate::sizes::{clear, size_in_table, sizes, sizes_of};
 use crate::text::printable;
+use armcal_calibrate::HeldOut;
 use armcal_core::{Certainty, SetupReport, listed};
-use armcal_diagnose::{Diagnosis, FoundEffect, HeldOut, UnknownReport, Verdict};
+use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
 use serde_json::Value;
@@ -94,7 +96,7 @@ fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
 
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
 pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
-    let nested = d.nested.iter().map(|n| printable(&n.sentence()));
+    let nested = d.nested.iter().map(|n| printable(&nested_sentence(n)));
     let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
     let all = d.effects.iter().map(found).chain(shown_unlisted(d).map(unlisted)).chain(beside).chain(nested);
     all.map(|said| run.in_words(&said)).collect()
@@ -372,9 +374,8 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
-    let sentences = d
-        .explanations
-        .iter()
+    let sentences = explanations(d)
+        .into_iter()
         .map(|e| ("-", format!("{}: {}", names.number_label(&printable(&e.number)), told(&e.sentence))));
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")

@@ -21,6 +21,7 @@ mod comparison;
 mod diagnosis_summary;
 mod diagnosis_text;
 mod error;
+mod explanations;
 mod findings;
 mod layouts;
 mod look_at;
@@ -62,6 +63,7 @@ pub use campaign::{
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};
 pub use error::ReportError;
+pub use explanations::nested_sentence;
 pub use look_at::look_at;
 pub use model_file::marked_xml;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};

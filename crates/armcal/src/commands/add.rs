@@ -13,7 +13,7 @@ use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::{EffectSpec, EffectTable, tables_toml};
 use armcal_recording::{atomic, may_put};
-use armcal_report::{Comparison, PastRun, Status, diagnosis_text, write_all};
+use armcal_report::{Comparison, PastRun, Status, diagnosis_text, nested_sentence, write_all};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -114,7 +114,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             print(&format!("\nTransfer: {}.\n", run.in_words(&transfer.sentence())))?;
         }
         if let Some(nested) = &nested {
-            print(&format!("\nThe choice: {}.\n", run.in_words(&nested.sentence())))?;
+            print(&format!("\nThe choice: {}.\n", run.in_words(&nested_sentence(nested))))?;
         }
         print(&format!("\n{}", diagnosis_text(&run, style())))?;
         let (path, out) = (extended.path.display(), request.out.display());

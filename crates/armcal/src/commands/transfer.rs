@@ -4,7 +4,7 @@ use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::transfer::{Asked, SessionTransfer, between};
-use armcal_diagnose::HeldOut;
+use armcal_calibrate::HeldOut;
 use armcal_report::{number, plain_table, table_text};
 use comfy_table::Cell;
 

@@ -8,12 +8,11 @@ use super::{Allowed, Known, Pair, Proposal, Proposed};
 use crate::error::Error;
 use armcal_calibrate::linearise;
 use armcal_core::Observation;
-use armcal_diagnose::{DiagnosisConfig, PoolDwell, Survivor, plan};
+use armcal_diagnose::DiagnosisConfig;
 use armcal_model::{EffectSpec, Model, Session};
+use armcal_plan::{Geometry, PoolDwell, Survivor, apart, plan};
 use nalgebra::{DMatrix, DVector};
 
-/// Precision of an amplitude's prior in typical sizes: a tenth, so that it hardly holds it back.
-const AMPLITUDE_PRECISION: f64 = 0.01;
 /// At this Delta the evidence names the true one (Bayes factor above 20 in 85 % of cases).
 const SETTLED: f64 = 14.0;
 /// Effects that are told from nothing together, at most.
@@ -82,8 +81,7 @@ struct Weighed {
     pool: Vec<Possible>,
     dwells: Vec<PoolDwell>,
     survivors: Vec<Survivor>,
-    geometry: DMatrix<f64>,
-    precision: DVector<f64>,
+    geometry: Geometry,
 }
 
 impl Weighed {
@@ -133,9 +131,11 @@ impl Weighed {
                 dwells.push(PoolDwell { geometry: block.select_columns(&own), effects });
             }
         }
-        let geometry = -data.jacobian.select_columns(&own);
-        let precision = DVector::from_iterator(own.len(), own.iter().map(|c| data.axes[*c].precision));
-        Ok(Weighed { pool, dwells, survivors, geometry, precision })
+        let geometry = Geometry {
+            columns: -data.jacobian.select_columns(&own),
+            precision: DVector::from_iterator(own.len(), own.iter().map(|c| data.axes[*c].precision)),
+        };
+        Ok(Weighed { pool, dwells, survivors, geometry })
     }
 
     fn choose(&self, standing: &Standing, count: usize, config: &DiagnosisConfig) -> Choice {
@@ -159,7 +159,7 @@ impl Weighed {
         let (mut dwells, mut barred) = (Vec::new(), vec![false; self.pool.len()]);
         let mut repeating = false;
         while dwells.len() < count && kept.len() > 1 {
-            let batch = self.plan(&kept, &barred, count - dwells.len(), config);
+            let batch = self.plan(&kept, &barred, count - dwells.len());
             if batch.is_empty() && repeating {
                 break;
             }
@@ -191,12 +191,12 @@ impl Weighed {
     /// Whether `count` dwells of the pool would separate a pair.
     fn separable(&self, a: usize, b: usize, count: usize, config: &DiagnosisConfig) -> bool {
         let pair = [a.min(b), a.max(b)];
-        let dwells = self.plan(&pair, &vec![false; self.pool.len()], count, config);
+        let dwells = self.plan(&pair, &vec![false; self.pool.len()], count);
         self.apart(pair[0], pair[1], &dwells) >= config.min_delta
     }
 
     /// The greedy choice among survivors that part them, of the dwells that are not barred.
-    fn plan(&self, kept: &[usize], barred: &[bool], count: usize, config: &DiagnosisConfig) -> Vec<usize> {
+    fn plan(&self, kept: &[usize], barred: &[bool], count: usize) -> Vec<usize> {
         let survivors: Vec<Survivor> = kept.iter().map(|k| self.survivors[*k].clone()).collect();
         let open: Vec<usize> = (0..self.dwells.len()).filter(|i| !barred[*i]).collect();
         let dwell = |i: &usize| PoolDwell {
@@ -204,7 +204,7 @@ impl Weighed {
             effects: kept.iter().map(|k| self.dwells[*i].effects[*k].clone()).collect(),
         };
         let dwells: Vec<PoolDwell> = open.iter().map(dwell).collect();
-        let plan = plan(&self.geometry, &self.precision, &survivors, &dwells, count, config);
+        let plan = plan(&self.geometry, &survivors, &dwells, count);
         let mut chosen: Vec<usize> = Vec::new();
         for i in plan.chosen.iter().map(|i| open[*i]) {
             if !chosen.contains(&i) {
@@ -220,41 +220,10 @@ impl Weighed {
         pairs.map(|(a, b)| self.apart(a, b, dwells)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Delta of a pair with these dwells, the smaller of both directions that there are.
+    /// Delta of a pair with these dwells.
     fn apart(&self, a: usize, b: usize, dwells: &[usize]) -> f64 {
-        [(a, b), (b, a)]
-            .into_iter()
-            .filter(|(true_one, _)| !self.survivors[*true_one].theta.is_empty())
-            .map(|(true_one, rival)| self.delta(true_one, rival, dwells))
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// `|(I - P) G theta|^2`: what the rival and the geometry leave of the true one's signature.
-    fn delta(&self, true_one: usize, rival: usize, dwells: &[usize]) -> f64 {
-        let size = self.geometry.ncols() + self.survivors[rival].columns.ncols();
-        let mut a = DMatrix::zeros(size, size);
-        for (j, precision) in self.precision.iter().enumerate() {
-            a[(j, j)] = *precision;
-        }
-        for j in self.precision.len()..size {
-            a[(j, j)] = AMPLITUDE_PRECISION;
-        }
-        let (mut b, mut c) = (DVector::zeros(size), 0.0);
-        let mut add = |geometry: &DMatrix<f64>, own: &DMatrix<f64>, other: &DMatrix<f64>| {
-            let mut x = DMatrix::zeros(geometry.nrows(), size);
-            x.columns_mut(0, geometry.ncols()).copy_from(geometry);
-            x.columns_mut(geometry.ncols(), other.ncols()).copy_from(other);
-            let signature = own * &self.survivors[true_one].theta;
-            a += x.tr_mul(&x);
-            b += x.tr_mul(&signature);
-            c += signature.norm_squared();
-        };
-        add(&self.geometry, &self.survivors[true_one].columns, &self.survivors[rival].columns);
-        for dwell in dwells.iter().map(|i| &self.dwells[*i]) {
-            add(&dwell.geometry, &dwell.effects[true_one], &dwell.effects[rival]);
-        }
-        let explained = a.cholesky().map_or(c, |a| b.dot(&a.solve(&b)));
-        (c - explained).max(0.0)
+        let dwells: Vec<&PoolDwell> = dwells.iter().map(|i| &self.dwells[*i]).collect();
+        apart(&self.geometry, &self.survivors, &dwells, (a, b))
     }
 }
 

@@ -4,9 +4,8 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story::with_effects;
-use armcal_calibrate::{Calibration, HoldoutConfig, calibrate};
+use armcal_calibrate::{Calibration, HeldOut, HoldoutConfig, calibrate, compare_heldout};
 use armcal_core::Observation;
-use armcal_diagnose::{HeldOut, compare_heldout};
 use armcal_model::{EffectSpec, Model};
 use serde::Serialize;
 
@@ -64,7 +63,7 @@ pub fn transfers(
     let transfer = |effect: &EffectSpec| {
         let held_out = match &all {
             Some(all) if effect.since.is_none() => {
-                compare_heldout(&calibrated(Some(effect))?, all, observations, &pipeline.diagnosis)
+                compare_heldout(&calibrated(Some(effect))?, all, observations, pipeline.diagnosis.flips())
             }
             _ => None,
         };

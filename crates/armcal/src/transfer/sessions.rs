@@ -11,9 +11,8 @@ use crate::progress::Progress;
 use crate::stages::past::{lasts, place_arms};
 use crate::stages::{frames, perceive};
 use crate::story::{self, Fitted, Settled, with_effects};
-use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_by_dwell};
 use armcal_core::{DwellId, Warning};
-use armcal_diagnose::{HeldOut, compare_errors, mean_by_dwell};
 use armcal_model::EffectSpec;
 use armcal_report::PastArms;
 use rayon::prelude::*;
@@ -103,7 +102,7 @@ pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer
     };
     let all = with(&effects)?;
     let compare = |before: &Errors, after: &Errors| {
-        let held_out = compare_errors(before, after, &judge.fitted.observations, &to.diagnosis);
+        let held_out = compare_errors(before, after, &judge.fitted.observations, to.diagnosis.flips());
         held_out.ok_or_else(|| Error::NothingToJudge { pipeline: to.name.clone() })
     };
     let carried = |effect: &EffectSpec| -> Result<Carried, Error> {

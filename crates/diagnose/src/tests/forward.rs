@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
+use crate::LinearRefit;
 use crate::problem::Columns;
-use crate::refit::LinearRefit;
 use crate::tests::{arm, in_rooms, outside, own, quick, room};
 use crate::weigh::weigh;
 use std::sync::Arc;

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
+use crate::LinearRefit;
 use crate::forward::tests::{beside, planted, strong, told};
 use crate::problem::{Columns, Problem};
-use crate::refit::LinearRefit;
 use crate::settle::settle;
 use crate::tests::{arm, in_rooms, own, quick};
 use crate::weigh::weigh;

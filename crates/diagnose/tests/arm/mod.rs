@@ -8,7 +8,9 @@ mod effects;
 pub use effects::{Effect, Listed, catalogue, on_joint, outside, torque};
 
 use armcal_core::{DwellId, FeatureId, Unit};
-use armcal_diagnose::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan, Toggle};
+use armcal_diagnose::{
+    Amplitude, Candidate, Channel, Columns, DiagnoseError, DwellRow, Part, Problem, Refit, Scan, Toggle,
+};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix4, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -408,4 +410,34 @@ pub fn overconfident(mut p: Problem, factor: f64) -> Problem {
     p.scans.iter_mut().flat_map(|s| &mut s.points).for_each(|c| scale(&mut c.columns, factor));
     p.channels.iter_mut().for_each(|c| c.columns = Arc::new(c.columns.as_ref() * factor));
     p
+}
+
+/// Stays with one linearisation: accepted columns join the geometry.
+#[derive(Debug, Clone)]
+pub struct LinearRefit {
+    base: Problem,
+}
+
+impl LinearRefit {
+    /// Around a problem.
+    pub fn new(base: Problem) -> LinearRefit {
+        LinearRefit { base }
+    }
+}
+
+impl Refit for LinearRefit {
+    fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
+        let mut problem = self.base.clone();
+        for candidate in accepted {
+            // By name: a candidate may come back with dwells cut out.
+            let own = self.base.candidates.iter().chain(self.base.scans.iter().flat_map(|s| &s.points));
+            let own = own.into_iter().find(|c| c.spec == candidate.spec).unwrap_or(candidate);
+            let columns = own.columns.dense(&problem.dwells, 1.0);
+            problem = problem.with_columns(&columns);
+        }
+        let taken = |c: &Candidate| accepted.iter().any(|a| a.spec == c.spec);
+        problem.candidates.retain(|c| !taken(c));
+        problem.scans.retain(|s| !s.points.iter().any(taken));
+        Ok(problem)
+    }
 }

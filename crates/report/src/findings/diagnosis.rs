@@ -2,6 +2,7 @@
 
 use super::{error_curve, finite, or_zero, short, shown_unlisted, steps};
 use crate::diagnosis_text::{channel_told, driver_told, headline};
+use crate::explanations::explanations;
 use crate::proto;
 use crate::run::{Answer, Run};
 use crate::sizes::{size_in_table, sizes, sizes_of};
@@ -17,8 +18,8 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         typical: n.typical.clone(),
         why: n.why.clone(),
     });
-    let explanations = d
-        .explanations
+    let told = explanations(d);
+    let explanations = told
         .iter()
         .map(|e| proto::Explanation { number: e.number.clone(), sentence: run.in_words(&e.sentence) });
     proto::Diagnosis {
@@ -33,9 +34,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
         record_next: for_viewer(d.record_next.iter().map(|r| run.in_words(r))),
         not_testable: not_testable.collect(),
         told: for_viewer(
-            d.explanations
-                .iter()
-                .map(|e| format!("{}: {}", names.number_label(&e.number), run.in_words(&e.sentence))),
+            told.iter().map(|e| format!("{}: {}", names.number_label(&e.number), run.in_words(&e.sentence))),
         ),
         explanations: explanations.collect(),
         cannot_tell_apart: (d.cannot_tell_apart.iter())

@@ -5,8 +5,8 @@ use crate::channels::count;
 use crate::points::Point;
 use crate::proto::JointErrors;
 use crate::run::Run;
+use armcal_calibrate::{BLURRED, ImpliedError, implied_joint_errors};
 use armcal_core::robust::median;
-use armcal_diagnose::{BLURRED, ImpliedError, implied_joint_errors};
 use nalgebra::Vector3;
 
 const DEGREES: &str = "deg";

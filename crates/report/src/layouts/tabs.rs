@@ -138,13 +138,11 @@ fn numbers(f: &Findings) -> Option<Content> {
     if f.told_found > 0 {
         panels.push((2.0, raw("What was found, in full", "/armcal/story.found")));
     }
-    if !d.explanations.is_empty() {
-        panels.push((3.5, raw("The numbers, one by one", "/armcal/diagnosis.told")));
-    }
+    panels.push((3.5, raw("The numbers, one by one", "/armcal/diagnosis.told")));
     if !d.not_testable.is_empty() {
         panels.push((2.5, table("What these data could not have shown", "/armcal/diagnosis.not_testable")));
     }
-    (!panels.is_empty()).then_some(Content::Split(Column, panels))
+    Some(Content::Split(Column, panels))
 }
 
 pub(super) fn parameters(calibration: &Calibration) -> Content {

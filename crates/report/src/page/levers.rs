@@ -6,10 +6,9 @@
 use super::basis::joint_units;
 use crate::findings::moves_tip;
 use crate::run::Run;
-use armcal_calibrate::PositionNoise;
+use armcal_calibrate::{BLURRED, PositionNoise, implied_joint_errors};
 use armcal_core::Observation;
 use armcal_core::robust::median;
-use armcal_diagnose::{BLURRED, implied_joint_errors};
 use nalgebra::Vector3;
 use serde::Serialize;
 

@@ -29,6 +29,7 @@ pub(crate) use numbers::Column;
 use crate::ReportError;
 use crate::by_marker::{MarkerErrors, by_marker};
 use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, unlisted};
+use crate::explanations::{Explanation, explanations, nested_sentence};
 use crate::findings::shown_unlisted;
 use crate::run::{Refit, Run};
 use crate::sizes::sizes_of;
@@ -38,7 +39,7 @@ use crate::told_warning::ToldWarning;
 use crate::two_arms::about;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
-use armcal_diagnose::{Explanation, FoundEffect, Nested, NotTestable};
+use armcal_diagnose::{FoundEffect, NotTestable};
 use askama::Template;
 use document::Document;
 use shell::Shell;
@@ -134,7 +135,7 @@ fn verdict(run: &Run) -> Verdict {
         found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
             .chain(shown_unlisted(d).map(unlisted))
             .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
-            .chain(d.nested.iter().map(Nested::sentence))
+            .chain(d.nested.iter().map(nested_sentence))
             .map(|said| run.in_words(&said))
             .collect(),
         paste: shown_unlisted(d).map(pasted).filter(|table| !table.is_empty()).collect(),
@@ -142,7 +143,7 @@ fn verdict(run: &Run) -> Verdict {
         unseen: (d.not_testable.iter().cloned())
             .map(|n| NotTestable { effect: names.label(&n.effect), ..n })
             .collect(),
-        explanations: (d.explanations.iter())
+        explanations: (explanations(d).into_iter())
             .map(|e| Explanation {
                 number: names.number_label(&e.number),
                 sentence: run.in_words(&e.sentence),

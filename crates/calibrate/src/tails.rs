@@ -1,18 +1,18 @@
-//! Tail probabilities in logarithms: p-values of real data underflow, and ranks must not tie.
+//! Tail probabilities, those that underflow for real data in logarithms: ranks must not tie.
 
 use statrs::function::beta::{beta_reg, ln_beta};
 use statrs::function::gamma::gamma_ur;
 
-/// Normal quantiles z(0.975) and z(0.8).
-pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
-/// Power of 80 %.
-pub(crate) const Z_80: f64 = 0.841_621_233_572_914_4;
+/// Normal quantile z(0.975): half the width of a 95 % interval in standard errors.
+pub const Z_975: f64 = 1.959_963_984_540_054;
+/// Normal quantile z(0.8): a power of 80 %.
+pub const Z_80: f64 = 0.841_621_233_572_914_4;
 
 /// ln P(F > f) of the F distribution with `m`, `n` degrees of freedom.
 ///
 /// `P = I_x(n/2, m/2)`, x = n/(n + m f); for small x by the continued fraction of the incomplete beta function
 /// (DLMF 8.17.22) with its prefactor kept in logarithms.
-pub(crate) fn ln_f_tail(f: f64, m: f64, n: f64) -> f64 {
+pub fn ln_f_tail(f: f64, m: f64, n: f64) -> f64 {
     if f.is_nan() || f <= 0.0 || m <= 0.0 || n <= 0.0 {
         return 0.0;
     }
@@ -51,12 +51,12 @@ fn beta_fraction(a: f64, b: f64, x: f64) -> f64 {
 }
 
 /// P(chi-square with `k` degrees of freedom > x).
-pub(crate) fn chi2_tail(x: f64, k: f64) -> f64 {
+pub fn chi2_tail(x: f64, k: f64) -> f64 {
     if x.is_nan() || x <= 0.0 { 1.0 } else { gamma_ur(0.5 * k, 0.5 * x) }
 }
 
 /// ln of the sum of exponentials; negative infinity for nothing.
-pub(crate) fn ln_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
+pub fn ln_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().collect();
     let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if top == f64::NEG_INFINITY {

@@ -7,8 +7,9 @@
 //! over visits to one pose (of a seated tip in one cavity) that came the same way in one recording (ISO 9283 asks for one direction of
 //! approach): whatever a model does not know is the same in all of these.
 
-use crate::places::poses;
-use armcal_calibrate::Calibration;
+use crate::alike::AlikePoses;
+use crate::outcome::Calibration;
+use crate::poses::SAME_POSE_RAD;
 use armcal_core::{Arrival, FeatureId, Observation};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -18,15 +19,19 @@ use std::f64::consts::PI;
 const FEWEST: usize = 8;
 
 /// Mean error that repeatability alone gives, as the residuals of a calibration have it [m]; none where too little was revisited.
-pub(crate) fn repeatability_m(calibration: &Calibration, observations: &[Observation]) -> Option<f64> {
+pub fn repeatability_m(calibration: &Calibration, observations: &[Observation]) -> Option<f64> {
+    of_errors(observations, calibration.residuals.iter().map(|r| r.fitted_m))
+}
+
+/// The same of errors in the world [m], one an observation.
+fn of_errors(observations: &[Observation], errors_m: impl Iterator<Item = Vector3<f64>>) -> Option<f64> {
     let mut visits: BTreeMap<(usize, usize, FeatureId, String), Vec<Vector3<f64>>> = BTreeMap::new();
-    let each = poses(observations).into_iter().zip(observations).zip(&calibration.residuals);
-    for ((pose, o), residual) in each.filter(|((_, o), _)| o.position_rows() == 3) {
+    let mut poses = AlikePoses::within(SAME_POSE_RAD);
+    let pose = |o: &Observation| poses.group_of(&o.joint_rad);
+    let each = observations.iter().map(pose).zip(observations).zip(errors_m);
+    for ((pose, o), error_m) in each.filter(|((_, o), _)| o.position_rows() == 3) {
         let came = o.arrival.iter().map(Arrival::symbol).chain(o.cavity().unwrap_or_default().chars());
-        visits
-            .entry((o.dwell.recording, pose, o.feature, came.collect()))
-            .or_default()
-            .push(residual.fitted_m);
+        visits.entry((o.dwell.recording, pose, o.feature, came.collect())).or_default().push(error_m);
     }
     let (mut square_m2, mut more) = (0.0, 0);
     for errors_m in visits.values() {

@@ -6,7 +6,7 @@
 //! p-value exactly where signs are exchangeable (Hemerik and Goeman, TEST 27:811, 2018, theorems 1 and 2: a group, or draws
 //! from one without repetition); any two clusters agree in half of them. And all sums are one fast transform, `2^k k` additions.
 
-use crate::config::DiagnosisConfig;
+use crate::sign_flips::SignFlips;
 use nalgebra::DMatrix;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -16,26 +16,34 @@ use rand_chacha::ChaCha8Rng;
 const FEWEST: usize = 12;
 
 /// What each cluster is multiplied by in every resampling.
-pub(crate) enum Signs {
+#[derive(Debug, Clone)]
+pub enum Signs {
     /// Weights: clusters x resamplings.
     Webb(DMatrix<f64>),
     /// The place of each cluster among so many, and the function of each resampling.
-    Walsh { order: usize, places: Vec<usize>, functions: Vec<usize> },
+    Walsh {
+        /// Number of places, and of functions: a power of two.
+        order: usize,
+        /// Of each cluster.
+        places: Vec<usize>,
+        /// Of each resampling.
+        functions: Vec<usize>,
+    },
 }
 
 impl Signs {
     /// Of so many clusters; drawn from a stream of the seed's own, so threads do not matter.
-    pub fn new(clusters: usize, config: &DiagnosisConfig) -> Signs {
-        let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+    pub fn new(clusters: usize, flips: SignFlips) -> Signs {
+        let mut rng = ChaCha8Rng::seed_from_u64(flips.seed);
         if clusters < FEWEST {
             let points = [1.5f64, 1.0, 0.5].map(f64::sqrt);
             let mut weight = |_, _| {
                 let k = rng.random_range(0..6usize);
                 if k < 3 { points[k] } else { -points[k - 3] }
             };
-            return Signs::Webb(DMatrix::from_fn(clusters, config.resamplings, &mut weight));
+            return Signs::Webb(DMatrix::from_fn(clusters, flips.draws, &mut weight));
         }
-        let order = (config.resamplings + 1).max(clusters).next_power_of_two();
+        let order = (flips.draws + 1).max(clusters).next_power_of_two();
         let mut drawn = |from: usize, count: usize| {
             let mut all: Vec<usize> = (from..order).collect();
             all.shuffle(&mut rng);
@@ -44,7 +52,7 @@ impl Signs {
         };
         let places = drawn(0, clusters);
         // The first function multiplies by one: it is what was observed.
-        Signs::Walsh { order, places, functions: drawn(1, config.resamplings) }
+        Signs::Walsh { order, places, functions: drawn(1, flips.draws) }
     }
 
     /// Sums over the clusters, each with its sign: rows of `clusters` numbers become rows x resamplings.
@@ -90,7 +98,7 @@ mod tests {
     use super::*;
 
     fn signs(clusters: usize, resamplings: usize) -> Signs {
-        Signs::new(clusters, &DiagnosisConfig { resamplings, seed: 5, ..DiagnosisConfig::default() })
+        Signs::new(clusters, SignFlips { draws: resamplings, seed: 5 })
     }
 
     /// Each cluster alone: clusters x resamplings.
@@ -139,10 +147,7 @@ mod tests {
 
     #[test]
     fn another_seed_draws_other_signs() {
-        let of = |seed| {
-            let config = DiagnosisConfig { seed, ..DiagnosisConfig::default() };
-            table(&Signs::new(40, &config), 40)
-        };
+        let of = |seed| table(&Signs::new(40, SignFlips { draws: 999, seed }), 40);
         assert_eq!(of(1), of(1));
         assert_ne!(of(1), of(2));
     }

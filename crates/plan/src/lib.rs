@@ -11,16 +11,30 @@
 //! which is formula (11) one dwell at a time. The greedy choice (T-optimality: Atkinson and Fedorov 1975, symmetric as
 //! in Harman and Mueller 2017) adds the dwell that helps most over all ordered pairs, each pair counting until it is
 //! settled.
+//!
+//! `J`, `G` and rows of dwells are whitened: in standard deviations of the declared noise, geometry by its parameters,
+//! effects by amplitudes in typical sizes. So `Delta` has no unit, and none of it knows of arms.
 
-use crate::config::DiagnosisConfig;
-use crate::crossval::EFFECT_PRECISION;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+
+/// Precision of an amplitude's prior, in typical sizes: ten of them, so that it hardly holds it back.
+pub const AMPLITUDE_PRECISION: f64 = 0.01;
 
 /// A pair at this Delta is settled with about 95 % certainty; more does not count.
 const SETTLED: f64 = 20.0;
+/// A dwell that adds less than this to all pairs together is not worth the time.
+const NOTHING_GAINED: f64 = 1e-3;
 
-/// One of the explanations that survived.
+/// What the data at hand say of the parameters that are free under every explanation.
+#[derive(Debug, Clone)]
+pub struct Geometry {
+    /// Whitened columns on the data.
+    pub columns: DMatrix<f64>,
+    /// Prior precision of each.
+    pub precision: DVector<f64>,
+}
+
+/// One of the explanations that survived. One without columns stands for "nothing": it is a rival, never the truth.
 #[derive(Debug, Clone)]
 pub struct Survivor {
     /// Its name.
@@ -34,66 +48,29 @@ pub struct Survivor {
 /// A dwell that could be recorded.
 #[derive(Debug, Clone)]
 pub struct PoolDwell {
-    /// Whitened geometry rows, columns as in the problem.
+    /// Whitened geometry rows, columns as in the data.
     pub geometry: DMatrix<f64>,
     /// Whitened rows of each survivor, columns as there.
     pub effects: Vec<DMatrix<f64>>,
 }
 
 /// What to record and how much it tells.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Chosen dwells of the pool, the most telling first.
     pub chosen: Vec<usize>,
-    /// How far each pair is apart.
-    pub pairs: Vec<PlannedPair>,
     /// Smallest Delta over all pairs after each chosen dwell.
     pub smallest_delta: Vec<f64>,
-    /// One sentence.
-    pub sentence: String,
-}
-
-/// A pair of explanations, before and after the proposed dwells.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PlannedPair {
-    /// The explanations.
-    pub names: [String; 2],
-    /// Delta with the data at hand, the smaller of both directions.
-    pub delta_before: f64,
-    /// Delta expected with the proposed dwells.
-    pub delta_after: f64,
-    /// Whether any motion of the pool tells them apart.
-    pub separable: bool,
-}
-
-/// One ordered pair: k true at its size, l fitted instead.
-struct Rivalry {
-    k: usize,
-    l: usize,
-    inverse: DMatrix<f64>,
-    beta: DVector<f64>,
-    delta: f64,
 }
 
 /// Proposes up to `count` dwells of a pool.
-///
-/// `geometry` and `precision`: whitened columns of the free parameters on the data at hand, as in a
-/// [`Problem`](crate::Problem). A survivor without columns stands for "nothing": it is a rival, never the truth.
-pub fn plan(
-    geometry: &DMatrix<f64>,
-    precision: &DVector<f64>,
-    survivors: &[Survivor],
-    pool: &[PoolDwell],
-    count: usize,
-    config: &DiagnosisConfig,
-) -> Plan {
+pub fn plan(geometry: &Geometry, survivors: &[Survivor], pool: &[PoolDwell], count: usize) -> Plan {
     let mut rivalries = Vec::new();
     for k in 0..survivors.len() {
         for l in (0..survivors.len()).filter(|l| *l != k && !survivors[k].theta.is_empty()) {
-            rivalries.push(Rivalry::new(geometry, precision, survivors, k, l));
+            rivalries.push(Rivalry::new(geometry, survivors, k, l));
         }
     }
-    let before: Vec<f64> = rivalries.iter().map(|r| r.delta).collect();
     let (mut chosen, mut smallest_delta) = (Vec::new(), Vec::new());
     while chosen.len() < count && rivalries.iter().any(|r| r.delta < SETTLED) {
         let gain = |dwell: &PoolDwell| -> f64 {
@@ -106,77 +83,85 @@ pub fn plan(
         let Some(best) = (0..pool.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b]).then(b.cmp(a))) else {
             break;
         };
-        if gains[best].is_nan() || gains[best] < 1e-3 {
+        if gains[best].is_nan() || gains[best] < NOTHING_GAINED {
             break;
         }
         rivalries.iter_mut().for_each(|r| r.add(&pool[best], survivors));
         chosen.push(best);
         smallest_delta.push(rivalries.iter().map(|r| r.delta).fold(f64::INFINITY, f64::min));
     }
-    let pairs = pairs(survivors, &rivalries, &before, config);
-    let sentence = sentence(&pairs, chosen.len(), config);
-    Plan { chosen, pairs, smallest_delta, sentence }
+    Plan { chosen, smallest_delta }
 }
 
-fn pairs(
+/// Delta of a pair with some dwells of the pool beside the data, the smaller of both directions that there are; infinite
+/// where there is none.
+pub fn apart(
+    geometry: &Geometry,
     survivors: &[Survivor],
-    rivalries: &[Rivalry],
-    before: &[f64],
-    config: &DiagnosisConfig,
-) -> Vec<PlannedPair> {
-    let mut pairs = Vec::new();
-    for (i, r) in rivalries.iter().enumerate() {
-        let back = rivalries.iter().position(|o| o.k == r.l && o.l == r.k).unwrap_or(i);
-        if back < i {
-            continue;
-        }
-        let delta_after = r.delta.min(rivalries[back].delta);
-        pairs.push(PlannedPair {
-            names: [survivors[r.k].name.clone(), survivors[r.l].name.clone()],
-            delta_before: before[i].min(before[back]),
-            delta_after,
-            separable: delta_after >= config.min_delta,
-        });
-    }
-    pairs
+    dwells: &[&PoolDwell],
+    (a, b): (usize, usize),
+) -> f64 {
+    [(a, b), (b, a)]
+        .into_iter()
+        .filter(|(true_one, _)| !survivors[*true_one].theta.is_empty())
+        .map(|(true_one, rival)| delta(geometry, survivors, dwells, true_one, rival))
+        .fold(f64::INFINITY, f64::min)
 }
 
-fn sentence(pairs: &[PlannedPair], dwells: usize, config: &DiagnosisConfig) -> String {
-    let stuck: Vec<String> = pairs.iter().filter(|p| !p.separable).map(|p| p.names.join(" and ")).collect();
-    let rest = match stuck.is_empty() {
-        true => String::new(),
-        false => format!(
-            "no motion will tell {} apart (expected log-likelihood ratio below {}): put a marker on the base or on a link, \
-             or measure a motor current",
-            stuck.join("; "),
-            config.min_delta / 2.0
-        ),
-    };
-    match (pairs.is_empty(), dwells) {
-        (true, _) => "there is only one explanation; nothing is left to tell apart".to_string(),
-        (false, 0) if stuck.is_empty() => "the data at hand tell the explanations apart already".to_string(),
-        (false, _) if stuck.len() == pairs.len() => rest,
-        (false, _) => {
-            let told = format!("{dwells} more dwells tell the explanations apart");
-            if rest.is_empty() { told } else { format!("{told}, except: {rest}") }
-        }
+/// `|(I - P) G theta|^2`: what the rival and the geometry leave of the true one's signature.
+fn delta(
+    geometry: &Geometry,
+    survivors: &[Survivor],
+    dwells: &[&PoolDwell],
+    true_one: usize,
+    rival: usize,
+) -> f64 {
+    let size = geometry.columns.ncols() + survivors[rival].columns.ncols();
+    let mut a = DMatrix::zeros(size, size);
+    for j in 0..size {
+        a[(j, j)] = geometry.precision_of(j);
     }
+    let (mut b, mut c) = (DVector::zeros(size), 0.0);
+    let mut add = |geometry: &DMatrix<f64>, own: &DMatrix<f64>, other: &DMatrix<f64>| {
+        let x = joined(geometry, other);
+        let signature = own * &survivors[true_one].theta;
+        a += x.tr_mul(&x);
+        b += x.tr_mul(&signature);
+        c += signature.norm_squared();
+    };
+    add(&geometry.columns, &survivors[true_one].columns, &survivors[rival].columns);
+    for dwell in dwells {
+        add(&dwell.geometry, &dwell.effects[true_one], &dwell.effects[rival]);
+    }
+    let explained = a.cholesky().map_or(c, |a| b.dot(&a.solve(&b)));
+    (c - explained).max(0.0)
+}
+
+impl Geometry {
+    /// Prior precision of column `j`, those of an effect after those of the geometry.
+    fn precision_of(&self, j: usize) -> f64 {
+        self.precision.get(j).copied().unwrap_or(AMPLITUDE_PRECISION)
+    }
+}
+
+/// One ordered pair: k true at its size, l fitted instead.
+struct Rivalry {
+    k: usize,
+    l: usize,
+    /// `A^-1`.
+    inverse: DMatrix<f64>,
+    /// `A^-1 b`.
+    beta: DVector<f64>,
+    delta: f64,
 }
 
 impl Rivalry {
-    fn new(
-        geometry: &DMatrix<f64>,
-        precision: &DVector<f64>,
-        survivors: &[Survivor],
-        k: usize,
-        l: usize,
-    ) -> Rivalry {
-        let x = joined(geometry, &survivors[l].columns);
+    fn new(geometry: &Geometry, survivors: &[Survivor], k: usize, l: usize) -> Rivalry {
+        let x = joined(&geometry.columns, &survivors[l].columns);
         let signature = &survivors[k].columns * &survivors[k].theta;
         let mut a = x.tr_mul(&x);
-        let p = geometry.ncols();
         for j in 0..a.nrows() {
-            a[(j, j)] += if j < p { precision[j] } else { EFFECT_PRECISION };
+            a[(j, j)] += geometry.precision_of(j);
         }
         let size = a.nrows();
         let inverse = a.cholesky().map_or_else(|| DMatrix::zeros(size, size), |c| c.inverse());
@@ -212,9 +197,14 @@ impl Rivalry {
     }
 }
 
+/// Columns side by side.
 fn joined(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(a.nrows(), a.ncols() + b.ncols());
     all.columns_mut(0, a.ncols()).copy_from(a);
     all.columns_mut(a.ncols(), b.ncols()).copy_from(b);
     all
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
+mod tests;

@@ -3,28 +3,26 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::conclude::tests::{erring, observations};
+use armcal_core::{DwellId, Reference};
 
 /// A visit: the place, whether it came forwards, the recording, what it erred [mm].
 type Visit = (usize, bool, usize, [f64; 3]);
 
 /// The mean error [mm] that is learnt of these visits.
 fn learnt(visits: &[Visit]) -> Option<f64> {
-    let mut c = erring(1.0, 1.0);
-    let poses = observations();
     let seen: Vec<Observation> = (visits.iter().enumerate())
         .map(|(dwell, (place, forwards, recording, _))| {
-            let mut o = poses[2 * place].clone();
-            o.dwell = armcal_core::DwellId { recording: *recording, dwell };
-            o.arrival = vec![if *forwards { Arrival::Positive } else { Arrival::Negative }; 3];
-            o
+            let joint_rad = vec![0.1 * *place as f64, 1.5 - 0.06 * *place as f64, 0.0];
+            let id = DwellId { recording: *recording, dwell };
+            let arrival = if *forwards { Arrival::Positive } else { Arrival::Negative };
+            Observation {
+                arrival: vec![arrival; 3],
+                ..Observation::bare(id, joint_rad, Reference::position(Vector3::zeros()))
+            }
         })
         .collect();
-    c.residuals.truncate(visits.len());
-    for (residual, (.., error_mm)) in c.residuals.iter_mut().zip(visits) {
-        residual.fitted_m = Vector3::from(*error_mm) * 1e-3;
-    }
-    repeatability_m(&c, &seen).map(|m| m * 1e3)
+    let errors_m = visits.iter().map(|(.., error_mm)| Vector3::from(*error_mm) * 1e-3);
+    of_errors(&seen, errors_m).map(|m| m * 1e3)
 }
 
 /// Visits `n` times to each place, one after the other, each off by an error of the place and one of its own.

@@ -1,6 +1,6 @@
 //! Poses that are alike, found through cells, against asking every one before.
 
-use super::Alike;
+use super::AlikePoses;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -15,7 +15,7 @@ fn each_pose_is_with_the_first_one_before_it_that_is_alike() {
         let poses: Vec<Vec<f64>> =
             (0..600).map(|_| (0..joints).map(|_| rng.random_range(-span..span)).collect()).collect();
         let mut first: Vec<&[f64]> = Vec::new();
-        let mut alike = Alike::within(REACH_RAD);
+        let mut alike = AlikePoses::within(REACH_RAD);
         for pose in &poses {
             let is_alike = |other: &&[f64]| other.iter().zip(pose).all(|(a, b)| (a - b).abs() < REACH_RAD);
             let expected = first.iter().position(is_alike).unwrap_or_else(|| {
@@ -26,6 +26,6 @@ fn each_pose_is_with_the_first_one_before_it_that_is_alike() {
         }
         assert!(first.len() > 10 && first.len() < 550, "{joints} joints: {} groups", first.len());
     }
-    let mut alike = Alike::within(REACH_RAD);
+    let mut alike = AlikePoses::within(REACH_RAD);
     assert_eq!([[].as_slice(), &[0.0], &[f64::NAN], &[0.01]].map(|pose| alike.group_of(pose)), [0, 1, 2, 1]);
 }

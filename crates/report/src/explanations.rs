@@ -1,10 +1,20 @@
 //! Each number of the verdict in one plain sentence.
 
-use crate::config::DiagnosisConfig;
-use crate::diagnosis::{Diagnosis, Explanation, FoundEffect, Unexplained, Verdict};
+use armcal_diagnose::{Diagnosis, FoundEffect, Nested, Unexplained, Verdict};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A number of the verdict, in a plain sentence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Explanation {
+    /// Which number: `probability`, `p_adjusted`.
+    pub number: String,
+    /// What it says.
+    pub sentence: String,
+}
 
 /// Sentences for the verdict and its numbers.
-pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Explanation> {
+pub(crate) fn explanations(d: &Diagnosis) -> Vec<Explanation> {
     let mut all = Vec::new();
     let mut say = |number: &str, sentence: String| {
         all.push(Explanation { number: number.to_string(), sentence });
@@ -24,8 +34,8 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
              convincing in a share {:.3} of data sets ({} sign-flipped copies; a name needs at most {})",
             d.candidates.len(),
             d.p_adjusted,
-            config.resamplings,
-            config.max_p_adjusted
+            d.gate.resamplings,
+            d.gate.max_p_adjusted
         ),
     );
     for e in &d.effects {
@@ -94,7 +104,34 @@ pub(crate) fn explanations(d: &Diagnosis, config: &DiagnosisConfig) -> Vec<Expla
             ),
         );
     }
+    let not_chosen_again = d.not_chosen_again.iter();
+    let chosen_again =
+        d.nested.iter().map(nested_sentence).chain(
+            not_chosen_again.map(|why| format!("not chosen again without the held-out points: {why}")),
+        );
+    chosen_again.for_each(|sentence| say("nested", sentence));
     all
+}
+
+/// What a choice is worth on points that had no part in it, in one sentence without its capital.
+pub fn nested_sentence(nested: &Nested) -> String {
+    let turns = nested.chosen.len();
+    // The order in which they were found is no other choice.
+    let named = |effects: &Vec<String>| {
+        let mut names = effects.clone();
+        names.sort();
+        if names.is_empty() { "nothing".to_owned() } else { names.join(" + ") }
+    };
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    nested.chosen.iter().for_each(|effects| *counts.entry(named(effects)).or_default() += 1);
+    let chosen: Vec<String> =
+        counts.iter().map(|(names, count)| format!("{names} in {count} of {turns}")).collect();
+    format!(
+        "chosen without the held-out points ({}), it {}; chosen with them, to {:.3} mm",
+        chosen.join(", "),
+        nested.held_out.change_text(),
+        nested.chosen_on_all_mm
+    )
 }
 
 fn verdict(d: &Diagnosis) -> String {
@@ -182,4 +219,24 @@ fn effect(e: &FoundEffect, say: &mut dyn FnMut(&str, String)) {
 /// A probability, small ones as what they are below.
 fn probability(p: f64) -> String {
     if p < 5e-4 { "less than 0.001".to_owned() } else { format!("{p:.3}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nested_sentence;
+    use armcal_calibrate::HeldOut;
+    use armcal_diagnose::Nested;
+
+    #[test]
+    fn a_choice_made_again_is_counted_whatever_the_order_of_its_effects() {
+        let turns = [vec!["backlash:2", "scale:1"], vec!["scale:1", "backlash:2"], vec![]];
+        let held_out =
+            HeldOut { before: 1.0, after: 0.9, change_ci95: [-0.3, 0.1], gain: 0.1, p: 0.5, groups: 12 };
+        let chosen = turns.map(|effects| effects.into_iter().map(str::to_owned).collect()).to_vec();
+        assert_eq!(
+            nested_sentence(&Nested { held_out, chosen_on_all_mm: 0.8, chosen }),
+            "chosen without the held-out points (backlash:2 + scale:1 in 2 of 3, nothing in 1 of 3), it changes the mean error there \
+             from 1.000 to 0.900 mm (95 % -0.300 to +0.100); chosen with them, to 0.800 mm"
+        );
+    }
 }

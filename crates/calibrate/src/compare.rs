@@ -1,9 +1,9 @@
 //! Before against after, on dwells that neither fit saw.
 
-use crate::config::DiagnosisConfig;
-use crate::crossval::sign_flip;
 use crate::held_out::HeldOut;
-use armcal_calibrate::{Calibration, grouped_ci95};
+use crate::outcome::Calibration;
+use crate::paired::grouped_ci95;
+use crate::sign_flips::SignFlips;
 use armcal_core::{DwellId, Observation};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,13 +18,13 @@ pub fn compare_heldout(
     before: &Calibration,
     after: &Calibration,
     observations: &[Observation],
-    config: &DiagnosisConfig,
+    flips: SignFlips,
 ) -> Option<HeldOut> {
-    compare_errors(&held_out_errors_m(before), &held_out_errors_m(after), observations, config)
+    compare_errors(&held_out_errors_m(before), &held_out_errors_m(after), observations, flips)
 }
 
 /// Errors of a calibration on the dwells that were held out of it, by dwell [m]: the mean over what was measured in it.
-pub(crate) fn held_out_errors_m(calibration: &Calibration) -> BTreeMap<DwellId, f64> {
+pub fn held_out_errors_m(calibration: &Calibration) -> BTreeMap<DwellId, f64> {
     let held_out = calibration.residuals.iter().filter(|r| r.held_out);
     mean_by_dwell(held_out.map(|r| (r.dwell, r.fitted_m.norm())))
 }
@@ -44,7 +44,7 @@ pub fn compare_errors(
     before: &BTreeMap<DwellId, f64>,
     after: &BTreeMap<DwellId, f64>,
     observations: &[Observation],
-    config: &DiagnosisConfig,
+    flips: SignFlips,
 ) -> Option<HeldOut> {
     let mut place: BTreeMap<DwellId, String> =
         observations.iter().filter_map(|o| Some((o.dwell, o.cavity()?.to_string()))).collect();
@@ -73,7 +73,7 @@ pub fn compare_errors(
         after: pairs.iter().map(|p| p.1).sum::<f64>() / n,
         change_ci95: grouped_ci95(&changes),
         gain: 1.0 - square(|p| p.1) / square(|p| p.0).max(1e-300),
-        p: sign_flip(&falls, config),
+        p: flips.p(&falls),
         groups: groups.len(),
     })
 }

@@ -10,7 +10,7 @@
 //! gear, a line over torque for compliance. Each joint explains the residual as if it were alone, so an error of one
 //! joint also appears, weaker, in the others that can move the tip the same way.
 
-use armcal_calibrate::PositionNoise;
+use crate::PositionNoise;
 use armcal_core::Observation;
 use armcal_model::Model;
 use nalgebra::Vector3;
@@ -60,9 +60,22 @@ pub fn implied_joint_errors(
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
 mod tests {
     use super::*;
-    use crate::tests::planar_arm;
     use armcal_core::{DwellId, Reference};
+    use armcal_model::{Chain, Frames};
     use nalgebra::Matrix3;
+
+    /// A planar arm of two links and a wrist that turns about its own axis, through the tip.
+    fn planar_arm() -> Model {
+        let row = |name: &str, a_mm: f64| {
+            format!(
+                "[[rows]]\nname = \"{name}\"\ntheta_deg = 0.0\nd_mm = 0.0\na_mm = {a_mm:.1}\nalpha_deg = 0.0\n"
+            )
+        };
+        let rows = [("joint1", 400.0), ("joint2", 300.0), ("wrist", 0.0)].map(|(name, a_mm)| row(name, a_mm));
+        let text = format!("name = \"planar\"\n{}", rows.concat());
+        let chain = Chain::from_dh_toml(&text, std::path::Path::new("arm.toml")).unwrap();
+        Model::new(chain, Frames::of_bare_arm()).unwrap()
+    }
 
     fn seen(joint_rad: &[f64], position_m: Vector3<f64>) -> Observation {
         let id = DwellId { recording: 0, dwell: 0 };

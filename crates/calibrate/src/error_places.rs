@@ -35,9 +35,13 @@ pub struct ErrorPlace {
 }
 
 /// The error of one dwell, and what the declared noise would give.
-pub(crate) struct DwellError<'a> {
+#[derive(Debug, Clone, Copy)]
+pub struct DwellError<'a> {
+    /// What was observed in it.
     pub observation: &'a Observation,
+    /// Its error [m].
     pub error_m: f64,
+    /// The mean error that the declared noise alone would give there [m].
     pub expected_m: f64,
 }
 
@@ -49,7 +53,7 @@ impl DwellError<'_> {
 
 /// Where the errors are largest against what noise would give, the clearest place first. Dwells with larger noise are
 /// no places: errors are compared in units of their own expectation, as logarithms, so that no single one decides.
-pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) -> Vec<ErrorPlace> {
+pub fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) -> Vec<ErrorPlace> {
     let log: Vec<f64> = errors.iter().map(DwellError::ln_times_noise).collect();
     let mut found: Vec<(f64, ErrorPlace)> = Vec::new();
     for (place, members) in groups(errors, joint_names) {
@@ -73,7 +77,7 @@ pub(crate) fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) ->
 
 /// The few gross dwells for which alone the mean error is not within `floor_factor` of what noise would give; none where it is, or
 /// where that of the others is not either.
-pub(crate) fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<ErrorPlace> {
+pub fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<ErrorPlace> {
     let dwells_of = |of: &mut dyn Iterator<Item = &DwellError<'_>>| {
         of.map(|e| e.observation.dwell).collect::<BTreeSet<DwellId>>()
     };
