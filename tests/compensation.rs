@@ -146,7 +146,7 @@ fn compensated_set_points_reach_their_targets_in_the_rig_that_was_calibrated() {
         let files = ["effects", "geometry", "effects"].map(|result| format!("{result}-{of}.csv"));
         [0, 1, 2].map(|k| off(first + k, &files[k]))
     });
-    println!("commanded against reached [mm]: mean (largest); noise floor of the calibration {floor:.3}");
+    println!("commanded against reached [mm]: mean (largest); declared noise of the calibration {floor:.3}");
     for (what, rows) in [("stops", stops), ("path", path)] {
         let [nominal, geometry, effects] = rows.map(|[mean, most]| format!("{mean:.3} ({most:.3})"));
         println!("{what:6} nominal {nominal}, geometry {geometry}, with effects {effects}");

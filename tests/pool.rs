@@ -154,7 +154,7 @@ fn results_of_six_days_are_pooled_into_what_one_fit_of_their_recordings_gives() 
 
     let unseen_mm = number(&week.pooled, "/transfer/unseen/fitted_mm/mean");
     let floor_mm = number(&week.pooled, "/transfer/noise_floor_mm");
-    println!("as a new day: {unseen_mm:.3} mm, noise floor {floor_mm:.3} mm");
+    println!("as a new day: {unseen_mm:.3} mm, declared noise {floor_mm:.3} mm");
     assert!(unseen_mm < 1.3 * floor_mm);
     for (recording, (day, ..)) in week.pooled["recordings"].as_array().expect("recordings").iter().zip(DAYS) {
         assert_eq!(recording["name"], day);

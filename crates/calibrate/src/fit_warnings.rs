@@ -99,7 +99,7 @@ pub(crate) fn above_floor(calibration: &Calibration) -> Option<Warning> {
         return None;
     }
     let message = format!(
-        "the mean error of {:.3} mm is {:.1} times the noise floor of {:.3} mm: an effect is missing from the model, the \
+        "the mean error of {:.3} mm is {:.1} times what the declared noise gives ({:.3} mm): an effect is missing from the model, the \
          setup is not as declared, or the noise is declared too small",
         calibration.judged().fitted.mean_m * 1e3,
         calibration.times_floor(),

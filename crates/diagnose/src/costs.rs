@@ -9,7 +9,7 @@ const IMPOSSIBLE: usize = 2;
 const UNLISTED: usize = 4;
 
 /// Costs in a room [nats]: [`DiagnosisConfig::margin_nats`] for each amplitude, and -ln of the prior, which the entries of the
-/// catalogue, and what is not listed, share evenly.
+/// catalogue, and what is not listed, share evenly, and the values of a shape that was searched share that of their entry.
 #[derive(Clone, Copy)]
 pub(crate) struct Costs<'r> {
     pub room: &'r Room,
@@ -30,7 +30,7 @@ impl Costs<'_> {
         let weighed = &self.room.weighed;
         let impossible = !self.room.judge(k, self.config).impossible.is_empty();
         let amplitudes = weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 };
-        self.of(amplitudes, self.config.prior_catalogue, weighed.entries.len())
+        self.of(amplitudes, self.config.prior_catalogue, weighed.entries.len() * weighed.entries[k].tried)
     }
 
     fn of(self, amplitudes: usize, prior: f64, count: usize) -> f64 {

@@ -17,7 +17,7 @@ pub(crate) const EFFECT_PRECISION: f64 = 0.01;
 
 /// Dwells of a stretch of time that is left out, and of what is left out before and after it.
 const STRETCH: usize = 4;
-const FORGOTTEN: usize = 10;
+const FORGOTTEN: usize = 6;
 
 /// Dwells that are predicted by a fit that did not see them.
 #[derive(Debug, Clone)]

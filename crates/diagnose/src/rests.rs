@@ -45,7 +45,7 @@ impl Diagnosis {
         }
         let message = format!(
             "{new}: joint {} rests in another place of its play in every dwell, over {:.0} % of the gap; no reading shows where, \
-             so that the noise floor counts it ({:.3} mm with it, {:.3} mm without); a preload, or an encoder on the link, \
+             so that it counts as noise ({:.3} mm with it, {:.3} mm without); a preload, or an encoder on the link, \
              takes it away",
             joint + 1,
             100.0 * part,

@@ -32,6 +32,8 @@ pub(crate) struct Entry {
     pub ln_evidence: f64,
     /// Products of its columns.
     pub gram: Gram,
+    /// Of so many points of a scan it is the best; one where nothing was searched.
+    pub tried: usize,
 }
 
 /// One explanation outside the catalogue, weighed.
@@ -116,7 +118,12 @@ fn weigh_at(
         .candidates
         .iter()
         .zip(ln.by_ref().zip(grams.by_ref()))
-        .map(|(candidate, (ln_evidence, gram))| Entry { candidate: candidate.clone(), ln_evidence, gram })
+        .map(|(candidate, (ln_evidence, gram))| Entry {
+            candidate: candidate.clone(),
+            ln_evidence,
+            gram,
+            tried: 1,
+        })
         .collect();
     let given = entries.len();
     let mut points = Vec::new();
@@ -124,10 +131,10 @@ fn weigh_at(
         let of_points: Vec<f64> = ln.by_ref().take(scan.points.len()).collect();
         let of_columns: Vec<Gram> = grams.by_ref().take(scan.points.len()).collect();
         if let Some(best) = (0..of_points.len()).max_by(|a, b| of_points[*a].total_cmp(&of_points[*b])) {
-            let ln_points = (scan.tried.max(of_points.len()) as f64).ln();
-            let ln_evidence = ln_sum_exp(of_points) - ln_points;
+            let tried = scan.tried.max(of_points.len());
+            let ln_evidence = ln_sum_exp(of_points) - (tried as f64).ln();
             let (candidate, gram) = (scan.points[best].clone(), of_columns[best].clone());
-            entries.push(Entry { candidate, ln_evidence, gram });
+            entries.push(Entry { candidate, ln_evidence, gram, tried });
         }
         let every = of_columns.len().div_ceil(KEPT_POINTS).max(1);
         points.push(of_columns.into_iter().enumerate().step_by(every).collect());

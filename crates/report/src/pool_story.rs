@@ -27,7 +27,7 @@ pub(crate) fn effect(run: &Run) -> Option<String> {
     let worst = (0..errors.len()).max_by(|a, b| mean_m(a).total_cmp(&mean_m(b)))?;
     (times.is_finite() && times > INADEQUATE).then(|| {
         format!(
-            "errors are {times:.1} times the noise floor, most in `{}` ({} mm): pool again with `[diagnosis] enabled = true`, which \
+            "errors are {times:.1} times what the declared noise gives, most in `{}` ({} mm): pool again with `[diagnosis] enabled = true`, which \
              looks for what is missing and for what moved between the recordings",
             printable(&run.recordings[worst].name),
             millimetres(errors[worst].calibrated.mean_m)

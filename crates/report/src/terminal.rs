@@ -173,7 +173,7 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
 }
 
 fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>], what: &str) -> String {
-    let mut table = pen.table(&[what, "n", "nominal", "calibrated", "noise floor"]);
+    let mut table = pen.table(&[what, "n", "nominal", "calibrated", "declared noise"]);
     for of in markers {
         let mut row = vec![Cell::new(printable(&of.marker)), number(of.n)];
         row.extend(of.shown().map(number));
@@ -204,7 +204,7 @@ fn errors_on(pen: &Pen, calibration: &Calibration, sides: &[(&str, &SideErrors)]
         table.add_row(error_row(label, side.nominal.n.to_string(), "nominal", &side.nominal));
         table.add_row(error_row("", String::new(), "calibrated", &side.fitted));
     }
-    let mut floor = vec![Cell::new("noise floor"), Cell::new(""), Cell::new("")];
+    let mut floor = vec![Cell::new("declared noise"), Cell::new(""), Cell::new("")];
     floor.push(number(millimetres(calibration.noise_floor_m)));
     table.add_row(floor);
     pen.render(&table)

@@ -11,7 +11,7 @@ pub fn conclusion(calibration: &Calibration) -> String {
 /// The same about errors of another name.
 pub(crate) fn conclusion_about(calibration: &Calibration, error: &str) -> String {
     let floor = match calibration.noise_floor_m {
-        floor if floor.is_finite() => format!("; the noise floor is {} mm.", millimetres(floor)),
+        floor if floor.is_finite() => format!("; the declared noise gives {} mm.", millimetres(floor)),
         _ => ".".into(),
     };
     let points = |side: &SideErrors| match side.fitted.n {

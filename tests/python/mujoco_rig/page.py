@@ -18,7 +18,7 @@ among names that the data do not tell apart; *at the floor*: no name, and no nee
 the floor on points it never saw (a joint that rests on one flank of its play in every pose, friction that winds up nothing);
 *not shown*: said to be nothing up to 1.5 floors; *unknown*: something unlisted is said to be missing; *unexplained*: errors above the
 floor, said so without a name; *silent*: nothing missing above 1.5 floors; *wrong set*, *wrong name*: none of the names, or one told
-alone, is true; *setup*: stopped before any physics. Held-out mean error over the noise floor before and after `armcal add
+alone, is true; *setup*: stopped before any physics. Held-out mean error over the declared noise before and after `armcal add
 suggested`: medians; *at floor*: share within {at_floor} of it afterwards. The floor afterwards is that of the model with what was
 added: where a joint rests anywhere in a play that was found, it counts that.
 

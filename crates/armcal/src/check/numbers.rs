@@ -19,7 +19,7 @@ pub fn errors(run: &Run, limits: &Limits) -> Vec<Check> {
         ("max_holdout_p95_mm", "95th percentile of the error", p95_mm, section.max_holdout_p95_mm, "mm"),
         (
             "max_over_floor",
-            "ratio of the mean error to the noise floor",
+            "ratio of the mean error to the declared noise",
             over_floor,
             section.max_over_floor,
             "",

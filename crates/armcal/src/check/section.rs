@@ -14,7 +14,7 @@ pub struct CheckSection {
     pub max_holdout_mean_mm: Option<f64>,
     /// Largest 95th percentile of the error on held-out points [mm].
     pub max_holdout_p95_mm: Option<f64>,
-    /// Largest ratio of the mean error on held-out points to the noise floor.
+    /// Largest ratio of the mean error on held-out points to the declared noise.
     pub max_over_floor: Option<f64>,
     /// Fewest dwells of any recording.
     pub min_dwells: Option<usize>,

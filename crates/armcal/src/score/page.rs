@@ -93,7 +93,7 @@ fn introduction(campaign: &Campaign<'_>) -> String {
          it found, nothing wrong; *not shown*:\nnot seen, and without it the held-out error is within {AT_FLOOR} of the \
          floor; *silent*: not seen though it shows; *found*: first, in set, placed or nearest; *wrong set*,\n*wrong*: a set or a single name that does not hold \
          it. The moment of an event may be missed by {DWELLS} dwells. *before*,\n*after/floor*: median of the mean \
-         error on held-out points before and after `armcal add suggested`, over the noise floor;\n*at floor*: share \
+         error on held-out points before and after `armcal add suggested`, over the declared noise;\n*at floor*: share \
          within {AT_FLOOR} of it after; *removed*: median share of the excess over the floor that is gone.\n",
         campaign.command
     )

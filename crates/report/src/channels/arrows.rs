@@ -90,7 +90,7 @@ impl Drawing {
         }
     }
 
-    /// Green at the noise floor, yellow between, red at the large nominal errors; logarithmic.
+    /// Green at the declared noise, yellow between, red at the large nominal errors; logarithmic.
     pub fn ramp(&self, error_m: f64) -> Rgba {
         ramp(self.small_m, self.large_m, error_m)
     }

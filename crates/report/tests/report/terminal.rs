@@ -96,7 +96,7 @@ fn the_closing_sentence_is_about_held_out_points() {
     let mut s = synthetic();
     let said = conclusion(&s.run.calibration);
     assert!(said.starts_with("On 4 held-out points the mean error falls from "), "{said}");
-    assert!(said.ends_with("; the noise floor is 0.18 mm."), "{said}");
+    assert!(said.ends_with("; the declared noise gives 0.18 mm."), "{said}");
     s.run.calibration.holdout = Default::default();
     let said = conclusion(&s.run.calibration);
     assert!(

@@ -7,7 +7,7 @@ function errorsFigure() {
   const c = colours(), e = doc.errors;
   const dots = (name, y, colour, symbol) => ({ type: "scatter", mode: "markers", name, x: when(e.time_ms), y, text: named(e.row), marker: { color: colour, symbol, size: 7 },
     hovertemplate: "%{text}<br>%{x}: %{y:.3f} mm<extra>" + name + "</extra>" });
-  return { data: [dots("nominal", e.before, c.minus, "diamond"), dots("calibrated", e.after, c.plus, "circle"), dots("noise floor", e.floor, c.floor, "line-ew-open")],
+  return { data: [dots("nominal", e.before, c.minus, "diamond"), dots("calibrated", e.after, c.plus, "circle"), dots("declared noise", e.floor, c.floor, "line-ew-open")],
     layout: layout({ height: 320, showlegend: true, xaxis: axis("start of the recording (UTC)", { type: "date" }), yaxis: axis("mean error [mm]", { type: "log" }) }) };
 }
 

@@ -1,4 +1,4 @@
-// Geometry, then what was found, one effect after the other: bars that fall towards the noise floor.
+// Geometry, then what was found, one effect after the other: bars that fall towards the declared noise.
 
 // A long name on up to three lines, broken after a space, a comma or an underscore.
 function wrapped(text, width) {
@@ -35,7 +35,7 @@ function pathFigure() {
     xaxis: axis("", { tickvals: names.map((_, i) => i), tickangle: 0, ticktext: names.map((n) => wrapped(n, 12)), gridcolor: "rgba(0,0,0,0)", range: [-0.6, Math.max(names.length, 3) - 0.4] }),
     yaxis: axis("mean error [mm]", { rangemode: "tozero", range: [0, 1.15 * Math.max(...means, floor)] }),
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, width: 2, dash: "dash" } }],
-    annotations: [{ xref: "paper", yref: "paper", x: 1, y: 1.12, text: "- - noise floor " + mm(floor) + " mm", showarrow: false, xanchor: "right", font: { color: c.floor, size: 12 } }],
+    annotations: [{ xref: "paper", yref: "paper", x: 1, y: 1.12, text: "- - declared noise " + mm(floor) + " mm", showarrow: false, xanchor: "right", font: { color: c.floor, size: 12 } }],
   }) };
 }
 

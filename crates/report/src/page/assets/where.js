@@ -35,7 +35,7 @@ function timeFigure() {
   more.xaxis = axis(x.label, { anchor: "y" + count });
   const floor = now.noise_floor_mm;
   const marks = rows.map((_, k) => beginnings(x, "x", "y" + (k ? k + 1 : ""))).concat(extra ? beginnings(x, "x", "y" + count) : []);
-  const told = { xref: "paper", x: 1, xanchor: "right", y: floor, yanchor: "bottom", text: "noise floor " + mm(floor) + " mm", showarrow: false, font: { size: 11, color: c.floor },
+  const told = { xref: "paper", x: 1, xanchor: "right", y: floor, yanchor: "bottom", text: "declared noise " + mm(floor) + " mm", showarrow: false, font: { size: 11, color: c.floor },
     bgcolor: c.paper, opacity: 0.85 };
   return { data, layout: layout({ height: 150 * count + 70, showlegend: true, ...more, annotations: [...marks[0].annotations, told],
     shapes: [...marks.flatMap((m) => m.shapes), { type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: c.floor, dash: "dash" } }] }) };
