@@ -466,7 +466,11 @@ fn assert_same_names(case: usize, factor: f64) {
     assert!(hidden.iter().all(holds) && as_it_is.len() == hidden.len(), "{as_it_is:?}");
     let (sets, other) = told(&model, &declared(observations, factor));
     assert!(other.holdout_mm.before > other.floor_mm, "{:?} {}", other.holdout_mm, other.floor_mm);
-    assert_eq!((sets, other.verdict), (as_it_is, d.verdict), "{hidden:?} at {factor} times");
+    let first = |d: &Diagnosis| d.effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>();
+    assert_eq!(first(&other), first(&d), "{hidden:?} at {factor} times");
+    // Of noise nearly as large as the errors more names remain, never fewer.
+    let grown = sets.iter().zip(&as_it_is).all(|(more, own)| own.iter().all(|name| more.contains(name)));
+    assert!(if factor < 1.0 { sets == as_it_is } else { grown }, "{hidden:?} at {factor} times: {sets:?}");
     // What changes is what is told of the rest.
     assert!(d.unexplained.is_none(), "{:?}", d.unexplained);
     assert_eq!(other.unexplained.is_some(), factor < 1.0, "{:?}", other.unexplained);
