@@ -169,18 +169,6 @@ pub(crate) fn errors_m(problem: &Problem, rows: &DVector<f64>) -> Vec<DwellError
     problem.dwells.iter().map(of).collect()
 }
 
-/// What `effect` columns do to errors on the groups, each predicted without itself.
-pub(crate) fn gain(
-    problem: &Problem,
-    effect: &DMatrix<f64>,
-    groups: &[Group],
-    scale: f64,
-    config: &DiagnosisConfig,
-) -> HeldOut {
-    let [before, after] = [None, Some(effect)].map(|effect| left_out(problem, effect, groups, scale));
-    compare(problem, &before, &after, groups, config)
-}
-
 /// Compares two sets of left-out whitened rows group by group.
 pub(crate) fn compare(
     problem: &Problem,

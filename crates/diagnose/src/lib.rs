@@ -99,4 +99,5 @@ pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Proble
 pub use refit::Refit;
 pub use ripple::Ripple;
 pub use scatter::{Correlation, Scatter};
+pub use score::is_clear;
 pub use unexplained::UNEXPLAINED;

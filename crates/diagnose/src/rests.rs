@@ -8,6 +8,7 @@
 use crate::diagnosis::{Diagnosis, Refitted};
 use crate::observed::Calibrated;
 use crate::problem::Candidate;
+use crate::scatter::IMPROBABLE;
 use armcal_calibrate::tails::ln_f_tail;
 use armcal_calibrate::{BLURRED, ImpliedError, PositionNoise, implied_joint_errors};
 use armcal_core::robust::median;
@@ -16,8 +17,6 @@ use armcal_model::EffectSpec;
 
 /// The shape of an effect that says how much of its gap a joint rests in.
 const REST: &str = "rest";
-/// So improbable by chance is beyond doubt.
-const IMPROBABLE: f64 = 1e-3;
 /// A part of the gap below which it makes no difference.
 const NEGLIGIBLE: f64 = 0.1;
 /// No joint rests in more than its gap; how wide that is, the directions of arrival tell.

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// A correlation at least so large, and so improbable by chance, is beyond doubt.
 const CORRELATED: f64 = 0.2;
-const IMPROBABLE: f64 = 1e-3;
+pub(crate) const IMPROBABLE: f64 = 1e-3;
 
 /// The scatter of what a fit leaves, against what is declared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,8 +48,13 @@ impl Correlation {
             rows += a.len() as f64;
             count += 1;
         }
+        Correlation::of_sums(product, rows, count)
+    }
+
+    /// From the sum of the products of so many rows of so many pairs.
+    fn of_sums(product: f64, rows: f64, pairs: usize) -> Option<Correlation> {
         let value = product / rows;
-        (count > 0).then(|| Correlation { value, p: chi2_tail(value * value * rows, 1.0), pairs: count })
+        (pairs > 0).then(|| Correlation { value, p: chi2_tail(value * value * rows, 1.0), pairs })
     }
 
     /// Whether errors are alike beyond doubt.
@@ -83,13 +88,16 @@ impl Scatter {
 
     /// How alike dwells err to those before them.
     pub(crate) fn memory(&self) -> f64 {
-        let neighbours = [self.tracked_neighbours, self.seated_neighbours].into_iter().flatten();
-        neighbours.map(|c| c.value).fold(0.0, f64::max)
+        self.neighbours().map(|c| c.value).fold(0.0, f64::max)
+    }
+
+    fn neighbours(&self) -> impl Iterator<Item = Correlation> {
+        [self.tracked_neighbours, self.seated_neighbours].into_iter().flatten()
     }
 
     /// Whether they do, beyond doubt.
     pub(crate) fn remembers(&self) -> bool {
-        [self.tracked_neighbours, self.seated_neighbours].iter().flatten().any(Correlation::is_certain)
+        self.neighbours().any(|c| c.is_certain())
     }
 
     /// Whether visits to one place err alike, beyond doubt.
@@ -127,19 +135,27 @@ fn neighbours(problem: &Problem, residual: &DVector<f64>, tracked: bool) -> Opti
     }))
 }
 
-/// Of every two visits to a place, what was measured in either turned into the axes of the board.
+/// Of every two visits to a place, what was measured in either turned into the axes of the board. Of the visits v of a place the
+/// products of every two are `(|sum v|^2 - sum |v|^2) / 2` together.
 fn visits(problem: &Problem, residual: &DVector<f64>) -> Option<Correlation> {
-    let mut places: BTreeMap<&str, Vec<DVector<f64>>> = BTreeMap::new();
+    let mut places: BTreeMap<&str, (DVector<f64>, f64, usize)> = BTreeMap::new();
     for d in &problem.dwells {
         if let Some(place) = &d.place {
-            places.entry(place).or_default().push(d.seat.tr_mul(&residual.rows(d.first_row, d.rows)));
+            let own = d.seat.tr_mul(&residual.rows(d.first_row, d.rows));
+            let (sum, square, count) =
+                places.entry(place).or_insert_with(|| (DVector::zeros(own.len()), 0.0, 0));
+            (*square, *count) = (*square + own.norm_squared(), *count + 1);
+            *sum += own;
         }
     }
-    let of_place = |all: Vec<DVector<f64>>| {
-        let pairs = (0..all.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-        pairs.map(|(i, j)| (all[i].clone(), all[j].clone())).collect::<Vec<_>>()
-    };
-    Correlation::of(places.into_values().flat_map(of_place))
+    let (mut product, mut rows, mut pairs) = (0.0, 0.0, 0);
+    for (sum, square, count) in places.values() {
+        let of_place = count * (count - 1) / 2;
+        product += 0.5 * (sum.norm_squared() - square);
+        rows += (of_place * sum.len()) as f64;
+        pairs += of_place;
+    }
+    Correlation::of_sums(product, rows, pairs)
 }
 
 #[cfg(test)]

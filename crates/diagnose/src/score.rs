@@ -124,8 +124,13 @@ impl Difference {
 
     /// Whether the first is better by more than chance, and by more than `detail` [nats].
     pub fn is_clear(self, detail: f64) -> bool {
-        self.nats > (CLEAR * self.se).max(SMALL_NATS).max(detail)
+        is_clear(self.nats, self.se, detail)
     }
+}
+
+/// Whether a difference of scores with its standard error is more than chance, and more than `detail` [nats].
+pub fn is_clear(nats: f64, se: f64, detail: f64) -> bool {
+    nats > (CLEAR * se).max(SMALL_NATS).max(detail)
 }
 
 /// Weights of explanations that look like probabilities: their shares in copies of the data whose groups are drawn anew. Each

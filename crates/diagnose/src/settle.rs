@@ -121,12 +121,9 @@ fn settled(
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);
-    let nothing = ranked.iter().find(|scored| scored.what == Instead::Nothing);
-    if nothing.is_some_and(|scored| scored.weight > 0.5) {
-        return None;
-    }
     let candidate = room.weighed.entries[judged.entry].candidate.clone();
-    Some(Accepted { candidate, judged, room, grade, set, instead_of, ranked })
+    let settled = Accepted { candidate, judged, room, grade, set, instead_of, ranked };
+    (settled.probability(|what| what == Instead::Nothing) <= 0.5).then_some(settled)
 }
 
 /// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.

@@ -4,7 +4,7 @@
 use crate::cells::{Dependences, Unlisted, cells, discrepancies};
 use crate::config::DiagnosisConfig;
 use crate::confusion::Crossed;
-use crate::crossval::{EFFECT_PRECISION, Group, gain};
+use crate::crossval::{EFFECT_PRECISION, Group, compare, left_out};
 use crate::evidence::{best_amplitude, coefficients, ln_bayes, projected};
 use crate::grams::each_gram;
 use crate::problem::{Candidate, Columns, Problem};
@@ -263,7 +263,9 @@ impl Weighed {
         groups: &[Group],
         config: &DiagnosisConfig,
     ) -> HeldOut {
-        gain(problem, effect, groups, self.scale, config)
+        let [before, after] =
+            [None, Some(effect)].map(|effect| left_out(problem, effect, groups, self.scale));
+        compare(problem, &before, &after, groups, config)
     }
 
     /// Products of all entries with each other.

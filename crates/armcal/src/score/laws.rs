@@ -8,8 +8,9 @@ use super::interval::Share;
 use super::{Answer, NOT_LISTED};
 use crate::error::Error;
 use armcal_core::{DwellId, Observation};
-use armcal_diagnose::{Diagnosis, Verdict};
+use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, is_clear};
 use armcal_lab::scenario::Scenario;
+use armcal_model::place_and_moment;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -154,8 +155,8 @@ fn of_rows(laws: &mut Laws, d: &Diagnosis, name: &str) {
         return;
     }
     let gain = d.effects.iter().map(|e| e.gain_nats).fold(0.0, f64::max);
-    let clear = |nats: f64, se: f64| nats > (2.33 * se).max(4.0).max(0.01 * gain);
-    let better = rows.iter().find(|(_, s)| clear(-s.behind_nats, s.behind_se));
+    let detail = DiagnosisConfig::default().leftover_share * gain;
+    let better = rows.iter().find(|(_, s)| is_clear(-s.behind_nats, s.behind_se, detail));
     laws.ask("no better loser", better.is_none(), || format!("{name}: {better:?} is better than {answer}"));
     if d.verdict == Verdict::Identified {
         let most = rows.iter().map(|(_, s)| s.probability).fold(0.0, f64::max);
@@ -176,14 +177,14 @@ fn is_refuted(name: &str, answer: &Answer, d: &Diagnosis) -> bool {
     let own = causes(&name);
     let held = answer.sets.iter().any(|set| own.is_subset(&causes(set)));
     let near = d.candidates.iter().filter(|c| own == causes(std::slice::from_ref(&c.spec)));
-    let stands = near.filter_map(|c| c.standing).any(|s| s.behind_nats <= (2.33 * s.behind_se).max(4.0));
+    let stands = near.filter_map(|c| c.standing).any(|s| !is_clear(s.behind_nats, s.behind_se, 0.0));
     !held && !stands
 }
 
 /// The names of a set without the moment of an event and the value of a searched shape, which are no other cause.
 fn causes(set: &[String]) -> BTreeSet<&str> {
-    let place = |name: &'_ str| -> usize { name.find([',', '@']).unwrap_or(name.len()) };
-    set.iter().filter(|name| *name != NOT_LISTED).map(|name| &name[..place(name)]).collect()
+    let place = |name| place_and_moment(name).map_or(name, |(place, _)| place);
+    set.iter().filter(|name| *name != NOT_LISTED).map(|name| place(name.as_str())).collect()
 }
 
 /// Half of the dwells, drawn.
