@@ -27,10 +27,14 @@ impl Costs<'_> {
 
     /// Of an entry of the catalogue.
     pub fn of_entry(self, k: usize) -> f64 {
-        let weighed = &self.room.weighed;
+        let entries = &self.room.weighed.entries;
+        self.of(self.amplitudes(k), self.config.prior_catalogue, entries.len() * entries[k].tried)
+    }
+
+    /// What an entry of the catalogue counts as.
+    pub fn amplitudes(self, k: usize) -> usize {
         let impossible = !self.room.judge(k, self.config).impossible.is_empty();
-        let amplitudes = weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 };
-        self.of(amplitudes, self.config.prior_catalogue, weighed.entries.len() * weighed.entries[k].tried)
+        self.room.weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 }
     }
 
     fn of(self, amplitudes: usize, prior: f64, count: usize) -> f64 {

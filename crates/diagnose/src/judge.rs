@@ -14,7 +14,7 @@ use crate::scatter::Scatter;
 use crate::score::{Difference, Score};
 use crate::weigh::Weighed;
 use armcal_calibrate::HeldOut;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// Dwells of a block when errors are like those before them.
@@ -171,7 +171,8 @@ pub(crate) fn judge(
 
     let theta = &fitted.estimate;
     let theta_sigma = relative_sigma(&fitted, residual_variance);
-    let base = &problem.residual - &problem.geometry * base_fit(problem);
+    let normal = armcal_calibrate::gram(&problem.geometry);
+    let base = &problem.residual - &problem.geometry * base_fit(problem, &normal, weighed.scale);
     let contrast = contrast(problem, &base, candidate, &effect, theta, theta_sigma, config);
     let unlisted = Unlisted::beside(room, entry, &score, config);
     let gain = score.above(room.nothing());
@@ -256,13 +257,14 @@ pub(crate) fn clusters(problem: &Problem, scatter: &Scatter) -> Vec<Vec<usize>> 
     groups.chunks(groups.len().div_ceil(MOST_CLUSTERS)).map(<[_]>::concat).collect()
 }
 
-/// Penalised linear fit of the geometry alone.
-pub(crate) fn base_fit(problem: &Problem) -> DVector<f64> {
-    let mut normal = armcal_calibrate::gram(&problem.geometry);
+/// Penalised linear fit of the geometry alone, whose products are known, with noise of `scale` times the declared one.
+pub(crate) fn base_fit(problem: &Problem, products: &DMatrix<f64>, scale: f64) -> DVector<f64> {
+    let mut normal = products.clone();
     let mut right = problem.geometry.tr_mul(&problem.residual);
     for k in 0..right.len() {
-        normal[(k, k)] += problem.geometry_precision[k];
-        right[k] -= problem.geometry_precision[k] * problem.geometry_offset[k];
+        let precision = problem.geometry_precision[k] * scale.powi(2);
+        normal[(k, k)] += precision;
+        right[k] -= precision * problem.geometry_offset[k];
     }
     let factor = crate::projection::cholesky_upper(normal);
     let half = factor.tr_solve_upper_triangular(&right).unwrap_or_else(|| right.clone());

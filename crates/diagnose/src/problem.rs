@@ -10,6 +10,9 @@ use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// Rounds in which the size of the errors settles.
+const SIGMA_ROUNDS: usize = 4;
+
 /// A linearised calibration with everything that might be missing from it.
 ///
 /// Rows are whitened by the declared noise: residual rows are N(0, 1) if the model is complete and the declaration
@@ -224,11 +227,15 @@ impl Problem {
         self.dwells.first().map_or(0, |d| d.joint_rad.len())
     }
 
-    /// Standard deviation of what the fit leaves, in units of the declared noise.
+    /// Standard deviation of what the fit leaves, in units of the declared noise: that at which priors weigh as they should
+    /// beside errors of just this size, from above, so that it does not depend on what is declared.
     pub(crate) fn sigma(&self) -> f64 {
         let dof = self.rows().saturating_sub(self.geometry.ncols()).max(1) as f64;
-        let left = &self.residual - &self.geometry * crate::judge::base_fit(self);
-        (left.norm_squared() / dof).sqrt()
+        let of = |left: DVector<f64>| (left.norm_squared() / dof).sqrt();
+        let normal = armcal_calibrate::gram(&self.geometry);
+        let beside =
+            |sigma: f64| of(&self.residual - &self.geometry * crate::judge::base_fit(self, &normal, sigma));
+        (0..SIGMA_ROUNDS).fold(of(self.residual.clone()), |sigma, _| beside(sigma))
     }
 
     /// Checks that sizes agree and everything is finite.

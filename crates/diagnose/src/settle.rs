@@ -1,11 +1,12 @@
 //! Names against all that may predict as much, each refitted: which share the answer, which leads it.
 //!
 //! The weighing proposes, one step in the linearised model leaves the few that come near, refits decide: by their [`Score`] and
-//! nothing else. An answer holds every explanation that no other one is clearly better than; first comes what is worth most, each
-//! amplitude costing something.
+//! nothing else. An answer holds every explanation that no other one is clearly better than; first comes the simplest of those
+//! within a standard error of what says most.
 
 use crate::DiagnoseError;
 use crate::config::DiagnosisConfig;
+use crate::costs::Costs;
 use crate::forward::{Accepted, all_but, confirm, known, named};
 use crate::judge::Grade;
 use crate::problem::Candidate;
@@ -190,12 +191,28 @@ fn answer(
         let real = *k == found.judged.entry || room.judge(*k, config).grade(config) > Grade::Refused;
         !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
-    let set: Vec<usize> = refits.iter().filter(stands).map(|(k, _)| *k).collect();
+    let set = simplest_first(refits.iter().filter(stands).collect(), costs);
     let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());
     match acts.is_empty() {
         true => (set, Vec::new()),
         false => (acts, others.into_iter().map(|k| of(k).spec.clone()).collect()),
     }
+}
+
+/// Entries that are one answer: of those within a standard error of what says most, those with the fewest amplitudes first (the
+/// one-standard-error rule: Breiman, Friedman, Olshen, Stone, Classification and Regression Trees, 1984); then the others as they
+/// came.
+fn simplest_first(members: Vec<&(usize, Score)>, costs: Costs<'_>) -> Vec<usize> {
+    let scores = || members.iter().map(|(_, score)| score);
+    let Some(most) = scores().reduce(|a, b| if b.above(a).nats > 0.0 { b } else { a }).cloned() else {
+        return Vec::new();
+    };
+    let mut members = members;
+    members.sort_by_key(|(k, score)| {
+        let behind = most.above(score);
+        if behind.nats <= behind.se { costs.amplitudes(*k) } else { usize::MAX }
+    });
+    members.into_iter().map(|(k, _)| *k).collect()
 }
 
 /// Everything that was scored, with its share of the probability.

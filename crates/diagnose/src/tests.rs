@@ -95,6 +95,41 @@ pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64) -> 
     Outside { what, ln_evidence }
 }
 
+/// The same readings with their noise declared a tenth: every whitened row is ten times as large.
+fn declared_a_tenth(p: &Problem) -> Problem {
+    let ten_times = |candidate: &mut crate::Candidate| {
+        candidate.columns = crate::Columns::Dense(candidate.columns.dense(&p.dwells, 10.0).into());
+    };
+    let mut q = p.clone();
+    q.residual *= 10.0;
+    q.geometry *= 10.0;
+    q.candidates.iter_mut().for_each(ten_times);
+    q.scans.iter_mut().flat_map(|scan| &mut scan.points).for_each(ten_times);
+    q.channels.iter_mut().for_each(|channel| channel.columns = (&*channel.columns * 10.0).into());
+    q
+}
+
+#[test]
+fn the_noise_that_is_found_is_the_same_whatever_is_declared() {
+    let mut p = planted(&[("backlash:1", 3.0)], 12, 5);
+    // Few dwells and errors in every direction, which the geometry would follow if priors did not hold it.
+    let mut state = 7u64;
+    p.residual.iter_mut().for_each(|r| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        *r += 12.0 * ((state >> 33) as f64 / 2f64.powi(30) - 1.0);
+    });
+    let q = declared_a_tenth(&p);
+    assert!((q.sigma() / p.sigma() - 10.0).abs() < 1e-9, "{} and {}", p.sigma(), q.sigma());
+    let (of_p, of_q) = (weigh(&p, &quick()), weigh(&q, &quick()));
+    assert!(
+        of_p.scale > 3.0 && (of_q.scale / of_p.scale - 10.0).abs() < 1e-6,
+        "{} {}",
+        of_p.scale,
+        of_q.scale
+    );
+    assert_eq!(of_p.ranking(), of_q.ranking());
+}
+
 /// A candidate of a problem.
 pub(crate) fn own(p: &Problem, spec: &str) -> crate::Candidate {
     p.candidates.iter().find(|c| c.spec == spec).unwrap().clone()

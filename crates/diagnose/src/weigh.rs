@@ -20,6 +20,8 @@ use std::sync::Arc;
 /// Residual variance of the best explanation above which the declared noise is taken to be wrong and everything is
 /// weighed again in units of what was found.
 const RESCALE_ABOVE: f64 = 4.0;
+/// Share of the noise that was assumed above which what was found is the same.
+const SETTLED: f64 = 0.9;
 /// Most points of a scan whose products are kept: neighbours on a grid are nearly the same column.
 const KEPT_POINTS: usize = 80;
 
@@ -73,19 +75,27 @@ pub(crate) fn weigh(problem: &Problem, config: &DiagnosisConfig) -> Weighed {
     weigh_among(problem, Dependences::of(problem).into(), config)
 }
 
-/// The same where it is known what the unlisted may depend on.
+/// The same where it is known what the unlisted may depend on. The noise settles from above, from what nothing leaves: then it is
+/// the same whatever is declared, and no explanation is weighed as if it could follow every error.
 pub(crate) fn weigh_among(
     problem: &Problem,
     dependences: Arc<Dependences>,
     config: &DiagnosisConfig,
 ) -> Weighed {
-    let first = weigh_at(problem, dependences, 1.0, config);
-    let variance = first.best_variance(problem, config);
-    if variance <= RESCALE_ABOVE {
-        return first;
+    let (mut dependences, mut scale) = (dependences, noise(problem.sigma().powi(2)));
+    loop {
+        let weighed = weigh_at(problem, dependences, scale, config);
+        let found = noise(weighed.best_variance(problem, config));
+        if found > SETTLED * scale || scale == 1.0 {
+            return weighed;
+        }
+        (dependences, scale) = (weighed.dependences, found);
     }
-    let Weighed { dependences, .. } = first;
-    weigh_at(problem, dependences, variance.sqrt(), config)
+}
+
+/// The noise at a residual variance, in units of the declared one: that itself, unless it is far off.
+fn noise(variance: f64) -> f64 {
+    if variance <= RESCALE_ABOVE { 1.0 } else { variance.sqrt() }
 }
 
 /// Weighs with the noise `scale` times the declared one.

@@ -208,12 +208,15 @@ fn the_geometry_alone_is_fitted_with_its_prior() {
     x.rows_mut(0, p.rows()).copy_from(&p.geometry);
     let mut y = DVector::zeros(p.rows() + n);
     y.rows_mut(0, p.rows()).copy_from(&p.residual);
+    // Noise three times as large makes the prior weigh nine times as much.
+    let root = 3.0 * 2f64.sqrt();
     for k in 0..n {
-        x[(p.rows() + k, k)] = 2f64.sqrt();
-        y[p.rows() + k] = -0.3 * 2f64.sqrt();
+        x[(p.rows() + k, k)] = root;
+        y[p.rows() + k] = -0.3 * root;
     }
     let expected = x.svd(true, true).solve(&y, 1e-12).unwrap();
-    assert!((base_fit(&p) - expected).amax() < 1e-9);
+    let products = armcal_calibrate::gram(&p.geometry);
+    assert!((base_fit(&p, &products, 3.0) - expected).amax() < 1e-9);
 }
 
 #[test]

@@ -134,6 +134,24 @@ fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
 }
 
 #[test]
+fn within_a_standard_error_the_simplest_comes_first_and_beyond_it_what_says_more() {
+    let config = quick();
+    // The twin, entry 0, has two amplitudes; every other name has one.
+    let p = with_twin(|a, _| DMatrix::from_columns(&[1.0 * a.column(0), 0.5 * a.column(0)]));
+    let room = crate::tests::room(&p, &config);
+    let (twin, simple) = (0, crate::tests::entry(&room.weighed, "backlash:1"));
+    // Four groups: 4 nats more, each group 1 +- scatter.
+    let of = |each: [f64; 4]| crate::score::tests::score(&each);
+    for (scattered, first) in [([5.0, -3.0, 5.0, -3.0], simple), ([1.1, 0.9, 1.1, 0.9], twin)] {
+        let members = [(twin, of(scattered)), (simple, of([0.0; 4]))];
+        for order in [[0, 1], [1, 0]] {
+            let set = simplest_first(order.map(|k| &members[k]).to_vec(), room.costs(&config));
+            assert_eq!(set.first(), Some(&first), "{scattered:?}");
+        }
+    }
+}
+
+#[test]
 fn a_twin_leaves_the_set_once_the_data_tell_it_apart() {
     assert_eq!(settled_sets(&mixed(0.02)).concat().len(), 2);
     assert_eq!(settled_sets(&mixed(1.5)), [["backlash:1"]]);
