@@ -468,7 +468,10 @@ fn axis(index: usize, parameter: &Parameter, start: f64, config: &FitConfig) -> 
         )));
     }
     let (centre, scale, precision) = match sigma {
-        Some(sigma) if parameter.role != Role::EstimatedFrame => (nominal, sigma, 1.0),
+        Some(sigma) if parameter.role != Role::EstimatedFrame => {
+            let size = parameter.usual.map_or(sigma, |usual| usual.min(sigma));
+            (nominal, size, (size / sigma).powi(2))
+        }
         _ => {
             let sigma = sigma.unwrap_or(RIDGE_SIGMA_SI);
             let size = reference_size(parameter.unit).min(sigma);

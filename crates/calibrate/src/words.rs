@@ -248,6 +248,7 @@ mod tests {
                 lower: -1.0,
                 upper: 1.0,
                 prior_sigma: None,
+                usual: None,
                 assumed: None,
                 free: true,
                 role: Role::Robot,

@@ -18,6 +18,10 @@ pub struct Parameter {
     pub upper: f64,
     /// Standard deviation of what is known about it before the data; `None` means nothing is.
     pub prior_sigma: Option<f64>,
+    /// The size that it usually has, where that is less than its prior says: what happens is small as a rule, and any size now and
+    /// then.
+    #[serde(skip)]
+    pub usual: Option<f64>,
     /// Where nobody declared bounds and prior: what it is one of. A fit may then learn how far those of a kind are from
     /// nominal; `prior_sigma` is the most that it may be.
     #[serde(skip)]
@@ -41,6 +45,7 @@ impl Parameter {
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
             prior_sigma: None,
+            usual: None,
             assumed: None,
             free: false,
             role,

@@ -65,7 +65,7 @@ fn observed_in(n: usize, hidden: &[&str], times: f64, seed: u64) -> (Model, Vec<
     let mut p = truth.nominal();
     for (k, parameter) in truth.parameters().iter().enumerate().filter(|(_, p)| p.free) {
         let z: f64 = rng.sample(StandardNormal);
-        let sigma = parameter.prior_sigma.unwrap_or(0.0);
+        let sigma = parameter.usual.or(parameter.prior_sigma).unwrap_or(0.0);
         p[k] += if k < free { 0.5 * z.clamp(-1.5, 1.5) * sigma } else { times * sigma };
     }
     for o in &mut observations {
@@ -113,6 +113,28 @@ fn a_hidden_backlash_is_named_among_the_whole_catalogue_and_adding_it_helps() {
     assert!(held.after < 0.6 && held.change_ci95[1] < 0.0 && held.p < 0.01, "{held:?}");
     let left = diagnosed(&extended, &after, &observations);
     assert_eq!(left.verdict, Verdict::NothingMissing, "{:?}", left.names);
+}
+
+/// A tool remounted 80 mm off, robot or camera 80 mm and 5 deg elsewhere: the size of an event keeps nobody from seeing it.
+#[test]
+fn an_event_of_any_size_is_named_with_its_size() {
+    for event in ["tool_shift@0.45", "frame_shift@0.45"] {
+        let (model, observations) = observed(&[event], 40.0, 11);
+        let (sets, d) = told(&model, &observations);
+        let [set] = &sets[..] else { panic!("{event}: {sets:?}") };
+        assert!(set.iter().any(|name| name == event), "{event}: {set:?}");
+        let refitted = with_calibrated(&model, &calibration(&model, &observations), &observations, |c| {
+            let model = c.model.with_effects(&[c.model.effect(event).unwrap()], c.session).unwrap();
+            calibrate(&model, &observations, &FitConfig::default(), &HoldoutConfig::None).unwrap()
+        });
+        let own = |e: &&armcal_calibrate::Estimate| e.parameter.name.starts_with(event);
+        assert!(refitted.fit.estimates.iter().filter(own).all(|e| !e.at_bound), "{event}");
+        let x = refitted.fit.estimates.iter().find(|e| e.parameter.name == format!("{event}.x")).unwrap();
+        // Where a frame is turned as well, how far it is shifted depends on the point that it is turned about.
+        let turned = event.starts_with("frame");
+        assert!(turned || (x.value - 0.048).abs() < 1e-3, "{event}: {} m", x.value);
+        assert!(d.holdout_mm.after < 2.0 * d.floor_mm, "{event}: {:?}", d.holdout_mm);
+    }
 }
 
 #[test]

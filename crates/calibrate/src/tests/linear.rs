@@ -42,6 +42,7 @@ pub fn parameter(name: &str, bound: f64, prior_sigma: Option<f64>) -> Parameter 
         lower: -bound,
         upper: bound,
         prior_sigma,
+        usual: None,
         assumed: None,
         free: true,
         role: Role::Robot,

@@ -62,6 +62,7 @@ fn problem(kinds: &[(ParameterKind, f64)], each: usize, seed: u64) -> OneEach {
                 lower: -5e-3,
                 upper: 5e-3,
                 prior_sigma: Some(4e-3),
+                usual: None,
                 assumed: Some(*kind),
                 free: true,
                 role: Role::Robot,

@@ -263,6 +263,7 @@ fn parameter(name: &str) -> Parameter {
         lower: -1.0,
         upper: 1.0,
         prior_sigma: None,
+        usual: None,
         assumed: None,
         free: true,
         role: Role::Robot,

@@ -59,10 +59,7 @@ impl Physics for FrameShift {
 
 /// A shift along the axes of a frame and a turn about them, of the size of a knock; `of` says whose axes.
 pub(super) fn rigid_motion(of: &str) -> Vec<Parameter> {
-    let deg = 1f64.to_radians();
-    let shift = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &format!("shift along{of}"));
-    let turn = amplitudes_xyz("r", Unit::Radian, 0.12 * deg, 3.0 * deg, &format!("turn about{of}"));
-    shift.into_iter().chain(turn).collect()
+    [shift_xyz(&format!("shift along{of}")), turn_xyz(&format!("turn about{of}"))].concat()
 }
 
 /// The translation that makes a turn about the frame's origin one about `pivot`: `c - Exp(w) c`.

@@ -37,5 +37,5 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let (name, first) = placing.marker()?;
     placing.event()?;
     let meaning = format!("shift of marker {name} on its link along");
-    Ok(Placement::new(amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, &meaning), Moved { first }))
+    Ok(Placement::new(shift_xyz(&meaning), Moved { first }))
 }

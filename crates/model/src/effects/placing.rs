@@ -10,6 +10,7 @@ use crate::error::hint;
 use crate::segment::Motion;
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::Vector3;
+use std::f64::consts::PI;
 
 /// A first axis closer to the vertical than this cosine (2.6 deg) is meant to stand upright.
 const UPRIGHT_COSINE: f64 = 0.999;
@@ -243,6 +244,17 @@ pub(crate) fn amplitude(
     }
 }
 
+/// An amplitude of an event, by how much it usually is: nothing keeps it from being many times that.
+pub(crate) fn amplitude_of_event(
+    quantity: &str,
+    unit: Unit,
+    usual: f64,
+    bound: f64,
+    meaning: impl Into<String>,
+) -> Parameter {
+    Parameter { usual: Some(usual), ..amplitude(quantity, unit, EVENT_SIGMA * usual, bound, meaning) }
+}
+
 /// Two amplitudes of a wave over a joint's angle [deg]; `angle` is what its sine and cosine are of.
 pub(crate) fn amplitudes_wave(typical_deg: f64, bound_deg: f64, angle: &str) -> Vec<Parameter> {
     let of = |function: &str| {
@@ -256,6 +268,34 @@ pub(crate) fn amplitudes_wave(typical_deg: f64, bound_deg: f64, angle: &str) -> 
         )
     };
     vec![of("sin"), of("cos")]
+}
+
+/// Usual sizes of an event that its prior has as a standard deviation.
+const EVENT_SIGMA: f64 = 10.0;
+/// How far an event usually shifts and turns something, and how far at most: what was remounted, or changed, may be anywhere in
+/// reach.
+const KNOCK: [f64; 2] = [1.2e-3, 0.12 * PI / 180.0];
+const REMOUNTED: [f64; 2] = [1.0, PI];
+
+/// The shift of an event along x, y, z.
+pub(crate) fn shift_xyz(meaning: &str) -> Vec<Parameter> {
+    let of =
+        |axis| amplitude_of_event(axis, Unit::Metre, KNOCK[0], REMOUNTED[0], format!("{meaning} {axis}"));
+    ["x", "y", "z"].map(of).into()
+}
+
+/// The turn of an event about x, y, z.
+pub(crate) fn turn_xyz(meaning: &str) -> Vec<Parameter> {
+    let of = |axis: &str| {
+        amplitude_of_event(
+            &format!("r{axis}"),
+            Unit::Radian,
+            KNOCK[1],
+            REMOUNTED[1],
+            format!("{meaning} {axis}"),
+        )
+    };
+    ["x", "y", "z"].map(of).into()
 }
 
 /// Three amplitudes along or about x, y, z.

@@ -43,7 +43,7 @@ pub(super) struct Moved {
 
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     placing.event()?;
-    let amplitudes = amplitudes_xyz("", Unit::Metre, 1.2e-3, 0.03, "shift on the last link along");
+    let amplitudes = shift_xyz("shift on the last link along");
     let first = placing.model.tip_segment(placing.arm()?).parameters.start;
     Ok(Placement::new(amplitudes, Moved { first }))
 }

@@ -41,7 +41,7 @@ struct ZeroSlip {
 fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let joint = placing.joint()?;
     placing.event()?;
-    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 30.0));
+    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 180.0));
     let offset = amplitude("offset", placing.joint_unit(joint), typical, bound, "how far the zero slipped");
     Ok(Placement::new(vec![offset], ZeroSlip { joint }))
 }
