@@ -47,6 +47,9 @@ mod write_faults;
 /// Is nothing written over that a command was given, or that armcal did not make?
 mod sacred_inputs;
 
+/// Is everything that is no file named and not waited for, wherever a file is read or written?
+mod bad_paths;
+
 /// Do names out of a recording stay names?
 mod hostile_names;
 

@@ -78,8 +78,8 @@ impl FileBytes {
         if about.is_dir() {
             return Err(refused("it is a folder without a recording in it (.mcap, .db3); name the files"));
         }
-        if !about.is_file() {
-            return Err(refused("it is a pipe or a device; copy it into a file first"));
+        if let Some(what) = input::irregular(&about) {
+            return Err(refused(&format!("it is {what}; copy it into a file first")));
         }
         let file = input::open(path).map_err(open)?;
         if file.metadata().map_err(open)?.len() == 0 {

@@ -44,7 +44,7 @@ impl Manifest {
     /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
     pub fn read(path: &Path) -> Result<Manifest, Error> {
         let at = |source| Error::ReadFile { what: "manifest", path: path.to_owned(), source };
-        let text = input::read_to_string(path).map_err(at)?;
+        let text = input::read_to_string(path, input::Kind::Data).map_err(at)?;
         let folder = std::path::absolute(path).map_err(at)?;
         let folder = folder.parent().unwrap_or(Path::new("")).to_owned();
         let file = if path.extension().is_some_and(|e| e == "toml") {
