@@ -107,6 +107,12 @@ mod docs;
 /// Does the plan propose dwells that, recorded, settle what the recording at hand leaves open?
 mod plan;
 
+/// Does the live page's server outlive clients that say nothing, too much, or leave?
+mod live_server;
+
+/// Does what befalls one recording of a campaign cost that recording alone?
+mod campaign_faults;
+
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;
 

@@ -55,6 +55,7 @@ mod records;
 mod report;
 pub mod ros2;
 mod seal;
+mod shortened;
 mod streams;
 mod sweep;
 mod temperature;
