@@ -47,6 +47,9 @@ mod write_faults;
 /// Is nothing written over that a command was given, or that armcal did not make?
 mod sacred_inputs;
 
+/// Is everything that is no file named and not waited for, wherever a file is read or written?
+mod bad_paths;
+
 /// Do names out of a recording stay names?
 mod hostile_names;
 
@@ -103,6 +106,12 @@ mod docs;
 
 /// Does the plan propose dwells that, recorded, settle what the recording at hand leaves open?
 mod plan;
+
+/// Does the live page's server outlive clients that say nothing, too much, or leave?
+mod live_server;
+
+/// Does what befalls one recording of a campaign cost that recording alone?
+mod campaign_faults;
 
 /// Does the report open offline in a real browser, show what the summary says, and refit live?
 mod report_page;

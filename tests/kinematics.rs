@@ -344,6 +344,21 @@ fn the_python_module_gets_the_same_digits() {
     }
 }
 
+/// ctypes lets threads run during a call: a motion that two of them have must not be in two calls at once.
+#[test]
+fn the_python_module_survives_threads() {
+    let Some(python) = python_with("ctypes") else { return };
+    let output = Command::new(&python)
+        .env("PYTHONPATH", root().join("crates/kinematics/python"))
+        .env("ARMCAL_KINEMATICS_LIBRARY", library_folder().join("libarmcal_kinematics.so"))
+        .arg("-B")
+        .arg(root().join("tests/python/threads.py"))
+        .arg(model_file(CASES[0].0))
+        .output()
+        .expect("starting Python");
+    assert!(output.status.success(), "{:?} {}", output.status, String::from_utf8_lossy(&output.stderr));
+}
+
 /// The header, the library and the Python module name the same functions, and the library needs no other.
 #[test]
 fn the_library_is_what_its_header_says() {

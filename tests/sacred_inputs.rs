@@ -1,4 +1,4 @@
-use crate::support::world::{Case, Files, Place, World, cases, complaint};
+use crate::support::world::{Case, Files, Place, World, cases, complaint, reads};
 use armcal::cli::Cli;
 use clap::CommandFactory as _;
 use clap::builder::ValueParser;
@@ -6,50 +6,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-/// Paths that a command only reads, by command and argument.
-const READ: [(&str, &str); 22] = [
-    ("run", "pipeline"),
-    ("inspect", "inputs"),
-    ("diagnose", "input"),
-    ("add", "pipeline"),
-    ("plan", "pipeline"),
-    ("pool", "pipeline"),
-    ("pool", "results"),
-    ("check", "pipeline"),
-    ("batch", "pipeline"),
-    ("map", "manifest"),
-    ("map", "pool"),
-    ("map", "pipeline"),
-    ("compare", "before"),
-    ("compare", "after"),
-    ("verify", "result"),
-    ("verify", "pipeline"),
-    ("transfer", "from"),
-    ("transfer", "to"),
-    ("compensate", "result"),
-    ("compensate", "targets"),
-    ("view", "input"),
-    ("simulate", "lab"),
-];
-const READ_TOO: [(&str, &str); 9] = [
-    ("init", "points"),
-    ("init", "urdf"),
-    ("init", "dh"),
-    ("init", "board"),
-    ("extract", "inputs"),
-    ("extract", "pipeline"),
-    ("export", "pipeline"),
-    ("write", "result"),
-    ("write", "hash_from"),
-];
-
-/// A new command with an output, or a new option, must be tried here.
+/// A new command with an input or an output, or a new option, must be tried: here, and with everything that is no file
+/// (`bad_paths`).
 #[test]
-fn every_path_that_can_be_typed_is_known_as_input_or_tried_as_output() {
-    let tried: BTreeSet<[String; 2]> = cases().iter().map(|case| case.name.map(str::to_owned)).collect();
-    let read = READ.iter().chain(&READ_TOO).map(|(command, arg)| [(*command).to_owned(), (*arg).to_owned()]);
-    let mut expected: BTreeSet<[String; 2]> = read.collect();
-    expected.extend(tried);
+fn every_path_that_can_be_typed_is_tried_as_input_or_as_output() {
+    let written = cases().into_iter().map(|case| case.name);
+    let read = reads().into_iter().filter(|read| read.typed).map(|read| read.name);
+    let expected: BTreeSet<[String; 2]> = written.chain(read).map(|name| name.map(str::to_owned)).collect();
     let path = ValueParser::path_buf().type_id();
     let mut typed = BTreeSet::new();
     for command in Cli::command().get_subcommands() {
@@ -297,4 +260,68 @@ fn a_result_is_replaced_by_its_own_kind_only() {
     std::os::unix::fs::symlink(world.path("page.html"), world.path("latest.html")).expect("linked");
     refused(&world.armcal(["compare", "result", "result", "--html", "latest.html"]), "latest.html", "a link");
     refused(&world.armcal(["export", "p.toml", "--out", "/dev/null"]), "/dev/null", "a device");
+}
+
+/// What people change in a text of armcal's is theirs, whoever would write it again.
+#[test]
+fn what_was_changed_since_armcal_wrote_it_stays() {
+    let world = World::new();
+    let init = ["init", "normal.mcap", "--dh", "arm.toml", "--board", "board.toml", "--out", "new.toml"];
+    world.done(&init);
+    world.done(&["add", "backlash:1", "new.toml", "--out", "more"]);
+    world.done(&["write", "result", "--as", "joint-zeros", "--out", "zeros.yaml"]);
+    world.done(&["simulate", "--hide", "nothing", "--out", "sealed"]);
+    let again: [(&str, &[&str]); 7] = [
+        ("new.toml", &init),
+        ("new+backlash-1.toml", &["add", "backlash:1", "new.toml", "--out", "more"]),
+        ("more/parameters.toml", &["add", "backlash:1", "new.toml", "--out", "more"]),
+        ("more/view.toml", &["add", "backlash:1", "new.toml", "--out", "more"]),
+        ("result/calibrated.toml", &["run", "p.toml", "--out", "result"]),
+        ("zeros.yaml", &["write", "result", "--as", "joint-zeros", "--out", "zeros.yaml"]),
+        ("sealed/pipeline.toml", &["simulate", "--hide", "nothing", "--out", "sealed", "--seed", "2"]),
+    ];
+    for (name, arguments) in again {
+        let written = std::fs::read_to_string(world.path(name)).expect("written");
+        let changed = written.clone() + "\n# measured again on Monday\n";
+        world.write(name, &changed);
+        refused(&world.armcal(arguments), name, name);
+        let now = std::fs::read_to_string(world.path(name)).expect("still there");
+        assert!(now == changed, "{name} has changed");
+        world.write(name, &written);
+    }
+    // As they were written, they give way; a proposal still only when that is asked for, and then with what was changed in it.
+    for (name, arguments) in &again[1..] {
+        world.done(arguments);
+        assert!(world.path(name).is_file());
+    }
+    refused(&world.armcal(init), "--force", "a proposal");
+    let written = std::fs::read(world.path("new.toml")).expect("written");
+    world.write("new.toml", "# armcal.pipeline/1 sha256:0123456789abcdef\nname = \"mine\"\n");
+    refused(&world.armcal(init), "may have been changed", "a changed proposal");
+    world.done(&[&init[..], &["--force"]].concat());
+    assert!(
+        std::fs::read(world.path("new.toml")).expect("written") == written,
+        "as it was proposed at first"
+    );
+}
+
+/// A pipeline that people wrote has no mark, and what `add` makes of it has one.
+#[test]
+fn an_extended_pipeline_is_known_for_its_own_until_it_is_changed() {
+    let world = World::new();
+    let add = ["add", "backlash:1", "p.toml"];
+    world.done(&add);
+    let path = world.path("p+backlash-1.toml");
+    let first = std::fs::read_to_string(&path).expect("written");
+    assert!(first.starts_with("# armcal.pipeline/1 sha256:"), "{first}");
+    let original = std::fs::read_to_string(world.path("p.toml")).expect("a pipeline");
+    world.write("p.toml", &original.replace("k = 5", "k = 4"));
+    world.done(&add);
+    let second = std::fs::read_to_string(&path).expect("written");
+    assert!(
+        second != first && second.contains("k = 4"),
+        "the original was changed, and the extended one follows"
+    );
+    std::fs::write(&path, second.replace("k = 4", "k = 3")).expect("changed");
+    refused(&world.armcal(add), "p+backlash-1.toml", "a changed one");
 }

@@ -188,3 +188,16 @@ pub fn read_json(path: &Path) -> Value {
 pub fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
 }
+
+/// A library that fails a call of the system in a program, made at `library`: see `failing_calls.c`. `None`, which is said, where
+/// the machine cannot make one.
+pub fn failing_calls(library: &Path) -> Option<PathBuf> {
+    let source = root().join("tests/support/failing_calls.c");
+    let mut compile = std::process::Command::new("cc");
+    let made = compile.args(["-shared", "-fPIC", "-o"]).arg(library).arg(source).arg("-ldl").status();
+    if !made.is_ok_and(|status| status.success()) {
+        skip("this machine has no C compiler");
+        return None;
+    }
+    Some(library.to_owned())
+}

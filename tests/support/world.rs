@@ -138,6 +138,15 @@ impl World {
         assert!(matches!(output.status.code(), Some(0 | 3)), "{arguments:?}: {said}");
     }
 
+    /// The same, which must end by itself: what waits for somebody else is ended and named.
+    pub fn ends<S: AsRef<std::ffi::OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Output {
+        let mut command = Command::new("timeout");
+        command.args(["--signal=KILL", "120"]).arg(env!("CARGO_BIN_EXE_armcal")).args(arguments);
+        let output = command.current_dir(self.folder.path()).output().expect("starting armcal");
+        assert!(output.status.code().is_some_and(|code| code != 137), "it waits: {command:?}");
+        output
+    }
+
     /// Runs a case with this output.
     pub fn attempt(&self, case: &Case, output: &Path) -> Output {
         let mut arguments: Vec<&std::ffi::OsStr> = case.arguments.iter().map(std::ffi::OsStr::new).collect();
@@ -259,6 +268,85 @@ pub fn cases() -> Vec<Case> {
         of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec![], Place::File),
         of(["man", "folder"], "", &["man"], vec![], folder(&["armcal.1", "armcal-run.1"])),
         of(["export", "out"], "--out", &["export", "p.toml"], with(&[]), Place::File),
+    ]
+}
+
+/// What a command takes a file for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Read {
+    /// A text or a result: read whole, up to a limit.
+    Whole,
+    /// A recording: read in part, of any size.
+    Recording,
+}
+
+/// One input of one command.
+pub struct Reads {
+    /// The subcommand, and how clap calls the argument.
+    pub name: [&'static str; 2],
+    /// All that is typed; [`INPUT`] stands for the input.
+    pub arguments: Vec<&'static str>,
+    /// How the input's name ends.
+    pub ending: &'static str,
+    pub read: Read,
+    /// Whether clap knows it for a path; patterns and other words are texts to it.
+    pub typed: bool,
+}
+
+/// Stands for an input in [`Reads::arguments`].
+pub const INPUT: &str = "INPUT";
+
+/// Every input of every command.
+pub fn reads() -> Vec<Reads> {
+    let of = |name: [&'static str; 2], arguments: &[&'static str], ending, read| {
+        let arguments = [&name[..1], arguments].concat();
+        let typed = !matches!(name, ["batch" | "init", "inputs"]);
+        Reads { name, arguments, ending, read, typed }
+    };
+    let whole = |name, arguments: &[&'static str], ending| of(name, arguments, ending, Read::Whole);
+    let recording = |name, arguments: &[&'static str]| of(name, arguments, "mcap", Read::Recording);
+    let init = |name, option, ending| {
+        whole(name, &["normal.mcap", "--dh", "arm.toml", "--out", "new.toml", option, INPUT], ending)
+    };
+    let map = ["--shard", "1/1", "--pipeline"];
+    vec![
+        whole(["run", "pipeline"], &[INPUT], "toml"),
+        recording(["inspect", "inputs"], &[INPUT]),
+        whole(["inspect", "inputs"], &[INPUT], "toml"),
+        whole(["diagnose", "input"], &[INPUT], "toml"),
+        recording(["diagnose", "input"], &[INPUT]),
+        whole(["add", "pipeline"], &["backlash:1", INPUT], "toml"),
+        whole(["plan", "pipeline"], &[INPUT], "toml"),
+        whole(["pool", "pipeline"], &[INPUT, "result"], "toml"),
+        whole(["pool", "results"], &["p.toml", INPUT], "json"),
+        whole(["check", "pipeline"], &[INPUT], "toml"),
+        whole(["batch", "pipeline"], &["normal.mcap", "--pipeline", INPUT], "toml"),
+        recording(["batch", "inputs"], &[INPUT, "--pipeline", "p.toml"]),
+        whole(["map", "manifest"], &[&map[..], &["p.toml", "--manifest", INPUT]].concat(), "txt"),
+        whole(["map", "pool"], &[&map[..], &["p.toml", "--pool", INPUT]].concat(), "json"),
+        whole(["map", "pipeline"], &[&map[..], &[INPUT, "--manifest", "manifest.txt"]].concat(), "toml"),
+        recording(["compare", "before"], &[INPUT, "result"]),
+        recording(["compare", "after"], &["result", INPUT]),
+        whole(["verify", "result"], &[INPUT, "p.toml"], "json"),
+        whole(["verify", "pipeline"], &["result", INPUT], "toml"),
+        whole(["transfer", "from"], &[INPUT, "other.toml"], "toml"),
+        whole(["transfer", "to"], &["p.toml", INPUT], "toml"),
+        whole(["compensate", "result"], &[INPUT, "targets.csv"], "json"),
+        whole(["compensate", "targets"], &["result", INPUT], "csv"),
+        whole(["compensate", "targets"], &["result", INPUT], "toml"),
+        whole(["view", "input"], &[INPUT], "toml"),
+        whole(["simulate", "lab"], &[INPUT], "toml"),
+        recording(["init", "inputs"], &[INPUT, "--dh", "arm.toml"]),
+        init(["init", "points"], "--points", "csv"),
+        init(["init", "board"], "--board", "toml"),
+        whole(["init", "dh"], &["normal.mcap", "--out", "new.toml", "--dh", INPUT], "toml"),
+        whole(["init", "urdf"], &["normal.mcap", "--out", "new.toml", "--urdf", INPUT], "urdf"),
+        recording(["extract", "inputs"], &[INPUT, "--topic", "*", "--out", "thin.mcap"]),
+        whole(["extract", "pipeline"], &["normal.mcap", "--out", "thin.mcap", "--pipeline", INPUT], "toml"),
+        whole(["export", "pipeline"], &[INPUT], "toml"),
+        whole(["write", "result"], &[INPUT, "--as", "joint-zeros"], "json"),
+        recording(["write", "result"], &[INPUT, "--as", "joint-zeros"]),
+        whole(["write", "hash_from"], &["result", "--as", "ur-yaml", "--hash-from", INPUT], "yaml"),
     ]
 }
 

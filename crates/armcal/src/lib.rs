@@ -22,6 +22,7 @@ pub mod setup;
 pub mod stages;
 pub mod stdout;
 pub mod story;
+pub mod threads;
 pub mod transfer;
 pub mod two_arms;
 pub mod verify;

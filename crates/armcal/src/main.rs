@@ -3,7 +3,7 @@
 
 use armcal::cli::Cli;
 use armcal::commands::{self, Outcome};
-use armcal::{Error, stdout};
+use armcal::{Error, stdout, threads};
 use armcal_report::TerminalStyle;
 use clap::Parser as _;
 use std::io::Write as _;
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
         }
         Err(mistake) => mistake.exit(),
     };
-    ended(commands::dispatch(&cli))
+    ended(threads::start().and_then(|()| commands::dispatch(&cli)))
 }
 
 fn ended(result: Result<Outcome, Error>) -> ExitCode {

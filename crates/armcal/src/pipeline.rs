@@ -25,6 +25,7 @@ use armcal_core::RollPitchYaw;
 use armcal_diagnose::DiagnosisConfig;
 use armcal_dwell::{ClockConfig, DwellConfig};
 use armcal_model::{Deviation, EffectTable, Masses};
+use armcal_recording::input::Kind;
 use armcal_recording::{Streams, files_of, input, is_url, without_ending};
 use armcal_report::{OutputConfig, VerifyConfig};
 use armcal_table::{AssociationConfig, Tilt};
@@ -337,13 +338,13 @@ fn is_of_two_arms(text: &str) -> bool {
 impl Pipeline {
     /// Reads and checks a pipeline file.
     pub fn load(path: &Path) -> Result<Pipeline, Error> {
-        let text = read_text("pipeline", path)?;
+        let text = read_text("pipeline", Kind::Text, path)?;
         Pipeline::parse(path, text, path.parent().unwrap_or(Path::new("")))
     }
 
     /// The same for recordings that are named elsewhere; the pipeline's own are left out.
     pub fn load_for_others(path: &Path) -> Result<Pipeline, Error> {
-        let text = read_text("pipeline", path)?;
+        let text = read_text("pipeline", Kind::Text, path)?;
         let mut pipeline = Pipeline::read(path, text, path.parent().unwrap_or(Path::new("")))?;
         pipeline.note_inputs();
         pipeline.recordings.clear();

@@ -2,6 +2,8 @@
 
 use crate::CalibrateError;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -59,6 +61,33 @@ pub struct FitConfig {
     /// ways end at the same bits. Not set by files, default: false.
     #[serde(skip)]
     pub every_step: bool,
+    /// By which whoever asked says that nobody waits any more. Not set by files, default: never.
+    #[serde(skip)]
+    pub stop: Stop,
+}
+
+/// Says to a calibration under way that nobody waits for it any more.
+#[derive(Debug, Clone, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Nobody waits any more: every fit with it ends at its next step.
+    pub fn now(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// # Errors
+    /// [`CalibrateError::Stopped`].
+    pub fn check(&self) -> Result<(), CalibrateError> {
+        if self.0.load(Ordering::Relaxed) { Err(CalibrateError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// Who may stop a fit says nothing of how it is done.
+impl PartialEq for Stop {
+    fn eq(&self, _: &Stop) -> bool {
+        true
+    }
 }
 
 impl Default for FitConfig {
@@ -74,6 +103,7 @@ impl Default for FitConfig {
             max_iterations: 200,
             give_up_above_m: None,
             every_step: false,
+            stop: Stop::default(),
         }
     }
 }

@@ -117,6 +117,9 @@ pub enum CalibrateError {
     /// Observations are elsewhere, and what was asked about them is not answered yet.
     #[error("what was asked about observations that are elsewhere is not answered yet")]
     Unanswered,
+    /// Whoever asked wants no answer any more.
+    #[error("nobody waits for this calibration any more, so it was stopped")]
+    Stopped,
     /// Answers about observations that are elsewhere cannot be had.
     #[error("{0}")]
     Unreachable(String),

@@ -311,7 +311,7 @@ fn solve_robust(
         let rough = estimated && round <= ROUGH_ROUNDS;
         let step_tolerance = if rough { ROUGH_STEP_TOLERANCE } else { STEP_TOLERANCE };
         let cost = RobustCost { exact_curvature: !rough, ..RobustCost::new(white, config, sigma_scale) };
-        let settings = Settings { max_iterations: config.max_iterations, step_tolerance };
+        let settings = Settings { max_iterations: config.max_iterations, step_tolerance, stop: &config.stop };
         let solution = solver::minimise(&cost, at, settings)?;
         iterations += solution.iterations;
         let fitted = solution.fitted_directions(white);

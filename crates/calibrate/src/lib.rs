@@ -77,7 +77,7 @@ mod tests;
 pub use alike::AlikePoses;
 pub use calibration::{calibrate, calibrate_beside, calibrate_elsewhere, holdout_turns};
 pub use compare::{compare_errors, compare_heldout, held_out_errors_m, mean_by_dwell};
-pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale};
+pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale, Stop};
 pub use covariance::Covariance;
 pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use ended::{Ended, fitted_values};

@@ -40,6 +40,7 @@ pub(crate) fn minimise(white: &Whitened<'_>, config: &FitConfig) -> Result<Paper
     let mut region = 1.0;
     let (mut status, mut iterations) = (Status::IterationLimit, 0);
     'outer: while iterations < config.max_iterations {
+        config.stop.check()?;
         iterations += 1;
         let blocks = white.distances(&x)?;
         loop {

@@ -4,6 +4,7 @@ use crate::random::{Purpose, Stream};
 use crate::screw::{Line, pose, turn};
 use crate::{LabError, config};
 use armcal_core::Pose;
+use armcal_recording::input;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::Path;
@@ -143,7 +144,7 @@ pub fn drawing(path: &Path) -> Result<String, LabError> {
         return Ok(PAPER.to_owned());
     }
     let refused = |source| LabError::Read { what: "board file", path: path.to_owned(), source };
-    armcal_recording::input::read_to_string(path).map_err(refused)
+    input::read_to_string(path, input::Kind::Text).map_err(refused)
 }
 
 impl TiltMechanism {

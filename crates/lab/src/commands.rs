@@ -4,6 +4,7 @@
 
 use crate::LabError;
 use crate::config::{LabConfig, SetPointsConfig};
+use armcal_recording::input;
 use std::path::Path;
 
 /// The set-points of one recording.
@@ -30,8 +31,9 @@ impl Commands {
     fn load(config: &LabConfig, told: &SetPointsConfig, base_dir: &Path) -> Result<Commands, LabError> {
         let path = base_dir.join(&told.file);
         let failed = |why: String| LabError::SetPoints { path: path.clone(), why };
-        let file = armcal_recording::input::open(&path).map_err(|e| failed(e.to_string()))?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+        let text = input::read_to_string(&path, input::Kind::Data).map_err(|e| failed(e.to_string()))?;
+        let mut options = csv::ReaderBuilder::new();
+        let mut reader = options.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
         let header = reader.headers().map_err(|e| failed(e.to_string()))?.clone();
         let find = |name: &str| header.iter().position(|column| column == name);
         let columns = config.joints.names.iter().map(|joint| {

@@ -126,7 +126,7 @@ pub(crate) fn write_recordings(truth: &Truth, logs: &[Log], folder: &Path) -> Re
 }
 
 pub(crate) fn make_folder(path: &Path) -> Result<(), LabError> {
-    std::fs::create_dir_all(path).map_err(|source| LabError::Folder { path: path.to_owned(), source })
+    Ok(armcal_recording::make_folder(path)?)
 }
 
 /// Simulates a session without writing anything: the truth, and one log a recording.

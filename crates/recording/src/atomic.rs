@@ -9,6 +9,8 @@
 
 #![allow(clippy::disallowed_methods, reason = "this is where outputs are written")]
 
+use crate::guard::Over;
+use crate::seal::sealed_bytes;
 use crate::{RecordingError, guard, input};
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -27,6 +29,7 @@ const TRIES: usize = 10;
 pub struct AtomicFile {
     temporary: NamedTempFile,
     target: PathBuf,
+    over: Over,
 }
 
 impl AtomicFile {
@@ -35,8 +38,12 @@ impl AtomicFile {
     /// # Errors
     /// As [`crate::may_write`], and a folder that cannot be written.
     pub fn create(target: &Path) -> Result<AtomicFile, RecordingError> {
+        AtomicFile::create_over(target, Over::Unchanged)
+    }
+
+    fn create_over(target: &Path, over: Over) -> Result<AtomicFile, RecordingError> {
         let refused = |why: String| RecordingError::Write { path: target.to_owned(), why };
-        guard::may_write(target)?;
+        guard::may_write_over(target, over)?;
         let Some(name) = target.file_name() else {
             return Err(refused("it is a folder, not a file name".into()));
         };
@@ -53,7 +60,7 @@ impl AtomicFile {
             let locked = temporary.as_file().try_lock();
             let held = !matches!(locked, Err(TryLockError::WouldBlock)) && temporary.path().exists();
             if held {
-                return Ok(AtomicFile { temporary, target: target.to_owned() });
+                return Ok(AtomicFile { temporary, target: target.to_owned(), over });
             }
         }
         Err(refused("another process keeps removing its unfinished file".into()))
@@ -69,7 +76,7 @@ impl AtomicFile {
     /// # Errors
     /// As [`crate::may_write`], and a result of another kind at the target.
     pub fn may_commit(&self) -> Result<(), RecordingError> {
-        guard::may_replace(&self.target, self.temporary.path()).map(drop)
+        guard::may_replace(&self.target, self.temporary.path(), self.over).map(drop)
     }
 
     /// Syncs the file to disk and gives it its name, replacing an earlier result of the same kind.
@@ -77,12 +84,12 @@ impl AtomicFile {
     /// # Errors
     /// As [`AtomicFile::may_commit`], and what the system refuses.
     pub fn commit(self) -> Result<(), RecordingError> {
-        let (target, mut temporary) = (self.target, self.temporary);
+        let AtomicFile { target, mut temporary, over } = self;
         let refused = |e: io::Error| RecordingError::Write { path: target.clone(), why: e.to_string() };
         temporary.as_file().sync_all().map_err(refused)?;
         let mut tries = 0..TRIES;
         loop {
-            if guard::may_replace(&target, temporary.path())? {
+            if guard::may_replace(&target, temporary.path(), over)? {
                 temporary.persist(&target).map_err(|e| refused(e.error))?;
                 break;
             }
@@ -123,15 +130,24 @@ impl Seek for AtomicFile {
     }
 }
 
-/// Writes a whole file atomically. A file that has just this content already is left as it is.
+/// Writes a whole file atomically; the mark of a text gets its hash. A file that has just this content already is left as it is.
 ///
 /// # Errors
 /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
 pub fn write(target: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
+    write_over(target, bytes, Over::Unchanged)
+}
+
+/// The same where it is said what may be lost.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_over(target: &Path, bytes: &[u8], over: Over) -> Result<(), RecordingError> {
+    let bytes = &sealed_bytes(bytes);
     if guard::is_there(target, bytes)? {
         return Ok(());
     }
-    let mut file = AtomicFile::create(target)?;
+    let mut file = AtomicFile::create_over(target, over)?;
     let refused = |e: io::Error| RecordingError::Write { path: target.to_owned(), why: e.to_string() };
     file.write_all(bytes).map_err(refused)?;
     file.commit()
@@ -167,7 +183,7 @@ mod tests {
 
     /// A file that says that it is of the same kind as the others.
     fn marked(text: &str) -> Vec<u8> {
-        format!("# armcal.test/1\n{text}").into_bytes()
+        sealed_bytes(format!("# armcal.test/1\n{text}").as_bytes()).into_owned()
     }
 
     fn names(folder: &Path) -> Vec<String> {

@@ -13,8 +13,8 @@ use std::path::Path;
 /// How local files are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Access {
-    /// Memory-mapped: the fastest, and all of a file is judged. A mapped file must not be truncated by anybody while it
-    /// is read, which would kill the process (SIGBUS).
+    /// Memory-mapped: the fastest, and all of a file is judged. A file that is shortened meanwhile is an error on Linux; elsewhere
+    /// it kills the process (SIGBUS).
     #[default]
     Mapped,
     /// By ranges, as from object storage: for files on network storage or in the hands of other programs. A file that
@@ -38,7 +38,10 @@ impl Access {
 /// # Errors
 /// A file or object that cannot be opened or read, is empty or a folder.
 pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
-    FileBytes::open(path, Access::from_env())?.identity()
+    let bytes = FileBytes::open(path, Access::from_env())?;
+    let identity = bytes.identity();
+    bytes.unshortened(path)?;
+    identity
 }
 
 /// SHA-256 of a whole file, hexadecimal, for whoever compares it with what `sha256sum` prints.
@@ -47,13 +50,15 @@ pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
 /// As [`identity_of`].
 pub fn sha256_of(path: &Path) -> Result<String, RecordingError> {
     let mut hasher = Sha256::new();
-    match FileBytes::open(path, Access::from_env())? {
+    let bytes = FileBytes::open(path, Access::from_env())?;
+    match &bytes {
         FileBytes::Mapped(map) => map.pieces(0..map.len(), |piece| hasher.update(piece)),
         FileBytes::Ranged(ranged) => ranged.each_round(&mut |piece| {
             hasher.update(piece);
             Ok(())
         })?,
     }
+    bytes.unshortened(path)?;
     Ok(hex::encode(hasher.finalize()))
 }
 
@@ -76,10 +81,11 @@ impl FileBytes {
         // Looked at before it is opened: opening a pipe waits for whoever writes to it.
         let about = std::fs::metadata(path).map_err(open)?;
         if about.is_dir() {
+            std::fs::read_dir(path).map_err(open)?;
             return Err(refused("it is a folder without a recording in it (.mcap, .db3); name the files"));
         }
-        if !about.is_file() {
-            return Err(refused("it is a pipe or a device; copy it into a file first"));
+        if let Some(what) = input::irregular(&about) {
+            return Err(refused(&format!("it is {what}; copy it into a file first")));
         }
         let file = input::open(path).map_err(open)?;
         if file.metadata().map_err(open)?.len() == 0 {
@@ -112,6 +118,19 @@ impl FileBytes {
         match self {
             FileBytes::Mapped(map) => Ok(map.identity()),
             FileBytes::Ranged(ranged) => ranged.identity(),
+        }
+    }
+
+    /// # Errors
+    /// It became shorter since it was opened, so that what was read is worth nothing.
+    pub fn unshortened(&self, path: &Path) -> Result<(), RecordingError> {
+        match self {
+            FileBytes::Mapped(map) if map.is_shortened() => {
+                let source =
+                    std::io::Error::other("bytes that it had when it was opened cannot be read any more");
+                Err(RecordingError::Read { path: path.to_owned(), source })
+            }
+            _ => Ok(()),
         }
     }
 

@@ -93,6 +93,16 @@ pub enum RecordingError {
     /// A file could not be written.
     #[error("cannot write {}: {why}; nothing was left behind", path.display())]
     Write { path: PathBuf, why: String },
+    /// A folder for results cannot be made.
+    #[error("making the folder {}: {source}", path.display())]
+    Folder { path: PathBuf, source: std::io::Error },
+    /// An output that is no file of this machine.
+    #[error(
+        "cannot write to {}: results are written to files of this machine only; choose a folder or file here, and copy it there \
+         when it is done",
+        path.display()
+    )]
+    NoFile { path: PathBuf },
     /// An output would replace an input.
     #[error(
         "{} is an input of this command (read as {}), and no input is ever written over: choose another output",

@@ -5,9 +5,11 @@
 #![allow(clippy::disallowed_methods, reason = "what is at the place of an output is no input")]
 
 use crate::mark::{Mark, attached_to_run};
+use crate::seal::sealed_bytes;
+use crate::url::is_url;
 use crate::{RecordingError, input};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is at a path.
 enum There {
@@ -21,12 +23,20 @@ enum There {
 }
 
 /// Whether an output may be begun at `target`, as far as its name tells: not an input of this process, and nothing else
-/// that armcal did not make.
+/// that armcal did not make or that somebody changed since.
 ///
 /// # Errors
-/// [`RecordingError::IsInput`], [`RecordingError::NotOurs`], or a folder at `target`.
+/// [`RecordingError::NoFile`], [`RecordingError::IsInput`], [`RecordingError::NotOurs`], or a folder at `target`.
 pub fn may_write(target: &Path) -> Result<(), RecordingError> {
-    match there(target)? {
+    may_write_over(target, Over::Unchanged)
+}
+
+/// The same where it is said what may be lost.
+///
+/// # Errors
+/// As [`may_write`].
+pub fn may_write_over(target: &Path, over: Over) -> Result<(), RecordingError> {
+    match there(target, over)? {
         There::Foreign(what) => Err(not_ours(target, what)),
         _ => Ok(()),
     }
@@ -40,24 +50,42 @@ pub fn may_write_all(targets: impl IntoIterator<Item = impl AsRef<Path>>) -> Res
     targets.into_iter().try_for_each(|target| may_write(target.as_ref()))
 }
 
+/// What an output may take the place of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Over {
+    /// What armcal made and nobody has changed since.
+    Unchanged,
+    /// What armcal made, changed or not: somebody asked for that.
+    Changed,
+}
+
 /// Whether just these bytes may be written to `target`: where they are there already, too.
 ///
 /// # Errors
 /// As [`may_write`], and a result of another kind.
 pub fn may_put(target: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
-    if is_there(target, bytes)? { Ok(()) } else { fits(target, there(target)?, Mark::of_text(bytes)) }
+    let bytes = &sealed_bytes(bytes);
+    if is_there(target, bytes)? {
+        return Ok(());
+    }
+    fits(target, there(target, Over::Unchanged)?, Mark::of_text(bytes))
 }
 
 /// Whether a file has just this content; an input is an error even then.
 pub(crate) fn is_there(target: &Path, bytes: &[u8]) -> Result<bool, RecordingError> {
     refuse_input(target)?;
-    let plain = target.symlink_metadata().is_ok_and(|a| a.is_file() && a.len() == bytes.len() as u64);
-    Ok(plain && std::fs::read(target).is_ok_and(|there| there == bytes))
+    Ok(holds(target, bytes))
+}
+
+/// Whether a file, and no link to one, has just this content.
+pub fn holds(path: &Path, bytes: &[u8]) -> bool {
+    let plain = path.symlink_metadata().is_ok_and(|a| a.is_file() && a.len() == bytes.len() as u64);
+    plain && std::fs::read(path).is_ok_and(|there| there == bytes)
 }
 
 /// Whether a finished file may take the place of `target`; says whether there is anything to replace.
-pub(crate) fn may_replace(target: &Path, finished: &Path) -> Result<bool, RecordingError> {
-    let there = there(target)?;
+pub(crate) fn may_replace(target: &Path, finished: &Path, over: Over) -> Result<bool, RecordingError> {
+    let there = there(target, over)?;
     if let There::Nothing = there {
         return Ok(false);
     }
@@ -77,7 +105,13 @@ fn fits(target: &Path, there: There, new: Option<Mark>) -> Result<(), RecordingE
     }
 }
 
-fn there(target: &Path) -> Result<There, RecordingError> {
+/// What an output can be: a file here. A path such as `s3://bucket/out` would quietly become a folder called `s3:`.
+fn refuse_url(target: &Path) -> Result<(), RecordingError> {
+    if is_url(target) { Err(RecordingError::NoFile { path: target.to_owned() }) } else { Ok(()) }
+}
+
+fn there(target: &Path, over: Over) -> Result<There, RecordingError> {
+    refuse_url(target)?;
     // Without following a link, which is nothing that armcal makes.
     let about = match target.symlink_metadata() {
         Ok(about) => about,
@@ -92,8 +126,8 @@ fn there(target: &Path) -> Result<There, RecordingError> {
     if about.is_symlink() {
         return Ok(There::Foreign("is a link".to_owned()));
     }
-    if !about.is_file() {
-        return Ok(There::Foreign("is a device or a pipe".to_owned()));
+    if let Some(what) = input::irregular(&about) {
+        return Ok(There::Foreign(format!("is {what}")));
     }
     if about.len() == 0 {
         return Ok(There::Empty);
@@ -102,7 +136,10 @@ fn there(target: &Path) -> Result<There, RecordingError> {
         Ok(There::Foreign(format!("cannot be read ({e}), so armcal cannot know it for its own")))
     };
     match Mark::of_file(target) {
-        Ok(Some(mark)) => Ok(There::Ours(Some(mark))),
+        Ok(Some(mark)) => Ok(match mark.edited() {
+            Some(what) if over == Over::Unchanged => There::Foreign(what.to_owned()),
+            _ => There::Ours(Some(mark)),
+        }),
         Ok(None) => match attached_to_run(target) {
             Ok(true) => Ok(There::Ours(None)),
             Ok(false) => Ok(There::Foreign("was not made by armcal".to_owned())),
@@ -110,6 +147,34 @@ fn there(target: &Path) -> Result<There, RecordingError> {
         },
         Err(e) => unread(&e),
     }
+}
+
+/// Makes the folder of results that somebody named, if need be.
+///
+/// # Errors
+/// What is no folder here; what the system refuses.
+pub fn make_folder(folder: &Path) -> Result<(), RecordingError> {
+    refuse_url(folder)?;
+    std::fs::create_dir_all(folder)
+        .map_err(|source| RecordingError::Folder { path: folder.to_owned(), source })
+}
+
+/// Makes a folder inside one of results, if need be. The name of the outer one is the user's, and may be a link; what is in it
+/// is armcal's, and a link there would lead the results somewhere else.
+///
+/// # Errors
+/// As [`make_folder`], and a link.
+pub fn make_folder_in(outer: &Path, inner: impl AsRef<Path>) -> Result<PathBuf, RecordingError> {
+    make_folder(outer)?;
+    let mut folder = outer.to_owned();
+    for name in inner.as_ref() {
+        folder.push(name);
+        if folder.is_symlink() {
+            return Err(not_ours(&folder, "is a link".to_owned()));
+        }
+        make_folder(&folder)?;
+    }
+    Ok(folder)
 }
 
 fn refuse_input(target: &Path) -> Result<(), RecordingError> {

@@ -54,6 +54,8 @@ mod reading;
 mod records;
 mod report;
 pub mod ros2;
+mod seal;
+mod shortened;
 mod streams;
 mod sweep;
 mod temperature;
@@ -67,11 +69,14 @@ pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime};
 pub use foreign::inflated;
 pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
-pub use guard::{may_put, may_write, may_write_all};
+pub use guard::{
+    Over, holds, make_folder, make_folder_in, may_put, may_write, may_write_all, may_write_over,
+};
 pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;
+pub use seal::{is_marked, sealed};
 pub use streams::{
     Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
 };

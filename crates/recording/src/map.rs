@@ -5,6 +5,7 @@
 //! passes over a map says which stretch it is done with, and the pages leave; they stay in the system's cache.
 
 use crate::identity::Pieces;
+use crate::shortened::Watched;
 use std::fs::File;
 use std::io;
 use std::ops::{Deref, Range};
@@ -16,6 +17,8 @@ const PIECE_BYTES: usize = 4 << 20;
 
 /// A file mapped read-only.
 pub(crate) struct Map {
+    /// Dropped first: what is not mapped any more is not watched.
+    watched: Watched,
     bytes: memmap2::Mmap,
     /// What passes have hashed of it; `None` where they shall not.
     pub hashed: Option<Pieces>,
@@ -26,11 +29,15 @@ impl Map {
     pub fn of(file: &File) -> io::Result<Map> {
         #[expect(unsafe_code, reason = "mapping is the only way to read gigabytes without copying them")]
         // SAFETY: the map is read-only and private to this process. Another process that truncates the file while it
-        // is mapped can still kill us with SIGBUS; recordings are finished files, which nobody truncates, and where
-        // somebody may (`crate::Access`), the file is not mapped.
+        // is mapped is seen (`crate::shortened`; elsewhere than on Linux it kills us with SIGBUS).
         let bytes = unsafe { memmap2::Mmap::map(file) }?;
         let hashed = Some(Pieces::of(bytes.len()));
-        Ok(Map { bytes, hashed })
+        Ok(Map { watched: Watched::of(&bytes), bytes, hashed })
+    }
+
+    /// Whether the file became shorter and something behind its new end was read: then what was read is worth nothing.
+    pub fn is_shortened(&self) -> bool {
+        self.watched.is_shortened()
     }
 
     /// Says that a pass in order of offsets is done with these bytes. They can be read again at any time.

@@ -1,26 +1,23 @@
 //! What a file says it is: everything that armcal writes can be told from what it did not write, by its content.
 //!
 //! * JSON begins with `"schema": "armcal.KIND/N"`; pages, TOML, URDF, Markdown and man pages have `armcal.KIND/N` in a comment or
-//!   generator tag of their first lines;
+//!   generator tag of their first lines, TOML, URDF and Markdown with a hash of everything else ([`crate::seal`]);
 //! * MCAP names the library `armcal/VERSION` and bears a metadata record of its kind;
 //! * Parquet has `armcal.KIND/N` among the key-value pairs of its footer.
 //!
 //! [`SIGNATURES`] and [`TABLES`] know what has no such word: formats that leave no room for it, and earlier versions.
 
-#![allow(clippy::disallowed_methods, reason = "what is at the place of an output is no input")]
-
 use crate::index::{self, Found};
 use crate::ranges::Ranged;
 use crate::raw::{Attachment, parse_metadata};
-use crate::{EXTRACT_METADATA, RecordingError};
+use crate::seal::{Seal, comment, kind};
+use crate::{EXTRACT_METADATA, RecordingError, input};
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 /// A mark stands in so many bytes at the beginning of a text.
 const HEAD_BYTES: u64 = 16 << 10;
-/// A comment that marks a text stands in one of so many lines.
-const HEAD_LINES: usize = 8;
 /// A larger footer of a Parquet file is none of ours.
 const MAX_FOOTER_BYTES: u64 = 16 << 20;
 const PARQUET: &[u8] = b"PAR1";
@@ -67,29 +64,46 @@ const TABLES: [(&str, [&str; 2]); 5] = [
     ("paths", ["calibrated_x_m", "motion"]),
 ];
 
+/// Texts that people are told to edit. Without a hash they are of an earlier version, and may have been.
+const EDITED: [&str; 2] = ["pipeline", "board"];
+
 /// The kind of a file that armcal made: `summary`, `report-page`, `dwells`, ...
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Mark(String);
+pub(crate) struct Mark {
+    kind: String,
+    seal: Seal,
+}
 
 impl Mark {
     /// Whether a file of this kind may take the place of one of the other kind.
     pub fn replaces(&self, other: &Mark) -> bool {
-        let earlier = match other.0.as_str() {
-            EARLIER_PAGE => self.0.ends_with(PAGE_SUFFIX),
-            EARLIER_POOL_PAGE => self.0 == RUN_PAGE,
+        let earlier = match other.kind.as_str() {
+            EARLIER_PAGE => self.kind.ends_with(PAGE_SUFFIX),
+            EARLIER_POOL_PAGE => self.kind == RUN_PAGE,
             _ => false,
         };
-        self == other || earlier
+        self.kind == other.kind || earlier
     }
 
     /// The kind, as people read it.
     pub fn kind(&self) -> &str {
-        &self.0
+        &self.kind
+    }
+
+    /// Whether somebody has changed the file since armcal wrote it, or may have; in words.
+    pub fn edited(&self) -> Option<&'static str> {
+        match self.seal {
+            Seal::Broken => Some("was changed since armcal wrote it"),
+            Seal::None if EDITED.contains(&self.kind.as_str()) => {
+                Some("was written by a version of armcal that does not tell whether it was changed since")
+            }
+            Seal::None | Seal::Whole => None,
+        }
     }
 
     /// The mark of a file; `None` for one that armcal did not make.
     pub fn of_file(path: &Path) -> io::Result<Option<Mark>> {
-        let mut file = File::open(path)?;
+        let mut file = input::regular(path)?;
         let mut head = Vec::new();
         file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
         if head.starts_with(mcap::MAGIC) {
@@ -98,7 +112,11 @@ impl Mark {
         if head.starts_with(PARQUET) {
             return of_parquet(&mut file);
         }
-        Ok(Mark::of_text(&head))
+        let mut mark = Mark::of_text(&head);
+        if let (Some(mark), Some(comment)) = (&mut mark, comment(valid(&head))) {
+            mark.seal = comment.seal(&head, file)?;
+        }
+        Ok(mark)
     }
 
     /// The mark of a text, given its beginning.
@@ -106,26 +124,25 @@ impl Mark {
         let head = String::from_utf8_lossy(head);
         let holds = |(_, begins, part): &&(&str, &str, &str)| head.starts_with(begins) && head.contains(part);
         let signed = || SIGNATURES.iter().find(holds).map(|(kind, ..)| (*kind).to_owned());
-        of_schema(&head).or_else(|| of_comment(&head)).or_else(signed).map(Mark)
+        of_schema(&head).or_else(|| Some(comment(&head)?.kind)).or_else(signed).map(unsealed)
     }
 }
 
-/// `KIND` of `KIND/N...`.
-fn kind(text: &str) -> Option<String> {
-    let (kind, version) = text.split_once('/')?;
-    let plain = !kind.is_empty() && kind.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_".contains(&b));
-    (plain && version.starts_with(|c: char| c.is_ascii_digit())).then(|| kind.to_owned())
+fn unsealed(kind: String) -> Mark {
+    Mark { kind, seal: Seal::None }
+}
+
+/// The text that bytes begin with.
+fn valid(bytes: &[u8]) -> &str {
+    let end = std::str::from_utf8(bytes).map_or_else(|e| e.valid_up_to(), str::len);
+    std::str::from_utf8(&bytes[..end]).unwrap_or_default()
 }
 
 /// The first key of a JSON object, if it is our schema.
 fn of_schema(head: &str) -> Option<String> {
     let key = head.trim_start().strip_prefix('{')?.trim_start().strip_prefix("\"schema\"")?;
-    kind(key.trim_start().strip_prefix(':')?.trim_start().strip_prefix("\"armcal.")?)
-}
-
-fn of_comment(head: &str) -> Option<String> {
-    let begins = ["# armcal.", "<!-- armcal.", ".\\\" armcal.", "<meta name=\"generator\" content=\"armcal."];
-    head.lines().take(HEAD_LINES).find_map(|line| begins.iter().find_map(|b| kind(line.strip_prefix(b)?)))
+    let word = key.trim_start().strip_prefix(':')?.trim_start().strip_prefix("\"armcal.")?;
+    kind(word).map(|(kind, _)| kind)
 }
 
 fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
@@ -146,7 +163,7 @@ fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
         && names.is_empty()
         && channels.values().all(|channel| channel.topic.starts_with("/joint_set_points"));
     let earlier = || set_points.then_some(&RECORDS[2]);
-    Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| Mark((*kind).to_owned())))
+    Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| unsealed((*kind).to_owned())))
 }
 
 fn of_parquet(file: &mut File) -> io::Result<Option<Mark>> {
@@ -167,8 +184,9 @@ fn of_parquet(file: &mut File) -> io::Result<Option<Mark>> {
     file.take(footer_bytes).read_to_end(&mut footer)?;
     let footer = String::from_utf8_lossy(&footer);
     let said = footer.match_indices("armcal.").find_map(|(at, word)| kind(&footer[at + word.len()..]));
+    let said = said.map(|(kind, _)| kind);
     let has = |(_, columns): &&(&str, [&str; 2])| columns.iter().all(|column| footer.contains(column));
-    Ok(said.or_else(|| TABLES.iter().find(has).map(|(kind, _)| (*kind).to_owned())).map(Mark))
+    Ok(said.or_else(|| TABLES.iter().find(has).map(|(kind, _)| (*kind).to_owned())).map(unsealed))
 }
 
 /// Whether the `run.mcap` beside a file has just this file attached: so earlier versions, which did not mark every file,
@@ -179,9 +197,10 @@ pub(crate) fn attached_to_run(path: &Path) -> Result<bool, RecordingError> {
     if Mark::of_file(&beside).ok().flatten().is_none_or(|mark| mark.kind() != "run") {
         return Ok(false);
     }
-    let bytes = std::fs::read(path).map_err(read)?;
+    let mut bytes = Vec::new();
+    input::regular(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(read)?;
     let name = format!("armcal/{}", path.file_name().unwrap_or_default().to_string_lossy());
-    let ranged = Ranged::local(File::open(&beside).map_err(read)?, &beside)?;
+    let ranged = Ranged::local(input::regular(&beside).map_err(read)?, &beside)?;
     let Found::Layout(layout) = index::find(&ranged)? else { return Ok(false) };
     for range in &layout.attachments {
         let body = ranged.read_one(range.clone())?;

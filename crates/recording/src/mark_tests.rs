@@ -1,7 +1,7 @@
 use super::*;
 use crate::atomic::{self, AtomicFile};
 use crate::output::McapOutput;
-use crate::{input, may_put, may_write, may_write_all};
+use crate::{Over, input, make_folder, make_folder_in, may_put, may_write, may_write_all, may_write_over};
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
@@ -42,14 +42,14 @@ fn texts_of_armcal_are_known_and_others_are_not() {
     ] {
         assert_eq!(kind_of(text), None, "{text}");
     }
-    let late = format!("{}# armcal.view/1\n", "\n".repeat(HEAD_LINES));
+    let late = format!("{}# armcal.view/1\n", "\n".repeat(8));
     assert_eq!(kind_of(&late), None, "a mark far down is somebody's text");
 }
 
 #[test]
 fn a_page_of_an_earlier_version_gives_way_to_pages_only() {
     let [earlier, report, summary, other] =
-        ["page", "report-page", "summary", "comparison-page"].map(|kind| Mark(kind.to_owned()));
+        ["page", "report-page", "summary", "comparison-page"].map(|kind| unsealed(kind.to_owned()));
     assert!(report.replaces(&earlier) && report.replaces(&report));
     assert!(!summary.replaces(&earlier) && !report.replaces(&other) && !earlier.replaces(&report));
 }
@@ -97,7 +97,8 @@ fn a_recording_of_armcal_is_what_its_records_make_it() {
 fn a_file_without_a_mark_is_known_by_the_run_that_has_it_attached() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = folder.path().join("calibrated.toml");
-    let new = b"# armcal.calibrated-model/1\nname = 'new'\n";
+    let new = crate::sealed("# armcal.calibrated-model/1\nname = 'new'\n");
+    let new = new.as_bytes();
     write_mcap(
         &folder.path().join("run.mcap"),
         &["armcal/run"],
@@ -116,12 +117,16 @@ fn inputs_are_never_written_over_whatever_they_are() {
     let folder = tempfile::tempdir().expect("a folder");
     let [ours, link, hard, later] =
         ["a.toml", "b.toml", "c.toml", "d.toml"].map(|name| folder.path().join(name));
-    let text = b"# armcal.test/1\none\n";
+    let text = crate::sealed("# armcal.test/1\none\n");
+    let text = text.as_bytes();
     atomic::write(&ours, text).expect("written");
     atomic::write(&ours, b"# armcal.test/1\ntwo\n").expect("its own kind");
     let mut begun = AtomicFile::create(&ours).expect("begun before it is read");
     begun.write_all(text).expect("written");
-    assert_eq!(input::read_to_string(&ours).expect("readable"), "# armcal.test/1\ntwo\n");
+    assert_eq!(
+        input::read_to_string(&ours, input::Kind::Text).expect("readable"),
+        crate::sealed("# armcal.test/1\ntwo\n")
+    );
     std::os::unix::fs::symlink(&ours, &link).expect("linked");
     std::fs::hard_link(&ours, &hard).expect("linked");
     for path in [&ours, &link, &hard, &folder.path().join("../").join(folder.path()).join("a.toml")] {
@@ -192,4 +197,54 @@ fn a_place_that_cannot_be_looked_at_is_no_free_place() {
     let file = folder.path().join("file");
     std::fs::write(&file, "mine").expect("written");
     assert!(matches!(may_write(&file.join("out.toml")), Err(RecordingError::Write { .. })));
+}
+
+/// Somebody's changes are nobody's to take away, unless they say so.
+#[test]
+fn what_was_changed_since_is_replaced_only_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.toml");
+    let over = |over| atomic::write_over(&path, b"# armcal.pipeline/1\nnew = 1\n", over);
+    let put = |text: &str| std::fs::write(&path, text).expect("written");
+    let refused = |what: &str| match over(Over::Unchanged) {
+        Err(RecordingError::NotOurs { what: said, .. }) => assert!(said.contains(what), "{said}"),
+        other => panic!("{other:?}"),
+    };
+    atomic::write(&path, b"# armcal.pipeline/1\nold = 1\n").expect("written");
+    over(Over::Unchanged).expect("as it was written");
+    let written = std::fs::read_to_string(&path).expect("readable");
+    put(&written.replace("new", "mine"));
+    refused("changed since");
+    assert!(matches!(may_write(&path), Err(RecordingError::NotOurs { .. })), "before the work begins");
+    assert!(may_put(&path, b"# armcal.pipeline/1\nnew = 1\n").is_err());
+    may_write_over(&path, Over::Changed).expect("asked for");
+    over(Over::Changed).expect("asked for");
+    assert_eq!(std::fs::read_to_string(&path).expect("readable"), written);
+    // Of an earlier version, or without its hash: nobody knows. Results of earlier versions give way.
+    put("# armcal.pipeline/1\nmine = 1\n");
+    refused("does not tell");
+    put("# armcal.other/1\n");
+    refused("another result");
+    // Not even where it is asked for: what armcal did not make.
+    put("mine = 1\n");
+    assert!(matches!(over(Over::Changed), Err(RecordingError::NotOurs { .. })));
+}
+
+#[test]
+fn a_url_is_no_output_and_a_link_is_no_folder_inside_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for url in ["s3://bucket/out", "gs://b/o.toml", "S3://b", "file:///tmp/out", "https://host/out"] {
+        let url = Path::new(url);
+        let refused = [may_write(url), may_put(url, b""), make_folder(url), atomic::write(url, b"x")];
+        for result in refused {
+            assert!(matches!(result, Err(RecordingError::NoFile { .. })), "{}: {result:?}", url.display());
+        }
+        assert!(matches!(may_write(&url.join("run.mcap")), Err(RecordingError::NoFile { .. })));
+    }
+    let (elsewhere, out) = (folder.path().join("elsewhere"), folder.path().join("out"));
+    std::fs::create_dir(&elsewhere).expect("a folder");
+    std::os::unix::fs::symlink(&elsewhere, &out).expect("linked");
+    make_folder_in(&out, "shards").expect("the user named the link");
+    std::os::unix::fs::symlink(&elsewhere, out.join("recordings")).expect("linked");
+    assert!(matches!(make_folder_in(&out, "recordings"), Err(RecordingError::NotOurs { .. })));
 }

@@ -273,7 +273,16 @@ impl RecordingFile {
     /// An object is identified by its store, copied or not.
     fn identity(&self) -> Result<String, RecordingError> {
         let bytes = self.original();
-        self.object().map_or_else(|| bytes.identity(), |object| Ok(object.identity(bytes.len())))
+        let identity =
+            self.object().map_or_else(|| bytes.identity(), |object| Ok(object.identity(bytes.len())));
+        self.unshortened()?;
+        identity
+    }
+
+    /// # Errors
+    /// The file became shorter since it was opened.
+    pub fn unshortened(&self) -> Result<(), RecordingError> {
+        self.original().unshortened(&self.path)
     }
 
     fn object(&self) -> Option<&ObjectIdentity> {

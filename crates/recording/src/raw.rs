@@ -107,7 +107,10 @@ impl Recording {
             file.channels.iter().filter(|(_, channel)| wanted(channel)).map(|(id, _)| *id).collect()
         };
         let ids: Vec<BTreeSet<u16>> = self.files.iter().map(ids).collect();
-        for_each_batch(&self.files, &blocks(&self.files, &ids), |batch| self.hand_out(&batch, &ids, f))
+        let done =
+            for_each_batch(&self.files, &blocks(&self.files, &ids), |batch| self.hand_out(&batch, &ids, f));
+        self.files.iter().try_for_each(RecordingFile::unshortened)?;
+        done
     }
 
     fn hand_out(

@@ -1,6 +1,7 @@
 //! The streams of a pipeline, read into columns.
 
 use crate::gather::{Gathered, Kind, Request, gather};
+use crate::open::RecordingFile;
 use crate::reading::{Columns, Reading};
 use crate::streams::field_of;
 use crate::{Chain, LengthUnit, PoseStream, Recording, RecordingError, StreamReport, Streams, Transforms};
@@ -21,6 +22,16 @@ impl Recording {
     /// A missing topic, joint or body (the nearest present one is named), a topic that cannot be decoded, a stream
     /// without a usable row, numbers that cannot be in the declared unit, a clock the stream does not have.
     pub fn read(
+        &self,
+        streams: &Streams,
+    ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {
+        let read = self.read_streams(streams);
+        // Of a file that became shorter anything may be missing, and for any reason.
+        self.files.iter().try_for_each(RecordingFile::unshortened)?;
+        read
+    }
+
+    fn read_streams(
         &self,
         streams: &Streams,
     ) -> Result<(Samples, Vec<StreamReport>, Vec<Warning>), RecordingError> {

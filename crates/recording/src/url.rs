@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Whether a path is a URL, such as `s3://bucket/key`.
 pub fn is_url(path: &Path) -> bool {
-    path.to_str().and_then(|text| text.split_once("://")).is_some_and(|(scheme, _)| {
+    path.to_string_lossy().split_once("://").is_some_and(|(scheme, _)| {
         let word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.');
         scheme.starts_with(|c: char| c.is_ascii_alphabetic()) && scheme.chars().all(word)
     })

@@ -8,8 +8,8 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum ReportError {
     /// The output folder cannot be made.
-    #[error("cannot make the output folder {}: {source}; choose another one", path.display())]
-    Folder { path: PathBuf, source: std::io::Error },
+    #[error("{0}; choose another one")]
+    Folder(Box<armcal_recording::RecordingError>),
     /// A file cannot be written, or an input not be passed through.
     #[error("writing {}: {source}", path.display())]
     Write { path: PathBuf, source: Box<armcal_recording::RecordingError> },

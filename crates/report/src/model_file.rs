@@ -4,6 +4,7 @@
 use crate::{ReportError, Run};
 use armcal_core::Warning;
 use armcal_model::{Arm, Model};
+use armcal_recording::sealed;
 use std::path::Path;
 
 /// By this the file is known for armcal's own.
@@ -52,10 +53,10 @@ fn calibrated(
     let (chain, own) = model.chain().arm(arm);
     if chain.is_urdf() {
         let (text, warnings) = model.to_urdf(arm, nominal_text, Path::new("model_text of the run"), p)?;
-        let text = marked_xml(text);
+        let text = sealed(&marked_xml(text)).into_owned();
         return Ok(ModelFile { name: URDF.into(), media_type: "application/xml", text, warnings });
     }
-    let text = format!("# {MARK}\n\n{}", chain.to_dh_toml(&p[own])?);
+    let text = sealed(&format!("# {MARK}\n\n{}", chain.to_dh_toml(&p[own])?)).into_owned();
     Ok(ModelFile { name: DH.into(), media_type: "application/toml", text, warnings: Vec::new() })
 }
 

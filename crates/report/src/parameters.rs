@@ -4,9 +4,11 @@ use crate::ReportError;
 use crate::run::{Run, VERSION, role_word};
 use armcal_calibrate::Estimate;
 use armcal_core::{FeatureId, Pose, RollPitchYaw};
+use armcal_recording::sealed;
 use serde::Serialize;
 
 const HEADER: &str = "\
+# armcal.parameters/1
 # Parameters of the calibrated arm. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
 # determined = false: the data say nothing about it and the prior keeps it near nominal.
 # at_bound = true: it wants to go further than its bounds allow.
@@ -16,6 +18,7 @@ const HEADER: &str = "\
 
 /// Begins otherwise, so that a pool takes the place of no run's own parameters.
 const POOLED: &str = "\
+# armcal.pooled-parameters/1
 # Parameters of an arm calibrated on many recordings at once. value, nominal, sigma and ci95 (the 95 % interval) are in `unit`.
 # <recording>.<parameter> and board.<recording>.* are that recording's own; everything else is shared.
 # determined = false: the data say nothing about it and the prior keeps it near nominal.
@@ -70,7 +73,7 @@ pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
         frames: frames(run),
     };
     let header = if run.is_pool() { POOLED } else { HEADER };
-    Ok(format!("{header}{}", toml::to_string(&file)?))
+    Ok(sealed(&format!("{header}{}", toml::to_string(&file)?)).into_owned())
 }
 
 /// One parameter as it is written.

@@ -10,6 +10,7 @@ use armcal_model_file::{
     SCHEMA, Value,
 };
 use armcal_recording::{Recording, RecordingError, input};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Postures that are kept at most; a longer session is thinned out evenly.
@@ -98,8 +99,10 @@ pub fn open_model(path: &Path) -> Result<PastModel, PastRunError> {
 }
 
 fn file(path: &Path) -> Result<String, PastRunError> {
-    input::read_to_string(path)
-        .map_err(|e| PastRunError::NoModel { path: path.to_owned(), why: e.to_string() })
+    input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => PastRunError::NoModel { path: path.to_owned(), why: source.to_string() },
+        _ => PastRunError::Unreadable { path: path.to_owned(), source },
+    })
 }
 
 fn attached(path: &Path) -> Result<String, PastRunError> {

@@ -11,6 +11,7 @@ use armcal_table::Board;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// Format of the file.
@@ -128,7 +129,10 @@ impl PastObservations {
     /// A file that cannot be read, is of another format, or contradicts itself.
     pub fn open(path: &Path) -> Result<PastObservations, PastRunError> {
         let bad = |why: String| PastRunError::BadObservations { path: path.to_owned(), why };
-        let text = input::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let text = input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
+            ErrorKind::NotFound => bad(source.to_string()),
+            _ => PastRunError::Unreadable { path: path.to_owned(), source },
+        })?;
         let past: PastObservations = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
         if past.schema != SCHEMA {
             return Err(bad(format!("its schema is `{}`, not `{SCHEMA}`", past.schema)));

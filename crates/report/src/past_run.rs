@@ -84,6 +84,9 @@ pub enum PastRunError {
         path.display()
     )]
     NoResults { path: PathBuf, topic: &'static str },
+    /// A file of the result is there and cannot be read.
+    #[error("reading {}: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
     /// There is no model in the result.
     #[error(
         "{} holds no calibrated model ({why}); name the results of `armcal run` (their folder, run.mcap or model.json), \

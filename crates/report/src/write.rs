@@ -13,7 +13,7 @@ use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
 use crate::{ReportError, Run, summary_json};
 use armcal_recording::atomic::AtomicFile;
-use armcal_recording::{Recording, RecordingError};
+use armcal_recording::{Recording, RecordingError, make_folder};
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -91,8 +91,7 @@ pub fn write_all(
     let layouts = layouts(run, &points, &findings);
     let page = report_html(run, &Basis::of(run), PageKind::File)?;
 
-    std::fs::create_dir_all(out_dir)
-        .map_err(|source| ReportError::Folder { path: out_dir.to_owned(), source })?;
+    make_folder(out_dir).map_err(|source| ReportError::Folder(Box::new(source)))?;
     let mut staged = Vec::new();
     let texts = [
         (REPORT, &page),

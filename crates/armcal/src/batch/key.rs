@@ -3,10 +3,11 @@
 use super::Manifest;
 use crate::error::Error;
 use crate::pipeline::{Pipeline, RecordingEntry};
-use armcal_recording::{atomic, identity_of, input};
+use armcal_recording::{atomic, identity_of, input, make_folder_in};
 use armcal_report::VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -14,6 +15,8 @@ use std::time::UNIX_EPOCH;
 const FORMAT: &str = "armcal.batch/2";
 /// Format of what is remembered of a file.
 const SCHEMA: &str = "armcal.seen/2";
+/// A longer note is none of armcal's.
+const NOTE_BYTES: u64 = 64 << 10;
 /// Where the hashes of files are remembered, below the campaign's folder.
 const SEEN: &str = ".inputs";
 
@@ -21,7 +24,8 @@ const SEEN: &str = ".inputs";
 pub(crate) struct Keys {
     /// Hash of everything that is the same for all recordings.
     common: String,
-    seen: PathBuf,
+    /// Folder of the campaign.
+    out: PathBuf,
 }
 
 /// A file as it was when its hash was taken.
@@ -46,10 +50,10 @@ impl Keys {
         let board = pipeline.table.iter().map(|t| &t.board);
         for (what, path) in model.map(|p| ("model", p)).chain(board.map(|p| ("board", p))) {
             let path = pipeline.resolve(path);
-            let text = input::read_to_string(&path);
+            let text = input::read_to_string(&path, input::Kind::Text);
             parts.push(text.map_err(|source| Error::ReadFile { what, path, source })?);
         }
-        Ok(Keys { common: hash(parts), seen: out.join(SEEN) })
+        Ok(Keys { common: hash(parts), out: out.to_owned() })
     }
 
     /// The key of something else made from the same settings and these parts.
@@ -80,14 +84,15 @@ impl Keys {
     /// What a file holds, as a hash; remembered as long as size and modification time stay.
     fn identity(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
         let name = path.to_string_lossy().into_owned();
-        let memory = self.seen.join(format!("{}.json", &hash([name.clone()])[..32]));
+        let memory = self.out.join(SEEN).join(format!("{}.json", &hash([name.clone()])[..32]));
         let now = std::fs::metadata(path).ok().map(|about| {
             let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
             (about.len(), modified.map_or(0, |t| t.as_nanos()))
         });
         // Armcal's own notes, to be written over: no input.
-        #[allow(clippy::disallowed_methods)]
-        let known = std::fs::read(&memory).ok().and_then(|text| serde_json::from_slice::<Seen>(&text).ok());
+        let known = input::regular(&memory)
+            .ok()
+            .and_then(|file| serde_json::from_reader::<_, Seen>(file.take(NOTE_BYTES)).ok());
         if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
             let same = known.schema == SCHEMA
                 && known.path == name
@@ -104,8 +109,7 @@ impl Keys {
             let seen = Seen { schema, path: name, bytes, modified_ns, identity: identity.clone() };
             // A memory that cannot be written costs time only.
             if let Ok(text) = serde_json::to_vec(&seen) {
-                let _ = std::fs::create_dir_all(&self.seen);
-                let _ = atomic::write(&memory, &text);
+                let _ = make_folder_in(&self.out, SEEN).and_then(|_| atomic::write(&memory, &text));
             }
         }
         Ok(identity)
@@ -124,7 +128,7 @@ fn settings(text: &str) -> String {
 fn declared(entry: &RecordingEntry) -> String {
     let RecordingEntry { tilt, load_kg, loads, points, .. } = entry;
     let points = points.as_ref().map_or(String::new(), |points| {
-        let content = armcal_recording::input::read_to_string(&points.csv).unwrap_or_default();
+        let content = input::read_to_string(&points.csv, input::Kind::Data).unwrap_or_default();
         hash([format!("{points:?}"), content])
     });
     let more: String = loads.iter().map(|load| format!(" {}:{:e}", load.at, load.kg)).collect();

@@ -44,7 +44,7 @@ impl Manifest {
     /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
     pub fn read(path: &Path) -> Result<Manifest, Error> {
         let at = |source| Error::ReadFile { what: "manifest", path: path.to_owned(), source };
-        let text = input::read_to_string(path).map_err(at)?;
+        let text = input::read_to_string(path, input::Kind::Data).map_err(at)?;
         let folder = std::path::absolute(path).map_err(at)?;
         let folder = folder.parent().unwrap_or(Path::new("")).to_owned();
         let file = if path.extension().is_some_and(|e| e == "toml") {
@@ -81,7 +81,8 @@ impl Manifest {
                 files.extend(list(input).map_err(|e| bad(e.to_string()))?.into_iter().map(PathBuf::from));
             } else {
                 for found in glob::glob(input).map_err(|e| bad(e.to_string()))? {
-                    let found = found.map_err(|e| bad(e.to_string()))?;
+                    // A folder that cannot be looked into is one recording that fails, and not the end of the others.
+                    let found = found.unwrap_or_else(|e| e.path().to_owned());
                     let found = std::path::absolute(&found).unwrap_or(found);
                     files.extend(recordings_below(&found).into_iter().filter(|p| !p.starts_with(&out)));
                 }
@@ -123,12 +124,23 @@ fn is_manifest(path: &Path) -> bool {
     path.is_file() && !is_recording(path)
 }
 
-/// The recordings in a folder, and those of the rosbag2 folders in it; of anything else itself.
+/// The recordings in a folder, and those of the rosbag2 folders in it; of anything else itself. A folder that cannot be looked
+/// into stands for itself too, so that whoever opens it is told.
 pub fn recordings_below(path: &Path) -> Vec<PathBuf> {
+    if is_closed(path) {
+        return vec![path.to_owned()];
+    }
     let inside = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut bags: Vec<PathBuf> = inside.filter(|p| p.join("metadata.yaml").is_file()).collect();
+    let mut bags: Vec<PathBuf> =
+        inside.filter(|p| p.join("metadata.yaml").is_file() || is_closed(p)).collect();
     bags.sort();
-    recordings_at(path).into_iter().chain(bags.iter().flat_map(|bag| recordings_at(bag))).collect()
+    let of_bag = |bag: &PathBuf| if is_closed(bag) { vec![bag.clone()] } else { recordings_at(bag) };
+    recordings_at(path).into_iter().chain(bags.iter().flat_map(of_bag)).collect()
+}
+
+/// Whether it is a folder that cannot be looked into.
+fn is_closed(path: &Path) -> bool {
+    path.is_dir() && std::fs::read_dir(path).is_err()
 }
 
 /// Files beside a rosbag2 `metadata.yaml` are one recording; every other file is one by itself.

@@ -96,7 +96,7 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
             memory::give_back();
         }
         (done, skipped)
-    })?;
+    });
     let skipped = done.iter().filter(|(_, skipped)| *skipped).count();
     let done = done.into_iter().map(|(done, _)| done).collect();
     let campaign = keys.of_campaign(manifest);

@@ -2,7 +2,7 @@
 
 use super::store;
 use crate::error::Error;
-use armcal_recording::input;
+use armcal_recording::{input, make_folder_in};
 use armcal_report::{FailedRecording, VERSION};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -155,8 +155,7 @@ impl Receipt {
     }
 
     pub(super) fn write(&self, out: &Path) -> Result<(), Error> {
-        let folder = out.join(RECEIPTS);
-        std::fs::create_dir_all(&folder).map_err(|source| Error::Folder { path: folder.clone(), source })?;
+        make_folder_in(out, RECEIPTS).map_err(Error::Output)?;
         let text = serde_json::to_vec_pretty(self).map_err(Error::Json)?;
         store::write_one(&Receipt::file(self.shard, out), &text)
     }
@@ -174,7 +173,7 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, Error> {
     paths.sort();
     let read = |path: &std::path::PathBuf| {
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
-        let text = input::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let text = input::read_to_string(path, input::Kind::Data).map_err(|e| bad(e.to_string()))?;
         let receipt: Receipt = serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
         Ok(receipt)
     };

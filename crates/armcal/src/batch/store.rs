@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use armcal_campaign::Row;
-use armcal_recording::{atomic, input};
+use armcal_recording::{atomic, input, make_folder_in};
 use armcal_report::{DwellMark, OBSERVATIONS_FILE, PastObservations, ReportError};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -36,9 +36,7 @@ impl Store {
     /// # Errors
     /// A folder that cannot be made.
     pub fn open(out: &Path) -> Result<Store, Error> {
-        let results = out.join(RESULTS);
-        std::fs::create_dir_all(&results)
-            .map_err(|source| Error::Folder { path: results.clone(), source })?;
+        let results = make_folder_in(out, RESULTS).map_err(Error::Output)?;
         let store = Store { results };
         store.sweep();
         Ok(store)
@@ -63,7 +61,8 @@ impl Store {
     pub fn row(&self, folder: &str) -> Result<Row, Error> {
         let path = self.results.join(folder).join(ROW);
         let bad = |why: String| Error::Campaign { path: path.clone(), why };
-        let text = input::read_to_string(&path).map_err(|e| bad(format!("{e}; map its shard again")))?;
+        let text = input::read_to_string(&path, input::Kind::Data)
+            .map_err(|e| bad(format!("{e}; map its shard again")))?;
         serde_json::from_str(&text).map_err(|e| bad(e.to_string()))
     }
 
@@ -154,10 +153,14 @@ pub(crate) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     Ok(atomic::write(path, bytes).map_err(failed)?)
 }
 
-/// A file to be locked, made if need be; what is in it stays.
+/// A file to be locked, made if need be; what is in it stays. A link is not followed, and nothing else waited for.
 #[allow(clippy::disallowed_methods, reason = "nothing is written to it")]
 fn lock_file(path: &Path) -> std::io::Result<File> {
-    File::options().create(true).truncate(false).write(true).open(path)
+    let made = File::options().create_new(true).write(true).open(path);
+    match made {
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && !path.is_symlink() => input::regular(path),
+        made => made,
+    }
 }
 
 /// Gives a finished folder its name. A folder with anything in it is never replaced: the system refuses that.
@@ -176,7 +179,7 @@ fn named(made: &Path, target: &Path) -> std::io::Result<()> {
 /// already, by its row.
 #[allow(clippy::disallowed_methods, reason = "the folder is armcal's own")]
 fn remove_abandoned(folder: &Path) {
-    let free = match File::open(folder.join(LOCK)) {
+    let free = match input::regular(&folder.join(LOCK)) {
         Ok(lock) => lock.try_lock().is_ok(),
         // Between removing the lock and renaming.
         Err(_) => folder.join(ROW).is_file() && old(folder),

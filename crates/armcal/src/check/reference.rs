@@ -65,7 +65,8 @@ impl Calibrated {
             serde_json::from_value(PastRun::open(path)?.summary)
         } else {
             let file = if path.is_dir() { path.join("summary.json") } else { path.to_owned() };
-            let text = input::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
+            let text = input::read_to_string(&file, input::Kind::Data)
+                .map_err(|e| bad(format!("cannot be read: {e}")))?;
             serde_json::from_str(&text)
         };
         let calibrated =

@@ -12,13 +12,15 @@ use crate::view;
 use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::{EffectSpec, EffectTable, tables_toml};
-use armcal_recording::{atomic, may_put};
+use armcal_recording::{atomic, is_marked, may_put, sealed};
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, nested_sentence, write_all};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// First line of an extended pipeline whose original has no such line.
+const MARK: &str = "# armcal.pipeline/1, extended by `armcal add`";
 /// The word for "whatever the diagnosis suggests".
 const SUGGESTED: &str = "suggested";
 
@@ -195,6 +197,9 @@ pub fn extend(
     };
     let tables = tables_toml(new.iter().map(table).collect()).map_err(Error::Toml)?;
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
+    // By the mark its own maker knows the file again, and what somebody changes in it.
+    let marked = if is_marked(&text) { text } else { format!("{MARK}\n{text}") };
+    let text = sealed(&marked).into_owned();
     let path = write.map_or_else(|| beside(original, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
     may_put(&path, pipeline.text.as_bytes()).map_err(Error::Output)?;

@@ -1,10 +1,10 @@
 //! `armcal init`: a pipeline proposed from recordings.
 
-use super::{Outcome, json_text, may_write, print};
+use super::{Outcome, json_text, print};
 use crate::error::Error;
 use crate::init::{Asked, Proposal, Told, propose};
 use crate::progress::Progress;
-use armcal_recording::{RecordingError, atomic, input, may_put};
+use armcal_recording::{Over, RecordingError, atomic, holds, input, may_put, may_write_over};
 use armcal_report::printable;
 use clap::Args;
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ pub struct Request {
     /// Last link of the arm in the URDF.
     #[arg(long, value_name = "LINK", conflicts_with = "dh")]
     pub tip_link: Option<String>,
-    /// Replace an earlier proposal; nothing else is ever written over.
+    /// Replace an earlier proposal, with whatever was changed in it since; nothing else is ever written over.
     #[arg(long)]
     pub force: bool,
     /// Print JSON.
@@ -73,33 +73,34 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     };
     let proposal = propose(&asked, &Progress::new())?;
     // What is there already, word for word, stays: a robot's description has no mark of armcal's.
-    #[allow(
-        clippy::disallowed_methods,
-        reason = "an output of an earlier time, not an input: it may be written over"
-    )]
-    let is_new =
-        |(path, text): &&(PathBuf, String)| std::fs::read(path).ok().as_deref() != Some(text.as_bytes());
+    let is_new = |(path, text): &&(PathBuf, String)| !holds(path, text.as_bytes());
     let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();
     for (path, text) in &beside {
         free(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
     }
-    for (path, text) in &beside {
-        atomic::write(path, text.as_bytes()).map_err(Error::Output)?;
+    let over = if request.force { Over::Changed } else { Over::Unchanged };
+    let pipeline = (proposal.out.clone(), proposal.pipeline.text.clone());
+    for (path, text) in beside.into_iter().chain([&pipeline]) {
+        atomic::write_over(path, text.as_bytes(), over).map_err(Error::Output)?;
     }
-    atomic::write(&proposal.out, proposal.pipeline.text.as_bytes()).map_err(Error::Output)?;
     print(&if request.json { json_text(&json_of(&proposal))? } else { text(&proposal) })?;
     Ok(if proposal.runs() { Outcome::Done } else { Outcome::Doubtful })
 }
 
 /// Whether a file may be written: it is not there, or the user wants it replaced and it is one of armcal's.
 fn free(path: &Path, force: bool) -> Result<(), Error> {
-    may_write([path])?;
+    may_write_over(path, Over::Changed).map_err(Error::Output)?;
     let is_there = path.symlink_metadata().is_ok_and(|about| about.len() > 0);
-    if is_there && !force {
-        let what = "was proposed earlier; --force replaces it".to_owned();
-        return Err(Error::Output(RecordingError::NotOurs { path: path.to_owned(), what }));
+    if !is_there || force {
+        return Ok(());
     }
-    Ok(())
+    let what = match may_write_over(path, Over::Unchanged) {
+        Ok(()) => "was proposed earlier; --force replaces it",
+        Err(_) => {
+            "was proposed earlier and may have been changed since; --force replaces it with all changes"
+        }
+    };
+    Err(Error::Output(RecordingError::NotOurs { path: path.to_owned(), what: what.to_owned() }))
 }
 
 fn text(proposal: &Proposal) -> String {

@@ -3,7 +3,7 @@
 use super::{Outcome, may_write, print_written};
 use crate::cli::Cli;
 use crate::error::Error;
-use armcal_recording::atomic;
+use armcal_recording::{atomic, make_folder};
 use clap::{Command, CommandFactory as _};
 use clap_mangen::Man;
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ pub fn run(folder: &Path) -> Result<Outcome, Error> {
     let name = |page: &Command| page.get_display_name().unwrap_or(page.get_name()).to_owned();
     let paths: Vec<PathBuf> = pages.iter().map(|page| folder.join(name(page) + ".1")).collect();
     let failed = |source| Error::Folder { path: folder.to_owned(), source };
-    std::fs::create_dir_all(folder).map_err(failed)?;
     may_write(&paths)?;
+    make_folder(folder).map_err(Error::Output)?;
     for (page, path) in pages.into_iter().zip(&paths) {
         let mut text = MARK.as_bytes().to_vec();
         Man::new(page).render(&mut text).map_err(failed)?;

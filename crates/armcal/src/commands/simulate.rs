@@ -7,12 +7,13 @@ use crate::pipeline::read_text;
 use armcal_lab::pair::{self, PairConfig};
 use armcal_lab::scenario::{Scenario, seal};
 use armcal_lab::{LabConfig, simulate};
+use armcal_recording::input::Kind;
 use std::path::{Path, PathBuf};
 
 /// Simulates the rig that `lab` describes, of one arm or (with `[[arms]]`) of two, and writes its recordings and their truth to `out`.
 pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome, Error> {
     let lab = lab.unwrap_or(Path::new(""));
-    let text = read_text("lab file", lab)?;
+    let text = read_text("lab file", Kind::Text, lab)?;
     if text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("arms")) {
         let mut config = PairConfig::from_toml(&text, lab)?;
         config.seed = seed.unwrap_or(config.seed);

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::verify::verify;
-use armcal_recording::atomic;
+use armcal_recording::{atomic, make_folder};
 use armcal_report::{Status, verification_files, verification_json, verification_paths, verification_text};
 use std::path::Path;
 
@@ -18,8 +18,7 @@ pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Re
     let files = out.map(|_| verification_files(&verification)).transpose()?;
     progress.finish();
     if let (Some(folder), Some(files)) = (out, files) {
-        std::fs::create_dir_all(folder)
-            .map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
+        make_folder(folder).map_err(Error::Output)?;
         files
             .into_iter()
             .try_for_each(|(name, bytes)| atomic::write(&folder.join(name), &bytes))

@@ -4,6 +4,7 @@ use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::view::{Bench, serve, source_of};
+use armcal_recording::input::{Kind, read_to_string};
 use armcal_report::summary_json;
 use std::path::Path;
 
@@ -13,7 +14,7 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let bench = Bench::of(&path, &results, &progress)?;
     progress.finish();
-    let written = armcal_recording::input::read_to_string(&input.join("summary.json"));
+    let written = read_to_string(&input.join("summary.json"), Kind::Data);
     if written.is_ok_and(|text| text != summary_json(bench.run())) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",

@@ -6,6 +6,7 @@
 
 use crate::error::Error;
 use crate::pipeline::read_text;
+use armcal_recording::input::Kind;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 use std::path::Path;
@@ -41,7 +42,7 @@ struct File {
 
 /// Reads and checks the file.
 pub fn read(path: &Path) -> Result<Vec<Wanted>, Error> {
-    let text = read_text("file of targets", path)?;
+    let text = read_text("file of targets", Kind::Data, path)?;
     let bad = |problem: String| Error::BadTargets { path: path.to_owned(), problem };
     let toml = path.extension().is_some_and(|e| e == "toml");
     let parsed = if toml {

@@ -33,6 +33,7 @@ use crate::stages::associated::Associated;
 use crate::stages::perceive;
 use crate::story;
 use armcal_calibrate::HoldoutConfig;
+use armcal_recording::input::Kind;
 use armcal_table::Board;
 use channels::Channels;
 use proposal::Known;
@@ -137,7 +138,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
 }
 
 fn read_board(path: &Path) -> Result<Board, Error> {
-    Ok(Board::from_toml(&crate::pipeline::read_text("board", path)?, path)?)
+    Ok(Board::from_toml(&crate::pipeline::read_text("board", Kind::Text, path)?, path)?)
 }
 
 fn no_joints(channels: &Channels) -> Error {

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::pipeline::read_text;
 use crate::stages::points::rows::{is_axis, parse};
 use armcal_recording::LengthUnit;
+use armcal_recording::input::Kind;
 use std::path::{Path, PathBuf};
 
 /// Words in the names of columns that may be times.
@@ -25,7 +26,7 @@ pub struct Points {
 
 /// Looks into a file.
 pub fn look(path: &Path) -> Result<Points, Error> {
-    let text = read_text("CSV of points", path)?;
+    let text = read_text("CSV of points", Kind::Data, path)?;
     let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", path.display()) };
     let table = parse(&text, 1.0, None).map_err(bad)?;
     let unit = unit(&table.header).map_err(bad)?;

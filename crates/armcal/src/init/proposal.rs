@@ -14,7 +14,7 @@ use super::sockets::Sockets;
 use super::{Asked, Tried};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
-use armcal_recording::atomic;
+use armcal_recording::{atomic, sealed};
 use armcal_table::Board;
 use std::path::{Path, PathBuf};
 
@@ -109,7 +109,7 @@ impl Known<'_> {
         }
         let name = self.asked.out.file_stem().unwrap_or_default().to_string_lossy();
         head.line(&format!("name = {}", quoted(&name)), "");
-        let text = head.text() + &page.text();
+        let text = sealed(&(head.text() + &page.text())).into_owned();
         let pipeline = Pipeline::proposed(&self.asked.out, text, &folder)?;
         left.extend(self.read.left.clone());
         let bodies = self.read.bodies.iter().cloned().zip(self.cast.iter().cloned()).collect();

@@ -1,12 +1,12 @@
 //! Files that people write, read as text.
 
 use crate::error::Error;
-use armcal_recording::input;
+use armcal_recording::input::{self, Kind};
 use std::io::Read as _;
 use std::path::Path;
 
 /// The text of a file that people write; a recording or a folder in its place is named for what it is.
-pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error> {
+pub(crate) fn read_text(what: &'static str, kind: Kind, path: &Path) -> Result<String, Error> {
     let failed = |source| Error::ReadFile { what, path: path.to_owned(), source };
     let is = |found, next| Err(Error::NotText { path: path.to_owned(), found, wanted: what, next });
     let own = "name it under [[recordings]] of a pipeline file (docs/pipeline-reference.md), and give that";
@@ -34,7 +34,7 @@ pub(crate) fn read_text(what: &'static str, path: &Path) -> Result<String, Error
             ),
         ),
         _ => {
-            file.read_to_end(&mut bytes).map_err(failed)?;
+            input::read_on(&mut file, kind, &mut bytes).map_err(failed)?;
             let text = String::from_utf8(bytes);
             text.map_err(|_| failed(std::io::Error::other("it is not UTF-8 text")))
         }

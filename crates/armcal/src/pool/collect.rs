@@ -228,7 +228,8 @@ pub(super) fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
 }
 
 fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-    if path.is_file() {
+    // What is no folder is a result, or is told why it is none by whoever reads it.
+    if path.exists() && !path.is_dir() {
         found.insert(path.to_owned());
         return Ok(());
     }

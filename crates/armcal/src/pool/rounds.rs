@@ -12,7 +12,7 @@
 use crate::batch::{Keys, Shard, write_one};
 use crate::error::Error;
 use crate::pipeline::Pipeline;
-use armcal_recording::input;
+use armcal_recording::{input, make_folder_in};
 use armcal_report::VERSION;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -112,10 +112,9 @@ impl Rounds {
             Head { schema, version, pool, parts: parts.iter().map(|part| part.len() as u64).collect() };
         let mut all = rmp_serde::to_vec_named(&head).map_err(bytes)?;
         all.extend(parts.into_iter().flatten());
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|source| Error::Folder { path: folder.to_owned(), source })?;
-        }
+        let out = self.folder.parent().unwrap_or(Path::new(""));
+        let inner = path.parent().and_then(|folder| folder.strip_prefix(out).ok());
+        make_folder_in(out, inner.unwrap_or(Path::new(FOLDER))).map_err(Error::Output)?;
         write_one(path, &all)
     }
 

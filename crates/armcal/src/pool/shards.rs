@@ -222,8 +222,9 @@ fn survey(
         let failed = |source| Error::Recording { recording: path.display().to_string(), source };
         Ok((path.clone(), identity_of(path).map_err(failed)?))
     };
-    let identities = own.iter().map(identity).collect::<Result<_, Error>>()?;
+    // What is no result is refused before all of it is hashed.
     let mut found = contained(pipeline, &model_texts.concat(), board.as_ref(), own.iter().cloned())?;
+    let identities = own.iter().map(identity).collect::<Result<_, Error>>()?;
     found.iter_mut().flat_map(Found::observations_mut).for_each(lighten);
     Ok(Survey { pipeline: path, results, found, identities })
 }

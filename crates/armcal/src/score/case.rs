@@ -10,6 +10,7 @@ use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose}
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
+use armcal_recording::input;
 use serde::Serialize;
 use std::path::Path;
 
@@ -101,7 +102,7 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
 }
 
 fn truth(path: &Path) -> Result<Truth, Error> {
-    let text = armcal_recording::input::read_to_string(path).map_err(|source| Error::ReadFile {
+    let text = input::read_to_string(path, input::Kind::Data).map_err(|source| Error::ReadFile {
         what: "truth",
         path: path.to_owned(),
         source,

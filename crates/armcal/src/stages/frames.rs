@@ -229,7 +229,8 @@ pub fn start_frames(pipeline: &Pipeline, model: &mut Model, places: &[Option<Ass
 }
 
 fn read(what: &'static str, path: &Path) -> Result<String, Error> {
-    input::read_to_string(path).map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
+    let read = input::read_to_string(path, input::Kind::Text);
+    read.map_err(|source| Error::ReadFile { what, path: path.to_owned(), source })
 }
 
 /// A frame as its section has it.

@@ -8,7 +8,7 @@ use crate::pool::{self, Pooled};
 use crate::progress::Progress;
 use crate::stages::frames;
 use crate::story;
-use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_recording::atomic;
@@ -89,12 +89,18 @@ impl Bench {
     }
 
     /// Refits with what is wanted: the answer as the page reads it.
-    pub(super) fn refit(&self, wanted: &Wanted) -> Result<String, Error> {
+    ///
+    /// # Errors
+    /// What cannot be fitted, and `stop`.
+    pub(super) fn refit(&self, wanted: &Wanted, stop: &Stop) -> Result<String, Error> {
         let begun = Instant::now();
+        stop.check()?;
         let specs = self.specs(wanted)?;
         let model = self.geometry.with_effects(&specs, &self.run.session)?;
         let holdout = wanted.holdout.as_ref().unwrap_or(&self.pipeline.holdout);
-        let calibration = calibrate(&model, &self.run.observations, &self.pipeline.fit, holdout)?;
+        let fit = FitConfig { stop: stop.clone(), ..self.pipeline.fit.clone() };
+        let calibration = calibrate(&model, &self.run.observations, &fit, holdout)?;
+        stop.check()?;
         let added = specs.iter().filter(|s| !self.own.contains(s)).map(EffectSpec::to_string).collect();
         let refit = Refit { effects: added, model, calibration };
         let shown = refit_json(&self.run, &self.basis, &refit)?;

@@ -2,10 +2,11 @@
 //! hold-out is refitted as it is chosen.
 //!
 //! * [`Bench`]: the run, ready to be refitted; `requests`: what the page may ask of it;
-//! * `guard`: who may ask; `server`: the few routes; `source`: which pipeline made a folder of results;
+//! * `guard`: who may ask; `connections`: how many, and how long they may take; `server`: the few routes; `source`: which pipeline made a folder of results;
 //! * `turns`: one refit at a time, and not too many that wait.
 
 mod bench;
+mod connections;
 mod guard;
 mod requests;
 mod server;

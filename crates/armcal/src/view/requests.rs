@@ -5,6 +5,9 @@ use armcal_model::{EffectTable, Override};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Effects of one model, at most: more than an arm can have, and few enough for the name of a file.
+pub(super) const MOST_EFFECTS: usize = 64;
+
 /// Effects and hold-out of a refit.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +20,13 @@ pub(super) struct Wanted {
     pub expressions: Vec<Formula>,
     /// What the fit must not see; the pipeline's own when absent.
     pub holdout: Option<HoldoutConfig>,
+}
+
+impl Wanted {
+    /// How many effects they are.
+    pub fn count(&self) -> usize {
+        self.effects.len() + self.expressions.len()
+    }
 }
 
 /// A formula of the user: an `[[effects]]` table of kind `expression`.

@@ -1,15 +1,17 @@
 //! The server: one page, its choices, refits, and keeping a pipeline.
 
 use super::bench::Bench;
+use super::connections::{self, REQUEST_TIME};
 use super::guard::Guard;
-use super::requests::Wanted;
+use super::requests::{MOST_EFFECTS, Wanted};
 use super::turns::{MOST_ASKED, Turns};
 use crate::error::Error;
+use armcal_calibrate::Stop;
 use axum::Router;
-use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::body::{Body, Bytes, to_bytes};
+use axum::extract::{Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde_json::json;
@@ -28,21 +30,24 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Err
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let html = bench.html()?;
-    let app = routes(Arc::new(Served { bench, html, turns: Arc::default() }), guard);
+    let html = Bytes::from(bench.html()?);
+    let app = routes(Arc::new(Served { bench, html, turns: Turns::new() }), guard);
+    let mut runtime = tokio::runtime::Builder::new_current_thread();
+    // A thread each for the one that is computed and those that are written.
     let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed("starting"))?;
+        runtime.enable_all().max_blocking_threads(MOST_ASKED).build().map_err(failed("starting"))?;
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(failed("listening"))?;
         ready(&address)?;
-        axum::serve(listener, app).await.map_err(failed("serving"))
+        connections::serve(listener, app).await;
+        Ok(())
     })
 }
 
 struct Served {
     bench: Bench,
-    html: String,
-    turns: Arc<Turns>,
+    html: Bytes,
+    turns: Turns,
 }
 
 fn routes(served: Arc<Served>, guard: Guard) -> Router {
@@ -54,7 +59,7 @@ fn routes(served: Arc<Served>, guard: Guard) -> Router {
         .with_state(served);
     Router::new()
         .nest_service(&format!("/{}", guard.secret), own)
-        .layer(DefaultBodyLimit::max(LARGEST_BODY))
+        .layer(from_fn(arrived))
         .layer(from_fn_with_state(guard, guarded))
 }
 
@@ -76,6 +81,20 @@ async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Re
     response
 }
 
+/// Hands on what has arrived in time and is not too large.
+async fn arrived(request: Request, next: Next) -> Response {
+    let (head, body) = request.into_parts();
+    match tokio::time::timeout(REQUEST_TIME, to_bytes(body, LARGEST_BODY)).await {
+        Ok(Ok(bytes)) => next.run(Request::from_parts(head, Body::from(bytes))).await,
+        Ok(Err(e)) => {
+            answer(StatusCode::PAYLOAD_TOO_LARGE, &json!({ "error": format!("reading the request: {e}") }))
+        }
+        Err(_) => {
+            answer(StatusCode::REQUEST_TIMEOUT, &json!({ "error": "the request took too long to arrive" }))
+        }
+    }
+}
+
 async fn page(State(served): State<Arc<Served>>) -> Response {
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], served.html.clone()).into_response()
 }
@@ -84,24 +103,40 @@ async fn choices(State(served): State<Arc<Served>>) -> Response {
     answer(StatusCode::OK, &json!(served.bench.choices()))
 }
 
+/// Stops a refit when nobody waits for it any more: its request is dropped with the connection.
+struct Waiting(Stop);
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.0.now();
+    }
+}
+
 async fn refit(State(served): State<Arc<Served>>, body: Bytes) -> Response {
-    let Some(place) = served.turns.place() else {
-        let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
-        return answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }));
-    };
+    let Some(place) = served.turns.place() else { return too_many() };
+    let waiting = Waiting(Stop::default());
+    let stop = waiting.0.clone();
+    let turn = served.turns.turn().await;
     asked(served, body, move |bench, wanted| {
-        let _turn = place.turn();
-        bench.refit(wanted)
+        let _held = (place, turn);
+        bench.refit(wanted, &stop)
     })
     .await
 }
 
 async fn keep(State(served): State<Arc<Served>>, body: Bytes) -> Response {
-    asked(served, body, |bench, wanted| {
+    let Some(place) = served.turns.place() else { return too_many() };
+    asked(served, body, move |bench, wanted| {
+        let _held = place;
         let path = bench.keep(wanted)?;
         Ok(json!({ "pipeline": path.to_string_lossy() }).to_string())
     })
     .await
+}
+
+fn too_many() -> Response {
+    let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
+    answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }))
 }
 
 /// Does the arithmetic beside the server's own thread; what cannot be done is told in words.
@@ -116,6 +151,10 @@ async fn asked(
             return answer(StatusCode::BAD_REQUEST, &json!({ "error": format!("reading the request: {e}") }));
         }
     };
+    if wanted.count() > MOST_EFFECTS {
+        let why = format!("{} effects are wanted at once, and {MOST_EFFECTS} at most can be", wanted.count());
+        return answer(StatusCode::BAD_REQUEST, &json!({ "error": why }));
+    }
     let done = tokio::task::spawn_blocking(move || what(&served.bench, &wanted)).await;
     match done {
         Ok(Ok(text)) => ([(header::CONTENT_TYPE, "application/json")], text).into_response(),

@@ -24,7 +24,7 @@ pub fn remember(out: &Path, pipeline: &Path, results: &[PathBuf]) -> Result<(), 
     let seen = |path: &Path| pathdiff::diff_paths(real(path), &folder).unwrap_or_else(|| real(path));
     let source = Source { pipeline: seen(pipeline), results: results.iter().map(|r| seen(r)).collect() };
     let Ok(text) = toml::to_string(&source) else { return Ok(()) };
-    let text = format!("# Where `armcal view` finds the pipeline of these results.\n{text}");
+    let text = format!("# armcal.view/1\n# Where `armcal view` finds the pipeline of these results.\n{text}");
     atomic::write(&out.join(FILE), text.as_bytes()).map_err(Error::Output)
 }
 
@@ -40,7 +40,7 @@ pub fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
             "does not say which pipeline made it (view.toml: {why}); name the pipeline file instead"
         ),
     };
-    let text = input::read_to_string(&path).map_err(|e| unknown(e.to_string()))?;
+    let text = input::read_to_string(&path, input::Kind::Data).map_err(|e| unknown(e.to_string()))?;
     let source: Source = toml::from_str(&text).map_err(|e| unknown(e.to_string()))?;
     Ok((input.join(source.pipeline), source.results.iter().map(|r| input.join(r)).collect()))
 }

@@ -1,17 +1,20 @@
 //! Levenberg-Marquardt with bounds: every step is the exact minimiser of the damped quadratic model within the box.
 
 use super::{Cost, Curvature, Quadratic, bounded_qp};
+use crate::config::Stop;
 use crate::whitened::Point;
 use crate::{CalibrateError, Status};
 use nalgebra::DVector;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Settings {
+pub(crate) struct Settings<'a> {
     /// Limit of accepted steps.
     pub max_iterations: usize,
     /// Converged when `sqrt(d'Hd)` falls below this: a step of that many standard deviations of the estimate.
     pub step_tolerance: f64,
+    /// Asked at every step.
+    pub stop: &'a Stop,
 }
 
 /// A last step of no more standard deviations of the estimate may end where the linearised problem has it. That is less than the
@@ -38,7 +41,7 @@ pub(crate) struct Solution {
 pub(crate) fn minimise(
     cost: &dyn Cost,
     start: Point,
-    settings: Settings,
+    settings: Settings<'_>,
 ) -> Result<Solution, CalibrateError> {
     let (lower, upper) = (cost.lower(), cost.upper());
     let mut at = start;
@@ -46,6 +49,7 @@ pub(crate) fn minimise(
     let mut damping = model.damping.clone();
     let (mut mu, mut growth) = (1e-8, 10.0);
     for iterations in 0..settings.max_iterations {
+        settings.stop.check()?;
         damping.zip_apply(&model.damping, |d, new| *d = d.max(new));
         loop {
             let damped = model.hessian.damped(&(&damping * mu));

@@ -1,6 +1,6 @@
 use super::linear::{Linear, parameter};
 use super::rig;
-use crate::{CalibrateError, FitConfig, HoldoutConfig, calibrate, fit, fit_problem};
+use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, calibrate, fit, fit_problem};
 use armcal_core::{Observation, Reference};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
@@ -46,6 +46,18 @@ fn what_does_not_match_the_model_is_refused() {
     assert!(matches!(error, CalibrateError::Model(_)), "{error}");
     let error = calibrate(&model, &[], &FitConfig::default(), &HoldoutConfig::None).unwrap_err();
     assert!(matches!(error, CalibrateError::NoObservations { .. }), "{error}");
+}
+
+#[test]
+fn a_fit_that_nobody_waits_for_is_stopped() {
+    let (model, observations) = good();
+    for objective in [Objective::Robust, Objective::LeastSquares, Objective::Paper] {
+        let config = FitConfig { objective, ..FitConfig::default() };
+        fit(&model, &observations, &config).unwrap();
+        config.clone().stop.now();
+        let error = fit(&model, &observations, &config).unwrap_err();
+        assert!(matches!(error, CalibrateError::Stopped), "{objective:?}: {error}");
+    }
 }
 
 #[test]

@@ -8,15 +8,17 @@
     motion.tip([0.1, -0.4, 0.3])            # Pose(position_m, quaternion_xyzw), effects included
     motion.correct([0.1, -0.4, 0.3])        # SetPoint: what to command so that the tip is where nominal joints would have it
 
-Joints in [rad] (sliding: [m]), metres, kilograms, degrees Celsius. An ``Arm`` may be used by any number of threads, a
-``Motion`` by one at a time. What goes wrong is a :class:`KinematicsError`. Nothing but Python is needed: the shared library
-is in the package.
+Joints in [rad] (sliding: [m]), metres, kilograms, degrees Celsius. An ``Arm`` may be used by any number of threads; so may a
+``Motion``, whose calls wait for each other, and each goes on from where the one before left the arm. What goes wrong is a
+:class:`KinematicsError`. Nothing but Python is needed: the shared library is in the package.
 """
 
 import ctypes
+import functools
 import math
 import os
 import sys
+import threading
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 __all__ = ["Arm", "KinematicsError", "Motion", "Pose", "Reached", "SetPoint", "version"]
@@ -197,10 +199,23 @@ def _place(names: List[str], name: str, what: str) -> int:
     return names.index(name)
 
 
+def _alone(method):
+    """ctypes lets other threads run during a call, and a motion is for one at a time: they wait until its answer is laid out."""
+
+    @functools.wraps(method)
+    def waits(self, *args, **kwargs):
+        with self._lock:
+            return method(self, *args, **kwargs)
+
+    return waits
+
+
 class Motion:
     """One arm on its way, which remembers from where each joint came."""
 
     def __init__(self, arm: Arm, conditions: _Conditions):
+        # A handler of a signal may ask in the middle of a call: it is the same thread, between two steps of Python.
+        self._lock = threading.RLock()
         self._handle = ctypes.c_void_p()
         self._joints = len(arm.joints)
         _checked(_C.armcal_motion_new(arm._handle, ctypes.byref(conditions), ctypes.byref(self._handle)))
@@ -212,14 +227,17 @@ class Motion:
     def _of_joints(self, values: Optional[Sequence[float]], what: str):
         return None if values is None else _numbers(values, self._joints, what)
 
+    @_alone
     def start(self, joint_rad: Optional[Sequence[float]]) -> None:
         """The arm waits there, from where it came unknown; None: nobody knows where it waits."""
         _checked(_C.armcal_motion_start(self._handle, self._of_joints(joint_rad, "joints")))
 
+    @_alone
     def go(self, joint_rad: Sequence[float]) -> None:
         """The arm goes there, each joint one way."""
         _checked(_C.armcal_motion_go(self._handle, self._of_joints(joint_rad, "joints")))
 
+    @_alone
     def tip(
         self,
         joint_rad: Sequence[float],
@@ -235,12 +253,14 @@ class Motion:
         _checked(_C.armcal_motion_tip(self._handle, *given, ctypes.byref(pose)))
         return Pose(tuple(pose.position_m), tuple(pose.quaternion_xyzw))
 
+    @_alone
     def nominal_tip(self, joint_rad: Sequence[float]) -> Pose:
         """The tip as a controller that knows nothing of the calibration has it."""
         pose = _Pose()
         _checked(_C.armcal_motion_nominal_tip(self._handle, self._of_joints(joint_rad, "joints"), ctypes.byref(pose)))
         return Pose(tuple(pose.position_m), tuple(pose.quaternion_xyzw))
 
+    @_alone
     def correct(self, nominal_rad: Sequence[float], time_s: Optional[float] = None) -> SetPoint:
         """The set-point that brings the tip to where the nominal arm has it at these joints; then the arm stands there. With
         a time it is a point of a path."""
@@ -250,6 +270,7 @@ class Motion:
         _checked(_C.armcal_motion_correct(self._handle, nominal, time, corrected, direction, ctypes.byref(reached)))
         return self._set_point(nominal, corrected, direction, reached)
 
+    @_alone
     def set_point(
         self,
         position_m: Sequence[float],
@@ -268,6 +289,7 @@ class Motion:
         )
         return self._set_point(nominal, corrected, direction, reached)
 
+    @_alone
     def path(
         self, nominal_rad: Sequence[Sequence[float]], time_s: Sequence[float], crossing_s: float = 0.4
     ) -> List[SetPoint]:

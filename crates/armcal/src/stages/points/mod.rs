@@ -13,6 +13,7 @@ use crate::stages::links::place;
 use armcal_core::robust::median;
 use armcal_core::{Dwell, Pose, Severity, Stage, TipMeasurement, Warning, listed};
 use armcal_model::Model;
+use armcal_recording::input::Kind;
 use clock::Offset;
 use nalgebra::{Matrix3, Vector3};
 use rows::{Row, Table};
@@ -39,7 +40,7 @@ pub fn add(
         recording: recording.to_owned(),
         problem: format!("{}: {problem}", path.display()),
     };
-    let text = read_text("CSV of points", path)?;
+    let text = read_text("CSV of points", Kind::Data, path)?;
     let table = rows::parse(&text, points.unit.to_m(), points.time.as_deref()).map_err(bad)?;
     let fit = Fit::of(&table.rows, model, dwells);
     let (dwell_of, how) = match &table.began {
