@@ -10,6 +10,7 @@ mod key;
 mod manifest;
 mod memory;
 mod once;
+mod pattern;
 mod shard;
 mod store;
 mod work;
@@ -28,6 +29,9 @@ use shard::{Done, Receipt};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use store::Store;
+
+/// More threads than this are no help: a machine has fewer cores, and each takes memory.
+const MOST_JOBS: usize = 256;
 
 /// What to work on, and how.
 pub struct Request<'a> {
@@ -79,7 +83,7 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
     let keys = Keys::new(pipeline, request.full, out)?;
     let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
     progress.count(own.len());
-    let jobs = request.jobs.unwrap_or_else(workers::cores);
+    let jobs = request.jobs.unwrap_or_else(workers::cores).min(MOST_JOBS);
     let done = workers::each(own.len(), jobs, |i| {
         let index = own[i];
         let entry = &manifest.entries[index];

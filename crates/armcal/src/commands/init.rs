@@ -87,7 +87,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         atomic::write(path, text.as_bytes()).map_err(Error::Output)?;
     }
     atomic::write(&proposal.out, proposal.pipeline.text.as_bytes()).map_err(Error::Output)?;
-    print(&if request.json { json_text(&json_of(&proposal))? } else { text(&proposal) })?;
+    print(&if request.json { json_text(&super::with_losses(json_of(&proposal)))? } else { text(&proposal) })?;
     Ok(if proposal.runs() { Outcome::Done } else { Outcome::Doubtful })
 }
 
