@@ -35,6 +35,9 @@ mod shipped_pipelines;
 /// Are rosbag2's databases and compressed recordings read as they are, to the same numbers as MCAP?
 mod bags;
 
+/// Does every command say so where a recording that it reads has lost data, and is nothing reused that was made of less?
+mod damaged_inputs;
+
 /// Is every file of the MCAP project's conformance corpus read, whole or cut anywhere?
 mod mcap_conformance;
 

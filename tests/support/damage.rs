@@ -157,14 +157,15 @@ impl Sound {
                 self.changed(|b| b[chunk.start + 1..chunk.start + 9].fill(0xff)),
                 all,
                 "the length of this chunk is wrong",
-                false,
+                true,
             ),
         ]
     }
 
     fn at_the_end(&self, all: u64) -> Vec<Damaged> {
         let (footer, summary) = (self.footer(), self.summary_start());
-        let broken = |name, bytes, says| Damaged { name, bytes, usable: all, says, lost: false };
+        // No message is missing, but what would vouch for that is.
+        let broken = |name, bytes, says| Damaged { name, bytes, usable: all, says, lost: true };
         vec![
             broken("no footer", self.bytes[..footer].to_vec(), "ends before its footer"),
             broken("no summary and no footer", self.bytes[..summary].to_vec(), "ends before its footer"),
@@ -187,21 +188,22 @@ impl Sound {
         ]
     }
 
-    /// Lies of the chunk index and the statistics; chunks are found by walking all the same.
+    /// Lies of the chunk index and the statistics; chunks are found by walking all the same, and the disagreement is told.
     fn in_the_index(&self, all: u64) -> Vec<Damaged> {
         let index = self.in_summary(0x08);
         let statistics = self.in_summary(0x0b);
         let put = |at: usize, value: u64| {
             self.with_other_summary(|b| b[at..at + 8].copy_from_slice(&value.to_le_bytes()))
         };
-        let broken = |name, bytes, says, lost| Damaged { name, bytes, usable: all, says, lost };
+        let broken = |name, bytes, says| Damaged { name, bytes, usable: all, says, lost: true };
+        let into_index = put(index + 16, self.chunk(0).end as u64);
         vec![
-            broken("chunk index with a short length", put(index + 24, 3), "", false),
-            broken("chunk index with a long length", put(index + 24, u64::MAX), "", false),
-            broken("chunk index beyond the file", put(index + 16, 1 << 50), "", false),
-            broken("chunk index into a message index", put(index + 16, self.chunk(0).end as u64), "", false),
-            broken("statistics declare more", put(statistics, all + 5), "declare", true),
-            broken("statistics declare fewer", put(statistics, all - 5), "declare", false),
+            broken("chunk index with a short length", put(index + 24, 3), "and 3 by the index"),
+            broken("chunk index with a long length", put(index + 24, u64::MAX), "by the index"),
+            broken("chunk index beyond the file", put(index + 16, 1 << 50), "does not list this chunk"),
+            broken("chunk index into a message index", into_index, "does not list this chunk"),
+            broken("statistics declare more", put(statistics, all + 5), "declare"),
+            broken("statistics declare fewer", put(statistics, all - 5), "declare"),
         ]
     }
 }

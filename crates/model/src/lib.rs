@@ -56,4 +56,4 @@ pub use residual::ModelResidual;
 pub use segment::Motion;
 pub use skeleton::{Bone, Moving, Place, Skeleton};
 pub use tree::Asked;
-pub use urdf::{CalibratedOrigins, roll_pitch_yaw_of, three_numbers};
+pub use urdf::{CalibratedOrigins, check_xml, roll_pitch_yaw_of, three_numbers};

@@ -1,9 +1,75 @@
-//! Memory that the inflated chunks of all threads share.
+//! What may be inflated: memory that the chunks of all threads share, and an allowance of a recording that everything
+//! made from its bytes is paid from, so that neither time nor room grows beyond the bytes that are there.
+//!
+//! Chunks are paid for in the order of the file by what they claim, before any is inflated: what is refused depends on the
+//! file alone. Messages that are compressed one by one are inflated by many threads, so of them the sum decides.
 
+use crate::RecordingError;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
+/// A byte of a recording may stand for so many.
+pub(crate) const TIMES: u64 = 100;
+/// What a recording may inflate to beyond that [bytes].
+const FREE_BYTES: u64 = 8 << 20;
+/// The environment variable that says another number [MiB].
+pub(crate) const FREE_VARIABLE: &str = "ARMCAL_INFLATE_MIB";
+
+/// What the bytes of one file, or of all files of a recording in one pass, may still inflate to.
+#[derive(Debug)]
+pub struct Allowance {
+    bytes: u64,
+    free: u64,
+    left: AtomicU64,
+    exceeded: AtomicBool,
+}
+
+impl Allowance {
+    /// Of a file of so many bytes, one of so many of a recording.
+    pub(crate) fn of(bytes: u64, files: usize) -> Allowance {
+        let stated = std::env::var(FREE_VARIABLE).ok().and_then(|mib| mib.trim().parse::<u64>().ok());
+        let free = stated.map_or(FREE_BYTES, |mib| mib.saturating_mul(1 << 20)) / files.max(1) as u64;
+        let left = AtomicU64::new(free.saturating_add(bytes.saturating_mul(TIMES)));
+        Allowance { bytes, free, left, exceeded: AtomicBool::new(false) }
+    }
+
+    /// Takes what a chunk of `packed` bytes claims to inflate to. One that alone claims too much takes nothing: its claim may
+    /// be damaged, and the others are not to pay for that.
+    pub(crate) fn admits(&self, packed: u64, claim: u64) -> bool {
+        claim <= self.free.saturating_add(packed.saturating_mul(TIMES)) && self.take(claim)
+    }
+
+    /// Takes so many bytes, if they are left. Once they are not, nothing is.
+    pub(crate) fn takes(&self, bytes: u64) -> bool {
+        let taken = !self.is_exceeded() && self.take(bytes);
+        self.exceeded.fetch_or(!taken, Ordering::Relaxed);
+        taken
+    }
+
+    fn take(&self, bytes: u64) -> bool {
+        self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(bytes)).is_ok()
+    }
+
+    /// Whether more was asked for than there was.
+    pub(crate) fn is_exceeded(&self) -> bool {
+        self.exceeded.load(Ordering::Relaxed)
+    }
+
+    /// The same as an error, of a recording.
+    pub(crate) fn exceeded(&self, path: &Path) -> RecordingError {
+        RecordingError::Inflates { path: path.to_owned(), limit: self.refusal() }
+    }
+
+    /// The limit in words.
+    pub(crate) fn refusal(&self) -> String {
+        let limit = self.free.saturating_add(self.bytes.saturating_mul(TIMES));
+        format!("it inflates to more than the {limit} bytes that it may (docs/hardening.md, {FREE_VARIABLE})")
+    }
+}
+
 /// What large chunks may take together [bytes]; one that is larger than all of it waits until it is alone.
-pub(crate) const BUDGET_BYTES: usize = if cfg!(test) { 256 << 10 } else { 256 << 20 };
+pub(crate) const BUDGET_BYTES: usize = if cfg!(test) { 256 << 10 } else { 32 << 20 };
 
 static TAKEN: Mutex<usize> = Mutex::new(0);
 static GIVEN_BACK: Condvar = Condvar::new();

@@ -4,7 +4,7 @@
 
 use crate::map::Map;
 use crate::ranges::Ranged;
-use crate::{Fetched, RecordingError, input, url};
+use crate::{Fetched, RecordingError, foreign, input, url};
 use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -33,15 +33,21 @@ impl Access {
 }
 
 /// What tells the content of a file or object from any other, without reading its records: as
-/// [`crate::FileReport::identity`].
+/// [`crate::FileReport::identity`]; of a database with the log beside it, which is read with it.
 ///
 /// # Errors
 /// A file or object that cannot be opened or read, is empty or a folder.
 pub fn identity_of(path: &Path) -> Result<String, RecordingError> {
     let bytes = FileBytes::open(path, Access::from_env())?;
-    let identity = bytes.identity();
+    let (identity, _) = bytes.identity(0)?;
     bytes.unshortened(path)?;
-    identity
+    // Nothing stands beside an object.
+    let log = if !url::is_url(path) && foreign::is_database(&bytes)? {
+        foreign::log_identity(path)?
+    } else {
+        String::new()
+    };
+    Ok(identity + &log)
 }
 
 /// SHA-256 of a whole file, hexadecimal, for whoever compares it with what `sha256sum` prints.
@@ -89,7 +95,13 @@ impl FileBytes {
         }
         let file = input::open(path).map_err(open)?;
         if file.metadata().map_err(open)?.len() == 0 {
-            return Err(refused("the file is empty"));
+            let why = match foreign::logs_of(path).is_empty() {
+                true => "the file is empty",
+                false => {
+                    "the file is empty, and the journal beside it was never put into it: nothing was stored"
+                }
+            };
+            return Err(refused(why));
         }
         match access {
             Access::Mapped => Map::of(&file).map(FileBytes::Mapped).map_err(open),
@@ -114,10 +126,11 @@ impl FileBytes {
     }
 
     /// What tells the content from any other: what the store says, or a hash of all of it.
-    pub fn identity(&self) -> Result<String, RecordingError> {
+    /// With it the CRC of the first `crc_to` bytes, where all of it is read.
+    pub fn identity(&self, crc_to: usize) -> Result<(String, Option<u32>), RecordingError> {
         match self {
-            FileBytes::Mapped(map) => Ok(map.identity()),
-            FileBytes::Ranged(ranged) => ranged.identity(),
+            FileBytes::Mapped(map) => Ok(map.identity()).map(|(name, crc)| (name, Some(crc))),
+            FileBytes::Ranged(ranged) => ranged.identity(crc_to),
         }
     }
 

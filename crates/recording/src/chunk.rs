@@ -37,6 +37,11 @@ impl Inflater {
         }
     }
 
+    /// What was inflated last, to keep.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.buffer)
+    }
+
     /// The records of a whole chunk, given the body of its record. Size and CRC have been checked (MCAP allows a
     /// CRC of 0 for "not computed"). The error is the reason why nothing of the chunk may be used.
     pub fn whole<'b>(&'b mut self, body: &'b [u8]) -> Result<&'b [u8], String> {
@@ -61,7 +66,7 @@ impl Inflater {
         if size > LARGE_BYTES && !header.compression.is_empty() && self.share.is_none() {
             self.share = Some(Share::of(size));
         }
-        let data: &[u8] = match header.compression.as_str() {
+        let data: &[u8] = match header.compression {
             "" => packed,
             "zstd" => {
                 possible(ZSTD_RATIO)?;
@@ -90,7 +95,7 @@ impl Inflater {
         let (header, packed) = ChunkHeader::parse(body)?;
         let size = header.uncompressed_size.min(MAX_CHUNK_BYTES) as usize;
         // A failing stream is expected here: what it gave before it failed is what we came for.
-        match header.compression.as_str() {
+        match header.compression {
             "" => return Some(&packed[..packed.len().min(size)]),
             "zstd" => {
                 let _ = stream_into(&mut self.buffer, zstd::Decoder::new(packed).ok()?, size);

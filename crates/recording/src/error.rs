@@ -46,6 +46,9 @@ pub enum RecordingError {
     /// A recording in another format cannot be read.
     #[error("cannot read {}: {why}", path.display())]
     Foreign { path: PathBuf, why: String },
+    /// What is compressed in a recording inflates to more than its size allows for.
+    #[error("{} is not read on: {limit}; set it to more where the recording is sound", path.display())]
+    Inflates { path: PathBuf, limit: String },
     /// Two files of one recording are the same part of it.
     #[error("{} and {} are one part in two forms: name one of them", path.display(), other.display())]
     TwoForms { path: PathBuf, other: PathBuf },

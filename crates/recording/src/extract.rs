@@ -5,7 +5,7 @@
 
 use crate::output::McapOutput;
 use crate::{RawChannel, Recording, RecordingError, Source, error, may_write};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -43,7 +43,8 @@ pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Resul
     let channels = matching(recording.channels(), wanted.topics)?;
     let mut output = McapOutput::create(out, common_profile(recording))?;
     let mut kept = Kept::of(&channels, &mut output)?;
-    let by_topic = |channel: &RawChannel| channels.iter().any(|c| c.topic == channel.topic);
+    let topics: HashSet<&str> = channels.iter().map(|c| c.topic.as_str()).collect();
+    let by_topic = |channel: &RawChannel| topics.contains(channel.topic.as_str());
     recording.for_each_raw_of(&by_topic, &mut |message| {
         let id = kept.count(message.channel, &mut output)?;
         output.put(id, message.sequence, message.log_ns, message.publish_ns, message.data)
@@ -58,7 +59,7 @@ pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Resul
     for (name, entries) in recording.metadata()? {
         output.metadata(&name, &entries)?;
     }
-    output.metadata(EXTRACT_METADATA, &about(recording, &kept))?;
+    output.metadata(EXTRACT_METADATA, &about(recording, &kept)?)?;
     output.finish()?;
     Ok(Extracted { topics: kept.topics, attachments })
 }
@@ -143,9 +144,9 @@ fn common_profile(recording: &Recording) -> &str {
 }
 
 /// Where the thin recording comes from. Local files by their names only: where they lie is no part of the content.
-fn about(recording: &Recording, kept: &Kept) -> BTreeMap<String, String> {
+fn about(recording: &Recording, kept: &Kept) -> Result<BTreeMap<String, String>, RecordingError> {
     let mut entries = BTreeMap::from([("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]);
-    for (i, file) in recording.report().files.iter().enumerate() {
+    for (i, file) in recording.whole_report()?.files.iter().enumerate() {
         let name = match (&file.object, file.path.file_name()) {
             (None, Some(name)) => name.to_string_lossy().into_owned(),
             _ => file.path.to_string_lossy().into_owned(),
@@ -160,5 +161,5 @@ fn about(recording: &Recording, kept: &Kept) -> BTreeMap<String, String> {
     for (i, (topic, _)) in kept.topics.iter().enumerate() {
         entries.insert(format!("topic{i}"), topic.clone());
     }
-    entries
+    Ok(entries)
 }

@@ -1,5 +1,6 @@
 //! Messages of the wanted streams, decoded block by block in parallel and put together in file order.
 
+use crate::budget::Allowance;
 use crate::clock::Stamps;
 use crate::decode::{Place, Plan, Role, Rows};
 use crate::error::nearest;
@@ -144,6 +145,7 @@ pub(crate) fn gather(
         unreadable.push(target(recording, index, request, &mut wanted)?);
     }
     let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
+    let allowance = recording.allowance();
     let rows: Vec<f64> = (0..requests.len()).map(|request| declared(recording, &wanted, request)).collect();
     let (surveys, stretches) = sweep(
         &recording.files,
@@ -153,11 +155,12 @@ pub(crate) fn gather(
         },
         |streams, at, message| {
             for target in wanted[at.file].get(&message.channel_id).into_iter().flatten() {
-                streams[target.request].take(at, target, message);
+                streams[target.request].take(at, target, message, &allowance);
             }
         },
     )?;
     recording.remember(surveys);
+    recording.within(&allowance)?;
     let mut parts: Vec<Vec<Gathered>> =
         requests.iter().map(|_| Vec::with_capacity(stretches.len())).collect();
     for stretch in stretches {
@@ -275,12 +278,12 @@ impl<'a> Stretch<'a> {
         Stretch { kind, rows: Rows::new(kind.role()), gathered, sampled: (None, 0) }
     }
 
-    fn take(&mut self, at: At, target: &Target, message: &Message<'_>) {
+    fn take(&mut self, at: At, target: &Target, message: &Message<'_>, allowance: &Allowance) {
         let Stretch { rows, gathered, .. } = self;
         gathered.messages += 1;
         rows.clear();
         let decode = |data: Cow<'_, [u8]>| target.plan.decode(&data, rows).map_err(|e| e.to_string());
-        let data = if target.cdr { inflated(message.data) } else { Ok(message.data.into()) };
+        let data = if target.cdr { inflated(message.data, allowance) } else { Ok(message.data.into()) };
         if let Err(why) = data.and_then(decode) {
             gathered.undecodable += 1;
             gathered.first_error.get_or_insert(why);

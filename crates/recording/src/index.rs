@@ -5,8 +5,9 @@
 //! a chunk is checked against it again when it is read. Anything else makes it unusable, and the file is read whole.
 
 use crate::RecordingError;
+use crate::budget::Allowance;
 use crate::channels::Definitions;
-use crate::layout::{Block, Content, Layout, check_magic};
+use crate::layout::{self, Block, Content, DataCrc, Layout, check_magic};
 use crate::ranges::Ranged;
 use crate::records::{ChunkIndex, Cursor, ENVELOPE, RawRecord, Records, Statistics};
 use crate::report::Source;
@@ -17,9 +18,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Footer record.
-const FOOTER_BYTES: usize = ENVELOPE + 20;
+const FOOTER_BYTES: usize = ENVELOPE + layout::FOOTER_BYTES;
 /// DataEnd record, the last before the summary.
-const DATA_END_BYTES: usize = ENVELOPE + 4;
+const DATA_END_BYTES: usize = ENVELOPE + layout::DATA_END_BYTES;
 /// The header record is looked for in so many bytes.
 const HEAD_BYTES: usize = 4096;
 /// A larger summary is not read into memory.
@@ -42,6 +43,11 @@ pub(crate) enum Found {
 
 /// Finds the structure of a file with two or three requests.
 pub(crate) fn find(file: &Ranged) -> Result<Found, RecordingError> {
+    find_within(file, &Allowance::of(file.len(), 1))
+}
+
+/// The same of one that may inflate to so much.
+pub(crate) fn find_within(file: &Ranged, allowance: &Allowance) -> Result<Found, RecordingError> {
     let size = file.len() as usize;
     let head = file.read_one(0..HEAD_BYTES)?;
     if let Err(why) = check_magic(&head) {
@@ -64,12 +70,18 @@ pub(crate) fn find(file: &Ranged) -> Result<Found, RecordingError> {
     if crc != 0 && crc32fast::hash(summary) != crc {
         return Ok(Found::Unusable("the CRC of its summary disagrees"));
     }
-    if data_end[0] != op::DATA_END {
+    let data_end = Records::new(data_end, 0, DATA_END_BYTES).next().and_then(Result::ok);
+    let Some(data_end) =
+        data_end.filter(|r| r.op == op::DATA_END && r.body.len() + ENVELOPE == DATA_END_BYTES)
+    else {
         return Ok(Found::Unusable("no end of the data stands before its summary"));
-    }
+    };
+    let crc = Cursor::new(data_end.body).u32().filter(|crc| *crc != 0);
+    let data = summary_start - DATA_END_BYTES;
     let listed = Bytes::copy_from_slice(&summary[..end - summary_start]);
+    let layout = Summary::parse(&listed).and_then(|summary| summary.layout(&head, data, allowance));
     let layout =
-        Summary::parse(&listed).and_then(|summary| summary.layout(&head, summary_start - DATA_END_BYTES));
+        layout.map(|layout| Layout { data_crc: crc.map(|crc| DataCrc { end: data, crc }), ..layout });
     Ok(layout.map_or_else(Found::Unusable, |layout| Found::Layout(Box::new(layout))))
 }
 
@@ -98,7 +110,7 @@ impl Summary {
         let mut summary = Summary::default();
         for record in Records::new(bytes, 0, bytes.len()) {
             let record = record.map_err(|_| "a record of its summary is cut off")?;
-            summary.definitions.absorb(&record);
+            summary.definitions.absorb(&record)?;
             summary.absorb(&record).ok_or("a record of its summary cannot be read")?;
         }
         Ok(summary)
@@ -117,7 +129,7 @@ impl Summary {
     }
 
     /// The layout of a data section that ends at `data_end`.
-    fn layout(mut self, head: &[u8], data_end: usize) -> Result<Layout, &'static str> {
+    fn layout(mut self, head: &[u8], data_end: usize, allowance: &Allowance) -> Result<Layout, &'static str> {
         let statistics = self.statistics.take().ok_or("its summary has no statistics")?;
         self.check(&statistics)?;
         let header = Records::new(head, mcap::MAGIC.len(), head.len()).next().and_then(Result::ok);
@@ -126,6 +138,9 @@ impl Summary {
         let words = words.string().zip(words.string()).ok_or("its header cannot be read")?;
         let data = header.offset + ENVELOPE + header.body.len()..data_end;
         let blocks = self.blocks(&data)?;
+        self.chunks.sort_by_key(|chunk| chunk.chunk_start);
+        let too_large = |c: &&ChunkIndex| !allowance.admits(c.chunk_length, c.inflates_to);
+        let refused = self.chunks.iter().filter(too_large).map(|c| c.chunk_start as usize).collect();
         let bodies = |records: &[(u64, u64)]| -> Result<Vec<Range<usize>>, &'static str> {
             let body = |(offset, length): &(u64, u64)| {
                 range(*offset, *length).map(|r| r.start + ENVELOPE..r.end).filter(|r| r.start <= r.end)
@@ -137,6 +152,8 @@ impl Summary {
             library: words.1,
             source: Some(Source::Index),
             blocks,
+            chunks: self.chunks.len(),
+            refused,
             attachments: bodies(&self.attachments)?,
             metadata: bodies(&self.metadata)?,
             first_ns: self.chunks.iter().map(|c| c.start_ns).filter(|ns| *ns > 0).min(),
@@ -184,10 +201,12 @@ impl Summary {
             }
             let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
             let indexed = !chunk.message_indexes.is_empty();
+            let body = record.start + ENVELOPE..record.end;
             let block = Block {
                 offset: record.start,
-                content: Content::Chunk(record.start + ENVELOPE..record.end),
+                content: Content::Chunk { body, indexes: indexes.clone() },
                 holds: indexed.then(|| chunk.message_indexes.keys().copied().collect()),
+                inflates_to: Some(chunk.inflates_to),
             };
             known.push((record.start..indexes.end, Some(block)));
         }
@@ -202,7 +221,7 @@ impl Summary {
                 return Err("a large part of it is in no chunk");
             }
             if range.start > at {
-                blocks.push(Block { offset: at, content: Content::Loose(at..range.start), holds: None });
+                blocks.push(Block::of(at, Content::Records(at..range.start)));
             }
             at = range.end;
             blocks.extend(block);

@@ -4,9 +4,13 @@
 //! `bytes` (a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`; of a `foreign`
 //! format, such as rosbag2's database, a copy of its messages) ->
 //! `records` (record envelopes) -> `layout` (where messages lie, by walking a map) or `index` (by the summary alone) ->
-//! `chunk` (inflated and checked, within a `budget`) -> `sweep` (all blocks in parallel, results in file order) ->
+//! `chunk` (inflated and checked, within a `budget`) -> `judge` (the records of a block against its indexes) -> `sweep` (all
+//! blocks in parallel, results in file order) ->
 //! `decode` (messages to rows) -> `gather` (rows of a stream; of bodies that hang on others the `transforms`
 //! between) -> `reading` (columns: clock, cleaning, units). `read` takes all streams of a pipeline through these.
+//!
+//! What was read is compared with whatever else says what was written: `witness`, and of rosbag2 `bag` and `foreign`. A
+//! disagreement is data lost, which the process remembers ([`losses`]).
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
 //! off or damaged. What is sound is used; what is not is reported with its byte offset and reason. Nothing panics
@@ -19,12 +23,14 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod atomic;
+mod bag;
 mod budget;
 mod bytes;
 mod channels;
 mod chunk;
 mod clean;
 mod clock;
+mod damage;
 pub mod decode;
 mod error;
 mod extract;
@@ -36,7 +42,9 @@ mod identity;
 mod index;
 pub mod input;
 mod joints;
+mod judge;
 mod layout;
+mod losses;
 mod map;
 mod mark;
 #[cfg(any(test, not(feature = "s3")))]
@@ -62,7 +70,10 @@ mod temperature;
 mod together;
 mod transforms;
 mod url;
+mod witness;
 
+pub use bag::read_with;
+pub use budget::Allowance;
 pub use bytes::{Access, identity_of, sha256_of};
 pub use error::{RecordingError, nearest, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
@@ -72,6 +83,7 @@ pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
 pub use guard::{
     Over, holds, make_folder, make_folder_in, may_put, may_write, may_write_all, may_write_over,
 };
+pub use losses::losses;
 pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
 pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};

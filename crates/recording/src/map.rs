@@ -22,6 +22,8 @@ pub(crate) struct Map {
     bytes: memmap2::Mmap,
     /// What passes have hashed of it; `None` where they shall not.
     pub hashed: Option<Pieces>,
+    /// Of so many bytes from the start the CRC is wanted too.
+    crc_to: usize,
 }
 
 impl Map {
@@ -32,12 +34,27 @@ impl Map {
         // is mapped is seen (`crate::shortened`; elsewhere than on Linux it kills us with SIGBUS).
         let bytes = unsafe { memmap2::Mmap::map(file) }?;
         let hashed = Some(Pieces::of(bytes.len()));
-        Ok(Map { watched: Watched::of(&bytes), bytes, hashed })
+        Ok(Map { watched: Watched::of(&bytes), bytes, hashed, crc_to: 0 })
     }
 
     /// Whether the file became shorter and something behind its new end was read: then what was read is worth nothing.
     pub fn is_shortened(&self) -> bool {
         self.watched.is_shortened()
+    }
+
+    /// Says that with the identity the CRC of so many bytes from the start is wanted, before any of it is hashed.
+    pub fn want_crc(&mut self, to: usize) {
+        self.crc_to = to;
+        if let Some(pieces) = &mut self.hashed {
+            pieces.crc_to = to;
+        }
+    }
+
+    /// The CRC of so many bytes from the start.
+    pub fn crc(&self, to: usize) -> u32 {
+        let mut crc = crc32fast::Hasher::new();
+        self.pieces(0..to, |piece| crc.update(piece));
+        crc.finalize()
     }
 
     /// Says that a pass in order of offsets is done with these bytes. They can be read again at any time.
@@ -81,12 +98,12 @@ impl Map {
         }
     }
 
-    /// What tells its content from any other ([`crate::identity`]).
-    pub fn identity(&self) -> String {
+    /// What tells its content from any other ([`crate::identity`]), and the CRC that is wanted.
+    pub fn identity(&self) -> (String, u32) {
         let release = |range| self.release(range);
         match &self.hashed {
             Some(pieces) => pieces.identity(self, release),
-            None => Pieces::of(self.len()).identity(self, release),
+            None => Pieces::with_crc(self.len(), self.crc_to).identity(self, release),
         }
     }
 }

@@ -1,32 +1,37 @@
 //! A recording: one or more files, opened, laid out, and reported on.
 
+use crate::budget::Allowance;
 use crate::bytes::{Access, FileBytes};
+use crate::damage::{Damage, Faults};
 use crate::foreign::names::{files_of, is_recording, without_ending};
 use crate::foreign::{self, Converted};
 use crate::index::{self, Found};
-use crate::layout::{Damage, Layout};
-use crate::raw::{Attachment, RawChannel, RawSchema, parse_metadata};
-use crate::records::ENVELOPE;
+use crate::layout::Layout;
+use crate::raw::{RawChannel, RawSchema};
 use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep};
 use crate::{
-    ChannelReport, Fetched, FileReport, ObjectIdentity, RecordingError, RecordingReport, Source, decode,
+    ChannelReport, Fetched, FileReport, ObjectIdentity, RecordingError, RecordingReport, Source, bag, decode,
+    losses, witness,
 };
 use armcal_core::{Severity, Stage, Warning};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-
-/// Places of damage told one by one; of more, only how many there are: a file can hold millions.
-const DAMAGE_TOLD: usize = 50;
 
 /// An opened recording, which may consist of several split files.
 pub struct Recording {
     pub(crate) files: Vec<RecordingFile>,
     /// What the passes made so far have found in each file.
     surveys: Mutex<Vec<FileSurvey>>,
-    report: OnceLock<RecordingReport>,
+    judged: OnceLock<JudgedFiles>,
+}
+
+/// What a recording is found to be.
+struct JudgedFiles {
+    report: RecordingReport,
+    /// A file that could not be read to its end, and why.
+    unread: Option<(PathBuf, String)>,
 }
 
 /// One file of a recording.
@@ -40,13 +45,13 @@ pub(crate) struct RecordingFile {
 }
 
 /// Channels that were not read whole.
-enum Unread {
+pub(crate) enum Unread {
     All,
     Some(BTreeSet<u16>),
 }
 
 impl Unread {
-    fn has(&self, channel: u16) -> bool {
+    pub fn has(&self, channel: u16) -> bool {
         match self {
             Unread::All => true,
             Unread::Some(ids) => ids.contains(&channel),
@@ -66,8 +71,12 @@ enum Copied {
     /// Of the messages of a file in another format.
     Messages {
         original: FileBytes,
-        /// What of it could not be used.
+        /// What of it could not be used, or disagrees with the rest.
         damage: Vec<Damage>,
+        /// Identity of the log that was read with it.
+        log: String,
+        /// Whether the messages are in an MCAP file of somebody else's.
+        packed: bool,
     },
 }
 
@@ -96,13 +105,29 @@ impl Recording {
         }
         let paths = &files_of(paths);
         refuse_repeated(paths)?;
-        let open = |path: &PathBuf| RecordingFile::open(path, access);
+        let open = |path: &PathBuf| RecordingFile::open(path, access, paths.len());
         let mut files = paths.par_iter().map(open).collect::<Result<Vec<_>, _>>()?;
         files.sort_by_key(|f| f.layout.first_ns.unwrap_or(u64::MAX));
         let surveys = Mutex::new(vec![FileSurvey::default(); files.len()]);
-        let mut recording = Recording { files, surveys, report: OnceLock::new() };
+        let mut recording = Recording { files, surveys, judged: OnceLock::new() };
         recording.complete_definitions()?;
         Ok(recording)
+    }
+
+    /// What the messages of one pass may inflate to that are compressed one by one.
+    pub fn allowance(&self) -> Allowance {
+        Allowance::of(self.files.iter().map(|file| file.original().len()).sum(), 1)
+    }
+
+    /// Whether a pass stayed within its allowance.
+    ///
+    /// # Errors
+    /// It did not, so that messages are missing from what it gave.
+    pub fn within(&self, allowance: &Allowance) -> Result<(), RecordingError> {
+        match self.files.first().filter(|_| allowance.is_exceeded()) {
+            Some(file) => Err(allowance.exceeded(&file.path)),
+            None => Ok(()),
+        }
     }
 
     /// Leaves the identity of the files out of the passes over them: whoever does not ask for the report need not pay for it.
@@ -117,36 +142,78 @@ impl Recording {
 
     /// Files, channels and warnings about them; streams are empty until [`Recording::read`] has named them. The
     /// first call makes a pass over mapped files unless `read` has already made one, and hashes local files. Of files
-    /// read by ranges it tells what has been read until then.
+    /// read by ranges it tells what has been read until then. Bytes that cannot be read again to hash them are a warning
+    /// here; [`Recording::whole_report`] fails.
     pub fn report(&self) -> &RecordingReport {
-        self.report.get_or_init(|| {
-            let unread = self.unread();
+        &self.judged().report
+    }
+
+    /// The same of files that could be read to their ends.
+    ///
+    /// # Errors
+    /// Bytes that cannot be read, which is no damage of the file.
+    pub fn whole_report(&self) -> Result<&RecordingReport, RecordingError> {
+        let judged = self.judged();
+        match &judged.unread {
+            None => Ok(&judged.report),
+            Some((path, why)) => {
+                let source = std::io::Error::other(why.clone());
+                Err(RecordingError::Read { path: path.clone(), source })
+            }
+        }
+    }
+
+    /// The same, where nothing else is wanted of the recording.
+    ///
+    /// # Errors
+    /// As [`Recording::whole_report`].
+    pub fn into_report(self) -> Result<RecordingReport, RecordingError> {
+        self.whole_report()?;
+        Ok(self.judged.into_inner().map(|judged| judged.report).unwrap_or_default())
+    }
+
+    fn judged(&self) -> &JudgedFiles {
+        self.judged.get_or_init(|| {
             // Only fetching can fail, and of mapped files nothing is fetched.
-            if let Ok((found, _)) = sweep(&self.files, &unread, |_| (), |(), _, _| ()) {
+            if let Ok((found, _)) = sweep(&self.files, &self.unread(), |_| (), |(), _, _| ()) {
                 self.remember(found);
             }
-            let hashes: Vec<_> = self.files.par_iter().map(RecordingFile::identity).collect();
+            let hashed: Vec<_> = self.files.par_iter().map(RecordingFile::hashed).collect();
             let surveys = self.surveys();
-            let damage = |(file, hash): (&RecordingFile, &Result<String, RecordingError>), survey| {
-                let mut damage = file.damage(survey);
-                damage.extend(hash.as_ref().err().map(|e| Damage {
-                    offset: 0,
-                    why: format!("its bytes cannot be hashed: {e}"),
-                    lost: true,
-                }));
-                damage
+            let compared = self.files.iter().zip(surveys.iter()).map(|(f, s)| witness::compare(f, s));
+            let mut damage: Vec<Faults> = compared.collect();
+            let mut unread = None;
+            for ((file, faults), hashed) in self.files.iter().zip(&mut damage).zip(&hashed) {
+                match hashed {
+                    Ok(hashed) => witness::compare_crc(file, hashed.crc, faults),
+                    Err(e) => {
+                        faults.lost(0, || format!("its bytes cannot be hashed: {e}"));
+                        unread.get_or_insert((file.path.clone(), e.to_string()));
+                    }
+                }
+            }
+            for (file, why) in bag::compare(&self.files, &surveys) {
+                match why {
+                    Ok(why) => damage[file].lost(0, || why),
+                    Err((path, e)) => {
+                        damage[file].lost(0, || format!("{} cannot be read: {e}", path.display()));
+                        unread.get_or_insert((path, e.to_string()));
+                    }
+                }
+            }
+            let damage: Vec<Vec<Damage>> = damage.into_iter().map(Faults::in_words).collect();
+            let identity = |hashed: &Result<Hashed, RecordingError>| {
+                hashed.as_ref().map_or_else(|_| String::new(), |hashed| hashed.identity.clone())
             };
-            let per_file = || self.files.iter().zip(&hashes).zip(surveys.iter());
-            let damage: Vec<Vec<Damage>> = per_file().map(|(file, survey)| damage(file, survey)).collect();
-            RecordingReport {
-                files: per_file()
-                    .zip(&damage)
-                    .map(|(((f, hash), _), damage)| f.report(hash, damage))
-                    .collect(),
+            let per_file = || self.files.iter().zip(&hashed).zip(&damage);
+            let report = RecordingReport {
+                files: per_file().map(|((f, hashed), damage)| f.report(identity(hashed), damage)).collect(),
                 channels: self.channel_reports(&surveys),
                 streams: Vec::new(),
-                warnings: self.files.iter().zip(damage).flat_map(|(f, damage)| f.warnings(damage)).collect(),
-            }
+                warnings: per_file().flat_map(|((f, _), damage)| f.warnings(damage)).collect(),
+            };
+            losses::note(&report.warnings);
+            JudgedFiles { report, unread }
         })
     }
 
@@ -181,55 +248,66 @@ impl Recording {
             self.remember(found);
             let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
             for (file, survey) in self.files.iter_mut().zip(surveys) {
-                file.layout.definitions.merge(std::mem::take(&mut survey.definitions));
+                if !file.layout.definitions.merge(std::mem::take(&mut survey.definitions)) {
+                    let why = "its chunks define schemas or channels otherwise than the rest of the file";
+                    file.layout.faults.lost(0, || why.to_owned());
+                }
                 let first = survey.tallies.values().map(|t| t.first_ns).min();
                 file.layout.first_ns = first.or(file.layout.first_ns);
             }
         }
         for file in &mut self.files {
-            file.channels = file.layout.definitions.resolve();
+            file.channels = file.layout.definitions.shared();
         }
         Ok(())
     }
 
     fn channel_reports(&self, surveys: &[FileSurvey]) -> Vec<ChannelReport> {
-        type Key = (String, String, String, String);
-        let mut merged: BTreeMap<Key, (Option<Tally>, Arc<RawChannel>)> = BTreeMap::new();
+        type Key<'a> = (&'a str, &'a str, &'a str, &'a str);
+        let mut merged: BTreeMap<Key<'_>, (Option<Tally>, &Arc<RawChannel>)> = BTreeMap::new();
         for (file, survey) in self.files.iter().zip(surveys) {
             let unread = file.unread(survey);
             for (id, channel) in &file.channels {
-                let (schema, encoding) = channel
-                    .schema
-                    .as_ref()
-                    .map_or_else(Default::default, |s| (s.name.clone(), s.encoding.clone()));
-                let key = (channel.topic.clone(), schema, encoding, channel.message_encoding.clone());
-                let (tally, _) = merged.entry(key).or_insert_with(|| (None, channel.clone()));
+                let (schema, encoding) =
+                    channel.schema.as_ref().map_or(("", ""), |s| (s.name.as_str(), s.encoding.as_str()));
+                let key = (channel.topic.as_str(), schema, encoding, channel.message_encoding.as_str());
+                let (tally, _) = merged.entry(key).or_insert_with(|| (None, channel));
                 if let Some(found) = file.tally(survey, &unread, *id) {
                     tally.get_or_insert(Tally { messages: 0, ..found }).add(found);
                 }
             }
         }
         // Thousands of channels may share one schema, which is compiled once.
-        let mut known: BTreeMap<Compiled, Result<String, String>> = BTreeMap::new();
-        let report = |(key, (tally, channel)): (Key, (Option<Tally>, Arc<RawChannel>))| {
+        let mut known: BTreeMap<Compiled<'_>, Result<String, String>> = BTreeMap::new();
+        let mut reports = Vec::with_capacity(merged.len());
+        for (key, (tally, channel)) in merged {
             let tally = tally.unwrap_or(Tally { messages: 0, first_ns: 0, last_ns: 0 });
-            ChannelReport {
-                topic: key.0,
-                schema: key.1,
-                schema_encoding: key.2,
-                message_encoding: key.3,
+            let compiled = (channel.schema.as_ref().map(Arc::as_ptr), channel.message_encoding.as_str());
+            reports.push(ChannelReport {
+                topic: key.0.to_owned(),
+                schema: key.1.to_owned(),
+                schema_encoding: key.2.to_owned(),
+                message_encoding: key.3.to_owned(),
                 messages: tally.messages,
                 first_ns: ns(tally.first_ns),
                 last_ns: ns(tally.last_ns),
-                decodable: known.entry(compiled(&channel)).or_insert_with(|| readable_as(&channel)).clone(),
-            }
-        };
-        merged.into_iter().map(report).collect()
+                decodable: known.entry(compiled).or_insert_with(|| readable_as(channel)).clone(),
+            });
+        }
+        reports
     }
 }
 
+/// What hashing a file gives.
+struct Hashed {
+    identity: String,
+    /// Of the data section, where all of it was read.
+    crc: Option<u32>,
+}
+
 impl RecordingFile {
-    fn open(path: &Path, access: Access) -> Result<RecordingFile, RecordingError> {
+    /// One of so many files.
+    fn open(path: &Path, access: Access, files: usize) -> Result<RecordingFile, RecordingError> {
         let mut file = RecordingFile {
             path: path.to_owned(),
             bytes: FileBytes::open(path, access)?,
@@ -237,10 +315,11 @@ impl RecordingFile {
             layout: Layout::default(),
             channels: BTreeMap::new(),
         };
+        let allowance = Allowance::of(file.bytes.len(), files);
         if let FileBytes::Ranged(ranged) = &file.bytes {
-            match index::find(ranged)? {
+            match index::find_within(ranged, &allowance)? {
                 Found::Layout(layout) => file.layout = *layout,
-                Found::NotMcap(why) => return file.converted(why),
+                Found::NotMcap(why) => return file.converted(why, &allowance),
                 Found::Unusable(why) => {
                     let map = ranged.spool(path)?;
                     let copied =
@@ -249,34 +328,49 @@ impl RecordingFile {
                 }
             }
         }
-        if let FileBytes::Mapped(map) = &file.bytes {
-            match Layout::of(map) {
+        if let FileBytes::Mapped(map) = &mut file.bytes {
+            // A copy has an allowance of its own: what the summary was thought to be worth is void.
+            let allowance = Allowance::of(map.len() as u64, files);
+            match Layout::of(map, &allowance) {
                 Ok(layout) => file.layout = layout,
-                Err(why) => return file.converted(why),
+                Err(why) => return file.converted(why, &allowance),
             }
+            map.want_crc(file.layout.data_crc.map_or(0, |data| data.end));
         }
         Ok(file)
     }
 
     /// The same of a file in another format; `why` it is no MCAP file.
-    fn converted(mut self, why: String) -> Result<RecordingFile, RecordingError> {
+    fn converted(mut self, why: String, allowance: &Allowance) -> Result<RecordingFile, RecordingError> {
         let not_mcap = |why: String| RecordingError::NotMcap { path: self.path.clone(), why };
-        let Some(Converted { map, damage }) = foreign::convert(&self.bytes, &self.path)? else {
+        let converted = foreign::convert(&self.bytes, &self.path, allowance)?;
+        let Some(Converted { map, damage, log, packed }) = converted else {
             return Err(not_mcap(why));
         };
-        self.layout = Layout::of(&map).map_err(not_mcap)?;
+        self.layout = Layout::of(&map, allowance).map_err(not_mcap)?;
         let original = std::mem::replace(&mut self.bytes, FileBytes::Mapped(map));
-        self.copied = Some(Copied::Messages { original, damage });
+        self.copied = Some(Copied::Messages { original, damage, log, packed });
         Ok(self)
     }
 
     /// An object is identified by its store, copied or not.
-    fn identity(&self) -> Result<String, RecordingError> {
+    fn hashed(&self) -> Result<Hashed, RecordingError> {
+        let data_end = self.layout.data_crc.map_or(0, |data| data.end);
         let bytes = self.original();
-        let identity =
-            self.object().map_or_else(|| bytes.identity(), |object| Ok(object.identity(bytes.len())));
+        let (mut identity, mut crc) = match self.object() {
+            Some(object) if self.copied.is_some() => (object.identity(bytes.len()), None),
+            _ => bytes.identity(data_end)?,
+        };
+        match (&self.copied, &self.bytes) {
+            (Some(Copied::Messages { log, packed, .. }), FileBytes::Mapped(map)) => {
+                identity += log;
+                crc = packed.then(|| map.crc(data_end));
+            }
+            (Some(_), FileBytes::Mapped(map)) if crc.is_none() => crc = Some(map.crc(data_end)),
+            _ => {}
+        }
         self.unshortened()?;
-        identity
+        Ok(Hashed { identity, crc })
     }
 
     /// # Errors
@@ -303,7 +397,7 @@ impl RecordingFile {
 
     /// Channels of which no pass has seen every block that may hold messages; one walk over the blocks, however many
     /// channels there are.
-    fn unread(&self, survey: &FileSurvey) -> Unread {
+    pub fn unread(&self, survey: &FileSurvey) -> Unread {
         let blocks = self.layout.blocks.iter().enumerate();
         let mut unread = Unread::Some(BTreeSet::new());
         for (_, block) in blocks.filter(|(block, _)| !survey.passed.contains(block)) {
@@ -322,73 +416,22 @@ impl RecordingFile {
         tallies.get(&channel).copied()
     }
 
-    /// Everything wrong with the file, as far as it was read, by offset.
-    fn damage(&self, survey: &FileSurvey) -> Vec<Damage> {
-        let mut all: Vec<Damage> = self.layout.damage.iter().chain(&survey.damage).cloned().collect();
+    /// What copying it showed.
+    pub fn copy_damage(&self) -> Vec<Damage> {
         match &self.copied {
             Some(Copied::Whole { why, .. }) => {
-                all.push(Damage { offset: 0, why: format!("{why}, so all of it was read"), lost: false });
+                vec![Damage { offset: 0, why: format!("{why}, so all of it was read"), lost: false }]
             }
-            Some(Copied::Messages { damage, .. }) => all.extend(damage.iter().cloned()),
-            None => {}
+            Some(Copied::Messages { damage, .. }) => damage.clone(),
+            None => Vec::new(),
         }
-        let strangers = survey.tallies.iter().filter(|(id, _)| !self.channels.contains_key(id));
-        all.extend(strangers.map(|(id, tally)| Damage {
-            offset: 0,
-            why: format!(
-                "{} messages of channel {id}, whose definition is lost, cannot be used",
-                tally.messages
-            ),
-            lost: true,
-        }));
-        all.extend(self.miscounted(survey));
-        all.extend(self.bad_extras());
-        all.sort_by_key(|d| d.offset);
-        summarised(all)
     }
 
-    /// Statistics that disagree with what was found; of a file read in parts, on the channels that were read.
-    fn miscounted(&self, survey: &FileSurvey) -> Option<Damage> {
-        let statistics = self.layout.statistics.as_ref()?;
-        let found = |id: &u16| survey.tallies.get(id).map_or(0, |t| t.messages);
-        let (declared, found): (u64, u64) = if survey.passed.len() == self.layout.blocks.len() {
-            (statistics.message_count, survey.tallies.values().map(|t| t.messages).sum())
-        } else {
-            let unread = self.unread(survey);
-            let read = || statistics.channel_message_counts.iter().filter(|(id, _)| !unread.has(**id));
-            (read().map(|(_, declared)| declared).sum(), read().map(|(id, _)| found(id)).sum())
-        };
-        let why = format!("its statistics declare {declared} messages, {found} are usable");
-        (declared != found).then_some(Damage { offset: 0, why, lost: declared > found })
-    }
-
-    /// Attachments and metadata that cannot be passed on; those of files read by ranges are judged when they are read.
-    fn bad_extras(&self) -> Vec<Damage> {
-        let FileBytes::Mapped(map) = &self.bytes else { return Vec::new() };
-        let bad = |range: &Range<usize>, what| Damage {
-            offset: range.start - ENVELOPE,
-            why: format!("{what} is damaged and not passed on"),
-            lost: true,
-        };
-        let mut damage = Vec::new();
-        for range in &self.layout.attachments {
-            damage.extend(
-                Attachment::parse(&map[range.clone()]).is_none().then(|| bad(range, "an attachment")),
-            );
-            map.passed(range.clone());
-        }
-        for range in &self.layout.metadata {
-            let sound = parse_metadata(&map[range.clone()]).is_some();
-            damage.extend((!sound).then(|| bad(range, "a metadata record")));
-        }
-        damage
-    }
-
-    fn report(&self, identity: &Result<String, RecordingError>, damage: &[Damage]) -> FileReport {
+    fn report(&self, identity: String, damage: &[Damage]) -> FileReport {
         FileReport {
             path: self.path.clone(),
             bytes: self.original().len(),
-            identity: identity.as_ref().cloned().unwrap_or_default(),
+            identity,
             object: self.object().cloned(),
             fetched: match &self.copied {
                 Some(Copied::Whole { fetched, .. }) => Some(*fetched),
@@ -397,14 +440,14 @@ impl RecordingFile {
             source: self.layout.source.unwrap_or(Source::Scan),
             profile: self.layout.profile.clone(),
             library: self.layout.library.clone(),
-            chunks: self.layout.chunks(),
+            chunks: self.layout.chunks,
             truncated_at: self.layout.truncated_at.map(|at| at as u64),
             damaged: damage.iter().map(|d| (d.offset as u64, d.why.clone())).collect(),
         }
     }
 
-    fn warnings(&self, damage: Vec<Damage>) -> Vec<Warning> {
-        let warn = |d: Damage| {
+    fn warnings(&self, damage: &[Damage]) -> Vec<Warning> {
+        let warn = |d: &Damage| {
             let (severity, code) = match d.lost {
                 true => (Severity::DataLost, "recording-damaged"),
                 false => (Severity::Notice, "recording-irregular"),
@@ -413,18 +456,8 @@ impl RecordingFile {
             let text = format!("at byte {}: {}", d.offset, d.why);
             Warning::new(severity, Stage::Recording, code, subject, text)
         };
-        damage.into_iter().map(warn).collect()
+        damage.iter().map(warn).collect()
     }
-}
-
-/// The first places of damage, and how many more there are.
-fn summarised(mut all: Vec<Damage>) -> Vec<Damage> {
-    let more = all.split_off(DAMAGE_TOLD.min(all.len()));
-    if let Some(first) = more.first() {
-        let why = format!("{} more places of damage from here on", more.len());
-        all.push(Damage { offset: first.offset, why, lost: more.iter().any(|d| d.lost) });
-    }
-    all
 }
 
 /// Log times are unsigned in MCAP; beyond the year 2262 they saturate.
@@ -433,11 +466,7 @@ pub(crate) fn ns(unsigned: u64) -> i64 {
 }
 
 /// What decides how messages are read: a schema in memory, and the message encoding.
-type Compiled = (Option<*const RawSchema>, String);
-
-fn compiled(channel: &RawChannel) -> Compiled {
-    (channel.schema.as_ref().map(Arc::as_ptr), channel.message_encoding.clone())
-}
+type Compiled<'a> = (Option<*const RawSchema>, &'a str);
 
 fn readable_as(channel: &RawChannel) -> Result<String, String> {
     let Some(schema) = &channel.schema else {

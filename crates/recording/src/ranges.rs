@@ -104,17 +104,21 @@ impl Ranged {
         Map::of(&copy).map_err(failed)
     }
 
-    /// What tells its content from any other: what the store says, or a hash, for which all of it is read.
-    pub fn identity(&self) -> Result<String, RecordingError> {
+    /// What tells its content from any other: what the store says, or a hash, for which all of it is read. With it the CRC
+    /// of the first `crc_to` bytes, where all is read.
+    pub fn identity(&self, crc_to: usize) -> Result<(String, Option<u32>), RecordingError> {
         if let Some(object) = &self.object {
-            return Ok(object.identity(self.size));
+            return Ok((object.identity(self.size), None));
         }
-        let mut hasher = blake3::Hasher::new();
+        let (mut hasher, mut crc, mut left) = (blake3::Hasher::new(), crc32fast::Hasher::new(), crc_to);
         self.each_round(&mut |bytes| {
             hasher.update(bytes);
+            let covered = left.min(bytes.len());
+            crc.update(&bytes[..covered]);
+            left -= covered;
             Ok(())
         })?;
-        Ok(named(hasher.finalize()))
+        Ok((named(hasher.finalize()), Some(crc.finalize())))
     }
 
     /// Hands the file to `f` in order, some pieces at a time in memory.

@@ -6,7 +6,6 @@ use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records,
 use crate::{Recording, RecordingError};
 use mcap::records::op;
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
@@ -128,7 +127,7 @@ impl Recording {
             (blocks, blocks_left) = blocks_left.split_at(count);
             (fetched, fetched_left) = fetched_left.split_at(count);
             let work = blocks.par_iter().zip(fetched);
-            let inflated: Vec<(Cow<'_, [u8]>, BlockSurvey)> =
+            let inflated: Vec<(Vec<u8>, BlockSurvey)> =
                 work.map(|(at, fetched)| inflate(&self.files, *at, fetched.as_ref())).collect();
             let mut surveys = Vec::with_capacity(inflated.len());
             for (bytes, (at, survey)) in inflated {

@@ -139,6 +139,8 @@ pub(crate) struct Message<'a> {
     pub log_ns: u64,
     pub publish_ns: u64,
     pub data: &'a [u8],
+    /// All of the record behind its envelope.
+    pub body: &'a [u8],
 }
 
 impl<'a> Message<'a> {
@@ -150,23 +152,36 @@ impl<'a> Message<'a> {
             log_ns: c.u64()?,
             publish_ns: c.u64()?,
             data: c.rest(),
+            body,
         })
     }
 }
 
+impl Message<'_> {
+    /// Writes the record as it was.
+    pub fn write_to(&self, bytes: &mut Vec<u8>) {
+        bytes.push(op::MESSAGE);
+        bytes.extend((self.body.len() as u64).to_le_bytes());
+        bytes.extend(self.body);
+    }
+}
+
 /// The fields of a chunk record before its data.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ChunkHeader {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ChunkHeader<'a> {
     pub start_ns: u64,
     pub uncompressed_size: u64,
     pub uncompressed_crc: u32,
-    pub compression: String,
+    pub compression: &'a str,
     pub compressed_size: u64,
 }
 
-impl ChunkHeader {
+impl<'a> ChunkHeader<'a> {
+    /// Bytes of a header that names no compression.
+    pub const LEAST_BYTES: usize = 40;
+
     /// The header, and whatever follows it.
-    pub fn parse(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
+    pub fn parse(body: &'a [u8]) -> Option<(ChunkHeader<'a>, &'a [u8])> {
         let mut c = Cursor::new(body);
         let start_ns = c.u64()?;
         let _end_ns = c.u64()?;
@@ -174,16 +189,16 @@ impl ChunkHeader {
             start_ns,
             uncompressed_size: c.u64()?,
             uncompressed_crc: c.u32()?,
-            compression: c.string()?,
+            compression: c.text()?,
             compressed_size: c.u64()?,
         };
         Some((header, c.rest()))
     }
-}
 
-/// Whether the opcode defines or carries a message, in a chunk or outside.
-pub(crate) fn is_content(opcode: u8) -> bool {
-    matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
+    /// Bytes that inflating it makes; none where it is not compressed.
+    pub fn inflates_to(&self) -> u64 {
+        if self.compression.is_empty() { 0 } else { self.uncompressed_size }
+    }
 }
 
 /// The fields of a chunk index record that lead to the chunk.
@@ -197,19 +212,25 @@ pub(crate) struct ChunkIndex {
     pub message_indexes: BTreeMap<u16, u64>,
     /// Length of the message indexes, which follow the chunk.
     pub message_index_length: u64,
+    /// Bytes that inflating the chunk makes; none where it is not compressed.
+    pub inflates_to: u64,
 }
 
 impl ChunkIndex {
     pub fn parse(body: &[u8]) -> Option<ChunkIndex> {
         let mut c = Cursor::new(body);
-        Some(ChunkIndex {
+        let mut index = ChunkIndex {
             start_ns: c.u64()?,
             end_ns: c.u64()?,
             chunk_start: c.u64()?,
             chunk_length: c.u64()?,
             message_indexes: c.map(Cursor::u16, Cursor::u64)?,
             message_index_length: c.u64()?,
-        })
+            inflates_to: 0,
+        };
+        let (compression, _, uncompressed) = (c.text()?, c.u64()?, c.u64()?);
+        index.inflates_to = if compression.is_empty() { 0 } else { uncompressed };
+        Some(index)
     }
 }
 

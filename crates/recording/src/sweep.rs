@@ -8,14 +8,13 @@ use crate::budget::BUDGET_BYTES;
 use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
-use crate::index::{body_of_chunk, holding};
-use crate::layout::{Content, Damage};
+use crate::damage::Faults;
+use crate::index::holding;
+use crate::judge::{Judged, inflates_to, judged};
 use crate::open::RecordingFile;
-use crate::records::{ChunkHeader, Message, RawRecord, Records};
+use crate::records::{Message, RawRecord, Records};
 use bytes::Bytes;
-use mcap::records::op;
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Blocks of a file read by ranges are fetched up to this at a time.
@@ -63,7 +62,7 @@ impl Tally {
 pub(crate) struct FileSurvey {
     pub tallies: BTreeMap<u16, Tally>,
     pub definitions: Definitions,
-    pub damage: Vec<Damage>,
+    pub faults: Faults,
     /// Blocks that were passed over.
     pub passed: BTreeSet<usize>,
 }
@@ -76,17 +75,17 @@ impl FileSurvey {
         }
     }
 
-    fn count(&mut self, message: &Message<'_>) {
-        let one = Tally { messages: 1, first_ns: message.log_ns, last_ns: message.log_ns };
-        self.tallies.entry(message.channel_id).and_modify(|t| t.add(one)).or_insert(one);
+    /// Takes in messages of a channel.
+    pub fn count(&mut self, channel: u16, found: Tally) {
+        self.tallies.entry(channel).and_modify(|t| t.add(found)).or_insert(found);
     }
 
     fn merge(&mut self, other: FileSurvey) {
-        for (id, tally) in other.tallies {
-            self.tallies.entry(id).and_modify(|t| t.add(tally)).or_insert(tally);
+        other.tallies.into_iter().for_each(|(channel, tally)| self.count(channel, tally));
+        if !self.definitions.merge(other.definitions) {
+            self.faults.lost(0, || "chunks define schemas or channels of one number differently".to_owned());
         }
-        self.definitions.merge(other.definitions);
-        self.damage.extend(other.damage);
+        self.faults.merge(other.faults);
     }
 }
 
@@ -110,8 +109,7 @@ pub(crate) fn sweep<C: Send>(
         let range = file.layout.blocks[at.block].range();
         // Hashing streams through the bytes, and leaves them in the cache for inflating, which does not.
         file.bytes.hash(&range);
-        let (bytes, damage) = judge(file, at, fetched, inflater);
-        let survey = survey(file, at, bytes, damage, |message| each(collector, at, message));
+        let survey = judged(file, at, fetched, inflater, &mut |message| each(collector, at, message)).survey;
         inflater.done();
         file.bytes.passed(range);
         (at, survey)
@@ -204,13 +202,7 @@ pub(crate) fn together(
     fetched: &[Option<Bytes>],
     most: usize,
 ) -> usize {
-    let claim = |(at, fetched): (&At, &Option<Bytes>)| {
-        let (file, fetched) = (&files[at.file], fetched.as_ref());
-        let body = stored(file, *at, fetched).unwrap_or_default();
-        let loose = matches!(file.layout.blocks[at.block].content, Content::Loose(_));
-        let header = if loose { None } else { ChunkHeader::parse(body) };
-        header.map_or(0, |(header, _)| header.uncompressed_size)
-    };
+    let claim = |(at, fetched): (&At, &Option<Bytes>)| inflates_to(&files[at.file], *at, fetched.as_ref());
     let sums = blocks.iter().zip(fetched).scan(0_u64, |sum, block| {
         *sum = sum.saturating_add(claim(block));
         Some(*sum)
@@ -219,108 +211,24 @@ pub(crate) fn together(
 }
 
 /// The records of a block, held for passes that hand messages out in order, and the survey of it. A bad one is empty.
-pub(crate) fn inflate<'a>(
-    files: &'a [RecordingFile],
-    at: At,
-    fetched: Option<&'a Bytes>,
-) -> (Cow<'a, [u8]>, BlockSurvey) {
-    let file = &files[at.file];
+pub(crate) fn inflate(files: &[RecordingFile], at: At, fetched: Option<&Bytes>) -> (Vec<u8>, BlockSurvey) {
     let mut inflater = Inflater::default();
-    let (bytes, damage) = judge(file, at, fetched, &mut inflater);
-    let survey = (at, survey(file, at, bytes, damage, |_| ()));
-    let loose = matches!(file.layout.blocks[at.block].content, Content::Loose(_));
-    match loose.then(|| stored(file, at, fetched).ok()).flatten() {
-        Some(bytes) => (bytes.into(), survey),
-        None => (bytes.to_vec().into(), survey),
+    let mut kept = Vec::new();
+    let file = &files[at.file];
+    let alone = file.layout.blocks[at.block].is_alone();
+    let Judged { survey, inflated } = judged(file, at, fetched, &mut inflater, &mut |message| {
+        // A large chunk is kept as it was inflated, and not copied.
+        if !alone {
+            message.write_to(&mut kept);
+        }
+    });
+    if alone {
+        kept = inflated.unwrap_or_else(|| inflater.take());
     }
+    (kept, (at, survey))
 }
 
 /// The records of a block's bytes.
 pub(crate) fn records(bytes: &[u8]) -> impl Iterator<Item = RawRecord<'_>> {
     Records::new(bytes, 0, bytes.len()).map_while(Result::ok)
-}
-
-/// Counts the messages of a block and hands them to `each`.
-fn survey(
-    file: &RecordingFile,
-    at: At,
-    bytes: &[u8],
-    damage: Option<Damage>,
-    mut each: impl FnMut(&Message<'_>),
-) -> FileSurvey {
-    let mut survey = FileSurvey::default();
-    survey.damage.extend(damage);
-    let mut short = 0_u64;
-    for record in records(bytes) {
-        if !file.layout.definitions_complete {
-            survey.definitions.absorb(&record);
-        }
-        if record.op != op::MESSAGE {
-            continue;
-        }
-        match Message::parse(record.body) {
-            Some(message) => {
-                survey.count(&message);
-                each(&message);
-            }
-            None => short += 1,
-        }
-    }
-    if short > 0 {
-        let offset = file.layout.blocks[at.block].offset;
-        let why = format!("messages shorter than their header are dropped ({short} here)");
-        survey.damage.push(Damage { offset, why, lost: true });
-    }
-    survey
-}
-
-/// The bytes of a block as they are in the file: the body of a chunk, or records outside chunks.
-fn stored<'a>(file: &'a RecordingFile, at: At, fetched: Option<&'a Bytes>) -> Result<&'a [u8], String> {
-    let content = &file.layout.blocks[at.block].content;
-    match (&file.bytes, fetched) {
-        (FileBytes::Mapped(map), _) => {
-            let (Content::Chunk(body) | Content::CutChunk(body) | Content::Loose(body)) = content;
-            Ok(&map[body.clone()])
-        }
-        (FileBytes::Ranged(_), Some(bytes)) if matches!(content, Content::Loose(_)) => Ok(bytes),
-        (FileBytes::Ranged(_), Some(bytes)) => body_of_chunk(bytes),
-        (FileBytes::Ranged(_), None) => Err("it was not read".to_owned()),
-    }
-}
-
-/// The usable record bytes of a block, and what is wrong with the rest.
-fn judge<'a>(
-    file: &'a RecordingFile,
-    at: At,
-    fetched: Option<&'a Bytes>,
-    inflater: &'a mut Inflater,
-) -> (&'a [u8], Option<Damage>) {
-    let block = &file.layout.blocks[at.block];
-    let damage = |why: String| Some(Damage { offset: block.offset, why, lost: true });
-    let body = match stored(file, at, fetched) {
-        Ok(body) => body,
-        Err(why) => return (&[], damage(format!("chunk dropped: {why}"))),
-    };
-    match &block.content {
-        Content::Loose(_) if well_formed(body) => (body, None),
-        Content::Loose(_) => (body, damage("from somewhere here on, records cannot be read".into())),
-        Content::Chunk(_) => match inflater.whole(body) {
-            Ok(bytes) if well_formed(bytes) => (bytes, None),
-            Ok(_) => (&[], damage("chunk dropped: its records do not add up to its size".into())),
-            Err(why) => (&[], damage(format!("chunk dropped: {why}"))),
-        },
-        Content::CutChunk(_) => {
-            let sound = body.iter().rposition(|b| *b != 0).map_or(0, |i| i + 1);
-            if inflater.whole(body).is_ok_and(well_formed) {
-                return (inflater.whole(body).unwrap_or_default(), None);
-            }
-            let bytes = inflater.prefix(&body[..sound]).unwrap_or_default();
-            (bytes, damage(format!("last chunk cut off: only the first {} bytes of it inflate", bytes.len())))
-        }
-    }
-}
-
-/// Whether the bytes are whole records to the last byte.
-fn well_formed(bytes: &[u8]) -> bool {
-    Records::new(bytes, 0, bytes.len()).all(|r| r.is_ok())
 }

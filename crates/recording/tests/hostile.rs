@@ -101,14 +101,95 @@ fn lengths_that_lie_reserve_nothing() {
     }
 }
 
+/// 64 MiB of zeros in 2 KiB are honest for the codec, but nothing that a recorder writes.
 #[test]
-fn a_bomb_takes_its_own_size_and_no_more() {
+fn a_bomb_is_refused_by_what_the_file_may_inflate_to() {
     let _alone = alone();
-    // 64 MiB of zeros in 2 KiB: honest for the codec, but no records.
     let bomb = zstd::bulk::compress(&vec![0; 64 << 20], 3).expect("compresses");
-    let bytes = file(&vec![chunk(b"zstd", 64 << 20, &bomb); 20]);
-    // A vector that grows is for a moment there twice, once at half its size.
-    measured("bomb", (64 << 20) * 2 + (1 << 20), || recordings::recording(&bytes));
+    let report = |bytes: &[u8]| {
+        recordings::on_disk(bytes, |path| Recording::open(&[path.to_owned()]).map(|r| r.report().clone()))
+            .expect("an MCAP file")
+    };
+    let bombs = file(&vec![chunk(b"zstd", 64 << 20, &bomb); 20]);
+    let said = measured("bombs", 1 << 20, || report(&bombs));
+    assert_eq!(said.files[0].damaged.len(), 20);
+    assert!(said.files[0].damaged.iter().all(|(_, why)| why.contains("ARMCAL_INFLATE_MIB")), "{said:?}");
+    // Many small ones are no way around it: together they make no more than one.
+    let small = zstd::bulk::compress(&vec![0; 1 << 20], 3).expect("compresses");
+    let many = file(&vec![chunk(b"zstd", 1 << 20, &small); 300]);
+    let said = measured("many bombs", 3 << 20, || report(&many));
+    let refused = |report: &armcal_recording::RecordingReport| {
+        report.warnings.iter().any(|w| w.message.contains("ARMCAL_INFLATE_MIB"))
+    };
+    assert!(refused(&said), "{said:?}");
+    // What alone is large is in memory once, and once more for a moment while it grows.
+    let noise: Vec<u8> = (0..4_u32 << 20).flat_map(|i| i.wrapping_mul(2_654_435_761).to_le_bytes()).collect();
+    let large = zstd::bulk::compress(&noise, 1).expect("compresses");
+    let bytes = file(&[chunk(b"zstd", noise.len() as u64, &large)]);
+    let said = measured("a large chunk", 2 * noise.len() + (1 << 20), || report(&bytes));
+    assert!(!refused(&said), "{said:?}");
+}
+
+/// Messages that are compressed one by one, in a chunk that is compressed: the sum of all is what counts.
+#[test]
+fn messages_that_are_bombs_end_the_pass() {
+    let _alone = alone();
+    let schema = "string[] name\nfloat64[] position\n";
+    let definitions = [
+        record(SCHEMA, &[&[1, 0][..], &text(b"a/J"), &text(b"ros2msg"), &text(schema.as_bytes())].concat()),
+        record(CHANNEL, &[&[0, 0, 1, 0][..], &text(b"/j"), &text(b"cdr"), &text(b"")].concat()),
+    ];
+    let bomb = zstd::bulk::compress(&vec![0; 64 << 20], 3).expect("compresses");
+    let message = record(MESSAGE, &[&[0; 22][..], &bomb].concat());
+    let records = [definitions.concat(), message.repeat(50)].concat();
+    let packed = zstd::bulk::compress(&records, 3).expect("compresses");
+    let bytes = file(&[chunk(b"zstd", records.len() as u64, &packed)]);
+    let joints = armcal_recording::JointStream {
+        topic: "/j".into(),
+        names: vec!["joint1".into()],
+        ..Default::default()
+    };
+    let streams = armcal_recording::Streams { joints: vec![joints], ..Default::default() };
+    let said = measured("bombs in messages", 48 << 20, || {
+        recordings::on_disk(&bytes, |path| {
+            let recording = Recording::open(&[path.to_owned()]).expect("an MCAP file");
+            recording.read(&streams).map(drop).map_err(|e| e.to_string())
+        })
+    });
+    assert!(said.is_err_and(|e| e.contains("inflates to more") && e.contains("ARMCAL_INFLATE_MIB")));
+}
+
+/// What is remembered of a file does not grow with its records: ten times as many take no more.
+#[test]
+fn records_that_say_nothing_take_no_memory_each() {
+    let _alone = alone();
+    let empty = |op: u8| record(op, b"");
+    let sound = chunk(b"", 0, b"");
+    let broken = chunk(b"zstd", 100, b"abc");
+    let kinds = [
+        ("empty chunks", empty(CHUNK), 16),
+        ("sound chunks without records", sound, 24),
+        ("broken chunks", broken, 24),
+        ("unknown records", empty(0x20), 0),
+        ("private records", empty(0x90), 0),
+        ("message indexes of nothing", empty(0x07), 0),
+        ("messages without a header", empty(MESSAGE), 0),
+    ];
+    for (what, one, each) in kinds {
+        let peak = |n: usize| {
+            let bytes = file(&vec![one.clone(); n]);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+            let read = || {
+                recordings::on_disk(&bytes, |path| {
+                    Recording::open(&[path.to_owned()]).map(|r| r.report().warnings.len()).expect("MCAP")
+                })
+            };
+            pool.install(|| peak_bytes(read)).1
+        };
+        let (few, many) = (peak(10_000), peak(200_000));
+        // Where each chunk is, while the index is compared with that: less than the chunk itself.
+        assert!(many <= few + (256 << 10) + 2 * each * 200_000, "{what}: {few} and {many}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
-use armcal_core::{Observation, Parameter, Pose, Role};
+use armcal_core::{Observation, Parameter, Pose, Role, Severity};
 use armcal_model::Session;
 use armcal_recording::input;
 use armcal_table::Board;
@@ -38,6 +38,9 @@ pub struct PastObservations {
     pub recordings: Vec<ObservedRecording>,
 }
 
+/// So many losses of a recording are handed on in words.
+const LOSSES: usize = 5;
+
 /// One recording and its observations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObservedRecording {
@@ -53,6 +56,9 @@ pub struct ObservedRecording {
     pub base: StartFrame,
     /// Where its board started: as measured, or found by the association, tilt included.
     pub board: Option<StartFrame>,
+    /// What of its data was lost, in words; the first few.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
     /// What the fit saw, and what was held out of it.
     pub observations: Vec<Observation>,
 }
@@ -180,7 +186,9 @@ fn recording(run: &Run, index: usize, recording: &RecordingRun) -> ObservedRecor
     let (model, start) = run.model.in_recording(index, &start);
     let board = model.board_in_world(&start, index);
     let of_frame = |name: String, pose: &Pose| StartFrame::of(model.parameters(), &name, pose);
+    let lost = recording.all_warnings().into_iter().filter(|w| w.severity == Severity::DataLost);
     ObservedRecording {
+        lost: lost.take(LOSSES).map(|w| w.message.clone()).collect(),
         name: recording.name.clone(),
         files: recording.files(),
         dwells: recording.found(),

@@ -3,7 +3,7 @@
 use super::Manifest;
 use crate::error::Error;
 use crate::pipeline::{Pipeline, RecordingEntry};
-use armcal_recording::{atomic, identity_of, input, make_folder_in};
+use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
 use armcal_report::VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 /// Raised when results made from the same would be written differently.
-const FORMAT: &str = "armcal.batch/2";
+const FORMAT: &str = "armcal.batch/3";
 /// Format of what is remembered of a file.
-const SCHEMA: &str = "armcal.seen/2";
+const SCHEMA: &str = "armcal.seen/3";
 /// A longer note is none of armcal's.
 const NOTE_BYTES: u64 = 64 << 10;
 /// Where the hashes of files are remembered, below the campaign's folder.
@@ -34,8 +34,8 @@ struct Seen {
     #[serde(default)]
     schema: String,
     path: String,
-    bytes: u64,
-    modified_ns: u128,
+    /// Size and time of the last change of the file, and of those beside it that are read with it.
+    sizes: Vec<(u64, u128)>,
     identity: String,
 }
 
@@ -81,32 +81,31 @@ impl Keys {
         hash(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
     }
 
-    /// What a file holds, as a hash; remembered as long as size and modification time stay.
+    /// What a file holds, and what is read with it, as a hash; remembered as long as sizes and modification times stay.
     fn identity(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
         let name = path.to_string_lossy().into_owned();
         let memory = self.out.join(SEEN).join(format!("{}.json", &hash([name.clone()])[..32]));
-        let now = std::fs::metadata(path).ok().map(|about| {
-            let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
-            (about.len(), modified.map_or(0, |t| t.as_nanos()))
-        });
+        let beside = read_with(path);
+        let sizes: Option<Vec<_>> =
+            std::iter::once(path).chain(beside.iter().map(PathBuf::as_path)).map(size).collect();
         // Armcal's own notes, to be written over: no input.
         let known = input::regular(&memory)
             .ok()
             .and_then(|file| serde_json::from_reader::<_, Seen>(file.take(NOTE_BYTES)).ok());
-        if let (Some((bytes, modified_ns)), Some(known)) = (now, known) {
-            let same = known.schema == SCHEMA
-                && known.path == name
-                && known.bytes == bytes
-                && known.modified_ns == modified_ns;
+        if let (Some(sizes), Some(known)) = (&sizes, known) {
+            let same = known.schema == SCHEMA && known.path == name && known.sizes == *sizes;
             // A file system without modification times cannot tell.
-            if same && modified_ns != 0 {
+            if same && sizes.iter().all(|(_, modified_ns)| *modified_ns != 0) {
                 return Ok(known.identity);
             }
         }
-        let identity = identity_of(path)?;
-        if let Some((bytes, modified_ns)) = now {
-            let schema = SCHEMA.to_owned();
-            let seen = Seen { schema, path: name, bytes, modified_ns, identity: identity.clone() };
+        let mut parts = vec![identity_of(path)?];
+        for path in &beside {
+            parts.push(identity_of(path)?);
+        }
+        let identity = if beside.is_empty() { parts.remove(0) } else { hash(parts) };
+        if let Some(sizes) = sizes {
+            let seen = Seen { schema: SCHEMA.to_owned(), path: name, sizes, identity: identity.clone() };
             // A memory that cannot be written costs time only.
             if let Ok(text) = serde_json::to_vec(&seen) {
                 let _ = make_folder_in(&self.out, SEEN).and_then(|_| atomic::write(&memory, &text));
@@ -114,6 +113,13 @@ impl Keys {
         }
         Ok(identity)
     }
+}
+
+/// Size and time of the last change of a file; `None` of what is not there, such as an object.
+fn size(path: &Path) -> Option<(u64, u128)> {
+    let about = std::fs::metadata(path).ok()?;
+    let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
+    Some((about.len(), modified.map_or(0, |t| t.as_nanos())))
 }
 
 /// The pipeline without what says nothing about how a recording is worked on; a text that is no TOML as it is.

@@ -1,5 +1,6 @@
 //! Which recordings: from globs, files and bag folders, or from a manifest file.
 
+use super::pattern::matching;
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
 use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
@@ -80,9 +81,7 @@ impl Manifest {
             if is_url(Path::new(input)) {
                 files.extend(list(input).map_err(|e| bad(e.to_string()))?.into_iter().map(PathBuf::from));
             } else {
-                for found in glob::glob(input).map_err(|e| bad(e.to_string()))? {
-                    // A folder that cannot be looked into is one recording that fails, and not the end of the others.
-                    let found = found.unwrap_or_else(|e| e.path().to_owned());
+                for found in matching(input).map_err(bad)? {
                     let found = std::path::absolute(&found).unwrap_or(found);
                     files.extend(recordings_below(&found).into_iter().filter(|p| !p.starts_with(&out)));
                 }

@@ -10,6 +10,7 @@ mod key;
 mod manifest;
 mod memory;
 mod once;
+mod pattern;
 mod shard;
 mod store;
 mod work;

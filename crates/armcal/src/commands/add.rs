@@ -100,7 +100,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             "comparison": comparison,
             "remaining": run.diagnosis,
         });
-        print(&super::json_text(&value)?)?;
+        print(&super::json_text(&super::with_losses(value))?)?;
     } else {
         let one_of = |name: &String| match set_of(name, &sets) {
             Some(set) => format!("{name} (one of {}: these data do not tell which)", listed(set)),

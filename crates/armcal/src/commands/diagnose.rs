@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::story;
+use armcal_core::{Severity, Stage, Warning};
 use armcal_report::{PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
 use std::path::Path;
 
@@ -17,7 +18,14 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
         } else {
             print(&past_diagnosis(&past, style()))?;
         }
-        return Ok(Outcome::Done);
+        let lost = past.summary["status"] == Status::DataLost.word();
+        if lost {
+            let why = "recordings of this run lost data; its page and summary.json say which and what";
+            let subject = input.display().to_string();
+            let lost = Severity::DataLost;
+            super::tell(&[Warning::new(lost, Stage::Recording, "recording-damaged", subject, why)]);
+        }
+        return Ok(if lost { Outcome::Doubtful } else { Outcome::Done });
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
@@ -25,7 +33,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;
-        print(&super::json_text(&summary["diagnosis"])?)?;
+        print(&super::json_text(&super::with_losses(summary["diagnosis"].clone()))?)?;
     } else {
         print(&diagnosis_text(&run, style()))?;
     }

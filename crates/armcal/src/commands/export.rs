@@ -20,7 +20,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
-    let text = format!("{:#}\n", problem(&run));
+    let text = format!("{:#}\n", super::with_losses(problem(&run)));
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;
     print(&format!("{}\n", out.display()))?;
     Ok(Outcome::Done)

@@ -45,13 +45,14 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
     let recording = Recording::open(&asked.inputs)
         .map_err(|source| Error::Recording { recording: name.clone(), source })?;
     let wanted = Extract { topics: &topics, attachments: asked.attachments };
-    let extracted = extract(&recording, &wanted, &asked.out).map_err(|source| match source {
+    let extracted = extract(&recording, &wanted, &asked.out);
+    let done = extracted.and_then(|extracted| Ok((extracted, recording.whole_report()?)));
+    let (extracted, report) = done.map_err(|source| match source {
         RecordingError::NoSuchTopic { ref pattern, .. } if asked.topics.contains(pattern) => {
             Error::of_usage(Error::Recording { recording: name, source })
         }
         source => Error::Recording { recording: name, source },
     })?;
-    let report = recording.report();
     print(&if asked.json { json(&extracted, report)? } else { text(&asked.out, &extracted, report) })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })

@@ -83,7 +83,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     for (path, text) in beside.into_iter().chain([&pipeline]) {
         atomic::write_over(path, text.as_bytes(), over).map_err(Error::Output)?;
     }
-    print(&if request.json { json_text(&json_of(&proposal))? } else { text(&proposal) })?;
+    print(&if request.json { json_text(&super::with_losses(json_of(&proposal)))? } else { text(&proposal) })?;
     Ok(if proposal.runs() { Outcome::Done } else { Outcome::Doubtful })
 }
 

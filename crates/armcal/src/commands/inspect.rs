@@ -12,21 +12,22 @@ use comfy_table::Table;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// Channels shown in a table.
+const SHOWN: usize = 500;
+
 /// Inspects MCAP files as the parts of one recording, or every recording of a pipeline.
 pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     let reports = match inputs {
         [only] if only.extension().is_some_and(|e| e == "toml") => of_pipeline(only)?,
         files => {
             let failed = |source| Error::Recording { recording: "the files given".to_owned(), source };
-            vec![(recording_name(None, files), Recording::open(files).map_err(failed)?.report().clone())]
+            let recording = Recording::open(files).map_err(failed)?;
+            vec![(recording_name(None, files), recording.into_report().map_err(failed)?)]
         }
     };
     if json {
-        let value: Vec<serde_json::Value> = reports
-            .iter()
-            .map(|(name, report)| serde_json::json!({"name": name, "report": report}))
-            .collect();
-        print(&format!("{:#}\n", serde_json::Value::from(value)))?;
+        let named: Vec<Named<'_>> = reports.iter().map(|(name, report)| Named { name, report }).collect();
+        print(&super::json_text(&named)?)?;
     } else {
         for (name, report) in &reports {
             print(&text(name, report))?;
@@ -43,6 +44,13 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
 }
 
+/// One recording in the JSON.
+#[derive(serde::Serialize)]
+struct Named<'a> {
+    name: &'a str,
+    report: &'a RecordingReport,
+}
+
 fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
     let pipeline = Pipeline::load(path)?;
     let recordings = perceive::open_all(&pipeline, &Progress::silent())?;
@@ -53,7 +61,8 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
             let read = recording.read(&pipeline.streams);
             let (_, streams, warnings) =
                 read.map_err(|source| Error::Recording { recording: name.clone(), source })?;
-            let mut report = recording.report().clone();
+            let failed = |source| Error::Recording { recording: name.clone(), source };
+            let mut report = recording.whole_report().map_err(failed)?.clone();
             report.streams = streams;
             report.warnings.extend(warnings);
             Ok((name, report))
@@ -67,6 +76,9 @@ fn text(name: &str, report: &RecordingReport) -> String {
         let _ = writeln!(out, "  {}", file_line(file));
     }
     let _ = writeln!(out, "{}", channels(&report.channels));
+    if let Some(more) = report.channels.len().checked_sub(SHOWN).filter(|more| *more > 0) {
+        let _ = writeln!(out, "  and {more} more channels; --json lists them");
+    }
     if !report.streams.is_empty() {
         let _ = writeln!(out, "{}", streams(&report.streams));
         for stream in &report.streams {
@@ -112,7 +124,7 @@ fn channels(channels: &[ChannelReport]) -> Table {
     table.load_style(RULED);
     table.set_header(["topic", "schema", "encoding", "messages", "Hz", "from [s]", "for [s]", "read as"]);
     let start_ns = channels.iter().filter(|c| c.messages > 0).map(|c| c.first_ns).min().unwrap_or(0);
-    for c in channels {
+    for c in channels.iter().take(SHOWN) {
         let duration_s = (c.last_ns - c.first_ns) as f64 * 1e-9;
         let rate_hz = if duration_s > 0.0 { (c.messages.saturating_sub(1)) as f64 / duration_s } else { 0.0 };
         table.add_row([

@@ -28,10 +28,15 @@ use crate::cli::{Cli, Command};
 use crate::error::Error;
 use crate::stdout::print;
 use crate::transfer::Asked;
+use armcal_core::Warning;
+use armcal_recording::losses;
 use armcal_report::{Detail, TerminalStyle};
 use std::borrow::Cow;
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
+
+/// Losses told one by one where there is no other place for them.
+const TOLD: usize = 20;
 
 /// How a command ended when it did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,8 +51,51 @@ pub enum Outcome {
     Again,
 }
 
-/// Runs the command a user typed.
+/// Runs the command a user typed. None ends as if all was well where a recording lost data.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
+    let outcome = command(cli);
+    let lost = losses();
+    // These tell what their recordings lost among their results.
+    let tells = matches!(
+        cli.command,
+        Command::Run { .. }
+            | Command::Inspect { .. }
+            | Command::Extract(_)
+            | Command::Batch { .. }
+            | Command::Reduce { .. }
+            | Command::Pool { .. }
+            | Command::View { .. }
+    );
+    if !tells || !matches!(outcome, Ok(Outcome::Doubtful)) {
+        tell(&lost);
+    }
+    match outcome {
+        Ok(Outcome::Done) if !lost.is_empty() => Ok(Outcome::Doubtful),
+        outcome => outcome,
+    }
+}
+
+/// Says on stderr what recordings lost, where results have no place for it.
+fn tell(lost: &[Warning]) {
+    let mut lines =
+        lost.iter().take(TOLD).map(|w| format!("{}: {w}\n", w.severity.word())).collect::<String>();
+    if lost.len() > TOLD {
+        lines += &format!("and {} more; `armcal inspect` lists them\n", lost.len() - TOLD);
+    }
+    // A closed stderr leaves nowhere to complain to; the exit code still tells.
+    let _ = std::io::stderr().write_all(harmless(&lines, TerminalStyle::Plain).as_bytes());
+}
+
+/// The same in the JSON of a result, where anything was lost.
+fn with_losses(mut value: serde_json::Value) -> serde_json::Value {
+    let lost = losses();
+    if let (Some(object), false) = (value.as_object_mut(), lost.is_empty()) {
+        object.insert("data_lost".to_owned(), serde_json::json!(lost));
+    }
+    value
+}
+
+fn command(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
         Command::Check(asked) => check::run(asked),
         Command::Batch { inputs, pipeline, out, full, jobs, json } => {

@@ -77,7 +77,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     };
     let proposal = propose(&known, &open, &allowed, &pipeline.diagnosis)?;
     progress.finish();
-    print(&if request.json { super::json_text(&proposal)? } else { text(&proposal, joints) })?;
+    print(&if request.json {
+        super::json_text(&super::with_losses(serde_json::to_value(&proposal).map_err(Error::Json)?))?
+    } else {
+        text(&proposal, joints)
+    })?;
     Ok(Outcome::Done)
 }
 

@@ -5,7 +5,7 @@ use super::fields::Field;
 use crate::error::Error;
 use crate::stages::frames::bare;
 use armcal_core::Pose;
-use armcal_model::{Chain, Model};
+use armcal_model::{Chain, Model, check_xml};
 use armcal_recording::input::Kind;
 use roxmltree::{Document, Node};
 use std::cmp::Reverse;
@@ -285,6 +285,7 @@ fn from_urdf(
     recorded: bool,
 ) -> Result<Arm, Error> {
     let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", file.display()) };
+    check_xml(&text).map_err(&bad)?;
     let document =
         Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}; a DH table is given with --dh")))?;
     let joints = joints_of(document.root_element());

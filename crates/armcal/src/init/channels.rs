@@ -6,7 +6,8 @@ use crate::error::Error;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
 
 /// Messages of a channel that are looked into for names: the first so many, then every so-manieth.
 const FIRST: u64 = 100;
@@ -94,7 +95,7 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
     let mut channels = Channels::default();
     for Opened { entry, recording } in opened {
         let mut own: BTreeMap<String, Found> = BTreeMap::new();
-        let mut plans = Vec::new();
+        let mut plans = Plans::default();
         for channel in recording.channels() {
             let topic = own.entry(channel.topic.clone()).or_default();
             let Some(schema) = &channel.schema else { continue };
@@ -102,15 +103,7 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
                 Ok(role) => {
                     topic.role = topic.role.or(Some(role));
                     topic.thermometer |= role == Role::Scalar && is_thermometer(&channel);
-                    let plan = Plan::compile(
-                        role,
-                        &schema.name,
-                        &schema.encoding,
-                        &schema.data,
-                        &channel.message_encoding,
-                        None,
-                    );
-                    plans.extend(plan.ok().map(|plan| (channel.clone(), plan)));
+                    plans.add(role, channel);
                 }
                 Err(why) => {
                     topic.why_not = why;
@@ -121,10 +114,8 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
         }
         let promising: BTreeSet<String> =
             fields.iter().filter(|(_, f)| !f.is_empty()).map(|(topic, _)| topic.clone()).collect();
-        let wanted = |c: &RawChannel| {
-            is_text(c) || promising.contains(&c.topic) || plans.iter().any(|(own, _)| **own == *c)
-        };
-        let urdfs = &mut channels.urdfs;
+        let wanted = |c: &RawChannel| is_text(c) || promising.contains(&c.topic) || plans.of(c).is_some();
+        let (urdfs, allowance) = (&mut channels.urdfs, recording.allowance());
         recording
             .for_each_raw_of(&wanted, &mut |message| {
                 let Some(topic) = own.get_mut(&message.channel.topic) else { return Ok(()) };
@@ -133,7 +124,7 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
                 if topic.messages > FIRST && topic.messages % EVERY > 1 {
                     return Ok(());
                 }
-                let Ok(data) = inflated(message.data) else { return Ok(()) };
+                let Ok(data) = inflated(message.data, &allowance) else { return Ok(()) };
                 if let Some(fields) = fields.get_mut(&message.channel.topic) {
                     fields.add(topic.messages, message.log_ns as i64, &data);
                 }
@@ -143,11 +134,14 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
                     urdfs.extend(found);
                     topic.describes |= urdfs.len() > before;
                 }
-                if let Some((_, plan)) = plans.iter().find(|(own, _)| **own == *message.channel) {
+                if let Some(plan) = plans.of(message.channel) {
                     topic.add(names_in(plan, &data));
                 }
                 Ok(())
             })
+            .and_then(|()| recording.within(&allowance))
+            // What the pass found to be lost is noted, whatever becomes of the proposal.
+            .and_then(|()| recording.whole_report().map(drop))
             .map_err(|source: RecordingError| Error::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();
@@ -173,6 +167,35 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
     // The surest field first; what is known by its type before any.
     channels.joints.sort_by_key(|j| j.field.as_ref().map(|f| Reverse(f.surety)));
     Ok(channels)
+}
+
+/// How the messages of channels are read; thousands of channels may share one schema, which is compiled once.
+#[derive(Default)]
+struct Plans {
+    plans: Vec<Plan>,
+    /// Place of the plan of a schema with a message encoding.
+    schemas: HashMap<(Arc<RawSchema>, String), Option<usize>>,
+    channels: HashMap<Arc<RawChannel>, usize>,
+}
+
+impl Plans {
+    fn add(&mut self, role: Role, channel: Arc<RawChannel>) {
+        let Some(schema) = &channel.schema else { return };
+        let encoding = &channel.message_encoding;
+        let key = (schema.clone(), encoding.clone());
+        let plans = &mut self.plans;
+        let place = *self.schemas.entry(key).or_insert_with(|| {
+            let (name, data) = (&schema.name, &schema.data);
+            let plan = Plan::compile(role, name, &schema.encoding, data, encoding, None).ok()?;
+            plans.push(plan);
+            Some(plans.len() - 1)
+        });
+        self.channels.extend(place.map(|place| (channel, place)));
+    }
+
+    fn of(&self, channel: &RawChannel) -> Option<&Plan> {
+        self.channels.get(channel).map(|place| &self.plans[*place])
+    }
 }
 
 impl Found {

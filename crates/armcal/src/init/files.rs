@@ -3,7 +3,7 @@
 use crate::batch::{Manifest, recordings_below};
 use crate::error::Error;
 use crate::pipeline::RecordingEntry;
-use armcal_recording::{Recording, RecordingReport, is_recording, is_url, without_ending};
+use armcal_recording::{Recording, is_recording, is_url, without_ending};
 use std::io::Read as _;
 use std::path::Path;
 
@@ -52,12 +52,13 @@ fn continues(before: &Opened, next: &Opened) -> bool {
     if !in_order || before.entry.paths[0].parent() != next.entry.paths[0].parent() {
         return false;
     }
-    let used = |report: &RecordingReport| -> Option<(i64, i64)> {
+    let used = |recording: &Recording| -> Option<(i64, i64)> {
+        let report = recording.report();
         let used = report.channels.iter().filter(|c| c.messages > 0);
         let bounds = used.map(|c| (c.first_ns, c.last_ns));
         bounds.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
     };
-    let spans = used(before.recording.report()).zip(used(next.recording.report()));
+    let spans = used(&before.recording).zip(used(&next.recording));
     spans.is_some_and(|((_, end), (start, _))| start.abs_diff(end) < NEXT_PART_NS as u64)
 }
 

@@ -136,12 +136,17 @@ fn joined(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
     let names = unique_names(&found);
     let mut collected = Collected { recordings: Vec::new(), observations: Vec::new(), warnings };
     for (index, (f, name)) in found.into_iter().zip(names).enumerate() {
-        let ObservedRecording { files, dwells, rejected, base, board, mut observations, .. } = f.recording;
+        let ObservedRecording { files, dwells, rejected, base, board, lost, mut observations, .. } =
+            f.recording;
         observations.iter_mut().for_each(|o| o.dwell.recording = index);
         let board = board.as_ref().map(StartFrame::pose);
         let earlier = EarlierResult { path: f.result, files, dwells, rejected };
+        let lost = lost.into_iter().map(|why| {
+            Warning::new(Severity::DataLost, Stage::Recording, "recording-damaged", name.clone(), why)
+        });
+        let warnings = lost.collect();
         collected.recordings.push(CollectedRecording {
-            run: recording_run(name, earlier, board, &observations),
+            run: RecordingRun { warnings, ..recording_run(name, earlier, board, &observations) },
             base: base.pose(),
             board,
             number: f.number,

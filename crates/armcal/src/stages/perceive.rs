@@ -212,7 +212,7 @@ fn dwells_of_one(
         .collect();
 
     let repeated = streams.iter().filter(|s| s.role == "joints").map(|s| s.duplicate_stamps).sum();
-    let mut report = recording.report().clone();
+    let mut report = recording.whole_report().map_err(in_recording)?.clone();
     report.streams = streams;
     let fingerprint = Arc::new(Fingerprint::of(&samples));
     let readings = Readings::of(&samples.joints, repeated, &dwells);

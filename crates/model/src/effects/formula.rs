@@ -7,8 +7,10 @@ use num_dual::{Dual64, DualNum};
 use std::marker::PhantomData;
 use std::str::FromStr;
 
-/// Longest formula; reading one takes the square of its length.
-const LONGEST: usize = 10_000;
+/// Longest formula; reading one takes the square of its length, so of many the time is in proportion with the longest.
+const LONGEST: usize = 1000;
+/// Most signs that a number, a name or a parenthesis may have before it.
+const MOST_SIGNS: usize = 8;
 
 /// The functions of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,6 +141,13 @@ fn check_characters(text: &str) -> Result<(), String> {
     if text.len() > LONGEST {
         return Err(format!("the formula has {} characters; at most {LONGEST} are read", text.len()));
     }
+    let mut signs = 0;
+    for c in text.chars().filter(|c| *c != ' ') {
+        signs = if matches!(c, '+' | '-') { signs + 1 } else { 0 };
+        if signs > MOST_SIGNS {
+            return Err(format!("the formula has more than {MOST_SIGNS} signs in a row; write one or none"));
+        }
+    }
     match text.chars().find(|c| !belongs(*c)) {
         Some(other) => {
             Err(format!("the formula \"{text}\" has a {other:?}; it takes names, numbers and + - * / ^ ( )"))
@@ -267,6 +276,14 @@ mod tests {
     fn value(text: &str, variables: &[f64]) -> f64 {
         let numbers: Vec<Number> = variables.iter().map(|x| Number::number(*x)).collect();
         Formula::read(text).expect("a formula").value(&numbers).re
+    }
+
+    #[test]
+    fn signs_in_a_row_and_long_formulas_are_refused() {
+        let refused = |text: String| Formula::read(&text).err().unwrap_or_default();
+        assert!(!refused(format!("{}x", "-".repeat(8))).contains("signs in a row"));
+        assert!(refused(format!("{}x", "- ".repeat(9))).contains("signs in a row"));
+        assert!(refused(format!("{}x", "-".repeat(9000))).contains("at most 1000 are read"));
     }
 
     proptest! {

@@ -8,10 +8,12 @@
 //! the model wherever it is. Mass and centre of `<inertial>` of the links on the way, and of all that hangs on them, say what
 //! gravity does to elastic effects. Where more than the tip is measured, the ways to all of it are kept ([`branches`]).
 
+mod attributes;
 mod branches;
 mod reader;
 mod write;
 
+pub use attributes::check_xml;
 use branches::{Branches, Kept};
 use reader::{Reader, child, parse};
 pub use write::{CalibratedOrigins, roll_pitch_yaw_of, three_numbers};

@@ -1,5 +1,6 @@
 //! Reading elements of a URDF; every error names the line.
 
+use super::attributes;
 use crate::ModelError;
 use crate::error::nearest;
 use crate::segment::Body;
@@ -10,6 +11,10 @@ use std::path::Path;
 
 /// Parses XML; an error names the line.
 pub(crate) fn parse<'x>(xml: &'x str, path: &Path) -> Result<Document<'x>, ModelError> {
+    if let Some(line) = attributes::too_many(xml) {
+        let (subject, problem) = ("an element".to_owned(), attributes::problem());
+        return Err(ModelError::Urdf { path: path.to_owned(), line, subject, problem });
+    }
     Document::parse(xml).map_err(|cause| ModelError::UrdfXml {
         path: path.to_owned(),
         line: cause.pos().row,

@@ -3,7 +3,8 @@
 use super::Converted;
 use super::inflate::inflated;
 use crate::RecordingError;
-use crate::layout::Damage;
+use crate::budget::Allowance;
+use crate::damage::{Damage, Faults};
 use crate::map::Map;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
@@ -21,7 +22,7 @@ const CHUNK_BYTES: u64 = 1 << 20;
 pub(super) struct Copy {
     path: PathBuf,
     writer: mcap::Writer<BufWriter<File>>,
-    damage: Vec<Damage>,
+    faults: Faults,
     /// Messages that could not be inflated, and why the first of them.
     broken: Option<(u64, String)>,
 }
@@ -37,9 +38,10 @@ impl Copy {
             .compression(None)
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
-            .calculate_chunk_crcs(false);
+            .calculate_chunk_crcs(false)
+            .calculate_data_section_crc(false);
         let writer = options.create(BufWriter::new(file)).map_err(|e| failed(path, e))?;
-        Ok(Copy { path: path.to_owned(), writer, damage: Vec::new(), broken: None })
+        Ok(Copy { path: path.to_owned(), writer, faults: Faults::default(), broken: None })
     }
 
     /// The recording.
@@ -47,9 +49,9 @@ impl Copy {
         &self.path
     }
 
-    /// Notes what of the recording cannot be used.
+    /// Notes what of the recording cannot be used, or disagrees with the rest.
     pub fn lost(&mut self, why: String) {
-        self.damage.push(Damage { offset: 0, why, lost: true });
+        self.faults.lost(0, || why);
     }
 
     /// Adds a channel with its schema as (name, encoding, data), if it has one.
@@ -75,12 +77,14 @@ impl Copy {
         sequence: u32,
         time_ns: u64,
         data: &[u8],
+        allowance: &Allowance,
     ) -> Result<(), RecordingError> {
-        match inflated(data) {
+        match inflated(data, allowance) {
             Ok(data) => {
                 let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
                 self.writer.write_to_known_channel(&header, &data).map_err(|e| failed(&self.path, e))
             }
+            Err(_) if allowance.is_exceeded() => Err(allowance.exceeded(&self.path)),
             Err(why) => {
                 self.broken.get_or_insert((0, why)).0 += 1;
                 Ok(())
@@ -89,17 +93,18 @@ impl Copy {
     }
 
     /// The finished file, mapped.
-    pub fn finish(mut self) -> Result<Converted, RecordingError> {
+    pub fn finish(mut self, log: String) -> Result<Converted, RecordingError> {
         if let Some((messages, why)) = self.broken.take() {
             self.lost(format!("{messages} compressed messages cannot be used, the first because {why}"));
         }
-        let Copy { path, mut writer, damage, .. } = self;
+        let Copy { path, mut writer, faults, .. } = self;
         writer.finish().map_err(|e| failed(&path, e))?;
         let file = writer.into_inner().into_inner().map_err(|e| no_room(&path)(e.into_error()))?;
         let mut map = Map::of(&file).map_err(no_room(&path))?;
         // The identity is that of the original.
         map.hashed = None;
-        Ok(Converted { map, damage })
+        let damage: Vec<Damage> = faults.in_words();
+        Ok(Converted { map, damage, log, packed: false })
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::copy::no_room;
 use crate::RecordingError;
-use crate::layout::Damage;
+use crate::budget::Allowance;
+use crate::damage::Damage;
 use crate::map::Map;
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::Path;
 use zstd::stream::read::Decoder;
 
@@ -15,21 +16,22 @@ pub(super) const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// Inflated and written at once.
 const BUFFER_BYTES: usize = 1 << 20;
-/// The most that one message may inflate to, as a chunk of an MCAP file.
-const MAX_MESSAGE_BYTES: u64 = 1 << 30;
-/// The most that a file may inflate to: this, and so many times its size. No recording that is worth its room comes near.
-const MAX_FILE_BYTES: u64 = 1 << 30;
-const MAX_FILE_TIMES: u64 = 1000;
+/// A message is inflated, and paid for, in steps of this size.
+const STEP_BYTES: u64 = 64 << 10;
 
 /// Inflates a file into another. What ends or goes wrong on the way is damage; all before it is there.
-pub(super) fn whole(map: &Map, path: &Path, to: &mut File) -> Result<Option<Damage>, RecordingError> {
-    let limit = MAX_FILE_BYTES + (map.len() as u64).saturating_mul(MAX_FILE_TIMES);
+pub(super) fn whole(
+    map: &Map,
+    path: &Path,
+    to: &mut File,
+    allowance: &Allowance,
+) -> Result<Option<Damage>, RecordingError> {
     let mut decoder = Decoder::with_buffer(&map[..]).map_err(no_room(path))?;
-    let (mut buffer, mut written, mut at) = (vec![0; BUFFER_BYTES], 0, 0);
+    let (mut buffer, mut at) = (vec![0; BUFFER_BYTES], 0);
     let why = loop {
         match decoder.read(&mut buffer) {
             Ok(0) => return Ok(None),
-            Ok(_) if written > limit => break format!("it inflates to more than {limit} bytes"),
+            Ok(bytes) if !allowance.takes(bytes as u64) => break allowance.refusal(),
             Ok(bytes) => to.write_all(&buffer[..bytes]).map_err(no_room(path))?,
             Err(e) if e.kind() == ErrorKind::UnexpectedEof => {
                 break "what is compressed is cut off".to_owned();
@@ -38,25 +40,30 @@ pub(super) fn whole(map: &Map, path: &Path, to: &mut File) -> Result<Option<Dama
         }
         let now = map.len() - decoder.get_ref().len();
         map.passed(at..now);
-        (at, written) = (now, to.stream_position().map_err(no_room(path))?);
+        at = now;
     };
     Ok(Some(Damage { offset: at, why: format!("{why}, and is read no further"), lost: true }))
 }
 
-/// A message, inflated where it is compressed. No CDR message begins as compressed ones do.
+/// A message, inflated where it is compressed, as long as the allowance of its recording lasts. No CDR message begins as
+/// compressed ones do.
 ///
 /// # Errors
 /// What is compressed is damaged or too large, in words.
-pub fn inflated(data: &[u8]) -> Result<Cow<'_, [u8]>, String> {
+pub fn inflated<'a>(data: &'a [u8], allowance: &Allowance) -> Result<Cow<'a, [u8]>, String> {
     if !data.starts_with(&MAGIC) {
         return Ok(data.into());
     }
     let failed = |e: std::io::Error| format!("what is compressed is damaged: {e}");
     let mut inflated = Vec::new();
-    let decoder = Decoder::with_buffer(data).map_err(failed)?;
-    decoder.take(MAX_MESSAGE_BYTES + 1).read_to_end(&mut inflated).map_err(failed)?;
-    match inflated.len() as u64 > MAX_MESSAGE_BYTES {
-        true => Err(format!("it inflates to more than {MAX_MESSAGE_BYTES} bytes")),
-        false => Ok(inflated.into()),
+    let mut decoder = Decoder::with_buffer(data).map_err(failed)?;
+    loop {
+        let step = decoder.by_ref().take(STEP_BYTES).read_to_end(&mut inflated).map_err(failed)? as u64;
+        if !allowance.takes(step) {
+            return Err(allowance.refusal());
+        }
+        if step < STEP_BYTES {
+            return Ok(inflated.into());
+        }
     }
 }

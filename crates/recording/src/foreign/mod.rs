@@ -10,18 +10,22 @@
 )]
 
 mod copy;
+mod database;
 mod definitions;
 mod inflate;
 pub(crate) mod names;
 mod rosbag2;
+mod wal;
 
 pub(crate) use copy::DEFINITION_FROM;
 #[cfg(test)]
 pub(crate) use definitions::{TYPES as KNOWN_TYPES, of as definition_of};
 pub use inflate::inflated;
+pub(crate) use wal::{identity as log_identity, logs_of};
 
+use crate::budget::Allowance;
 use crate::bytes::FileBytes;
-use crate::layout::Damage;
+use crate::damage::Damage;
 use crate::map::Map;
 use crate::{RecordingError, url};
 use copy::{Copy, no_room};
@@ -35,6 +39,10 @@ pub(crate) struct Converted {
     pub map: Map,
     /// What of the original could not be used.
     pub damage: Vec<Damage>,
+    /// Identity of the log that was read with it.
+    pub log: String,
+    /// Whether the file was in the original as it is, and not made here.
+    pub packed: bool,
 }
 
 /// What a file is, by its first bytes.
@@ -57,30 +65,43 @@ fn kind(head: &[u8]) -> Option<Kind> {
     }
 }
 
+fn kind_of(bytes: &FileBytes) -> Result<Option<Kind>, RecordingError> {
+    Ok(kind(&bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?))
+}
+
+/// Whether a file is a database, which a log may stand beside.
+pub(crate) fn is_database(bytes: &FileBytes) -> Result<bool, RecordingError> {
+    Ok(kind_of(bytes)? == Some(Kind::Database))
+}
+
 /// Copies the messages of a file that is not MCAP itself; `None` if it is no recording that is known here.
-pub(crate) fn convert(bytes: &FileBytes, path: &Path) -> Result<Option<Converted>, RecordingError> {
-    let head = bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?;
-    match kind(&head) {
+pub(crate) fn convert(
+    bytes: &FileBytes,
+    path: &Path,
+    allowance: &Allowance,
+) -> Result<Option<Converted>, RecordingError> {
+    match kind_of(bytes)? {
         Some(Kind::Zstd) => match bytes {
-            FileBytes::Mapped(map) => in_frame(map, path).map(Some),
-            FileBytes::Ranged(ranged) => in_frame(&ranged.spool(path)?, path).map(Some),
+            FileBytes::Mapped(map) => in_frame(map, path, allowance).map(Some),
+            FileBytes::Ranged(ranged) => in_frame(&ranged.spool(path)?, path, allowance).map(Some),
         },
         Some(Kind::Database) => match bytes {
             FileBytes::Ranged(object) if url::is_url(path) => {
                 let mut file = tempfile::NamedTempFile::new().map_err(no_room(path))?;
                 object.each_round(&mut |piece| file.write_all(piece).map_err(no_room(path)))?;
-                database(file.path(), path).map(Some)
+                database(file.path(), path, allowance).map(Some)
             }
-            _ => database(path, path).map(Some),
+            _ => database(path, path, allowance).map(Some),
         },
         Some(Kind::Mcap) | None => Ok(None),
     }
 }
 
 /// What a file compressed as a whole holds.
-fn in_frame(map: &Map, path: &Path) -> Result<Converted, RecordingError> {
+fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
     let mut named = tempfile::NamedTempFile::new().map_err(no_room(path))?;
-    let damage: Vec<Damage> = inflate::whole(map, path, named.as_file_mut())?.into_iter().collect();
+    let damage: Vec<Damage> =
+        inflate::whole(map, path, named.as_file_mut(), allowance)?.into_iter().collect();
     let mut head = Vec::new();
     let mut reread = File::open(named.path()).map_err(no_room(path))?;
     std::io::Read::by_ref(&mut reread)
@@ -92,10 +113,10 @@ fn in_frame(map: &Map, path: &Path) -> Result<Converted, RecordingError> {
             let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
             // The identity is that of the original.
             map.hashed = None;
-            Ok(Converted { map, damage })
+            Ok(Converted { map, damage, log: String::new(), packed: true })
         }
         Some(Kind::Database) => {
-            let mut converted = database(named.path(), path)?;
+            let mut converted = database(named.path(), path, allowance)?;
             converted.damage.splice(0..0, damage);
             Ok(converted)
         }
@@ -109,8 +130,8 @@ fn in_frame(map: &Map, path: &Path) -> Result<Converted, RecordingError> {
 }
 
 /// The messages of the rosbag2 database `file`, which is or was made of `path`.
-fn database(file: &Path, path: &Path) -> Result<Converted, RecordingError> {
+fn database(file: &Path, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
     let mut copy = Copy::create(path)?;
-    rosbag2::read(file, &mut copy)?;
-    copy.finish()
+    let log = rosbag2::read(file, &mut copy, allowance)?;
+    copy.finish(log)
 }

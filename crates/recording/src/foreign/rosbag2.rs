@@ -5,37 +5,44 @@
 //! a journal, both are copied, and the copy is opened.
 
 use super::copy::{Copy, DEFINITION_FROM, no_room};
+use super::database::{Stored, compare_index, compare_log, compare_rows, failed, is_of_disk, quick_check};
 use super::definitions;
-use crate::RecordingError;
+use super::wal::{Frames, beside, frames, identity, logs_of};
+use crate::budget::Allowance;
+use crate::{RecordingError, input};
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Error, ErrorCode, OpenFlags};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// SQLite keeps what is not yet in a database in files of its name with these endings.
-const PENDING: [&str; 2] = ["-wal", "-journal"];
 /// The longest text or list of bytes that a database may make SQLite hold [bytes]; its own statements need some.
 const MAX_VALUE_BYTES: u64 = 1 << 30;
 const LEAST_VALUE_BYTES: u64 = 1 << 20;
 
-/// Copies the messages of a database.
-pub(super) fn read(file: &Path, copy: &mut Copy) -> Result<(), RecordingError> {
-    let refused = |why: String| RecordingError::Foreign { path: copy.path().to_owned(), why };
-    let with_pending = pending(file).map_err(no_room(copy.path()))?;
+/// Copies the messages of a database; returns the identity of the log that was read with it.
+pub(super) fn read(file: &Path, copy: &mut Copy, allowance: &Allowance) -> Result<String, RecordingError> {
+    let refused = |path: &Path, why: String| RecordingError::Foreign { path: path.to_owned(), why };
+    let with_pending = pending(file)?;
     let opened = match &with_pending {
-        Some((_, copied)) => Connection::open_with_flags(copied, OpenFlags::SQLITE_OPEN_READ_WRITE),
+        Some(Pending { copied, .. }) => {
+            Connection::open_with_flags(copied, OpenFlags::SQLITE_OPEN_READ_WRITE)
+        }
         None => {
             let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
             Connection::open_with_flags(immutable(file), flags)
         }
     };
-    let unreadable = |e: Error| refused(format!("it is an SQLite database that cannot be read ({e})"));
+    let path = copy.path().to_owned();
+    let unreadable = |e: Error| match is_of_disk(&e) {
+        true => failed(&path, e),
+        false => refused(&path, format!("it is an SQLite database that cannot be read ({e})")),
+    };
     let database = opened.map_err(unreadable)?;
-    harden(&database, longest(file)).map_err(unreadable)?;
+    let bytes = bytes_of_all(file);
+    harden(&database, bytes).map_err(unreadable)?;
     let is_corrupt = |e: &Error| e.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt);
     let (tables, corrupt) = match tables(&database) {
         Err(e) if is_corrupt(&e) => {
@@ -49,29 +56,40 @@ pub(super) fn read(file: &Path, copy: &mut Copy) -> Result<(), RecordingError> {
     if let Some(missing) = ["topics", "messages"].into_iter().find(|table| !tables.contains(*table)) {
         return Err(match corrupt {
             Some(e) => unreadable(e),
-            None => {
-                refused(format!("it is an SQLite database, but not of rosbag2: it has no table `{missing}`"))
-            }
+            None => refused(
+                &path,
+                format!("it is an SQLite database, but not of rosbag2: it has no table `{missing}`"),
+            ),
         });
     }
+    if let Some(e) = corrupt {
+        copy.lost(format!("the database is damaged ({e})"));
+    }
+    let log = match with_pending {
+        Some(pending) => {
+            if pending.wal {
+                compare_log(&database, pending.frames, copy)?;
+            }
+            pending.identity
+        }
+        None => String::new(),
+    };
+    quick_check(&database, copy)?;
     let topics = add_topics(&database, &tables, copy)?;
-    copy_messages(&database, &topics, copy)
+    let stored = copy_messages(&database, &topics, copy, (bytes, allowance))?;
+    compare_rows(&stored, copy);
+    compare_index(&database, &stored, copy)?;
+    Ok(log)
 }
 
 /// Nothing in a database is trusted: no functions in its schema, no values longer than the file.
-fn harden(database: &Connection, longest: i32) -> rusqlite::Result<()> {
+fn harden(database: &Connection, bytes: u64) -> rusqlite::Result<()> {
+    let longest = i32::try_from(bytes.clamp(LEAST_VALUE_BYTES, MAX_VALUE_BYTES)).unwrap_or(i32::MAX);
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)?;
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)?;
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)?;
     database.set_limit(Limit::SQLITE_LIMIT_LENGTH, longest)?;
     database.pragma_update(None, "cell_size_check", true)
-}
-
-/// No value is longer than a database and what is not in it yet [bytes].
-fn longest(file: &Path) -> i32 {
-    let parts = PENDING.map(|ending| beside(file, ending));
-    let bytes = parts.iter().map(PathBuf::as_path).chain([file]).map(bytes_of).sum::<u64>();
-    i32::try_from(bytes.clamp(LEAST_VALUE_BYTES, MAX_VALUE_BYTES)).unwrap_or(i32::MAX)
 }
 
 /// The tables whose columns are all stored.
@@ -89,9 +107,12 @@ fn add_topics(
     tables: &BTreeSet<String>,
     copy: &mut Copy,
 ) -> Result<BTreeMap<i64, u16>, RecordingError> {
-    let damaged = |e: Error, path: &Path| RecordingError::Foreign {
-        path: path.to_owned(),
-        why: format!("its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"),
+    let damaged = |e: Error, path: &Path| match is_of_disk(&e) {
+        true => failed(path, e),
+        false => RecordingError::Foreign {
+            path: path.to_owned(),
+            why: format!("its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"),
+        },
     };
     let of_bag = match tables.contains("message_definitions") {
         true => stored_definitions(database),
@@ -127,56 +148,63 @@ fn stored_definitions(database: &Connection) -> rusqlite::Result<BTreeMap<String
     statement.query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?.collect()
 }
 
-/// Copies message after message in the order in which they are stored.
+/// Copies message after message in the order in which they are stored, as long as they are no more than the database holds:
+/// pages that refer to each other could give rows without end.
 fn copy_messages(
     database: &Connection,
     topics: &BTreeMap<i64, u16>,
     copy: &mut Copy,
-) -> Result<(), RecordingError> {
-    let (mut read, mut strangers, mut odd) = (0_u32, 0_u64, 0_u64);
+    (most_bytes, allowance): (u64, &Allowance),
+) -> Result<Stored, RecordingError> {
+    let mut stored = Stored::default();
     let mut pass = || -> Result<(), Stop> {
-        let mut statement = database.prepare("SELECT topic_id, timestamp, data FROM messages NOT INDEXED")?;
+        let mut statement =
+            database.prepare("SELECT rowid, topic_id, timestamp, data FROM messages NOT INDEXED")?;
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
-            match (row.get_ref(0)?, row.get_ref(1)?, row.get_ref(2)?) {
-                (ValueRef::Integer(topic), ValueRef::Integer(time_ns), ValueRef::Blob(data))
-                    if time_ns >= 0 =>
-                {
-                    match topics.get(&topic) {
-                        Some(channel) => {
-                            copy.put(*channel, read, time_ns as u64, data).map_err(Stop::Failed)?
-                        }
-                        None => strangers += 1,
-                    }
-                }
-                _ => odd += 1,
+            let (number, data) = (row.get::<_, i64>(0)?, row.get_ref(3)?);
+            let time_ns = row.get_ref(2)?.as_i64().ok();
+            let sequence = stored.rows as u32;
+            stored.add(number, time_ns, data.as_bytes().map_or(0, <[u8]>::len));
+            if stored.bytes > most_bytes {
+                return Err(Stop::Endless);
             }
-            read = read.wrapping_add(1);
+            match (row.get_ref(1)?, time_ns, data) {
+                (ValueRef::Integer(topic), Some(time_ns @ 0..), ValueRef::Blob(data)) => {
+                    let Some(channel) = topics.get(&topic) else {
+                        stored.strangers += 1;
+                        continue;
+                    };
+                    let put = copy.put(*channel, sequence, time_ns.cast_unsigned(), data, allowance);
+                    put.map_err(Stop::Failed)?;
+                }
+                _ => stored.odd += 1,
+            }
         }
         Ok(())
     };
     match pass() {
         Ok(()) => {}
-        Err(Stop::Damaged(e)) => {
-            copy.lost(format!(
-                "the database is damaged ({e}) and read up to its message {read}; `sqlite3 IN .recover | sqlite3 OUT` \
-                 may save more"
-            ));
-        }
+        Err(Stop::Damaged(e)) if is_of_disk(&e) => return Err(failed(copy.path(), e)),
+        Err(Stop::Damaged(e)) => copy.lost(format!(
+            "the database is damaged ({e}) and read up to its message {}; `sqlite3 IN .recover | sqlite3 OUT` \
+             may save more",
+            stored.rows
+        )),
+        Err(Stop::Endless) => copy.lost(format!(
+            "its first {} messages are more than its {most_bytes} bytes can hold; it is read no further",
+            stored.rows
+        )),
         Err(Stop::Failed(e)) => return Err(e),
     }
-    for (messages, why) in [(strangers, "of topics that it does not list"), (odd, "without a time or bytes")]
-    {
-        if messages > 0 {
-            copy.lost(format!("{messages} messages {why} cannot be used"));
-        }
-    }
-    Ok(())
+    Ok(stored)
 }
 
 /// Why a pass over the messages ended early.
 enum Stop {
     Damaged(Error),
+    /// More rows than there are bytes for.
+    Endless,
     Failed(RecordingError),
 }
 
@@ -186,31 +214,42 @@ impl From<Error> for Stop {
     }
 }
 
-/// A copy of a database and of what SQLite has not put into it yet, if there is any.
-fn pending(file: &Path) -> std::io::Result<Option<(tempfile::TempDir, PathBuf)>> {
-    let endings: Vec<&str> =
-        PENDING.into_iter().filter(|ending| bytes_of(&beside(file, ending)) > 0).collect();
-    if endings.is_empty() {
+/// A copy of a database and of what SQLite has not put into it yet.
+struct Pending {
+    copied: PathBuf,
+    /// Identity of what is not in it yet.
+    identity: String,
+    /// Whether that is a write-ahead log, and what it holds.
+    wal: bool,
+    frames: Option<Frames>,
+    _folder: tempfile::TempDir,
+}
+
+/// Copies both, if there is anything that is not in the database yet.
+fn pending(file: &Path) -> Result<Option<Pending>, RecordingError> {
+    let logs = logs_of(file);
+    if logs.is_empty() {
         return Ok(None);
     }
-    let folder = tempfile::tempdir()?;
+    let failed = no_room(file);
+    let folder = tempfile::tempdir().map_err(&failed)?;
     let copied = folder.path().join("bag.db3");
-    std::fs::copy(file, &copied)?;
-    for ending in endings {
-        std::fs::copy(beside(file, ending), beside(&copied, ending))?;
+    std::fs::copy(file, &copied).map_err(&failed)?;
+    for (ending, log) in &logs {
+        input::note(log);
+        std::fs::copy(log, beside(&copied, ending)).map_err(&failed)?;
     }
-    Ok(Some((folder, copied)))
+    // Of the copies, which nobody writes on.
+    let identity = identity(&copied)?;
+    let wal = logs.iter().any(|(ending, _)| *ending == "-wal");
+    let frames = if wal { frames(&beside(&copied, "-wal")).map_err(&failed)? } else { None };
+    Ok(Some(Pending { copied, identity, wal, frames, _folder: folder }))
 }
 
-fn beside(file: &Path, ending: &str) -> PathBuf {
-    let mut name = OsString::from(file);
-    name.push(ending);
-    PathBuf::from(name)
-}
-
-/// Size of a file; 0 where there is none.
-fn bytes_of(path: &Path) -> u64 {
-    std::fs::metadata(path).map_or(0, |about| about.len())
+/// Size of a database and of what is not in it yet [bytes].
+fn bytes_of_all(file: &Path) -> u64 {
+    let bytes_of = |path: &Path| std::fs::metadata(path).map_or(0, |about| about.len());
+    logs_of(file).iter().map(|(_, path)| path.as_path()).chain([file]).map(bytes_of).sum()
 }
 
 /// A path as a URI by which SQLite opens a file that nobody changes.

@@ -125,7 +125,7 @@ fn a_wrong_record_length_is_jumped_with_the_index() {
     lying[chunk.chunk_start_offset as usize + 6] = 0xff;
     let recording = open(&lying);
     assert_eq!(counted(&recording), N, "the index knows the right length");
-    assert!(!loses(&recording));
+    assert!(loses(&recording), "nobody knows what else was changed");
     // Long enough to swallow the next chunk, short enough to end at the one after.
     let mut swallowing = bytes.clone();
     let after = &summary.chunk_indexes[4];
@@ -162,28 +162,62 @@ fn a_zero_filled_tail_is_a_cut() {
 }
 
 #[test]
-fn bytes_after_the_end_lose_nothing() {
+fn bytes_after_the_end_are_not_read_and_told() {
     let mut bytes = mcap_bytes(&[opaque("/a", N)], &Style::default());
     bytes.extend(b"appended by a careless tool");
     let recording = open(&bytes);
     assert_eq!(counted(&recording), N);
     assert!(recording.report().files[0].damaged[0].1.contains("27 bytes follow"));
-    assert!(!loses(&recording));
+    assert!(loses(&recording));
 }
 
+/// What is done to the bytes of a file.
+type Change<'a> = &'a dyn Fn(&mut Vec<u8>);
+
+/// The data section is there to the last message, but what would vouch for it is not.
 #[test]
-fn a_lost_footer_or_a_bad_summary_loses_nothing() {
+fn a_lost_footer_or_a_bad_summary_costs_no_message_and_is_told() {
     let bytes = mcap_bytes(&[opaque("/a", N)], &Style::default());
     let footer = bytes.len() - 8 - 29;
-    assert_eq!(counted(&open(&bytes[..footer])), N);
-    let mut bad_summary = bytes.clone();
-    bad_summary[footer - 40] ^= 0xff;
-    let recording = open(&bad_summary);
-    assert_eq!(counted(&recording), N);
-    assert!(recording.report().files[0].damaged[0].1.contains("CRC of the summary"));
-    let mut bad_offset = bytes;
-    bad_offset[footer + 9..footer + 17].copy_from_slice(&7_u64.to_le_bytes());
-    assert_eq!(counted(&open(&bad_offset)), N);
+    let changed = |change: Change<'_>| {
+        let mut changed = bytes.clone();
+        change(&mut changed);
+        open(&changed)
+    };
+    let cases: [(&str, Change<'_>); 5] = [
+        ("before its footer", &|b| b.truncate(footer)),
+        ("CRC of the summary", &|b| b[footer - 40] ^= 0xff),
+        ("does not point to the summary", &|b| {
+            b[footer + 9..footer + 17].copy_from_slice(&7_u64.to_le_bytes())
+        }),
+        ("before its footer", &|b| b[footer + 1] = 21),
+        ("before its footer", &|b| b[footer] = 0x0e),
+    ];
+    for (says, change) in cases {
+        let recording = changed(change);
+        assert_eq!(counted(&recording), N, "{says}");
+        let damaged = &recording.report().files[0].damaged;
+        assert!(
+            loses(&recording) && damaged.iter().any(|(_, why)| why.contains(says)),
+            "{says}: {damaged:?}"
+        );
+    }
+}
+
+/// One flipped bit makes a chunk a footer; the index leads to it all the same.
+#[test]
+fn a_chunk_of_another_kind_is_found_by_the_index() {
+    let bytes = mcap_bytes(&[opaque("/a", N)], &Style::default());
+    let summary = mcap::Summary::read(&bytes).expect("readable").expect("has a summary");
+    for chunk in [&summary.chunk_indexes[2], summary.chunk_indexes.last().expect("chunks")] {
+        for bit in 0..8 {
+            let mut flipped = bytes.clone();
+            flipped[chunk.chunk_start_offset as usize] ^= 1 << bit;
+            let recording = open(&flipped);
+            assert_eq!(counted(&recording), N, "bit {bit}");
+            assert!(loses(&recording), "bit {bit}");
+        }
+    }
 }
 
 #[test]

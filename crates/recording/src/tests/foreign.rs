@@ -52,9 +52,15 @@ fn what_is_in_a_write_ahead_log_is_read_and_nothing_changes_beside_it() {
     let recording = open(&path).expect("a recording");
     assert_eq!(raw_count(&recording), 500);
     assert_eq!(listing(folder.path()), before);
-    // The identity is that of the file itself.
-    let hash = format!("blake3:{}", blake3::hash(&std::fs::read(&path).expect("readable")).to_hex());
-    assert_eq!(recording.report().files[0].identity, hash);
+    // What was read is the file and its log: the identity is that of both, and another one when the log has grown.
+    let report = recording.report();
+    let hash = |path: &Path| blake3::hash(&std::fs::read(path).expect("readable")).to_hex();
+    let log = path.with_file_name("bag #1 100%.db3-wal");
+    assert_eq!(report.files[0].identity, format!("blake3:{}+wal:blake3:{}", hash(&path), hash(&log)));
+    assert_eq!(crate::identity_of(&path).expect("readable"), report.files[0].identity);
+    assert_eq!(report.warnings, []);
+    insert(&database, 1, 500, &message(500));
+    assert_ne!(crate::identity_of(&path).expect("readable"), report.files[0].identity);
     assert_eq!(recording.report().channels[0].decodable.as_deref(), Ok("joints"));
     drop(database);
 }

@@ -111,14 +111,15 @@ fn a_chunk_that_is_not_what_the_index_says_costs_its_messages_and_is_named() {
             damaged.iter().any(|(at, why)| *at == joints.chunk_start_offset && why.contains("chunk dropped"))
         );
         assert!(
-            damaged.iter().any(|(_, why)| why.contains("declare 10 messages, 9 are usable")),
+            damaged.iter().any(|(_, why)| why.contains("declare 10 messages on /joints, 9 are usable")),
             "{damaged:?}"
         );
     }
-    // What is not read is not judged.
+    // What is not read is not judged, but where the file is hashed its CRC still tells.
     let (_disk, recording) = by_ranges(&flipped(camera.chunk_start_offset + 1000));
     assert_eq!(messages_of(&recording, "/joints").len(), 10);
-    assert!(recording.report().warnings.is_empty());
+    let warnings = &recording.report().warnings;
+    assert!(warnings.len() == 1 && warnings[0].message.contains("CRC of the data section"), "{warnings:?}");
     assert_eq!(messages_of(&recording, "/camera").len(), 9);
 }
 
@@ -204,4 +205,8 @@ fn a_file_that_is_shortened_while_it_is_read_is_an_error() {
     assert!(matches!(error, RecordingError::Read { .. }), "{error}");
     assert!(error.to_string().contains("part_0.mcap") && error.to_string().contains("shortened"), "{error}");
     assert!(recording.report().warnings.iter().any(|w| w.message.contains("cannot be hashed")));
+    assert!(
+        matches!(recording.whole_report(), Err(RecordingError::Read { .. })),
+        "it cannot be hashed either"
+    );
 }
