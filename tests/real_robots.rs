@@ -140,8 +140,7 @@ fn gen3lite_without_a_camera_shows_the_dwells_that_lie_off_and_stays_inadequate(
     println!("mukca-gen3lite.toml: {first:?}, {fitted:.3} -> {after:.3} mm");
     let ends = |name: &Value| name.as_str().is_some_and(|n| n.contains("@0.7") || n.contains("@0.1-6"));
     assert!(first.is_some_and(|set| set.iter().all(ends)), "{}", summary["diagnosis"]["verdict"]);
-    // A placement left out knows nothing of an event in it.
-    assert!(after < 1.03 * fitted, "{fitted} -> {after} mm");
+    assert!(after < 0.95 * fitted, "{fitted} -> {after} mm");
     let warnings = summary["warnings"].as_array().expect("warnings");
     assert!(warnings.iter().any(|w| w["severity"] == "inadequate"), "{warnings:?}");
     assert_every_dwell(&summary, &real.join("mukca_gen3lite"));

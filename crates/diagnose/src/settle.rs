@@ -199,17 +199,13 @@ fn answer(
     }
 }
 
-/// Entries that are one answer: of those within a standard error of what says most, those with the fewest amplitudes first (the
-/// one-standard-error rule: Breiman, Friedman, Olshen, Stone, Classification and Regression Trees, 1984); then the others as they
-/// came.
-fn simplest_first(members: Vec<&(usize, Score)>, costs: Costs<'_>) -> Vec<usize> {
-    let scores = || members.iter().map(|(_, score)| score);
-    let Some(most) = scores().reduce(|a, b| if b.above(a).nats > 0.0 { b } else { a }).cloned() else {
-        return Vec::new();
-    };
-    let mut members = members;
+/// Entries that are one answer, those that are worth most first: of those within a standard error of the first one, those with the
+/// fewest amplitudes come first (the one-standard-error rule: Breiman, Friedman, Olshen, Stone, Classification and Regression
+/// Trees, 1984).
+fn simplest_first(mut members: Vec<&(usize, Score)>, costs: Costs<'_>) -> Vec<usize> {
+    let Some((first, most)) = members.first().copied() else { return Vec::new() };
     members.sort_by_key(|(k, score)| {
-        let behind = most.above(score);
+        let behind = most.above(score).less(costs.of_entry(*first) - costs.of_entry(*k));
         if behind.nats <= behind.se { costs.amplitudes(*k) } else { usize::MAX }
     });
     members.into_iter().map(|(k, _)| *k).collect()

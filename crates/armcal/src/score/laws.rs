@@ -70,7 +70,7 @@ impl Laws {
     /// As a page, every breach with its scenario.
     pub fn page(&self, command: &str) -> String {
         let mut text = format!(
-            "# Laws of the verdict\n\nWritten in one go: `{command}`\n\nWhat must hold of every answer, whatever is true, asked of \
+            "<!-- armcal.laws/1 -->\n\n# Laws of the verdict\n\nWritten in one go: `{command}`\n\nWhat must hold of every answer, whatever is true, asked of \
              simulated sessions; nobody reads what is hidden in them. The same laws run in the tests on fewer sessions.\n\n\
              | law | says | held | share (95 %) |\n|---|---|--:|---|\n"
         );
