@@ -2,6 +2,7 @@
 
 use crate::PastRunError;
 use crate::ReportError;
+use crate::past_run::past_text;
 use crate::run::{RecordingRun, Run, VERSION};
 use armcal_core::{DwellMark, FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Model};
@@ -9,8 +10,7 @@ use armcal_model_file::{
     ArmText, ChainText, FILE, FrameFacts, LengthFacts, MarkerFacts, PastModel, PlaceFacts, RecordingFacts,
     SCHEMA, Value,
 };
-use armcal_recording::{Recording, RecordingError, input};
-use std::io::ErrorKind;
+use armcal_recording::{Recording, RecordingError};
 use std::path::{Path, PathBuf};
 
 /// Postures that are kept at most; a longer session is thinned out evenly.
@@ -99,10 +99,7 @@ pub fn open_model(path: &Path) -> Result<PastModel, PastRunError> {
 }
 
 fn file(path: &Path) -> Result<String, PastRunError> {
-    input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
-        ErrorKind::NotFound => PastRunError::NoModel { path: path.to_owned(), why: source.to_string() },
-        _ => PastRunError::Unreadable { path: path.to_owned(), source },
-    })
+    past_text(path, |why| PastRunError::NoModel { path: path.to_owned(), why })
 }
 
 fn attached(path: &Path) -> Result<String, PastRunError> {

@@ -2,16 +2,15 @@
 //!
 //! [`observations_json`] of a run, [`PastObservations::open`] from its results. Every number comes back as it was.
 
+use crate::past_run::past_text;
 use crate::run::{RecordingRun, Run, VERSION};
 use crate::{DwellMark, PastRunError, ReportError};
 use armcal_core::{Observation, Parameter, Pose, Role, Severity};
 use armcal_model::Session;
-use armcal_recording::input;
 use armcal_table::Board;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// Format of the file.
@@ -135,10 +134,7 @@ impl PastObservations {
     /// A file that cannot be read, is of another format, or contradicts itself.
     pub fn open(path: &Path) -> Result<PastObservations, PastRunError> {
         let bad = |why: String| PastRunError::BadObservations { path: path.to_owned(), why };
-        let text = input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
-            ErrorKind::NotFound => bad(source.to_string()),
-            _ => PastRunError::Unreadable { path: path.to_owned(), source },
-        })?;
+        let text = past_text(path, bad)?;
         let past: PastObservations = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
         if past.schema != SCHEMA {
             return Err(bad(format!("its schema is `{}`, not `{SCHEMA}`", past.schema)));

@@ -6,9 +6,10 @@ use crate::run::{RecordingRun, Run, effects};
 use crate::{DwellMark, proto};
 use armcal_calibrate::Residual;
 use armcal_core::{Dwell, DwellId, Observation};
-use armcal_recording::{RawMetadata, Recording, RecordingError};
+use armcal_recording::{RawMetadata, Recording, RecordingError, input};
 use prost::Message as _;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Results of an earlier run.
@@ -100,6 +101,17 @@ pub enum PastRunError {
     /// The model of the result is not what it should be.
     #[error("the calibrated model in {}: {why}; run the pipeline again", path.display())]
     BadModel { path: PathBuf, why: String },
+}
+
+/// The text of a file of a result; `absent` says what it means that it is not there.
+pub(crate) fn past_text(
+    path: &Path,
+    absent: impl FnOnce(String) -> PastRunError,
+) -> Result<String, PastRunError> {
+    input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => absent(source.to_string()),
+        _ => PastRunError::Unreadable { path: path.to_owned(), source },
+    })
 }
 
 impl PastRun {

@@ -80,7 +80,7 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
     let keys = Keys::new(pipeline, request.full, out)?;
     let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
     progress.count(own.len());
-    let jobs = request.jobs.unwrap_or_else(workers::cores);
+    let jobs = request.jobs.unwrap_or_else(crate::threads::cores);
     let done = workers::each(own.len(), jobs, |i| {
         let index = own[i];
         let entry = &manifest.entries[index];

@@ -1,17 +1,13 @@
 //! Several recordings at a time.
 
 use super::memory;
+use crate::threads::cores;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// A core can be kept waiting by so many jobs; more only take memory from each other.
 const JOBS_A_CORE: usize = 4;
-
-/// Cores of this machine that the process may use.
-pub(super) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
 
 /// Does `work` for 0..count on `jobs` cores; results in order.
 ///

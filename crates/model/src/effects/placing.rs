@@ -244,15 +244,10 @@ pub(crate) fn amplitude(
     }
 }
 
-/// An amplitude of an event, by how much it usually is: nothing keeps it from being many times that.
-pub(crate) fn amplitude_of_event(
-    quantity: &str,
-    unit: Unit,
-    usual: f64,
-    bound: f64,
-    meaning: impl Into<String>,
-) -> Parameter {
-    Parameter { usual: Some(usual), ..amplitude(quantity, unit, EVENT_SIGMA * usual, bound, meaning) }
+/// An amplitude of an event: what it is told by is its usual size, and nothing keeps it from being many times that.
+pub(crate) fn of_event(amplitude: Parameter) -> Parameter {
+    let usual = amplitude.prior_sigma;
+    Parameter { usual, prior_sigma: usual.map(|usual| EVENT_SIGMA * usual), ..amplitude }
 }
 
 /// Two amplitudes of a wave over a joint's angle [deg]; `angle` is what its sine and cosine are of.
@@ -279,23 +274,12 @@ const REMOUNTED: [f64; 2] = [1.0, PI];
 
 /// The shift of an event along x, y, z.
 pub(crate) fn shift_xyz(meaning: &str) -> Vec<Parameter> {
-    let of =
-        |axis| amplitude_of_event(axis, Unit::Metre, KNOCK[0], REMOUNTED[0], format!("{meaning} {axis}"));
-    ["x", "y", "z"].map(of).into()
+    amplitudes_xyz("", Unit::Metre, KNOCK[0], REMOUNTED[0], meaning).into_iter().map(of_event).collect()
 }
 
 /// The turn of an event about x, y, z.
 pub(crate) fn turn_xyz(meaning: &str) -> Vec<Parameter> {
-    let of = |axis: &str| {
-        amplitude_of_event(
-            &format!("r{axis}"),
-            Unit::Radian,
-            KNOCK[1],
-            REMOUNTED[1],
-            format!("{meaning} {axis}"),
-        )
-    };
-    ["x", "y", "z"].map(of).into()
+    amplitudes_xyz("r", Unit::Radian, KNOCK[1], REMOUNTED[1], meaning).into_iter().map(of_event).collect()
 }
 
 /// Three amplitudes along or about x, y, z.

@@ -4,7 +4,7 @@ pub(super) use super::drivers::Drivers;
 pub(super) use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
 pub(super) use super::physics::{Deformation, Physics, Slot};
 pub(super) use super::placing::{
-    ARM, Placing, amplitude, amplitude_of_event, amplitudes_wave, amplitudes_xyz, shift_xyz, turn_xyz,
+    ARM, Placing, amplitude, amplitudes_wave, amplitudes_xyz, of_event, shift_xyz, turn_xyz,
 };
 pub(super) use super::shares::Shares;
 pub(super) use super::state::{LED, REST, SEATED};

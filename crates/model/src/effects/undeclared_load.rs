@@ -56,7 +56,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     let deg = 1f64.to_radians();
     let of_joint = |(joint, _): &(usize, f64)| {
         let meaning = format!("angle by which joint {} gives way with the arm stretched out", joint + 1);
-        amplitude_of_event(&format!("yield{}", joint + 1), Unit::Radian, 0.1 * deg, 10.0 * deg, meaning)
+        of_event(amplitude(&format!("yield{}", joint + 1), Unit::Radian, 0.1 * deg, 10.0 * deg, meaning))
     };
     Ok(Placement::new(joints.iter().map(of_joint).collect(), UndeclaredLoad { joints }))
 }
