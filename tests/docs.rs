@@ -20,9 +20,9 @@ fn the_reference_lists_every_key_with_a_default() {
         keys(&armcal_calibrate::FitConfig::default()),
         keys(&armcal_model::Deviation::default()),
         keys(&armcal_diagnose::DiagnosisConfig::default()),
-        keys(&armcal::pool::PoolSection::default()),
-        keys(&armcal::check::CheckSection::default()),
-        keys(&armcal::check::MaxWarnings::default()),
+        keys(&armcal_config::PoolSection::default()),
+        keys(&armcal_config::CheckSection::default()),
+        keys(&armcal_config::MaxWarnings::default()),
     ];
     for key in sections.concat() {
         assert!(reference.contains(&format!("`{key}`")), "docs/pipeline-reference.md does not list `{key}`");
@@ -57,7 +57,7 @@ fn effects_named_in_the_guide_to_the_diagnosis_exist() {
 fn the_limits_shown_in_the_guide_to_checks_are_understood() {
     #[derive(serde::Deserialize)]
     struct Shown {
-        check: armcal::check::CheckSection,
+        check: armcal_config::CheckSection,
     }
     let guide = std::fs::read_to_string(root().join("docs/check.md")).expect("guide");
     let block = guide.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a section");

@@ -1,9 +1,9 @@
 use crate::support::{paper_pipeline, quick_pipeline, read_json, root, run_pipeline, shipped};
-use armcal::pipeline::Pipeline;
 use armcal::progress::Progress;
-use armcal::story;
+use armcal_config::Pipeline;
 use armcal_core::FeatureId;
 use armcal_model::Masses;
+use armcal_pipeline as story;
 use armcal_recording::ros2::{Header, joint_state};
 use serde_json::Value;
 use std::borrow::Cow;
@@ -244,7 +244,7 @@ fn an_arm_without_effort_leaves_the_other_its_own() {
 
 /// Torque of a load at the left tip about the left arm's second joint, by what lifting it would cost [N m].
 fn torque_of_load_nm(pipeline: &Pipeline, q: &[f64], kg: f64) -> f64 {
-    let (_, chain) = armcal::stages::frames::nominal_chain(pipeline).expect("two arms");
+    let (_, chain) = armcal_stages::frames::nominal_chain(pipeline).expect("two arms");
     let left = armcal_model::Model::new(chain.arms()[1].chain.clone(), armcal_model::Frames::of_bare_arm());
     let left = left.expect("an arm");
     let height_m = |step: f64| {
@@ -282,7 +282,7 @@ fn a_load_at_the_other_arms_tip_is_what_its_spring_feels() {
         let loads: Vec<(FeatureId, f64)> = o.more_loads.iter().map(|load| (load.at, load.kg)).collect();
         assert_eq!((o.load_kg, &loads[..]), (0.0, expected));
     }
-    let fitted = |of: &armcal::story::Fitted| {
+    let fitted = |of: &armcal_stages::Fitted| {
         let estimates = &of.calibration.fit.estimates;
         let own = estimates.iter().find(|e| e.parameter.name.ends_with("compliance_load"));
         own.map(|e| (e.value, e.sigma))
@@ -292,7 +292,7 @@ fn a_load_at_the_other_arms_tip_is_what_its_spring_feels() {
     // The base was planted upright, and is estimated from arms with errors: its tilt is a share of the torque.
     assert!((value / compliance - 1.0).abs() < 0.03 && sigma < 0.01 * compliance);
     assert!(fitted(&untold).is_none());
-    let judged_m = |of: &armcal::story::Fitted| of.calibration.judged().fitted.mean_m;
+    let judged_m = |of: &armcal_stages::Fitted| of.calibration.judged().fitted.mean_m;
     assert!(judged_m(&untold) > 1.3 * judged_m(&told), "{} {}", judged_m(&untold), judged_m(&told));
 }
 

@@ -4,12 +4,12 @@
 //! `cargo bench -p armcal --bench before`; here it may come from the processor.
 
 use crate::support::root;
-use armcal::pipeline::Pipeline;
 use armcal::progress::Progress;
 use armcal::score::nominal_model;
-use armcal::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_config::Pipeline;
 use armcal_lab::scenario::{Design, Scenario};
+use armcal_pipeline as story;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -8,6 +8,9 @@
 
 mod support;
 
+/// Do the rooms of every crate lean on each other one way?
+mod architecture;
+
 /// Does the main job on the shipped fixtures give the paper's picture, and points the fit never saw?
 mod paper_rig;
 

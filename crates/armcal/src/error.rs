@@ -1,45 +1,21 @@
 //! Everything that stops a command, in words that say what was being done and to what.
 
+use armcal_stages::RunError;
 use std::path::PathBuf;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum Error {
-    /// A file of the pipeline could not be read.
-    #[error("reading the {what} {}: {source}", path.display())]
-    ReadFile {
-        /// `pipeline`, `board`, `DH model`, ...
-        what: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    /// A file of the pipeline is not there, and the pipeline says where its data come from.
-    #[error("{source}; the pipeline's data: {data}")]
-    MissingData { source: Box<Error>, data: String },
-    /// The pipeline file is not what it should be.
-    #[error("pipeline {}: {source}", path.display())]
-    PipelineSyntax { path: PathBuf, source: Box<toml::de::Error> },
-    /// Something else where a file that people write belongs: a recording, a folder.
-    #[error("{} is {found}, where a {wanted} belongs: {next}", path.display())]
-    NotText { path: PathBuf, found: &'static str, wanted: &'static str, next: String },
-    /// A recording without a message.
-    #[error(
-        "recording `{recording}` holds no message: there is nothing to calibrate with; was anything recorded?"
-    )]
-    NoMessages { recording: String },
+    /// A run, or what it needs.
+    #[error(transparent)]
+    Run(#[from] RunError),
     /// No pipeline can be proposed.
     #[error("{problem}")]
     Init { problem: String },
     /// A name on the command line that means nothing.
     #[error(transparent)]
     Usage(Box<Error>),
-    /// Two parts of the pipeline contradict each other.
-    #[error("pipeline {}: `{key}` {problem}", path.display())]
-    PipelineContradiction { path: PathBuf, key: String, problem: String },
-    /// A recording that is not what the pipeline relies on.
-    #[error("recording `{recording}`: {problem}")]
-    InRecording { recording: String, problem: String },
     /// What a batch should work on.
     #[error("recordings `{what}`: {why}")]
     Manifest { what: String, why: String },
@@ -61,45 +37,6 @@ pub enum Error {
     /// A defect of armcal itself.
     #[error("recording `{recording}`: armcal itself failed ({why}); please report it with the recording")]
     Internal { recording: String, why: String },
-    /// No dwell became an observation.
-    #[error("none of the {dwells} dwells became an observation; {hint}")]
-    NoObservations { dwells: usize, hint: String },
-    /// Reading a recording.
-    #[error("recording `{recording}`: {source}")]
-    Recording { recording: String, source: armcal_recording::RecordingError },
-    /// Finding dwells.
-    #[error("recording `{recording}`: {source}")]
-    Dwell { recording: String, source: armcal_dwell::DwellError },
-    /// The same readings in two recordings of a pipeline.
-    #[error(
-        "recordings `{first}` and `{second}` hold the same readings at the same times, {overlap_s:.1} s of them: counted \
-         twice they would make the result look surer than it is; remove one of them from [[recordings]], or cut what both hold \
-         out of one"
-    )]
-    RecordedTwice {
-        first: String,
-        second: String,
-        /// How long they are alike [s].
-        overlap_s: f64,
-    },
-    /// Associating dwells to cavities.
-    #[error("recording `{recording}`: {source}")]
-    Association { recording: String, source: armcal_table::TableError },
-    /// A measurement that no dwell was.
-    #[error("[[measure]] `{name}`: {problem}")]
-    Measure { name: String, problem: String },
-    /// Joined tips that cannot be calibrated against each other.
-    #[error("joined tips: {problem}")]
-    TwoArms { problem: String },
-    /// The board file.
-    #[error(transparent)]
-    Board(#[from] armcal_table::TableError),
-    /// The model.
-    #[error(transparent)]
-    Model(#[from] armcal_model::ModelError),
-    /// The fit.
-    #[error(transparent)]
-    Calibrate(#[from] armcal_calibrate::CalibrateError),
     /// Writing results.
     #[error(transparent)]
     Report(#[from] armcal_report::ReportError),
@@ -123,9 +60,6 @@ pub enum Error {
     /// Judging by ISO 9283.
     #[error("judging by ISO 9283: {0}")]
     Iso(#[from] armcal_iso9283::IsoError),
-    /// Looking for the missing effect.
-    #[error(transparent)]
-    Diagnose(#[from] armcal_diagnose::DiagnoseError),
     /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
     BadOption { option: &'static str, value: String, problem: String },
@@ -144,14 +78,6 @@ pub enum Error {
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,
-    /// Nothing can be calibrated, and a mistake of the setup explains it.
-    #[error("{mistakes} (as it is: {source})")]
-    Setup { source: Box<Error>, mistakes: String },
-    /// A mistake of the setup stands before any diagnosis.
-    #[error(
-        "the setup of `{pipeline}` contradicts the data, so no physical effect is looked for [{code}]: {message}"
-    )]
-    SetupFirst { pipeline: String, code: &'static str, message: String },
     /// `armcal transfer` to a session that shows nothing.
     #[error("no dwell of `{pipeline}` has a place that anything could be judged by; see `armcal run` of it")]
     NothingToJudge { pipeline: String },
@@ -206,6 +132,24 @@ pub enum Error {
     Stdout(std::io::Error),
 }
 
+/// What may stop a run stops a command.
+macro_rules! of_run {
+    ($($source:ty),*) => {$(
+        impl From<$source> for Error {
+            fn from(source: $source) -> Error {
+                Error::Run(source.into())
+            }
+        }
+    )*};
+}
+of_run!(
+    armcal_config::ConfigError,
+    armcal_table::TableError,
+    armcal_model::ModelError,
+    armcal_calibrate::CalibrateError,
+    armcal_diagnose::DiagnoseError
+);
+
 /// What is suggested and not added, inside a sentence.
 fn of_this_session(left_out: &[String]) -> String {
     if left_out.is_empty() {
@@ -218,18 +162,6 @@ impl Error {
     /// The same, as a mistake on the command line.
     pub fn of_usage(error: impl Into<Error>) -> Error {
         Error::Usage(Box::new(error.into()))
-    }
-
-    /// Whether it is about a file of the pipeline that is not there.
-    pub(crate) fn is_missing_file(&self) -> bool {
-        let missing = |source: &std::io::Error| source.kind() == std::io::ErrorKind::NotFound;
-        match self {
-            Error::ReadFile { source, .. } => missing(source),
-            Error::Recording { source: armcal_recording::RecordingError::Open { source, .. }, .. } => {
-                missing(source)
-            }
-            _ => false,
-        }
     }
 
     /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.

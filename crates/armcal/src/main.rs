@@ -2,7 +2,8 @@
 //! inadequate, 4 a pool in shards needs another round.
 
 use armcal::cli::Cli;
-use armcal::commands::{self, Outcome};
+use armcal::commands::Outcome;
+use armcal::dispatch::dispatch;
 use armcal::{Error, stdout, threads};
 use armcal_report::TerminalStyle;
 use clap::Parser as _;
@@ -18,7 +19,7 @@ fn main() -> ExitCode {
         }
         Err(mistake) => mistake.exit(),
     };
-    ended(threads::start().and_then(|()| commands::dispatch(&cli)))
+    ended(threads::start().and_then(|()| dispatch(&cli)))
 }
 
 fn ended(result: Result<Outcome, Error>) -> ExitCode {
@@ -32,7 +33,7 @@ fn ended(result: Result<Outcome, Error>) -> ExitCode {
             let _ = writeln!(
                 std::io::stderr(),
                 "error: {}",
-                commands::harmless(&error.to_string(), TerminalStyle::Plain)
+                stdout::harmless(&error.to_string(), TerminalStyle::Plain)
             );
             ExitCode::from(error.exit_code())
         }

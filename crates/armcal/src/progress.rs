@@ -1,6 +1,7 @@
 //! What is being done now, on stderr, when somebody watches.
 
 use armcal_report::printable;
+use armcal_stages::Steps;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write as _;
 use std::time::Duration;
@@ -58,6 +59,12 @@ impl Progress {
     /// Removes the line.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+impl Steps for Progress {
+    fn step(&self, what: &str) {
+        Progress::step(self, what);
     }
 }
 

@@ -1,9 +1,14 @@
-//! The results that a command prints: all of them reach stdout, or the command fails.
+//! What a command prints: results all reach stdout, or the command fails; losses that they have no place for go to stderr.
 
-use crate::commands::{harmless, style};
 use crate::error::Error;
-use std::io::{self, ErrorKind, Write as _};
+use armcal_core::Warning;
+use armcal_report::TerminalStyle;
+use std::borrow::Cow;
+use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Losses told one by one where there is no other place for them.
+const TOLD: usize = 20;
 
 /// Whether stdout was closed when the process began. Only `main` can see that: before it runs, the standard library opens
 /// `/dev/null` in the place of a closed descriptor, where everything can be written and nothing arrives.
@@ -30,5 +35,81 @@ pub fn written(write: impl FnOnce(&mut dyn io::Write) -> io::Result<()>) -> Resu
     match write(&mut out).and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::Stdout(e)),
         _ => Ok(()),
+    }
+}
+
+/// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and, where
+/// we use them, colours stay; the others become `\u001b`, which also leaves JSON what it is.
+pub fn harmless(text: &str, style: TerminalStyle) -> Cow<'_, str> {
+    // Overrides of the writing direction would let a name rewrite the rest of its line.
+    let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_harmless = |c: char| matches!(c, '\n' | '\t') || !c.is_control() && !turns(c);
+    if text.chars().all(is_harmless) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let colour = colour_code(rest).filter(|_| style == TerminalStyle::Colour);
+        let taken = colour.unwrap_or(&rest[..c.len_utf8()]);
+        match is_harmless(c) || colour.is_some() {
+            true => shown.push_str(taken),
+            false => shown.push_str(&format!("\\u{:04x}", u32::from(c))),
+        }
+        rest = &rest[taken.len()..];
+    }
+    Cow::Owned(shown)
+}
+
+/// The colour code a text begins with: `ESC [ numbers m`.
+fn colour_code(text: &str) -> Option<&str> {
+    let numbers = text.strip_prefix("\u{1b}[")?;
+    let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
+    numbers[end..].starts_with('m').then(|| &text[..end + "\u{1b}[m".len()])
+}
+
+/// Colours on a terminal, unless the user asked for none.
+pub fn style() -> TerminalStyle {
+    #[allow(clippy::disallowed_methods, reason = "nothing is written")]
+    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    if colour { TerminalStyle::Colour } else { TerminalStyle::Plain }
+}
+
+/// Says on stderr what recordings lost, where results have no place for it.
+pub fn tell(lost: &[Warning]) {
+    let mut lines =
+        lost.iter().take(TOLD).map(|w| format!("{}: {w}\n", w.severity.word())).collect::<String>();
+    if lost.len() > TOLD {
+        lines += &format!("and {} more; `armcal inspect` lists them\n", lost.len() - TOLD);
+    }
+    // A closed stderr leaves nowhere to complain to; the exit code still tells.
+    let _ = std::io::stderr().write_all(harmless(&lines, TerminalStyle::Plain).as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::harmless;
+    use armcal_report::TerminalStyle::{Colour, Plain};
+
+    #[test]
+    fn only_colours_and_lines_reach_the_terminal_as_they_are() {
+        let ours = "\u{1b}[1mtitle\u{1b}[0m\n\tcell \u{1b}[38;5;11mü\u{1b}[39m";
+        assert_eq!(harmless(ours, Colour), ours);
+        assert_eq!(harmless("\u{1b}[1mtitle\n", Plain), "\\u001b[1mtitle\n");
+        // Title, clipboard, screen, cursor, a C1 introducer, backspaces, carriage return.
+        for (evil, shown) in [
+            ("\u{1b}]0;pwned\u{7}", "\\u001b]0;pwned\\u0007"),
+            ("\u{1b}[2J\u{1b}[H", "\\u001b[2J\\u001b[H"),
+            ("\u{9b}31mx", "\\u009b31mx"),
+            ("ab\u{8}\u{7f}\r", "ab\\u0008\\u007f\\u000d"),
+            ("\u{1b}", "\\u001b"),
+            ("a\u{202e}b", "a\\u202eb"),
+            ("\u{1b}[31", "\\u001b[31"),
+        ] {
+            assert_eq!(harmless(evil, Colour), shown);
+        }
+        let json = serde_json::json!({ "name": "a\u{9b}b\u{7f}" });
+        let printed = serde_json::from_str::<serde_json::Value>(&harmless(&json.to_string(), Plain));
+        assert_eq!(printed.ok(), Some(json));
     }
 }

@@ -125,3 +125,29 @@ impl std::fmt::Display for Unit {
         f.write_str(self.symbol())
     }
 }
+
+/// A length in millimetres: two decimals, more where two would hide the digits that matter.
+pub fn millimetres(metres: f64) -> String {
+    let mm = metres * 1e3;
+    match mm.abs() {
+        a if !a.is_finite() => "-".into(),
+        a if a >= 0.095 => format!("{mm:.2}"),
+        a if a < 1e-9 => "0.00".into(),
+        a if a >= 0.0095 => format!("{mm:.3}"),
+        a if a >= 0.00095 => format!("{mm:.4}"),
+        _ => format!("{mm:.1e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_lengths_keep_two_digits() {
+        assert_eq!(millimetres(0.123_456), "123.46");
+        assert_eq!(millimetres(0.000_034_2), "0.034");
+        assert_eq!(millimetres(0.000_003_42), "0.0034");
+        assert_eq!((millimetres(0.0), millimetres(f64::NAN)), ("0.00".into(), "-".into()));
+    }
+}

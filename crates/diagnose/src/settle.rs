@@ -110,7 +110,7 @@ fn settled(
     for k in near(found, &room, config) {
         refits.extend(rooms.score(&with(k), &room).map(|score| (k, score)));
     }
-    let Some(nothing) = rooms.score(others, &room) else { return Some(found.clone()) };
+    let nothing = rooms.score(others, &room).unwrap_or_else(|| room.nothing().clone());
     let refits = one_of_each_cause(refits, &room, config);
     let (set, instead_of) = answer(found, &refits, &nothing, &room, config);
     let (mut judged, mut grade) = (found.judged.clone(), found.grade);

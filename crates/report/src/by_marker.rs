@@ -1,8 +1,8 @@
 //! Errors by what was measured: the tip and each of its markers, by a sensor or against fixed places.
 
 use crate::run::Run;
-use crate::text::millimetres;
 use armcal_core::Observation;
+use armcal_core::units::millimetres;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -4,8 +4,9 @@ use crate::pairing::{Paired, Unpaired, paired};
 use crate::past_run::{PastResidual, PastRun};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::proto;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
+use armcal_core::units::millimetres;
 use comfy_table::Cell;
 use serde::Serialize;
 

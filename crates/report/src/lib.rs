@@ -82,12 +82,10 @@ pub use same_dwells::also_in;
 pub use sizes::size as amplitude_text;
 pub use summary::{SCHEMA, summary_json};
 pub use terminal::{Detail, terminal};
-pub use text::{conclusion, millimetres, printable};
+pub use text::{conclusion, printable};
 pub use two_arms::Closing;
 pub use verification::{
-    IsoReport, On, PathSample, Published, TipMount, Told, Verification, VerifiedRecording, VerifyConfig,
-    verification_files, verification_json, verification_paths, verification_text,
+    IsoReport, PathSample, Told, Verification, VerifiedRecording, verification_files, verification_json,
+    verification_paths, verification_text,
 };
-pub use write::{
-    InputMessages, OutputConfig, pool_files, run_files, write_all, write_brief, write_pool_brief,
-};
+pub use write::{pool_files, run_files, write_all, write_brief, write_pool_brief};

@@ -2,8 +2,9 @@
 //! where it does not. Of any other run nothing.
 
 use crate::run::Run;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use armcal_calibrate::{INADEQUATE, PairedDifference};
+use armcal_core::units::millimetres;
 
 /// What the calibration is worth on another day.
 pub(crate) fn transfer(run: &Run) -> String {

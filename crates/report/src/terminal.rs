@@ -4,10 +4,11 @@ use crate::by_marker::{MarkerErrors, by_marker};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::{Run, Status, VERSION};
 use crate::story::{SHOWN, Story};
-use crate::text::{estimate_shown, millimetres, printable, remark};
+use crate::text::{estimate_shown, printable, remark};
 use crate::told_warning::ToldWarning;
 use crate::two_arms::{about, errors_are};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
+use armcal_core::units::millimetres;
 use armcal_core::{ErrorStats, Severity};
 use comfy_table::Cell;
 

@@ -2,6 +2,7 @@
 
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::Unit;
+use armcal_core::units::millimetres;
 
 /// The result in one sentence, about held-out points where there are any.
 pub fn conclusion(calibration: &Calibration) -> String {
@@ -49,19 +50,6 @@ fn change(side: &SideErrors) -> String {
         }
         std::cmp::Ordering::Less => format!("rises from {before} to {after} mm"),
         std::cmp::Ordering::Equal => format!("stays at {after} mm"),
-    }
-}
-
-/// A length in millimetres: two decimals, more where two would hide the digits that matter.
-pub fn millimetres(metres: f64) -> String {
-    let mm = metres * 1e3;
-    match mm.abs() {
-        a if !a.is_finite() => "-".into(),
-        a if a >= 0.095 => format!("{mm:.2}"),
-        a if a < 1e-9 => "0.00".into(),
-        a if a >= 0.0095 => format!("{mm:.3}"),
-        a if a >= 0.00095 => format!("{mm:.4}"),
-        _ => format!("{mm:.1e}"),
     }
 }
 
@@ -152,14 +140,6 @@ mod tests {
         assert_eq!(mm(-1e-6, 0.000_588), ["0.00", "0.59"]);
         assert_eq!(mm(0.5, f64::NAN), ["500.0000", "-"]);
         assert_eq!(mm(0.5, 1e-9), ["500.0000", "1.0e-6"]);
-    }
-
-    #[test]
-    fn small_lengths_keep_two_digits() {
-        assert_eq!(millimetres(0.123_456), "123.46");
-        assert_eq!(millimetres(0.000_034_2), "0.034");
-        assert_eq!(millimetres(0.000_003_42), "0.0034");
-        assert_eq!((millimetres(0.0), millimetres(f64::NAN)), ("0.00".into(), "-".into()));
     }
 
     #[test]

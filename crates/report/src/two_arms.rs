@@ -1,7 +1,8 @@
 //! What is particular to a run with tips that are joined.
 
 use crate::run::Run;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
+use armcal_core::units::millimetres;
 use armcal_core::{Against, Observation};
 use serde::Serialize;
 

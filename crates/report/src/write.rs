@@ -12,9 +12,9 @@ use crate::points::points;
 use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
 use crate::{ReportError, Run, summary_json};
+use armcal_config::{InputMessages, OutputConfig};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError, make_folder};
-use serde::{Deserialize, Serialize};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -26,35 +26,6 @@ const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
 pub(crate) const LAYOUT: &str = "foxglove-layout.json";
 pub(crate) const LAYOUT_LEGACY: &str = "foxglove-layout-legacy.json";
-
-/// The `[output]` section of a pipeline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct OutputConfig {
-    /// What `run.mcap` holds of the input; default `"copy"`.
-    pub input: InputMessages,
-}
-
-impl OutputConfig {
-    /// The recordings whose messages are copied into `run.mcap`.
-    pub fn copied<'r>(&self, recordings: &'r [Recording]) -> &'r [Recording] {
-        match self.input {
-            InputMessages::Copy => recordings,
-            InputMessages::Reference => &[],
-        }
-    }
-}
-
-/// What `run.mcap` holds of the input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum InputMessages {
-    /// Every sound message, attachment and metadata record, untouched.
-    #[default]
-    Copy,
-    /// Only the files' names and hashes.
-    Reference,
-}
 
 /// Writes `run.mcap`, `report.html`, `summary.json`, `parameters.toml`, the calibrated model (for its own
 /// tools, and as `model.json` with its effects), `observations.json` for `armcal pool` (of a pool `pool.json`), Foxglove layouts and the

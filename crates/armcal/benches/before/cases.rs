@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::process::{self, Ended};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -33,6 +34,21 @@ const SEED: usize = 7001;
 /// Shipped pipelines whose diagnosis takes minutes: run without.
 const LONG: &str = "ur10";
 
+/// In the place of the pipeline's path.
+const PIPELINE: &str = "";
+/// Its recordings, a path a line.
+const RECORDINGS: &str = "../recordings.txt";
+/// Commands in their order: words, what they read, the folder they write to.
+const COMMANDS: [(&str, &[&str], Option<&str>); 7] = [
+    ("run --verbose", &[PIPELINE], Some("run")),
+    ("check", &[PIPELINE], Some("check")),
+    ("plan --json", &[PIPELINE], None),
+    ("verify", &["run", PIPELINE], Some("verify")),
+    ("pool", &[PIPELINE, "run"], Some("pool")),
+    ("compare", &["run", "check"], None),
+    ("batch --pipeline", &[PIPELINE, RECORDINGS], Some("campaign")),
+];
+
 /// One pipeline with everything it reads.
 pub struct Case {
     pipeline: PathBuf,
@@ -43,13 +59,13 @@ pub struct Case {
 pub struct Run {
     /// Where its files are.
     pub folder: PathBuf,
-    /// What it printed, without the folder it wrote to.
+    /// What its commands printed, without the folder they wrote to.
     pub said: String,
-    /// Exit code.
-    pub status: Option<i32>,
+    /// Exit codes, command by command.
+    pub status: Vec<Option<i32>>,
     /// Least processor time of all repeats [s].
     pub cpu_s: f64,
-    /// High-water mark of its memory in the first run [MiB].
+    /// Highest high-water mark of their memory in the first round [MiB].
     pub peak_mib: f64,
 }
 
@@ -78,7 +94,12 @@ impl Case {
             Some(at) => Some(rig(name, SEED + at, &results.join("rig"), program)?),
             None => shipped(&root.join("pipelines"), name, &results)?,
         };
-        Ok(pipeline.map(|pipeline| Case { pipeline, results }))
+        let Some(pipeline) = pipeline else { return Ok(None) };
+        let here = pipeline.parent().ok_or("a pipeline is in a folder")?;
+        let all = recorded(&std::fs::read_to_string(&pipeline)?.parse()?, here);
+        let lines: String = all.iter().map(|path| format!("{}\n", path.display())).collect();
+        std::fs::write(results.join("recordings.txt"), lines)?;
+        Ok(Some(Case { pipeline, results }))
     }
 
     /// Both programs in turn, so that what else the machine does meets both.
@@ -92,14 +113,34 @@ impl Case {
         Ok(runs)
     }
 
+    /// The run, then what else makes something of the pipeline or of that result.
     fn once(&self, programs: &[PathBuf; 2], k: usize) -> Result<Run> {
         let folder = self.results.join(["before", "now"][k]);
-        let mut command = Command::new(&programs[k]);
-        command.args(["run", "--verbose"]).arg(&self.pipeline).arg("--out").arg(&folder);
-        let Ended { output, cpu_s, peak_mib } = process::run(command.env("RAYON_NUM_THREADS", "1"))?;
-        let text = String::from_utf8_lossy(&output.stdout);
-        let said = text.replace(&folder.display().to_string(), "OUT");
-        Ok(Run { folder, said, status: output.status.code(), cpu_s, peak_mib })
+        let place = |name: &str| folder.join(name).into_os_string();
+        let mut run = Run {
+            folder: folder.clone(),
+            said: String::new(),
+            status: Vec::new(),
+            cpu_s: 0.0,
+            peak_mib: 0.0,
+        };
+        for (command, results, out) in COMMANDS {
+            let mut arguments: Vec<OsString> = command.split(' ').map(OsString::from).collect();
+            arguments.extend(
+                results
+                    .iter()
+                    .map(|name| if *name == PIPELINE { self.pipeline.clone().into() } else { place(name) }),
+            );
+            arguments.extend(out.iter().flat_map(|out| ["--out".into(), place(out)]));
+            let mut process = Command::new(&programs[k]);
+            let Ended { output, cpu_s, peak_mib } =
+                process::run(process.args(arguments).env("RAYON_NUM_THREADS", "1"))?;
+            let text = String::from_utf8_lossy(&output.stdout);
+            run.said += &text.replace(&folder.display().to_string(), "OUT");
+            run.status.push(output.status.code());
+            (run.cpu_s, run.peak_mib) = (run.cpu_s + cpu_s, run.peak_mib.max(peak_mib));
+        }
+        Ok(run)
     }
 }
 
@@ -119,12 +160,8 @@ fn shipped(pipelines: &Path, name: &str, results: &Path) -> Result<Option<PathBu
     let path = pipelines.join(name).with_extension("toml");
     let text = std::fs::read_to_string(&path)?;
     let mut value: toml::Table = text.parse()?;
-    let recorded = |value: &toml::Value| -> Vec<PathBuf> {
-        let paths = value.get("paths").and_then(toml::Value::as_array).into_iter().flatten();
-        paths.filter_map(toml::Value::as_str).map(|p| pipelines.join(p)).collect()
-    };
-    let recordings = value.get("recordings").and_then(toml::Value::as_array).into_iter().flatten();
-    if recordings.flat_map(recorded).any(|p| !p.to_string_lossy().contains('*') && !p.exists()) {
+    let missing = |p: &PathBuf| !p.to_string_lossy().contains('*') && !p.exists();
+    if recorded(&value, pipelines).iter().any(missing) {
         return Ok(None);
     }
     if !name.starts_with(LONG) {
@@ -136,6 +173,16 @@ fn shipped(pipelines: &Path, name: &str, results: &Path) -> Result<Option<PathBu
     let copy = results.join("pipeline.toml");
     std::fs::write(&copy, toml::to_string(&value)?)?;
     Ok(Some(copy))
+}
+
+/// Paths of the recordings of a pipeline in this folder.
+fn recorded(pipeline: &toml::Table, folder: &Path) -> Vec<PathBuf> {
+    let paths = |value: &toml::Value| -> Vec<PathBuf> {
+        let paths = value.get("paths").and_then(toml::Value::as_array).into_iter().flatten();
+        paths.filter_map(toml::Value::as_str).map(|p| folder.join(p)).collect()
+    };
+    let recordings = pipeline.get("recordings").and_then(toml::Value::as_array).into_iter().flatten();
+    recordings.flat_map(paths).collect()
 }
 
 /// Makes the paths of a pipeline absolute, so that its copy finds them.

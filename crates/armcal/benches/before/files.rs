@@ -61,11 +61,7 @@ impl Difference {
 /// Compares JSON files number by number, all others byte by byte.
 pub fn compared(before: &Path, now: &Path) -> Result<Difference> {
     let mut told = Difference::default();
-    let names = |folder: &Path| -> Result<BTreeSet<String>> {
-        let entries = std::fs::read_dir(folder)?;
-        let name = |e: std::io::Result<std::fs::DirEntry>| Ok(e?.file_name().to_string_lossy().into_owned());
-        entries.map(name).collect()
-    };
+    let names = |folder: &Path| relative(folder, Path::new(""));
     let (old, new) = (names(before)?, names(now)?);
     if let Some(name) = old.symmetric_difference(&new).next() {
         told.differs(format!("{name} is in one of them only"));
@@ -83,4 +79,18 @@ pub fn compared(before: &Path, now: &Path) -> Result<Difference> {
         }
     }
     Ok(told)
+}
+
+/// Paths of all files in a folder and its folders, from that folder.
+fn relative(folder: &Path, inner: &Path) -> Result<BTreeSet<String>> {
+    let mut all = BTreeSet::new();
+    for entry in std::fs::read_dir(folder.join(inner))? {
+        let entry = entry?;
+        let path = inner.join(entry.file_name());
+        match entry.file_type()?.is_dir() {
+            true => all.extend(relative(folder, &path)?),
+            false => drop(all.insert(path.to_string_lossy().into_owned())),
+        }
+    }
+    Ok(all)
 }

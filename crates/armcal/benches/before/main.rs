@@ -1,8 +1,8 @@
 //! Whether this tree gives what an older commit gave, and at what cost: both programs in one run, on the same inputs.
 //!
 //! `cargo bench -p armcal --bench before -- REVISION` builds that revision (default `HEAD`: what is not committed is compared
-//! with what is) in a worktree under `target/before`, runs it and this tree over every shipped pipeline and twenty simulated
-//! rigs, compares every number of every file they leave, and prints processor times and memory side by side. It ends with an error
+//! with what is) in a worktree under `target/before`, gives it and this tree every shipped pipeline and twenty simulated rigs to
+//! run, check, plan, verify, pool and compare, compares every number of every file they leave, and prints processor times and memory side by side. It ends with an error
 //! where anything moved or the new program is more than 5 % slower over all cases. `--tolerance 1e-12` allows numbers to move
 //! by that share of the larger one; `--repeats N` (3) runs each case so often and takes the fastest; words that are no option are
 //! cases to run alone.
@@ -83,7 +83,7 @@ fn compared(before: &Run, now: &Run, tolerance: f64) -> Result<Compared> {
     };
     let said = (before.said != now.said).then(|| "the terminal says something else".to_owned());
     let status = (before.status != now.status)
-        .then(|| format!("exit code {:?} is now {:?}", before.status, now.status));
+        .then(|| format!("exit codes {:?} are now {:?}", before.status, now.status));
     let others: Vec<String> = [status, said, difference.other].into_iter().flatten().collect();
     others.iter().for_each(|other| words += &format!("; {other}"));
     let moved = !others.is_empty() || difference.largest.is_some_and(|(change, _)| change > tolerance);

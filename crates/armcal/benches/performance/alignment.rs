@@ -4,11 +4,11 @@ use crate::campaign::{self, Arm, between, drawn, normal};
 use crate::clock::{Spent, median, spent};
 use crate::page::{Bar, Section, Table};
 use crate::{Options, Result};
-use armcal::pipeline::Pipeline;
-use armcal::stages::doubts::Doubts;
-use armcal::stages::frames;
+use armcal_config::Pipeline;
 use armcal_core::{FeatureId, JointSamples, PoseSamples};
 use armcal_dwell::align_clocks;
+use armcal_stages::doubts::Doubts;
+use armcal_stages::frames;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 

@@ -3,7 +3,6 @@
 use crate::clock::{self, Spent};
 use crate::{Result, process};
 use armcal::cli::Cli;
-use armcal::commands;
 use clap::Parser as _;
 use std::ffi::OsStr;
 use std::process::Command;
@@ -23,7 +22,7 @@ pub struct Cost {
 /// The child's side: runs the command, and ends stderr with its high-water mark [MiB] and processor time [s].
 pub fn run(arguments: &[String]) -> Result<()> {
     let cli = Cli::try_parse_from([String::from("armcal")].iter().chain(arguments))?;
-    commands::dispatch(&cli)?;
+    armcal::dispatch::dispatch(&cli)?;
     let peak_mib = process::high_water_mib("/proc/self/status").ok_or("no VmHWM")?;
     eprintln!("\n{CHILD} {peak_mib} {}", clock::process_cpu_s()?);
     Ok(())

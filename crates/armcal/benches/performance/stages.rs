@@ -5,12 +5,13 @@ use crate::clock::{Spent, spent};
 use crate::page::{Section, Table};
 use crate::walk::walk;
 use crate::{Options, Result, batch, campaign};
-use armcal::pipeline::Pipeline;
 use armcal::progress::Progress;
-use armcal::refits::add_refits;
-use armcal::stages::{frames, perceive};
-use armcal::{setup, story};
+use armcal_config::Pipeline;
+use armcal_pipeline as story;
+use armcal_pipeline::add_refits;
 use armcal_report::write_all;
+use armcal_setup as setup;
+use armcal_stages::{frames, perceive};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
@@ -101,7 +102,7 @@ fn costs(title: String, pipeline: &Path) -> Result<Costs> {
     let (done, reading) = spent(read);
     done?;
     let settled = story::settle(&pipeline, &silent)?;
-    let (fitted, fitting) = spent(|| story::fit_places(&settled.inputs, &mut |_| ()));
+    let (fitted, fitting) = spent(|| armcal_stages::fit_places(&settled.inputs, &mut |_| ()));
     let fitted = fitted?;
     let values = fitted.calibration.fit.values();
     let observations: Vec<_> = fitted.observations.iter().collect();

@@ -2,9 +2,11 @@
 
 use super::Manifest;
 use crate::error::Error;
-use crate::pipeline::{Pipeline, RecordingEntry};
+use armcal_config::ConfigError;
+use armcal_config::{Pipeline, RecordingEntry};
 use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
 use armcal_report::VERSION;
+use armcal_stages::RunError;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::io::Read as _;
@@ -51,7 +53,7 @@ impl Keys {
         for (what, path) in model.map(|p| ("model", p)).chain(board.map(|p| ("board", p))) {
             let path = pipeline.resolve(path);
             let text = input::read_to_string(&path, input::Kind::Text);
-            parts.push(text.map_err(|source| Error::ReadFile { what, path, source })?);
+            parts.push(text.map_err(|source| ConfigError::ReadFile { what, path, source })?);
         }
         Ok(Keys { common: hash(parts), out: out.to_owned() })
     }
@@ -66,7 +68,7 @@ impl Keys {
     /// # Errors
     /// A file that cannot be read.
     pub fn of_recording(&self, entry: &RecordingEntry) -> Result<String, Error> {
-        let in_recording = |source| Error::Recording { recording: entry.name(), source };
+        let in_recording = |source| RunError::Recording { recording: entry.name(), source };
         let mut parts = vec![self.common.clone(), declared(entry)];
         for path in &entry.paths {
             parts.push(self.identity(path).map_err(in_recording)?);

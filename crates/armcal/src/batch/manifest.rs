@@ -2,7 +2,8 @@
 
 use super::pattern::matching;
 use crate::error::Error;
-use crate::pipeline::RecordingEntry;
+use armcal_config::ConfigError;
+use armcal_config::RecordingEntry;
 use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
 use armcal_table::Tilt;
 use serde::Deserialize;
@@ -44,13 +45,13 @@ impl Manifest {
     /// # Errors
     /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
     pub fn read(path: &Path) -> Result<Manifest, Error> {
-        let at = |source| Error::ReadFile { what: "manifest", path: path.to_owned(), source };
+        let at = |source| ConfigError::ReadFile { what: "manifest", path: path.to_owned(), source };
         let text = input::read_to_string(path, input::Kind::Data).map_err(at)?;
         let folder = std::path::absolute(path).map_err(at)?;
         let folder = folder.parent().unwrap_or(Path::new("")).to_owned();
         let file = if path.extension().is_some_and(|e| e == "toml") {
             toml::from_str(&text)
-                .map_err(|source| Error::PipelineSyntax { path: path.to_owned(), source: Box::new(source) })?
+                .map_err(|source| ConfigError::Syntax { path: path.to_owned(), source: Box::new(source) })?
         } else {
             let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
             ManifestFile {

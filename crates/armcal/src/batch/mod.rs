@@ -22,8 +22,8 @@ pub use shard::Shard;
 pub(crate) use store::write_one;
 
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
+use armcal_config::Pipeline;
 use armcal_report::{Campaign, FailedRecording, write_campaign};
 use shard::{Done, Receipt};
 use std::collections::BTreeSet;

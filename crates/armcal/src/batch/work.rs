@@ -3,9 +3,9 @@
 use super::key::Keys;
 use super::store::Store;
 use crate::error::Error;
-use crate::pipeline::{Pipeline, RecordingEntry};
 use crate::progress::Progress;
-use crate::story;
+use armcal_config::{Pipeline, RecordingEntry};
+use armcal_pipeline as story;
 use armcal_report::{FailedRecording, campaign_row, write_all, write_brief};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -47,7 +47,7 @@ fn make(
     let (mut run, recordings) = story::settle(pipeline, &silent)?.diagnosed(pipeline, &silent);
     let made = store.begin()?;
     if full {
-        crate::refits::add_refits(&mut run, pipeline, &silent)?;
+        armcal_pipeline::add_refits(&mut run, pipeline, &silent)?;
         write_all(&run, &recordings, made.path(), &pipeline.output)?;
     } else {
         write_brief(&run, made.path())?;

@@ -159,7 +159,7 @@ fn moved(shift: &Shift, limits: &Limits) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::CheckSection;
+    use armcal_config::CheckSection;
     use armcal_core::RollPitchYaw;
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
     use serde_json::{Value, json};

@@ -1,12 +1,13 @@
 //! The limits of a pipeline, ready to judge.
 
 use super::reference::Calibrated;
-use super::section::{CheckSection, Surroundings};
 use crate::error::Error;
-use crate::pipeline::{Pipeline, RecordingEntry};
-use crate::stages::frames;
 use armcal_calibrate::HoldoutConfig;
+use armcal_config::ConfigError;
+use armcal_config::{CheckSection, Surroundings};
+use armcal_config::{Pipeline, RecordingEntry};
 use armcal_model::EffectSpec;
+use armcal_stages::frames;
 use std::path::Path;
 
 /// A change up to this many joint standard deviations is chance, unless the file says otherwise.
@@ -35,22 +36,19 @@ impl Limits {
         if !section.has_limits() {
             return Err(Error::NoLimits { path: path.to_owned() });
         }
-        let refused = |key: String, problem: String| Error::PipelineContradiction {
-            path: path.to_owned(),
-            key,
-            problem,
-        };
+        let refused =
+            |key: String, problem: String| ConfigError::Contradiction { path: path.to_owned(), key, problem };
         let recordings: Vec<String> = pipeline.recordings.iter().map(RecordingEntry::name).collect();
         let holdout = pipeline.holdout != HoldoutConfig::None;
         let around = Surroundings { recordings: &recordings, holdout, diagnosis: pipeline.diagnosis.enabled };
         if let Some((key, problem)) = section.contradiction(&around) {
-            return Err(refused(key, problem));
+            return Err(refused(key, problem).into());
         }
         let (_, chain) = frames::nominal_chain(pipeline)?;
         let joints = chain.joint_names();
         if let Some((joint, _)) = section.teeth.iter().flatten().find(|(joint, _)| !joints.contains(joint)) {
             let problem = format!("names no joint; they are {}", joints.join(", "));
-            return Err(refused(format!("check.teeth.{joint}"), problem));
+            return Err(refused(format!("check.teeth.{joint}"), problem).into());
         }
         let allowed = section.allowed_effects.iter().flatten().map(|text| EffectSpec::parse(text, joints));
         let allowed = allowed

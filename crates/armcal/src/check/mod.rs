@@ -1,6 +1,6 @@
 //! `[check]`: whether a result keeps the limits of its pipeline file, for a job that runs on every change.
 //!
-//! [`section`] is what the user writes; [`Limits`] the same, ready to judge: its reference read, its effects understood.
+//! [`CheckSection`](armcal_config::CheckSection) is what the user writes; [`Limits`] the same, ready to judge: its reference read, its effects understood.
 //! [`judge`] makes one [`Check`] of every limit: [`numbers`] errors, dwells and warnings, [`verdict`] the diagnosis,
 //! [`shifts`] parameters and [`frame_shifts`] base, tip and boards against the [`reference`](mod@reference). What a broken
 //! limit says about its cause comes from [`reasons`]. The [`Judged`] whole is shown by [`text`], [`junit`] and [`markdown`].
@@ -14,7 +14,6 @@ mod measured;
 mod numbers;
 mod reasons;
 pub mod reference;
-pub mod section;
 mod shifts;
 pub mod text;
 mod verdict;
@@ -22,4 +21,3 @@ mod verdict;
 pub use judged::{Judged, Judgement, SCHEMA, judge};
 pub use limits::Limits;
 pub use measured::{Check, Measured};
-pub use section::{CheckSection, MaxWarnings};

@@ -3,24 +3,24 @@
 use super::run::results;
 use super::{Outcome, may_write, print, style};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use crate::extended::{extend, set_of};
 use crate::progress::Progress;
-use crate::stages::frames;
-use crate::story::{self, Fitted, Settled};
 use crate::transfer::{LeftOut, Transfer, transfers};
 use crate::view;
+use armcal_config::Pipeline;
 use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
-use armcal_model::{EffectSpec, EffectTable, tables_toml};
-use armcal_recording::{atomic, is_marked, may_put, sealed};
+use armcal_model::EffectSpec;
+use armcal_pipeline::{self as story, Settled};
+use armcal_recording::atomic;
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, nested_sentence, write_all};
+use armcal_stages::Fitted;
+use armcal_stages::frames;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// First line of an extended pipeline whose original has no such line.
-const MARK: &str = "# armcal.pipeline/1, extended by `armcal add`";
 /// The word for "whatever the diagnosis suggests".
 const SUGGESTED: &str = "suggested";
 
@@ -172,50 +172,4 @@ fn chosen(
         return Err(Error::NothingSuggested { pipeline: pipeline.name.clone(), left_out: reasons });
     }
     Ok(Chosen { new, sets, transfer, left_out, nested })
-}
-
-/// A pipeline with more effects, and where it is written.
-pub struct Extended {
-    /// The pipeline.
-    pub pipeline: Pipeline,
-    /// Its file.
-    pub path: PathBuf,
-}
-
-/// Appends `[[effects]]` tables to the pipeline's own text, so that comments and order stay as the user wrote them.
-///
-/// `original` is the pipeline's file; the extended one goes to `write`, or beside it.
-pub fn extend(
-    pipeline: &Pipeline,
-    original: &Path,
-    write: Option<&Path>,
-    (new, sets): (&[EffectSpec], &[Vec<String>]),
-) -> Result<Extended, Error> {
-    let table = |effect: &EffectSpec| {
-        let one_of = set_of(&effect.to_string(), sets).cloned().unwrap_or_default();
-        EffectTable { one_of, ..EffectTable::from(effect) }
-    };
-    let tables = tables_toml(new.iter().map(table).collect()).map_err(Error::Toml)?;
-    let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
-    // By the mark its own maker knows the file again, and what somebody changes in it.
-    let marked = if is_marked(&text) { text } else { format!("{MARK}\n{text}") };
-    let text = sealed(&marked).into_owned();
-    let path = write.map_or_else(|| beside(original, new), Path::to_owned);
-    let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
-    may_put(&path, pipeline.text.as_bytes()).map_err(Error::Output)?;
-    Ok(Extended { pipeline, path })
-}
-
-/// The names that are the same answer as one, where there are several.
-fn set_of<'s>(name: &str, sets: &'s [Vec<String>]) -> Option<&'s Vec<String>> {
-    sets.iter().find(|set| set.len() > 1 && set.iter().any(|other| other == name))
-}
-
-/// `paper.toml` and `backlash:1` give `paper+backlash-1.toml`.
-fn beside(pipeline: &Path, new: &[EffectSpec]) -> PathBuf {
-    let stem = pipeline.file_stem().unwrap_or_default().to_string_lossy();
-    let safe = |c: char| if c.is_ascii_alphanumeric() || "_.".contains(c) { c } else { '-' };
-    let names: String =
-        new.iter().map(|e| format!("+{}", e.to_string().chars().map(safe).collect::<String>())).collect();
-    pipeline.with_file_name(format!("{stem}{names}.toml"))
 }

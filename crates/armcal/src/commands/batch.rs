@@ -3,14 +3,14 @@
 use super::{Outcome, may_write, print, style};
 use crate::batch::{self, Manifest, Request, Shard, receipt_file};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
+use armcal_config::Pipeline;
 use armcal_recording::input;
 use armcal_report::{Campaign, Status, campaign_files, campaign_json, campaign_text};
 use std::path::{Path, PathBuf};
 
 /// What a user asked for.
-pub(super) struct Job<'a> {
+pub(crate) struct Job<'a> {
     pub manifest: Manifest,
     pub pipeline: Option<&'a Path>,
     pub out: &'a Path,
@@ -21,7 +21,7 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     fn pipeline(&self) -> Result<Pipeline, Error> {
         let path = self.pipeline.or(self.manifest.pipeline.as_deref()).ok_or(Error::NoPipeline)?;
-        Pipeline::load_for_others(path)
+        Ok(Pipeline::load_for_others(path)?)
     }
 
     /// Notes the recordings, so that no result is begun in the place of one.
@@ -36,7 +36,7 @@ impl Job<'_> {
 }
 
 /// All of it.
-pub(super) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
+pub(crate) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
     let pipeline = job.pipeline()?;
     job.note_inputs();
     may_write(campaign_files(job.out))?;
@@ -50,7 +50,7 @@ pub(super) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
 }
 
 /// One share.
-pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> {
+pub(crate) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> {
     let shard = shard_of(shard)?;
     let pipeline = job.pipeline()?;
     job.note_inputs();
@@ -64,7 +64,7 @@ pub(super) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
 }
 
 /// The share that was asked for, or that of this task of a Slurm job array.
-pub(super) fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
+pub(crate) fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
     match (shard, Shard::of_slurm()) {
         (Some(text), _) => text.parse().map_err(Error::Shard),
         (None, Some(of_slurm)) => of_slurm.map_err(Error::Shard),
@@ -73,7 +73,7 @@ pub(super) fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
 }
 
 /// The shares together.
-pub(super) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
+pub(crate) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
     may_write(campaign_files(out))?;
     let (campaign, written) = batch::reduce(out)?;
     show(&campaign, out, &written, json)

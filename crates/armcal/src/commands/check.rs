@@ -4,9 +4,10 @@ use super::run::results;
 use super::{Outcome, may_write, print};
 use crate::check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::{story, view};
+use crate::view;
+use armcal_config::Pipeline;
+use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::{printable, write_all};
 use clap::Args;
@@ -38,7 +39,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     // Loaded first: the files it names are inputs.
     let pipeline = Pipeline::load(&request.pipeline);
     may_write([&request.junit, &request.markdown].into_iter().flatten())?;
-    match pipeline.and_then(|pipeline| judged(request, &pipeline)) {
+    match pipeline.map_err(Error::from).and_then(|pipeline| judged(request, &pipeline)) {
         Ok(judged) => {
             write(&request.junit, || junit::junit(&judged))?;
             write(&request.markdown, || Ok(markdown::markdown(&judged)))?;
@@ -63,7 +64,7 @@ fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
     let (mut run, recordings) = story::settle(pipeline, &progress)?.diagnosed(pipeline, &progress);
     let judged = judge(&run, &limits)?;
     if let Some(out) = &request.out {
-        crate::refits::add_refits(&mut run, pipeline, &progress)?;
+        armcal_pipeline::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
         view::remember(out, &request.pipeline, &[])?;

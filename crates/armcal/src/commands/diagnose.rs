@@ -2,10 +2,10 @@
 
 use super::{Outcome, print, style};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story;
+use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
+use armcal_pipeline as story;
 use armcal_report::{PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
             let why = "recordings of this run lost data; its page and summary.json say which and what";
             let subject = input.display().to_string();
             let lost = Severity::DataLost;
-            super::tell(&[Warning::new(lost, Stage::Recording, "recording-damaged", subject, why)]);
+            crate::stdout::tell(&[Warning::new(lost, Stage::Recording, "recording-damaged", subject, why)]);
         }
         return Ok(if lost { Outcome::Doubtful } else { Outcome::Done });
     }

@@ -2,11 +2,11 @@
 
 use super::{Outcome, may_write, print};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story;
 use armcal_calibrate::position_covariance_m2;
+use armcal_config::Pipeline;
 use armcal_core::{Observation, Parameter, Pose, Reference};
+use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::Run;
 use nalgebra::SMatrix;

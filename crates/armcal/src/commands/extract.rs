@@ -2,12 +2,13 @@
 
 use super::{Outcome, json_text, print};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use armcal_config::Pipeline;
 use armcal_core::Severity;
 use armcal_recording::{
     Extract, Extracted, Recording, RecordingError, RecordingReport, extract, files_of, input,
 };
 use armcal_report::printable;
+use armcal_stages::RunError;
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -43,15 +44,15 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
     files_of(&asked.inputs).iter().for_each(|path| input::note(path));
     super::may_write([&asked.out])?;
     let recording = Recording::open(&asked.inputs)
-        .map_err(|source| Error::Recording { recording: name.clone(), source })?;
+        .map_err(|source| RunError::Recording { recording: name.clone(), source })?;
     let wanted = Extract { topics: &topics, attachments: asked.attachments };
     let extracted = extract(&recording, &wanted, &asked.out);
     let done = extracted.and_then(|extracted| Ok((extracted, recording.whole_report()?)));
     let (extracted, report) = done.map_err(|source| match source {
         RecordingError::NoSuchTopic { ref pattern, .. } if asked.topics.contains(pattern) => {
-            Error::of_usage(Error::Recording { recording: name, source })
+            Error::of_usage(RunError::Recording { recording: name, source })
         }
-        source => Error::Recording { recording: name, source },
+        source => RunError::Recording { recording: name, source }.into(),
     })?;
     print(&if asked.json { json(&extracted, report)? } else { text(&asked.out, &extracted, report) })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);

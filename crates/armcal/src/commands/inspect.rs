@@ -2,12 +2,13 @@
 
 use super::{Outcome, print};
 use crate::error::Error;
-use crate::pipeline::{Pipeline, recording_name};
 use crate::progress::Progress;
-use crate::stages::perceive;
+use armcal_config::{Pipeline, recording_name};
 use armcal_core::Severity;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::{RULED, printable};
+use armcal_stages::RunError;
+use armcal_stages::perceive;
 use comfy_table::Table;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     let reports = match inputs {
         [only] if only.extension().is_some_and(|e| e == "toml") => of_pipeline(only)?,
         files => {
-            let failed = |source| Error::Recording { recording: "the files given".to_owned(), source };
+            let failed = |source| RunError::Recording { recording: "the files given".to_owned(), source };
             let recording = Recording::open(files).map_err(failed)?;
             vec![(recording_name(None, files), recording.into_report().map_err(failed)?)]
         }
@@ -38,7 +39,7 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
             && report.channels.iter().all(|channel| channel.messages == 0)
     };
     if let Some((name, _)) = reports.iter().find(empty) {
-        return Err(Error::NoMessages { recording: name.clone() });
+        return Err(RunError::NoMessages { recording: name.clone() }.into());
     }
     let lost = reports.iter().flat_map(|(_, r)| &r.warnings).any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
@@ -60,8 +61,8 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
             let name = entry.name();
             let read = recording.read(&pipeline.streams);
             let (_, streams, warnings) =
-                read.map_err(|source| Error::Recording { recording: name.clone(), source })?;
-            let failed = |source| Error::Recording { recording: name.clone(), source };
+                read.map_err(|source| RunError::Recording { recording: name.clone(), source })?;
+            let failed = |source| RunError::Recording { recording: name.clone(), source };
             let mut report = recording.whole_report().map_err(failed)?.clone();
             report.streams = streams;
             report.warnings.extend(warnings);

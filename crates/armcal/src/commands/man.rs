@@ -1,10 +1,9 @@
 //! `armcal man`: the help of every command as man pages.
 
 use super::{Outcome, may_write, print_written};
-use crate::cli::Cli;
 use crate::error::Error;
 use armcal_recording::{atomic, make_folder};
-use clap::{Command, CommandFactory as _};
+use clap::Command;
 use clap_mangen::Man;
 use std::path::{Path, PathBuf};
 
@@ -12,8 +11,7 @@ use std::path::{Path, PathBuf};
 const MARK: &str = ".\\\" armcal.man/1\n";
 
 /// Writes `armcal.1` and a page a command.
-pub fn run(folder: &Path) -> Result<Outcome, Error> {
-    let mut root = Cli::command();
+pub fn run(mut root: Command, folder: &Path) -> Result<Outcome, Error> {
     root.build();
     // Built, each knows its whole name: `armcal-run`.
     let commands = root.get_subcommands().filter(|c| c.get_name() != "help").cloned();

@@ -2,15 +2,16 @@
 
 use super::{Outcome, joint_range, print};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use crate::progress::Progress;
-use crate::stages::frames;
-use crate::story::{self, Fitted, Settled};
 use armcal_calibrate::{HoldoutConfig, calibrate};
+use armcal_config::Pipeline;
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
+use armcal_pipeline::{self as story, Settled};
 use armcal_report::{number, plain_table, table_text};
+use armcal_stages::Fitted;
+use armcal_stages::frames;
 use clap::Args;
 use comfy_table::Cell;
 use nalgebra::Matrix3;

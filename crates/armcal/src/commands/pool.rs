@@ -2,13 +2,11 @@
 
 use super::{Outcome, batch, may_write, print, print_written, style};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
 use crate::{pool, view};
-use armcal_report::{
-    Detail, InputMessages, OutputConfig, Run, Status, pool_files, pool_json, terminal, write_all,
-    write_pool_brief,
-};
+use armcal_config::Pipeline;
+use armcal_config::{InputMessages, OutputConfig};
+use armcal_report::{Detail, Run, Status, pool_files, pool_json, terminal, write_all, write_pool_brief};
 use std::path::{Path, PathBuf};
 
 /// Pools results, writes all that one arm's run has to `out`, prints the story, or everything (or `pool.json`).
@@ -34,7 +32,7 @@ pub fn run(
 }
 
 /// Answers the open round of a pool for one share of the results.
-pub(super) fn map(
+pub(crate) fn map(
     pipeline: Option<&Path>,
     results: &[PathBuf],
     out: &Path,
@@ -50,7 +48,7 @@ pub(super) fn map(
 }
 
 /// Goes on with a pool as far as the answers of its shares reach.
-pub(super) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
+pub(crate) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let (pipeline, reduced) = pool::reduce(out, &progress)?;
     let run = match reduced {

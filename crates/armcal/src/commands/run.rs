@@ -2,9 +2,10 @@
 
 use super::{Outcome, may_write, print, print_written, style};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::{story, view};
+use crate::view;
+use armcal_config::Pipeline;
+use armcal_pipeline as story;
 use armcal_report::{Detail, Status, run_files, summary_json, terminal, write_all};
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,7 @@
 use super::score::{known_families, word};
 use super::{Outcome, print};
 use crate::error::Error;
-use crate::pipeline::read_text;
+use armcal_config::read_text;
 use armcal_lab::pair::{self, PairConfig};
 use armcal_lab::scenario::{Scenario, seal};
 use armcal_lab::{LabConfig, simulate};

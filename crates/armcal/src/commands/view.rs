@@ -21,7 +21,7 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
             input.display()
         ))?;
     }
-    super::tell(&armcal_recording::losses());
+    crate::stdout::tell(&armcal_recording::losses());
     serve(bench, port, |address| print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display())))?;
     Ok(Outcome::Done)
 }

@@ -2,14 +2,15 @@
 
 use super::{Outcome, may_write, print};
 use crate::error::Error;
-use crate::pipeline::read_text;
 use crate::write::left::{Recorded, left};
 use crate::write::{Made, Source, made};
+use armcal_config::read_text;
 use armcal_core::ErrorStats;
+use armcal_core::units::millimetres;
 use armcal_formats::Format;
 use armcal_recording::atomic;
 use armcal_recording::input::Kind;
-use armcal_report::{PastArms, PastModel, millimetres, open_model, plain_table, printable, table_text};
+use armcal_report::{PastArms, PastModel, open_model, plain_table, printable, table_text};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use comfy_table::ContentArrangement;
@@ -97,7 +98,7 @@ fn hash_from(format: Format, path: Option<&Path>) -> Result<Option<String>, Erro
             "the driver compares the file's hash with the arm's, and only the arm has it: name the kinematics file that \
              ur_calibration extracted from it",
         )),
-        (Format::UrYaml, Some(path)) => read_text("kinematics file", Kind::Text, path).map(Some),
+        (Format::UrYaml, Some(path)) => Ok(Some(read_text("kinematics file", Kind::Text, path)?)),
         (_, Some(path)) => Err(bad(path.display().to_string(), "only ur-yaml has a hash; leave it out")),
         (_, None) => Ok(None),
     }

@@ -5,7 +5,7 @@
 //! ```
 
 use crate::error::Error;
-use crate::pipeline::read_text;
+use armcal_config::read_text;
 use armcal_recording::input::Kind;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;

@@ -3,10 +3,10 @@
 use super::channels::{Channels, JointTopic};
 use super::fields::Field;
 use crate::error::Error;
-use crate::stages::frames::bare;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model, check_xml};
 use armcal_recording::input::Kind;
+use armcal_stages::frames::bare;
 use roxmltree::{Document, Node};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,7 +65,7 @@ impl Arm {
     /// The same arm with the tip at another link.
     pub fn model_to(&self, tip: &str) -> Result<Model, Error> {
         let base = self.base_link.as_deref().unwrap_or_default();
-        bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())
+        Ok(bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
     }
 
     /// The links that the joints carry, then the tip, in the base.
@@ -151,7 +151,7 @@ fn found(told: &Told, channels: &Channels, folders: &BTreeSet<PathBuf>, beside: 
     if let Some(path) = &told.dh {
         return from_dh(told, channels, path);
     }
-    let read = |path: &Path| crate::pipeline::read_text("URDF", Kind::Text, path);
+    let read = |path: &Path| armcal_config::read_text("URDF", Kind::Text, path);
     let (file, text, recorded) = match (&told.urdf, channels.urdfs.len()) {
         (Some(path), _) => (path.clone(), read(path)?, false),
         (None, 1) => (beside.to_owned(), channels.urdfs.iter().next().cloned().unwrap_or_default(), true),
@@ -192,7 +192,7 @@ fn said(joints: &JointTopic) -> String {
 }
 
 fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> {
-    let text = crate::pipeline::read_text("DH model", Kind::Text, path)?;
+    let text = armcal_config::read_text("DH model", Kind::Text, path)?;
     if text.trim_start().starts_with('<') {
         let problem = format!("{} is XML and no DH table: a URDF is given with --urdf", path.display());
         return Err(Error::Init { problem });

@@ -5,6 +5,7 @@ use super::files::Opened;
 use crate::error::Error;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
+use armcal_stages::RunError;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -142,7 +143,7 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
             .and_then(|()| recording.within(&allowance))
             // What the pass found to be lost is noted, whatever becomes of the proposal.
             .and_then(|()| recording.whole_report().map(drop))
-            .map_err(|source: RecordingError| Error::Recording { recording: entry.name(), source })?;
+            .map_err(|source: RecordingError| RunError::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();
             let Found { messages, role, thermometer, describes, names, why_not, .. } = own;

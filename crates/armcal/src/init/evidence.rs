@@ -3,10 +3,10 @@
 use super::arm::Arm;
 use super::motion::{Likeness, Speeds, likeness};
 use super::read::{AllRead, Read};
-use crate::stages::links::{Placed, place, turned_apart};
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Pose, PoseSamples};
 use armcal_dwell::mean_pose;
+use armcal_stages::links::{Placed, place, turned_apart};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Noise of positions [m] and turns [rad] below which no link is better than another.

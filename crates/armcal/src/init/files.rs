@@ -2,8 +2,10 @@
 
 use crate::batch::{Manifest, recordings_below};
 use crate::error::Error;
-use crate::pipeline::RecordingEntry;
+use armcal_config::ConfigError;
+use armcal_config::RecordingEntry;
 use armcal_recording::{Recording, is_recording, is_url, without_ending};
+use armcal_stages::RunError;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -39,7 +41,7 @@ pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
 }
 
 fn open(entry: RecordingEntry) -> Result<Opened, Error> {
-    let failed = |source| Error::Recording { recording: entry.name(), source };
+    let failed = |source| RunError::Recording { recording: entry.name(), source };
     let recording = Recording::open(&entry.paths).map_err(failed)?;
     Ok(Opened { entry, recording })
 }
@@ -83,7 +85,7 @@ fn refuse(path: &Path) -> Result<(), Error> {
     if !path.is_file() {
         return Ok(());
     }
-    let read = |source| Error::ReadFile { what: "recording", path: path.to_owned(), source };
+    let read = |source| ConfigError::ReadFile { what: "recording", path: path.to_owned(), source };
     let (mut head, mut file) = (Vec::new(), armcal_recording::input::open(path).map_err(read)?);
     file.by_ref().take(16).read_to_end(&mut head).map_err(read)?;
     let (what, ending) = match head.as_slice() {

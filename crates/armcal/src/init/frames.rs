@@ -4,6 +4,7 @@ use super::channels::BodyTopic;
 use super::files::Opened;
 use crate::error::Error;
 use armcal_recording::{LengthUnit, Transforms};
+use armcal_stages::RunError;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Gives bodies the root of their tree as frame, where tracked ones hang on different frames; what no transforms join to it is
@@ -18,7 +19,7 @@ pub fn join(
         bodies.iter().filter(|b| b.position.is_none()).map(|b| b.topic.clone()).collect();
     let topics: Vec<&str> = named.iter().map(String::as_str).collect();
     let read = first.recording.transforms(&topics, LengthUnit::M);
-    let read = read.map_err(|source| Error::Recording { recording: first.entry.name(), source })?;
+    let read = read.map_err(|source| RunError::Recording { recording: first.entry.name(), source })?;
     let trees: BTreeMap<&str, Transforms> = topics.into_iter().zip(read).collect();
     let hung = |b: &BodyTopic| -> Option<(String, &Transforms)> {
         let tree = trees.get(b.topic.as_str()).filter(|_| b.position.is_none())?;

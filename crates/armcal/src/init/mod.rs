@@ -28,12 +28,12 @@ pub use roles::{Cast, Role};
 
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::setup::Inputs;
-use crate::stages::associated::Associated;
-use crate::stages::perceive;
-use crate::story;
 use armcal_calibrate::HoldoutConfig;
+use armcal_pipeline as story;
 use armcal_recording::input::Kind;
+use armcal_stages::Inputs;
+use armcal_stages::associated::Associated;
+use armcal_stages::perceive;
 use armcal_table::Board;
 use channels::Channels;
 use proposal::Known;
@@ -138,7 +138,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
 }
 
 fn read_board(path: &Path) -> Result<Board, Error> {
-    Ok(Board::from_toml(&crate::pipeline::read_text("board", Kind::Text, path)?, path)?)
+    Ok(Board::from_toml(&armcal_config::read_text("board", Kind::Text, path)?, path)?)
 }
 
 fn no_joints(channels: &Channels) -> Error {

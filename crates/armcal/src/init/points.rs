@@ -1,10 +1,10 @@
 //! What a laser tracker exported beside the recordings, as the `points` of a pipeline: what its header says, and what it does not.
 
 use crate::error::Error;
-use crate::pipeline::read_text;
-use crate::stages::points::rows::{is_axis, parse};
+use armcal_config::read_text;
 use armcal_recording::LengthUnit;
 use armcal_recording::input::Kind;
+use armcal_stages::points::rows::{is_axis, parse};
 use std::path::{Path, PathBuf};
 
 /// Words in the names of columns that may be times.

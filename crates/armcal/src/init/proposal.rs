@@ -13,7 +13,7 @@ use super::seats::Seats;
 use super::sockets::Sockets;
 use super::{Asked, Tried};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use armcal_config::Pipeline;
 use armcal_recording::{atomic, sealed};
 use armcal_table::Board;
 use std::path::{Path, PathBuf};

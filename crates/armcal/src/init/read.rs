@@ -10,6 +10,7 @@ use armcal_dwell::{DwellConfig, detect_dwells};
 use armcal_recording::{
     JointStream, JointUnit, LengthUnit, PoseStream, RecordingError, ScalarStream, StreamReport, Streams,
 };
+use armcal_stages::RunError;
 
 /// More bodies than this are the frames of a simulation.
 const MOST_BODIES: usize = 24;
@@ -118,11 +119,12 @@ fn read_one(one: &Opened, streams: &mut Streams, left: &mut Vec<(String, String)
             Ok((samples, reports, _)) => {
                 let alone = Samples { joints: samples.joints.clone(), ..Samples::default() };
                 let found = detect_dwells(0, &alone, None, &DwellConfig::default());
-                let (dwells, _) = found.map_err(|source| Error::Dwell { recording: name.clone(), source })?;
+                let (dwells, _) =
+                    found.map_err(|source| RunError::Dwell { recording: name.clone(), source })?;
                 return Ok(Read { name, samples, reports, dwells });
             }
             Err(source) => {
-                mend(streams, &source, left).ok_or(Error::Recording { recording: name.clone(), source })?
+                mend(streams, &source, left).ok_or(RunError::Recording { recording: name.clone(), source })?
             }
         }
     }

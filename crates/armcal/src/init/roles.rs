@@ -188,7 +188,7 @@ fn the_tip(
 fn the_base(evidence: &[Evidence], tip: usize, still: &[usize], seats: Option<&Seats>, all: &mut [Cast]) {
     let Some(best) = evidence[tip].best_link() else { return };
     let apart = |body: usize| {
-        let of = |(at, placed): (usize, crate::stages::links::Placed)| {
+        let of = |(at, placed): (usize, armcal_stages::links::Placed)| {
             let seen = evidence[body].recordings[at].as_ref()?;
             let turned = seen.mean.map_or(f64::NAN, |mean| mean.rotation.angle_to(&placed.base.rotation));
             Some(((seen.middle_m - placed.base.translation.vector).norm(), turned))

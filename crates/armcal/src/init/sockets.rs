@@ -6,9 +6,9 @@
 use super::arm::Arm;
 use super::read::AllRead;
 use crate::error::Error;
-use crate::setup::Inputs;
-use crate::stages::links::rigid;
 use armcal_core::robust::median;
+use armcal_stages::Inputs;
+use armcal_stages::links::rigid;
 use armcal_table::{Board, Cavity};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;

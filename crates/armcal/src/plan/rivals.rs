@@ -3,6 +3,7 @@
 use crate::error::Error;
 use armcal_diagnose::{Diagnosis, ParameterReport, UnknownReport, Verdict};
 use armcal_model::{EffectSpec, Family};
+use armcal_stages::RunError;
 
 /// Effects that a quiet diagnosis leaves untested, at most this many.
 const UNTESTED: usize = 24;
@@ -32,7 +33,7 @@ pub struct Standing {
 /// What a diagnosis leaves standing: the first ambiguous set; the unlisted shape against the best names; otherwise the
 /// effects that could not be tested, against nothing.
 pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Error> {
-    let parse = |name: &String| EffectSpec::parse(name, joints).map_err(Error::Model);
+    let parse = |name: &String| EffectSpec::parse(name, joints).map_err(RunError::Model);
     let open = diagnosis.effects.iter().position(|e| e.set.len() > 1);
     let mut certain = Vec::new();
     for (_, found) in diagnosis.effects.iter().enumerate().filter(|(i, _)| Some(*i) != open) {

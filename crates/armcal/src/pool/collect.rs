@@ -1,14 +1,15 @@
 //! Finding the results of earlier runs, and checking that they belong together.
 
 use crate::error::Error;
-use crate::pipeline::{BoardPose, FramePose, ObservationsSection, Pipeline};
-use crate::two_arms::ClosedChainSection;
+use armcal_config::ConfigError;
+use armcal_config::{BoardPose, ClosedChainSection, ClosureKind, FramePose, ObservationsSection, Pipeline};
 use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_report::{
     BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, PastObservations,
     RecordingRun, StartFrame, also_in, sha256,
 };
+use armcal_stages::RunError;
 use armcal_table::{Assignment, Association, Board, Place};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -121,7 +122,7 @@ pub(super) fn together(mut found: Vec<Found>) -> Result<Collected, Error> {
     if found.is_empty() {
         let dwells = 0;
         let hint = "no result has an observation: look at what their runs rejected".to_owned();
-        return Err(Error::NoObservations { dwells, hint });
+        return Err(RunError::NoObservations { dwells, hint }.into());
     }
     let begins_ns = |f: &Found| f.recording.observations.iter().map(|o| o.time_ns).min();
     found.sort_by_cached_key(|f| (begins_ns(f), f.recording.name.clone(), f.result.clone()));
@@ -238,7 +239,7 @@ fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
         found.insert(path.to_owned());
         return Ok(());
     }
-    let failed = |source| Error::ReadFile { what: "folder of results", path: path.to_owned(), source };
+    let failed = |source| ConfigError::ReadFile { what: "folder of results", path: path.to_owned(), source };
     for entry in std::fs::read_dir(path).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         // A link to a folder may lead in circles.
@@ -287,7 +288,7 @@ fn contradiction(
                 .into(),
         );
     }
-    if let Some(difference) = ClosedChainSection::differs(pipeline.closed_chain.as_ref(), past) {
+    if let Some(difference) = joined_otherwise(pipeline.closed_chain.as_ref(), past) {
         return Some(difference);
     }
     let boards_estimated = pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated);
@@ -388,4 +389,18 @@ fn unique_names(found: &[Found]) -> Vec<String> {
         names.push(unique);
     }
     names
+}
+
+/// Why observations of a result cannot be pooled under this.
+fn joined_otherwise(closure: Option<&ClosedChainSection>, past: &PastObservations) -> Option<String> {
+    let all = past.recordings.iter().flat_map(|recording| &recording.observations);
+    let joined = all.filter(|o| o.is_joined()).map(Observation::is_scalar);
+    let said: BTreeSet<bool> = joined.collect();
+    match (said.first(), closure) {
+        (None, None) => None,
+        (Some(_), None) => Some("its tips are joined and the pipeline has no [closed_chain]".into()),
+        (None, Some(_)) => Some("none of its tips are joined and the pipeline has a [closed_chain]".into()),
+        (Some(apart), Some(closure)) => (*apart != (closure.kind == ClosureKind::RigidLink))
+            .then(|| "its tips are joined in another way (closed_chain.kind)".into()),
+    }
 }

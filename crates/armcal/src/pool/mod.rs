@@ -5,11 +5,9 @@
 
 mod collect;
 mod rounds;
-mod section;
 mod shards;
 
 pub use collect::{Collected, CollectedRecording, Start, collect};
-pub use section::PoolSection;
 pub use shards::{Mapped, Reduced, map, reduce};
 
 /// Whether `out` is that of a pool in shards.
@@ -18,15 +16,15 @@ pub fn is_in_shards(out: &std::path::Path) -> bool {
 }
 
 use crate::error::Error;
-use crate::pipeline::{BoardPose, FramePose, Pipeline};
 use crate::progress::Progress;
-use crate::stages::frames;
-use crate::story;
-use crate::two_arms::check::place_bases;
 use armcal_calibrate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, align_frames, calibrate};
+use armcal_config::{BoardPose, FramePose, Pipeline};
 use armcal_core::{Observation, Pose};
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
+use armcal_pipeline as story;
 use armcal_report::{Run, Undiagnosed};
+use armcal_stages::frames;
+use armcal_stages::joined_tips::place_bases;
 use std::path::PathBuf;
 
 /// Free parameters up to which what is missing is looked for: the search works on all of them at once.
@@ -61,7 +59,7 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
     } else {
         story::diagnose_again(&mut run, pipeline, progress);
-        crate::refits::add_refits(&mut run, pipeline, progress)?;
+        armcal_pipeline::add_refits(&mut run, pipeline, progress)?;
     }
     Ok(Pooled { run, geometry })
 }
@@ -81,7 +79,7 @@ fn joint_run(
     let geometry = geometry(pipeline, chain, &collected)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let observations = collected.observations;
-    let model = story::with_effects(pipeline, &geometry, &effects, &observations)?;
+    let model = armcal_stages::with_effects(pipeline, &geometry, &effects, &observations)?;
 
     progress.step(&format!("calibrating {} recordings", collected.recordings.len()));
     let calibration = calibrate(&model, &observations, &pipeline.holdout);
@@ -127,16 +125,16 @@ fn geometry_of(pipeline: &Pipeline, chain: Chain, starts: &[&Start]) -> Result<M
     let base = frames::base_frame(&pipeline.frames.base, &bases);
     let knowledge = pipeline.table.as_ref().map_or(Knowledge::Given, |table| match table.pose {
         BoardPose::Estimated => Knowledge::Estimated,
-        BoardPose::Measured | BoardPose::Given => frames::measured(table.sigma_mm, table.sigma_deg),
+        BoardPose::Measured | BoardPose::Given => armcal_config::measured(table.sigma_mm, table.sigma_deg),
     });
     let board = |start: &&Start| {
         let name = format!("board.{}", start.name);
         start.board.map(|pose| Frame { name, pose, knowledge, free_rotation: true })
     };
-    let tip = frames::frame("tip", &pipeline.frames.tip, pipeline.fit.use_orientation);
+    let tip = pipeline.frames.tip.frame("tip", pipeline.fit.use_orientation);
     let boards = starts.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
-    frames::declare(&mut model, pipeline)?;
+    armcal_stages::declare(&mut model, pipeline)?;
     let own = |start: &&Start| {
         let base_in_world = measured.then_some(start.base);
         RecordingStart { name: start.name.clone(), base_in_world }

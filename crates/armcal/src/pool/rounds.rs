@@ -11,7 +11,7 @@
 
 use crate::batch::{Keys, Shard, write_one};
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use armcal_config::Pipeline;
 use armcal_recording::{input, make_folder_in};
 use armcal_report::VERSION;
 use serde::de::DeserializeOwned;

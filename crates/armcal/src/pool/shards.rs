@@ -8,15 +8,16 @@ use super::rounds::Rounds;
 use super::{Start, geometry_of, joint_run};
 use crate::batch::Shard;
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::frames;
-use crate::story;
 use armcal_calibrate::{Answer, CalibrateError, Elsewhere, Objective, Request, answer, calibrate_elsewhere};
+use armcal_config::ConfigError;
+use armcal_config::Pipeline;
 use armcal_core::Observation;
 use armcal_model::{Model, Session};
 use armcal_recording::identity_of;
 use armcal_report::{PastObservations, Run, Undiagnosed};
+use armcal_stages::RunError;
+use armcal_stages::frames;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -110,7 +111,7 @@ pub fn map(
     }
     progress.step(&format!("round {round}: {} results", own.len()));
     if round == 0 {
-        let pipeline_path = std::path::absolute(path).map_err(|source| Error::ReadFile {
+        let pipeline_path = std::path::absolute(path).map_err(|source| ConfigError::ReadFile {
             what: "pipeline",
             path: path.to_owned(),
             source,
@@ -176,7 +177,7 @@ pub fn reduce(out: &Path, progress: &Progress) -> Result<(Pipeline, Reduced), Er
     let run = joint_run(&pipeline, collected, &fit, progress);
     let Asked { open, settled, .. } = asked;
     match run {
-        Err(Error::Calibrate(CalibrateError::Unanswered)) => {
+        Err(Error::Run(RunError::Calibrate(CalibrateError::Unanswered))) => {
             let requests: Vec<Request> = inner(open).into_values().collect();
             let (number, questions) = (round + 1, requests.len());
             rounds.write(&rounds.questions(number), &[Questions { requests, settled: inner(settled) }])?;
@@ -196,7 +197,8 @@ pub fn reduce(out: &Path, progress: &Progress) -> Result<(Pipeline, Reduced), Er
 fn poolable(path: &Path) -> Result<Pipeline, Error> {
     let pipeline = Pipeline::load_for_others(path)?;
     let refused = |key: &str, problem: &str| {
-        Err(Error::PipelineContradiction { path: path.to_owned(), key: key.into(), problem: problem.into() })
+        Err(ConfigError::Contradiction { path: path.to_owned(), key: key.into(), problem: problem.into() }
+            .into())
     };
     if pipeline.closed_chain.is_some() {
         return refused("closed_chain", "of arms that are joined is pooled in one process: `armcal pool`");
@@ -219,7 +221,7 @@ fn survey(
     let (model_texts, _) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let identity = |path: &PathBuf| {
-        let failed = |source| Error::Recording { recording: path.display().to_string(), source };
+        let failed = |source| RunError::Recording { recording: path.display().to_string(), source };
         Ok((path.clone(), identity_of(path).map_err(failed)?))
     };
     // What is no result is refused before all of it is hashed.
@@ -263,13 +265,13 @@ fn model_of(pipeline: &Pipeline, plan: &Plan) -> Result<Model, Error> {
     let starts: Vec<&Start> = plan.recordings.iter().map(|planned| &planned.start).collect();
     let geometry = geometry_of(pipeline, chain, &starts)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
-    story::with_session(&geometry, &effects, &plan.session)
+    Ok(armcal_stages::with_session(&geometry, &effects, &plan.session)?)
 }
 
 /// The observations of a recording, read again.
 fn observed(planned: &Planned, index: usize) -> Result<Vec<Observation>, Error> {
     let path = &planned.result;
-    let failed = |source| Error::Recording { recording: path.display().to_string(), source };
+    let failed = |source| RunError::Recording { recording: path.display().to_string(), source };
     if identity_of(path).map_err(failed)? != planned.identity {
         let problem = "changed since the first round: remove the folder `rounds` of the pool, and begin anew"
             .to_owned();

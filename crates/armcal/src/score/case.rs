@@ -1,15 +1,16 @@
 //! One scenario through the tool: what it says, what its suggestion does to held-out points, and the truth to judge by.
 
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
+use armcal_config::ConfigError;
+use armcal_config::Pipeline;
 use armcal_core::Observation;
 use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
+use armcal_pipeline as story;
 use armcal_recording::input;
 use serde::Serialize;
 use std::path::Path;
@@ -102,7 +103,7 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
 }
 
 fn truth(path: &Path) -> Result<Truth, Error> {
-    let text = input::read_to_string(path, input::Kind::Data).map_err(|source| Error::ReadFile {
+    let text = input::read_to_string(path, input::Kind::Data).map_err(|source| ConfigError::ReadFile {
         what: "truth",
         path: path.to_owned(),
         source,

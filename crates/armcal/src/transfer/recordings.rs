@@ -1,12 +1,12 @@
 //! Does what was learnt in all recordings but one help in that one? Effect by effect.
 
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::story::with_effects;
 use armcal_calibrate::{Calibration, HeldOut, HoldoutConfig, calibrate, compare_heldout};
+use armcal_config::Pipeline;
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model};
+use armcal_stages::with_effects;
 use serde::Serialize;
 
 /// What an effect does to the errors of recordings that its fit did not see.

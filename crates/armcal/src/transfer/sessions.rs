@@ -6,15 +6,16 @@
 
 use super::LeftOut;
 use crate::error::Error;
-use crate::pipeline::Pipeline;
 use crate::progress::Progress;
-use crate::stages::past::{lasts, place_arms};
-use crate::stages::{frames, perceive};
-use crate::story::{self, Fitted, Settled, with_effects};
+use crate::verify::{lasts, place_arms};
 use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_by_dwell};
+use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
 use armcal_model::EffectSpec;
+use armcal_pipeline::{self as story, Settled};
 use armcal_report::PastArms;
+use armcal_stages::{Fitted, with_effects};
+use armcal_stages::{frames, perceive};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -6,12 +6,12 @@
 
 use super::motion::{Motion, set_point};
 use crate::error::Error;
-use crate::stages::observe;
-use crate::stages::past::{Placed, PlacedBase};
-use crate::stages::perceive::Seen;
 use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_report::IsoReport;
+use armcal_stages::Seen;
+use armcal_stages::observe;
+use armcal_stages::{Placed, PlacedBase};
 use armcal_verify::{PathError, Planned, Polyline};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;

@@ -5,20 +5,27 @@
 mod iso;
 mod motion;
 mod once;
+mod past;
 mod point;
 mod told;
 
+pub(crate) use past::{lasts, place_arms};
+
+use armcal_stages::RunError;
+use past::place;
+
 use crate::error::Error;
-use crate::pipeline::{BoardPose, Pipeline};
 use crate::progress::Progress;
-use crate::stages::associated::Associated;
-use crate::stages::measures::Measures;
-use crate::stages::past::{Placed, place};
-use crate::stages::perceive::Seen;
-use crate::stages::{frames, observe, perceive};
+use armcal_config::{BoardPose, Pipeline};
+use armcal_stages::Placed;
+use armcal_stages::associated::Associated;
+use armcal_stages::measures::Measures;
+
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
 use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording, open_model};
+use armcal_stages::Seen;
+use armcal_stages::{frames, observe, perceive};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -143,7 +150,7 @@ impl Surroundings<'_> {
         if !measures.is_empty() {
             if self.pipeline.table.is_some() {
                 let problem = "stands beside a [table]: verify the dwells of the table and those of the measurements apart";
-                return Err(Error::Measure { name: "all".to_owned(), problem: problem.to_owned() });
+                return Err(RunError::Measure { name: "all".to_owned(), problem: problem.to_owned() }.into());
             }
             let none = self.seen.iter().map(|_| None).collect::<Vec<_>>();
             let sure = observe::observations(self.pipeline, None, self.seen, &none).observations;
@@ -167,14 +174,8 @@ impl Surroundings<'_> {
 
     fn associate(&self, placed: &Placed, boards_fitted: bool) -> Result<Vec<Option<Association>>, Error> {
         let p = &placed.calibrated;
-        observe::associate_all(
-            self.pipeline,
-            self.board,
-            &placed.model,
-            p,
-            boards_fitted,
-            (self.seen, &Associated::default()),
-        )
+        let seen = (self.seen, &Associated::default());
+        Ok(observe::associate_all(self.pipeline, self.board, &placed.model, p, boards_fitted, seen)?)
     }
 
     fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {

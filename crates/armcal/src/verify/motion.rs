@@ -1,12 +1,13 @@
 //! The arm between its dwells: predicted from the encoders, and planned by the set-points.
 
 use crate::error::Error;
-use crate::pipeline::Pipeline;
-use crate::stages::observe;
-use crate::stages::past::{Placed, PlacedBase};
-use crate::stages::perceive::Seen;
+use armcal_config::Pipeline;
 use armcal_core::{DwellId, JointSamples, Observation, Samples};
 use armcal_dwell::{ClockAlignment, Moment, track};
+use armcal_stages::RunError;
+use armcal_stages::Seen;
+use armcal_stages::observe;
+use armcal_stages::{Placed, PlacedBase};
 use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
@@ -148,8 +149,8 @@ impl Recorded<'_> {
     /// Frames of the moving tip by this clock.
     fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<Moment>, Error> {
         let Seen { name, dwells, .. } = self.seen;
-        track(self.samples, clock, dwells, self.dwell)
-            .map_err(|source| Error::Dwell { recording: name.clone(), source })
+        let moments = track(self.samples, clock, dwells, self.dwell);
+        Ok(moments.map_err(|source| RunError::Dwell { recording: name.clone(), source })?)
     }
 
     fn observation(&self, pipeline: &Pipeline, index: usize, m: &Moment) -> Observation {

@@ -1,9 +1,10 @@
 //! What two of the new recordings both hold counts once.
 
-use crate::pipeline::Pipeline;
-use crate::stages::perceive::{Seen, repeats};
+use armcal_config::Pipeline;
 use armcal_core::{JointSamples, Samples, Severity, Stage, Warning};
 use armcal_recording::{Fingerprint, SharedTime};
+use armcal_stages::Seen;
+use armcal_stages::perceive::repeats;
 
 /// New recordings, each with its samples; no time is in two of them.
 pub struct Distinct {

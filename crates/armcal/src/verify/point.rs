@@ -1,7 +1,7 @@
 //! Errors of the dwells, in the axes of the calibrated base.
 
-use crate::stages::past::Placed;
 use armcal_core::Observation;
+use armcal_stages::Placed;
 use armcal_verify::PointError;
 
 /// Measured minus predicted of every observation, by the nominal and by the calibrated arm.

@@ -1,10 +1,10 @@
 //! What the result knows of the new recordings, and where they go beyond it.
 
-use crate::stages::perceive::Seen;
 use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
 use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_recording::{FileReport, sha256_of};
 use armcal_report::{DwellMark, PastModel, Told, also_in};
+use armcal_stages::Seen;
 use std::collections::BTreeMap;
 
 /// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.

@@ -1,18 +1,18 @@
 //! A run on the workbench: every question of the page is a refit of its observations.
 
 use super::requests::{Choices, Wanted};
-use crate::commands::add;
 use crate::error::Error;
-use crate::pipeline::Pipeline;
+use crate::extended::extend;
 use crate::pool::{self, Pooled};
 use crate::progress::Progress;
-use crate::stages::frames;
-use crate::story;
 use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
+use armcal_config::Pipeline;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
+use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::{Basis, PageKind, Refit, Run, refit_json, report_html};
+use armcal_stages::frames;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -37,7 +37,7 @@ impl Bench {
                 let settled = story::settle(&pipeline, progress)?;
                 let geometry = settled.fitted.geometry.clone();
                 let (mut run, _) = settled.diagnosed(&pipeline, progress);
-                crate::refits::add_refits(&mut run, &pipeline, progress)?;
+                armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;
                 (pipeline, geometry, run)
             }
             results => {
@@ -119,7 +119,7 @@ impl Bench {
             return Err(Error::NothingToKeep { path: self.path.clone() });
         }
         let sets = self.run.diagnosis.as_ref().map_or_else(Vec::new, Diagnosis::sets);
-        let extended = add::extend(&self.pipeline, &self.path, None, (&new, &sets))?;
+        let extended = extend(&self.pipeline, &self.path, None, (&new, &sets))?;
         atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
         Ok(extended.path)
     }

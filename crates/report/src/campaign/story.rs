@@ -3,9 +3,10 @@
 use super::Campaign;
 use super::words::{meaning, sentence};
 use crate::story::Story;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use crate::told_warning::ToldWarning;
 use armcal_campaign::{ErrorFigures, Row, Status};
+use armcal_core::units::millimetres;
 use armcal_core::{Severity, listed};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;

@@ -103,8 +103,8 @@ impl Drawing {
              green {} mm, red {} mm and more",
             self.nominal_factor,
             self.fitted_factor,
-            crate::text::millimetres(self.small_m),
-            crate::text::millimetres(self.large_m)
+            armcal_core::units::millimetres(self.small_m),
+            armcal_core::units::millimetres(self.large_m)
         );
         let mut legend = entity("scale", time_ns);
         legend.texts.push(label(&self.legend_m?, INK, words));

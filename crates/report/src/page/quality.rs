@@ -2,7 +2,7 @@
 
 use crate::past_observations::ObservedFile;
 use crate::run::{RecordingErrors, RecordingRun, Run};
-use crate::text::millimetres;
+use armcal_core::units::millimetres;
 use armcal_recording::StreamReport;
 
 /// One recording.

@@ -11,12 +11,13 @@ pub use terminal::verification_text;
 
 use crate::run::{Status, status_of};
 use crate::two_arms::Closing;
+use armcal_config::Published;
 use armcal_core::Warning;
 use armcal_iso9283::Assessment;
 use armcal_model_file::Value;
 use armcal_verify::{PathError, PathRow, PointsRow};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// A calibrated model against recordings it never saw.
@@ -52,28 +53,6 @@ pub struct Verification {
     pub warnings: Vec<Warning>,
 }
 
-/// The `[verify]` section of a pipeline.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct VerifyConfig {
-    /// Published numbers to print beside the own ones.
-    pub published: Vec<Published>,
-    /// Whether the calibrated point is where it was during the calibration.
-    pub tip: TipMount,
-}
-
-/// Whether the calibrated point on the last link is where it was during the calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TipMount {
-    /// It is: both arms keep the tip that the calibration recordings gave them.
-    #[default]
-    Kept,
-    /// Another tool, or a target mounted anew: both arms take the tip of `[frames.tip]`, fitted to the judged dwells where
-    /// it is to be estimated.
-    Remounted,
-}
-
 /// A recording that the calibration saw, whole or in part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Told {
@@ -83,32 +62,6 @@ pub struct Told {
     pub dwells: usize,
     /// Of so many.
     pub all: usize,
-}
-
-/// One published row.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Published {
-    /// What it is: source and subject.
-    pub label: String,
-    /// Which table it belongs to.
-    pub on: On,
-    /// Mean error before calibration [mm].
-    pub before_mm: Option<f64>,
-    /// Mean error after it [mm].
-    pub after_mm: Option<f64>,
-    /// By how much the error fell, where only that is published [%].
-    pub improvement_percent: Option<f64>,
-}
-
-/// Which table a published row belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum On {
-    /// Errors at points.
-    Points,
-    /// Errors along paths.
-    Paths,
 }
 
 /// Criteria of ISO 9283, against what each model says was commanded.

@@ -1,6 +1,6 @@
 //! One row of a verification's tables in words and millimetres, the same on terminal and page.
 
-use crate::text::millimetres;
+use armcal_core::units::millimetres;
 use armcal_verify::{By, Compared, Estimate, PathRow, Plane, PointsRow};
 
 /// Cells of a row; empty where a number would say nothing.

@@ -1,11 +1,13 @@
 //! A verification for people, at most 100 columns wide.
 
 use super::row::{Row, or_dash};
-use super::{On, Published, Told, Verification, VerifiedRecording};
+use super::{Told, Verification, VerifiedRecording};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::run::VERSION;
-use crate::text::{millimetres, printable};
+use crate::text::printable;
 use crate::two_arms::Closing;
+use armcal_config::{On, Published};
+use armcal_core::units::millimetres;
 use armcal_verify::{Against, By, Compared, PathRow, Plane};
 use comfy_table::Cell;
 

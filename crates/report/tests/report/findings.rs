@@ -1,7 +1,8 @@
 use crate::recording::{Full, get, list, number, own, read, string, vector, write};
 use crate::synthetic::{Synthetic, synthetic};
+use armcal_config::InputMessages;
 use armcal_model::EffectSpec;
-use armcal_report::{InputMessages, Refit};
+use armcal_report::Refit;
 use nalgebra::{Rotation3, Vector3};
 use prost_reflect::DynamicMessage;
 use serde_json::Value;

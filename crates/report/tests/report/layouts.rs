@@ -4,7 +4,7 @@
 use crate::findings::with_play_found;
 use crate::recording::{Full, get, list, number, own, read, rotation, string, vector, write};
 use crate::synthetic::{Synthetic, synthetic};
-use armcal_report::InputMessages;
+use armcal_config::InputMessages;
 use nalgebra::{Matrix3, Vector3};
 use prost_reflect::{DynamicMessage, ReflectMessage as _, Value as Field};
 use serde_json::Value;

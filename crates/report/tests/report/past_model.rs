@@ -1,6 +1,7 @@
 use crate::synthetic::synthetic;
+use armcal_config::OutputConfig;
 use armcal_model::{EffectTable, Model};
-use armcal_report::{OutputConfig, Run, open_model, write_all};
+use armcal_report::{Run, open_model, write_all};
 use std::path::Path;
 
 /// What the model of a run predicts, in millimetres, at parameters that are off in every entry.

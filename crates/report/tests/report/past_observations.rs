@@ -1,7 +1,8 @@
 use crate::synthetic::synthetic;
+use armcal_config::OutputConfig;
 use armcal_core::{Observation, Reference};
 use armcal_report::{
-    BoardFacts, OBSERVATIONS_FILE, OutputConfig, PastObservations, observations_json, open_model, write_all,
+    BoardFacts, OBSERVATIONS_FILE, PastObservations, observations_json, open_model, write_all,
 };
 
 #[test]

@@ -1,5 +1,6 @@
 use crate::synthetic::{HOSTILE, NAMES, Synthetic, synthetic};
-use armcal_report::{InputMessages, OutputConfig, write_all};
+use armcal_config::{InputMessages, OutputConfig};
+use armcal_report::write_all;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use prost_reflect::{DescriptorPool, DynamicMessage, Value};
 use std::collections::BTreeMap;

@@ -3,7 +3,7 @@
 use crate::recording::{Full, own, read, write};
 use crate::recording::{list, rotation, string, vector};
 use crate::synthetic::{Synthetic, synthetic};
-use armcal_report::InputMessages;
+use armcal_config::InputMessages;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;

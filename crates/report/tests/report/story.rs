@@ -3,10 +3,9 @@
 use crate::findings::with_play_found;
 use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
+use armcal_config::InputMessages;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{
-    Basis, Detail, InputMessages, PageKind, Status, TerminalStyle, report_html, summary_json, terminal,
-};
+use armcal_report::{Basis, Detail, PageKind, Status, TerminalStyle, report_html, summary_json, terminal};
 
 /// Text without line breaks, indents and markup of characters.
 fn flat(text: &str) -> String {

@@ -1,7 +1,8 @@
 use crate::synthetic::{HOSTILE, Synthetic, synthetic};
+use armcal_config::OutputConfig;
 use armcal_core::{Pose, RollPitchYaw};
 use armcal_model::{Chain, Frame, Frames, Model};
-use armcal_report::{OutputConfig, summary_json, write_all};
+use armcal_report::{summary_json, write_all};
 use polars::prelude::{DataFrame, ParquetReader, SerReader as _};
 use std::path::Path;
 

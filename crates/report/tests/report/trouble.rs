@@ -1,5 +1,6 @@
 use crate::synthetic::synthetic;
-use armcal_report::{InputMessages, OutputConfig, ReportError, write_all};
+use armcal_config::{InputMessages, OutputConfig};
+use armcal_report::{ReportError, write_all};
 use std::path::Path;
 
 fn names(folder: &Path) -> Vec<String> {

@@ -8,7 +8,7 @@ use crate::init::points::Points;
 use crate::init::read::key;
 use crate::init::roles::Role;
 use crate::init::seats::tilts;
-use crate::pipeline::recording_name;
+use armcal_config::recording_name;
 use armcal_recording::{JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;
 use std::collections::BTreeSet;

@@ -1,0 +1,96 @@
+//! From what a user typed to the command that does it.
+
+use crate::batch::Manifest;
+use crate::cli::{Cli, Command};
+use crate::commands::{
+    Outcome, add, batch, check, compare, compensate, completions, diagnose, effects, export, extract, init,
+    inspect, man, plan, pool, run, score, simulate, transfer, verify, view, write,
+};
+use crate::error::Error;
+use crate::stdout::tell;
+use crate::transfer::Asked;
+use armcal_recording::losses;
+use armcal_report::Detail;
+use clap::CommandFactory as _;
+use std::path::Path;
+
+/// Runs the command a user typed. None ends as if all was well where a recording lost data.
+pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
+    let outcome = command(cli);
+    let lost = losses();
+    // These tell what their recordings lost among their results.
+    let tells = matches!(
+        cli.command,
+        Command::Run { .. }
+            | Command::Inspect { .. }
+            | Command::Extract(_)
+            | Command::Batch { .. }
+            | Command::Reduce { .. }
+            | Command::Pool { .. }
+            | Command::View { .. }
+    );
+    if !tells || !matches!(outcome, Ok(Outcome::Doubtful)) {
+        tell(&lost);
+    }
+    match outcome {
+        // What a check accepts of lost data is said in its limits.
+        Ok(Outcome::Done) if !lost.is_empty() && !matches!(cli.command, Command::Check(_)) => {
+            Ok(Outcome::Doubtful)
+        }
+        outcome => outcome,
+    }
+}
+
+fn command(cli: &Cli) -> Result<Outcome, Error> {
+    match &cli.command {
+        Command::Check(asked) => check::run(asked),
+        Command::Batch { inputs, pipeline, out, full, jobs, json } => {
+            let manifest = Manifest::of(inputs, out)?;
+            batch::run(
+                &batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs },
+                *json,
+            )
+        }
+        Command::Map { pool: results, shard, pipeline, out, .. } if !results.is_empty() => {
+            pool::map(pipeline.as_deref(), results, out, shard.as_deref())
+        }
+        Command::Map { manifest, shard, pipeline, out, full, jobs, .. } => {
+            let manifest = Manifest::read(manifest.as_deref().unwrap_or(Path::new("")))?;
+            let job = batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs };
+            batch::map(&job, shard.as_deref())
+        }
+        Command::Reduce { out, json } if crate::pool::is_in_shards(out) => pool::reduce(out, *json),
+        Command::Reduce { out, json } => batch::reduce(out, *json),
+        Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
+        Command::Compensate(asked) => compensate::run(asked),
+        Command::Completions { shell } => completions::run(Cli::command(), *shell),
+        Command::Man { folder } => man::run(Cli::command(), folder),
+        Command::Diagnose { input, json } => diagnose::run(input, *json),
+        Command::Add(asked) => add::run(asked),
+        Command::Effects { name, json } => effects::run(name.as_deref(), *json),
+        Command::Score(asked) => score::run(asked),
+        Command::Plan(asked) => plan::run(asked),
+        Command::Pool { pipeline, results, out, verbose, json } => {
+            pool::run(pipeline, results, out, detail(*verbose), *json)
+        }
+        Command::Run { pipeline, out, verbose, json } => run::run(pipeline, out, detail(*verbose), *json),
+        Command::Init(asked) => init::run(asked),
+        Command::Inspect { inputs, json } => inspect::run(inputs, *json),
+        Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
+            simulate::hide(family, design, size, out, seed.unwrap_or(1))
+        }
+        Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
+        Command::Transfer { from, to, effects, json } => transfer::run(&Asked { from, to, effects }, *json),
+        Command::Verify { result, pipeline, out, json } => {
+            verify::run(result, pipeline, out.as_deref(), *json)
+        }
+        Command::Write(asked) => write::run(asked),
+        Command::View { input, port } => view::run(input, *port),
+        Command::Export { pipeline, out } => export::run(pipeline, out),
+        Command::Extract(asked) => extract::run(asked),
+    }
+}
+
+fn detail(verbose: bool) -> Detail {
+    if verbose { Detail::Everything } else { Detail::Story }
+}

@@ -1,0 +1,107 @@
+//! `[[measure]]`: what the tip, or a marker, is measured against beside sensor and table.
+
+use crate::FramePose;
+use armcal_core::{Against, FeatureId};
+use armcal_model::{Knowledge, Length};
+use armcal_recording::GaugeStream;
+use serde::Deserialize;
+
+/// One measurement, as written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeasureSection {
+    /// Its name, of which parameters, errors and warnings speak; that of the place when absent.
+    pub name: Option<String>,
+    /// `"coincide"`, `"distance"` or `"plane"`.
+    pub kind: MeasureKind,
+    /// `"tip"` or a marker, then a point (for `"plane"`: a plane).
+    pub between: [String; 2],
+    /// Of a distance [mm]: what it is, or what it is where the instrument reads zero; default 0 with a `reading`.
+    pub length_mm: Option<f64>,
+    /// How well that is known: `"given"` (default), `"measured"` with `length_sigma_mm`, `"estimated"`.
+    #[serde(default)]
+    pub length: FramePose,
+    /// Standard error of a measured length [mm].
+    #[serde(default)]
+    pub length_sigma_mm: f64,
+    /// Standard error of one measurement, per row [mm].
+    pub sigma_mm: f64,
+    /// The instrument: a topic of one number. Without one a distance is `length_mm`, and a plane is touched.
+    pub reading: Option<GaugeStream>,
+    /// Readings outside are none, as of an instrument that touches nothing or is at its stop [mm].
+    pub range_mm: Option<[f64; 2]>,
+    /// The recordings it was made in, by name; all when absent.
+    pub recordings: Option<Vec<String>>,
+    /// Without an instrument: dwells in which the nominal arm is further off than this do not belong [mm]; default 50.
+    #[serde(default = "default_max_gap_mm")]
+    pub max_gap_mm: f64,
+}
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeasureKind {
+    /// Both in one point: 3 rows.
+    Coincide,
+    /// How far they are from each other: 1 row.
+    Distance,
+    /// How high it is above the plane: 1 row.
+    Plane,
+}
+
+fn default_max_gap_mm() -> f64 {
+    50.0
+}
+
+/// A measurement between places of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measure {
+    /// Its name.
+    pub name: String,
+    /// What is measured.
+    pub kind: MeasureKind,
+    /// Of what.
+    pub feature: FeatureId,
+    /// Against what.
+    pub against: Against,
+    /// Of a distance: which of the model's lengths it counts from.
+    pub length: usize,
+    /// Standard error per row [m].
+    pub sigma_m: f64,
+    /// Whether an instrument says how far, and between which readings [m].
+    pub reading_m: Option<[f64; 2]>,
+    /// The recordings it was made in; all of them where nothing is said.
+    pub recordings: Option<Vec<usize>>,
+    /// How far off the nominal arm may be [m].
+    pub max_gap_m: f64,
+}
+
+impl Measure {
+    /// Whether it was made in a recording.
+    pub fn is_in(&self, recording: usize) -> bool {
+        self.recordings.as_ref().is_none_or(|own| own.contains(&recording))
+    }
+}
+
+impl MeasureSection {
+    /// Its name, given or that of its place.
+    pub fn name(&self) -> &str {
+        self.name.as_ref().unwrap_or(&self.between[1])
+    }
+
+    /// The length that it counts from.
+    pub(crate) fn length(&self) -> Length {
+        let knowledge = knowledge(self.length, self.length_sigma_mm);
+        let length_m = self.length_mm.unwrap_or(0.0) * 1e-3;
+        Length { name: self.name().to_owned(), length_m, knowledge }
+    }
+}
+
+/// How well a length is known.
+pub(crate) fn knowledge(length: FramePose, sigma_mm: f64) -> Knowledge {
+    match length {
+        FramePose::Given => Knowledge::Given,
+        FramePose::Measured => Knowledge::Measured { sigma_m: sigma_mm * 1e-3, sigma_rad: 0.0 },
+        FramePose::Estimated => Knowledge::Estimated,
+    }
+}

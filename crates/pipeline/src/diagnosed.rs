@@ -1,0 +1,61 @@
+//! What is missing in the model of a run, looked for where the pipeline wants to know: whatever comes of it, the calibration stands.
+
+use armcal_config::Pipeline;
+use armcal_core::{Severity, Stage, Warning};
+use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested};
+use armcal_report::{Run, Undiagnosed};
+use armcal_stages::{RunError, Steps};
+
+/// Code of the warning about a diagnosis that could not be made.
+pub(crate) const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
+
+/// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
+pub fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
+    let found = diagnosis(pipeline, &calibrated(run, pipeline), progress);
+    set_diagnosis(run, found);
+}
+
+/// What a diagnosis asks of a run.
+pub(crate) fn calibrated<'a>(run: &'a Run, pipeline: &'a Pipeline) -> Calibrated<'a> {
+    let Run { model, calibration, observations, session, .. } = run;
+    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
+    Calibrated { model, calibration, observations, session, fit, holdout }
+}
+
+pub(crate) fn diagnosis(
+    pipeline: &Pipeline,
+    calibrated: &Calibrated<'_>,
+    progress: &dyn Steps,
+) -> Result<Option<Diagnosis>, RunError> {
+    if !pipeline.diagnosis.enabled {
+        return Ok(None);
+    }
+    progress.step("diagnosing");
+    Ok(Some(diagnose(calibrated, &pipeline.diagnosis)?))
+}
+
+/// What came of a diagnosis, or why there is none.
+pub(crate) fn set_diagnosis(run: &mut Run, found: Result<Option<Diagnosis>, RunError>) {
+    (run.diagnosis, run.undiagnosed) = match found {
+        Ok(Some(diagnosis)) => (Some(diagnosis), None),
+        Ok(None) => (None, Some(Undiagnosed::NotAsked)),
+        Err(RunError::SetupFirst { .. }) => (None, Some(Undiagnosed::SetupFirst)),
+        Err(e) => {
+            let message = format!("what is missing could not be looked for: {e}; the calibration stands");
+            let (severity, stage) = (Severity::Inadequate, Stage::Diagnose);
+            run.warnings.push(Warning::new(severity, stage, DIAGNOSIS_FAILED, "diagnosis", message));
+            (None, Some(Undiagnosed::Failed))
+        }
+    };
+}
+
+/// The choice of what was found, made again without each part of the hold-out.
+pub fn chosen_again(
+    pipeline: &Pipeline,
+    calibrated: &Calibrated<'_>,
+    found: &Diagnosis,
+    progress: &dyn Steps,
+) -> Result<Option<Nested>, RunError> {
+    progress.step("choosing again without each part of the hold-out");
+    Ok(nested(calibrated, found, &pipeline.diagnosis)?)
+}

@@ -1,0 +1,217 @@
+//! From recordings to a calibration whose setup was looked at, and what a report needs of it.
+
+use crate::diagnosed::{diagnosis, set_diagnosis};
+use armcal_calibrate::Calibration;
+use armcal_config::Pipeline;
+use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
+use armcal_diagnose::{Diagnosis, Knowledge, Verdict};
+use armcal_model::{Model, Session};
+use armcal_recording::Recording;
+use armcal_report::{RecordingRun, Run, Undiagnosed};
+use armcal_setup as setup;
+use armcal_stages::associated::Associated;
+use armcal_stages::{Fitted, Inputs, RunError, Steps, fit_places, frames};
+use armcal_stages::{Seen, perceive};
+use armcal_table::Association;
+
+/// Association and fit depend on each other; more rounds than this mean they do not settle.
+const MAX_ROUNDS: usize = 4;
+
+/// Recordings whose dwells have found their places, and the calibration on them.
+pub struct Settled {
+    /// The opened recordings.
+    pub recordings: Vec<Recording>,
+    /// Texts of the nominal model files: one an arm.
+    pub model_texts: Vec<String>,
+    /// What it was calibrated from.
+    pub inputs: Inputs,
+    /// What contradicts the data about the setup.
+    pub setup: SetupReport,
+    /// The calibration on them.
+    pub fitted: Fitted,
+}
+
+/// Reads the recordings, associates and calibrates in turn until every dwell stays in its place, and looks for mistakes
+/// in the setup.
+pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, RunError> {
+    let (model_texts, chain) = frames::nominal_chain(pipeline)?;
+    // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
+    Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
+    let board = frames::board(pipeline)?;
+    let recordings = perceive::open_all(pipeline, progress)?;
+    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
+    let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
+    perceive::refuse_repeated(&fingerprints)?;
+    let inputs = Inputs {
+        pipeline: pipeline.clone(),
+        chain,
+        board,
+        seen,
+        changes: Vec::new(),
+        most_rounds: MAX_ROUNDS,
+        known: Associated::default(),
+    };
+    let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
+    progress.step("checking the setup");
+    let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
+    let setup = setup::examine(&inputs, &fitted);
+    Ok(Settled { recordings, model_texts, inputs, setup, fitted })
+}
+
+/// The error of inputs that cannot be calibrated, with the mistake of the setup that would explain it.
+fn without_setup(source: RunError, inputs: &Inputs) -> RunError {
+    let report = setup::examine_failed(inputs);
+    let messages: Vec<String> = report.mistakes().map(|f| format!("[{}] {}", f.code, f.message)).collect();
+    match messages.is_empty() {
+        true => source,
+        false => RunError::Setup { source: Box::new(source), mistakes: messages.join("; also, ") },
+    }
+}
+
+impl Settled {
+    /// Of a session whose setup contradicts its data, every further sentence would be about the mistake.
+    ///
+    /// # Errors
+    /// The first mistake.
+    pub fn refuse_mistakes(&self) -> Result<(), RunError> {
+        self.setup.mistakes().next().map_or(Ok(()), |mistake| {
+            Err(RunError::SetupFirst {
+                pipeline: self.inputs.pipeline.name.clone(),
+                code: mistake.code,
+                message: mistake.message.clone(),
+            })
+        })
+    }
+
+    /// Looks for the effect that the calibrated model is missing, if the pipeline wants to know.
+    ///
+    /// # Errors
+    /// A mistake of the setup, which would get the name of an effect; a diagnosis that cannot be made.
+    pub fn diagnose(&self, pipeline: &Pipeline, progress: &dyn Steps) -> Result<Option<Diagnosis>, RunError> {
+        self.refuse_mistakes()?;
+        diagnosis(pipeline, &self.fitted.calibrated(pipeline), progress)
+    }
+
+    /// Everything for the report, with its diagnosis: whatever comes of that, the calibration stands. What it proposes is not
+    /// fitted, which takes longer than all before: only a report shows it ([`add_refits`]).
+    pub fn diagnosed(self, pipeline: &Pipeline, progress: &dyn Steps) -> (Run, Vec<Recording>) {
+        let found = self.diagnose(pipeline, progress);
+        let (mut run, recordings) = self.into_run(pipeline);
+        set_diagnosis(&mut run, found);
+        if let Some(named) = run.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {
+            run.setup.outdone_by(named.holdout_mm.after);
+        }
+        (run, recordings)
+    }
+
+    /// Everything for the report, without a diagnosis.
+    pub fn into_run(self, pipeline: &Pipeline) -> (Run, Vec<Recording>) {
+        let Fitted { model, observations, session, calibration, places, rejections, rounds, .. } =
+            self.fitted;
+        let mut warnings = closing_warnings(rounds, places.iter().any(Option::is_some), &calibration);
+        warnings.extend(frames::links_without_mass(pipeline, &self.inputs.chain));
+        let run = Run {
+            recordings: recording_runs(pipeline, self.inputs.seen, places, &rejections),
+            board: self.inputs.board,
+            setup: self.setup,
+            warnings,
+            ..run_of(pipeline, self.model_texts, model, (observations, session), calibration)
+        };
+        (run, self.recordings)
+    }
+}
+
+/// A run of these observations, and nothing else of it.
+pub fn run_of(
+    pipeline: &Pipeline,
+    model_texts: Vec<String>,
+    model: Model,
+    (observations, session): (Vec<Observation>, Session),
+    calibration: Calibration,
+) -> Run {
+    let ties = frames::ties(pipeline, &model);
+    Run {
+        pipeline_name: pipeline.name.clone(),
+        pipeline_text: pipeline.text.clone(),
+        model_texts,
+        recordings: Vec::new(),
+        board: None,
+        model,
+        session,
+        observations,
+        calibration,
+        transfer: None,
+        setup: SetupReport::default(),
+        diagnosis: None,
+        undiagnosed: Some(Undiagnosed::NotAsked),
+        wanted_mm: pipeline.accuracy.wanted_mm,
+        ties,
+        steps: Vec::new(),
+        alternatives: Vec::new(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Joins what was seen, where each dwell turned out to be, and what was rejected.
+fn recording_runs(
+    pipeline: &Pipeline,
+    seen: Vec<Seen>,
+    places: Vec<Option<Association>>,
+    rejections: &[Rejection],
+) -> Vec<RecordingRun> {
+    seen.into_iter()
+        .zip(places)
+        .zip(&pipeline.recordings)
+        .enumerate()
+        .map(|(index, ((seen, association), entry))| RecordingRun {
+            name: seen.name,
+            paths: entry.paths.clone(),
+            report: seen.report,
+            clock: seen.clock,
+            dwells: seen.dwells,
+            association,
+            earlier: None,
+            rejections: rejections.iter().filter(|r| r.dwell.recording == index).cloned().collect(),
+            warnings: seen.warnings,
+        })
+        .collect()
+}
+
+fn closing_warnings(rounds: usize, at_table: bool, calibration: &Calibration) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    // What has no table has no visiting order either.
+    if at_table && rounds == MAX_ROUNDS {
+        warnings.push(Warning::new(
+            Severity::Inadequate,
+            Stage::Table,
+            "association-unsettled",
+            "association",
+            format!(
+                "after {MAX_ROUNDS} rounds of fitting and associating, dwells still change cavities; \
+                 give a visiting order, [table.association] visiting_order"
+            ),
+        ));
+    }
+    warnings.extend(holdout_worse(calibration));
+    warnings
+}
+
+/// Code of the warning about a fit that does not generalise.
+pub(crate) const HOLDOUT_WORSE: &str = "holdout-worse";
+
+pub(crate) fn holdout_worse(calibration: &Calibration) -> Option<Warning> {
+    let fitted_mm = calibration.holdout.fitted.mean_m * 1e3;
+    let nominal_mm = calibration.holdout.nominal.mean_m * 1e3;
+    (calibration.holdout.fitted.n > 0 && fitted_mm > nominal_mm).then(|| {
+        Warning::new(
+            Severity::Inadequate,
+            Stage::Calibrate,
+            HOLDOUT_WORSE,
+            "hold-out",
+            format!(
+                "on held-out points the fit is worse than nominal ({fitted_mm:.3} against {nominal_mm:.3} mm): \
+                 it does not generalise; free fewer parameters or record more varied dwells"
+            ),
+        )
+    })
+}

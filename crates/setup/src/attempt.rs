@@ -1,0 +1,90 @@
+//! Hypotheses fitted: each change, and of a change that holds a number the value that fits best.
+
+use super::hypotheses::{Freedom, Hypothesis, Number};
+use super::trial::{Misfit, misfit};
+use armcal_stages::Fitted;
+use armcal_stages::Inputs;
+use rayon::prelude::*;
+
+/// Steps of a search between two neighbours.
+const REFINEMENTS: usize = 10;
+
+/// A hypothesis and how well the inputs fit with it.
+pub struct Tried {
+    /// The mistake that somebody may have made.
+    pub hypothesis: Hypothesis,
+    /// The inputs without it.
+    pub inputs: Inputs,
+    /// The fit to those.
+    pub fitted: Fitted,
+    /// How badly it fits.
+    pub misfit: Misfit,
+}
+
+/// Those of the hypotheses that can be fitted. `before` is the misfit without any.
+pub fn attempted(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
+    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, h)).collect();
+    refine_numbers(now, before, &mut tried);
+    tried
+}
+
+/// Of each number the value that fits best, refined; the other values are dropped.
+fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
+    let of_number = |t: &Tried| t.hypothesis.number.is_some();
+    let name = |t: &Tried| (t.hypothesis.code, t.hypothesis.subject.clone());
+    let mut numbers: Vec<(&'static str, String)> = tried.iter().filter(|t| of_number(t)).map(name).collect();
+    numbers.dedup();
+    for number in numbers {
+        let own = |t: &Tried| of_number(t) && name(t) == number;
+        // In the place of its values: of what cannot be told apart the first in the list is believed.
+        let place = tried.iter().take_while(|t| !own(t)).count();
+        let (values, others): (Vec<Tried>, Vec<Tried>) = std::mem::take(tried).into_iter().partition(own);
+        *tried = others;
+        let best = values.into_iter().min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log));
+        let worth = best.filter(|best| best.misfit.log < before.log);
+        tried.splice(place..place, worth.map(|best| refined(now, best)));
+    }
+}
+
+/// The best value of a number between the neighbours of the one that was tried, by golden section.
+fn refined(now: &Inputs, tried: Tried) -> Tried {
+    let Some(number) = tried.hypothesis.number.clone() else { return tried };
+    let ratio = (5f64.sqrt() - 1.0) / 2.0;
+    let at = |value: f64| {
+        let of_value = (number.at)(value);
+        let number = Some(Number { value, ..number.clone() });
+        attempt(now, Hypothesis { number, freedom: Freedom::Number, ..of_value })
+    };
+    // By the spread: of a scale, the plain mean is least at too small a one.
+    let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.of_spread());
+    let [mut low, mut high] = number.between;
+    let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));
+    let (mut at_a, mut at_b) = (at(a), at(b));
+    // Each step keeps the better of the two inner values, and tries one more.
+    for _ in 1..REFINEMENTS {
+        if mean(&at_a) < mean(&at_b) {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - ratio * (high - low);
+            at_a = at(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + ratio * (high - low);
+            at_b = at(b);
+        }
+    }
+    let mut best = tried;
+    for other in [at_a, at_b].into_iter().flatten() {
+        if other.misfit.of_spread() < best.misfit.of_spread() {
+            best = other;
+        }
+    }
+    best
+}
+
+/// A hypothesis, fitted.
+pub fn attempt(now: &Inputs, hypothesis: Hypothesis) -> Option<Tried> {
+    let inputs = hypothesis.undone(now);
+    let fitted = inputs.fit().ok()?;
+    let misfit = misfit(&inputs, &fitted);
+    Some(Tried { hypothesis, inputs, fitted, misfit })
+}

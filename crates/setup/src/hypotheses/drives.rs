@@ -1,0 +1,131 @@
+//! What stands between a joint and its reading: a gear, a pulley, another joint's angle; and what the model holds fixed.
+//!
+//! Rarer than a sign or an order: tried where none of those explains the errors.
+
+use super::joints::{scale, shift};
+use super::{Estimated, Freedom, Hypothesis};
+use armcal_core::{Parameter, Unit};
+use armcal_model::{EffectSpec, EffectTable, Override};
+use armcal_stages::{Change, Inputs};
+use std::collections::BTreeMap;
+
+const RATIO: &str = "mend `counts_per_turn` in [streams.joints], or divide by the gear's ratio in the driver";
+const COUPLED: &str = "convert it in the driver that records it, or read the joint's own angle";
+const FREE: &str = "leave out `free = false`, or mend the values that are held fixed";
+const FIXED: &str = "free it in the model file, or mend its value there";
+const PRIORS: &str = "mend the values in the model file, or widen the deviation that it allows";
+
+/// Ratios of gears and units that are mistaken for none; those near 1 are in `joints`.
+const RATIOS: [f64; 6] = [3.0, 5.0, 10.0, 50.0, 100.0, 1000.0];
+/// A ratio further from 1 than this is no tolerance of a gear or pulley.
+const RATIO_OFF: f64 = 0.03;
+/// How far a ratio may come out.
+const RATIO_BOUND: f64 = 0.5;
+/// Fixed parameters are let go this far, and are wrong if they come out this far off [m], [rad].
+const FREED: f64 = 0.05;
+const FAR_FREED: f64 = 2e-3;
+/// Priors that are this many standard deviations off are too tight.
+const FAR_SIGMAS: f64 = 4.0;
+
+pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
+    let names = inputs.chain.joint_names();
+    let turning: Vec<usize> =
+        (0..names.len()).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
+    let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
+    let mut all = Vec::new();
+    let each = (0..names.len()).map(|j| (vec![j], joint(j)));
+    for (set, subject) in each.chain([((0..names.len()).collect(), "all joints".to_owned())]) {
+        for ratio in RATIOS {
+            let (set, subject) = (set.clone(), subject.clone());
+            let change = format!("the reading of {subject} divided by {ratio}");
+            all.push(Hypothesis::new("joint-scale", subject, change, RATIO, move |i| {
+                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, 1.0 / ratio)));
+            }));
+        }
+    }
+    for &j in turning.iter().skip(1) {
+        for (sign, words) in [(-1.0, "minus"), (1.0, "plus")] {
+            let change = format!(
+                "{} read as its reading {words} that of joint {j} (its reading is coupled)",
+                joint(j)
+            );
+            all.push(Hypothesis::new("joint-coupling", joint(j), change, COUPLED, move |i| {
+                i.each_dwell(|d| {
+                    let before_rad = sign * d.joint_rad[j - 1];
+                    shift(d, j, before_rad);
+                });
+            }));
+        }
+    }
+    for j in 0..names.len() {
+        let change = format!("the gear ratio of {} estimated", joint(j));
+        let spec = EffectSpec::new("gear_ratio").at(j);
+        let scale = ("scale", within(RATIO_BOUND));
+        all.push(effect("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
+    }
+    all
+}
+
+/// Parameters that the model file holds fixed, each and together, and priors that are too tight.
+pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
+    let parameters = inputs.chain.parameters();
+    let fixed: Vec<&Parameter> = parameters.iter().filter(|p| !p.free).collect();
+    let mut all = Vec::new();
+    let each =
+        fixed.iter().map(|p| (vec![*p], format!("{}, which the model file holds fixed, estimated", p.name)));
+    let together = (fixed.len() > 1)
+        .then(|| (fixed.clone(), "all that the model file holds fixed estimated".to_owned()));
+    for (set, change) in each.chain(together) {
+        let names: Vec<String> = set.iter().map(|p| p.name.clone()).collect();
+        let subject = armcal_core::listed(&names);
+        let freedom = if set.len() == 1 { Freedom::Number } else { Freedom::Frame };
+        let estimated = set.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
+        let hypothesis = Hypothesis::new("parameter-fixed", subject, change, FIXED, move |i| {
+            i.changes.extend(names.iter().map(|name| Change::freed(name, FREED)));
+        });
+        all.push(hypothesis.estimating(freedom, estimated));
+    }
+    if inputs.pipeline.parameters.iter().any(|p| p.free == Some(false)) {
+        let estimated = parameters.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
+        let change = "all that is held fixed by the pipeline's [[parameters]] estimated";
+        let hypothesis = Hypothesis::new("parameter-fixed", "the model", change, FREE, |i| {
+            i.pipeline.parameters.retain(|p| p.free != Some(false));
+        });
+        all.push(hypothesis.estimating(Freedom::Frame, estimated));
+    }
+    let estimated: Vec<Estimated> = parameters
+        .iter()
+        .filter_map(|p| Some(Estimated::of(p, FAR_SIGMAS * p.prior_sigma.filter(|_| p.free)?)))
+        .collect();
+    if !estimated.is_empty() {
+        let names: Vec<String> = estimated.iter().map(|own| own.parameter.clone()).collect();
+        let change = "the priors and bounds of the model's parameters thirty times as wide";
+        let hypothesis = Hypothesis::new("parameter-bound", "the model", change, PRIORS, move |i| {
+            i.changes.extend(names.iter().map(|name| super::model::widened(name)));
+        });
+        all.push(hypothesis.estimating(Freedom::Frame, estimated));
+    }
+    all
+}
+
+/// An amplitude as far as this either way.
+pub fn within(bound: f64) -> Override {
+    Override { bound: Some(bound), prior: Some(bound), ..Override::default() }
+}
+
+/// An effect of the catalogue whose one amplitude may be far larger than its physics allows.
+pub fn effect(
+    code: &'static str,
+    subject: String,
+    change: String,
+    remedy: &'static str,
+    spec: EffectSpec,
+    (amplitude, said): (&str, Override),
+    far: f64,
+) -> Hypothesis {
+    let estimated = Estimated { parameter: format!("{spec}.{amplitude}"), nominal: 0.0, far };
+    let overrides = BTreeMap::from([(amplitude.to_owned(), said)]);
+    let table = EffectTable::from(&EffectSpec { overrides, ..spec });
+    let add = move |i: &mut Inputs| i.pipeline.effects.push(table.clone());
+    Hypothesis::new(code, subject, change, remedy, add).estimating(Freedom::Number, vec![estimated])
+}

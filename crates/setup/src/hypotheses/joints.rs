@@ -1,0 +1,155 @@
+//! Joint readings: sign, order, unit, counts a turn, zero.
+
+use super::Hypothesis;
+use crate::DEGREES;
+use armcal_core::{Arrival, Dwell, Unit};
+use armcal_stages::Inputs;
+use std::f64::consts::FRAC_PI_2;
+
+pub const SIGN: &str = "mend the direction of its encoder in [streams.joints] or in the driver that records it, or its axis in the model file";
+const ORDER: &str = "mend `names` in [streams.joints], or the driver that records them";
+const UNIT: &str = "mend `unit` in [streams.joints], or the driver that records it";
+const COUNTS: &str = "mend `counts_per_turn` in [streams.joints], or the driver that records it";
+pub const ZERO: &str = "mend `zero_counts` in [streams.joints], or theta of the model";
+
+/// Joints beyond which only neighbours and ends are exchanged, not every two.
+const FEW: usize = 3;
+
+pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
+    let names = inputs.chain.joint_names();
+    let n = names.len();
+    let turning: Vec<usize> = (0..n).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
+    let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
+    let mut all = Vec::new();
+    all.extend(sign_sets(n).into_iter().map(|set| reversed(names, set)));
+    for order in orders(n) {
+        let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
+        let change = format!("the joints read in the order {}", words.join(", "));
+        all.push(Hypothesis::new("joint-order", "order of the joints", change, ORDER, move |i| {
+            i.each_dwell(|d| reorder(d, &order));
+        }));
+    }
+    for (factor, words) in [
+        (1.0 / DEGREES, "read as degrees instead of radians"),
+        (DEGREES, "read as radians instead of degrees"),
+    ] {
+        let each = turning.iter().map(|&j| (vec![j], joint(j)));
+        for (set, subject) in each.chain([(turning.clone(), "all joints".to_owned())]) {
+            let change = format!("{subject} {words}");
+            all.push(Hypothesis::new("joint-unit", subject, change, UNIT, move |i| {
+                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
+            }));
+        }
+    }
+    for factor in [0.25, 0.5, 2.0, 4.0] {
+        let each = (0..n).map(|j| (vec![j], joint(j)));
+        for (set, subject) in each.chain([((0..n).collect(), "all joints".to_owned())]) {
+            let change = format!("{factor} times the reading of {subject}");
+            all.push(Hypothesis::new("joint-scale", subject, change, COUNTS, move |i| {
+                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
+            }));
+        }
+    }
+    for &j in &turning {
+        for quarters in [1.0, 2.0, 3.0] {
+            let change = format!("the zero of {} moved by {} deg", joint(j), 90.0 * quarters);
+            all.push(Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
+                i.each_dwell(|d| shift(d, j, quarters * FRAC_PI_2));
+            }));
+        }
+    }
+    all
+}
+
+/// The signs of these joints reversed.
+pub fn reversed(names: &[String], set: Vec<usize>) -> Hypothesis {
+    let joint = |j: &usize| format!("joint {} ({})", j + 1, names[*j]);
+    let subject = set.iter().map(joint).collect::<Vec<_>>().join(", ");
+    let change = format!("the sign of {subject} reversed");
+    Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
+        i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, -1.0)));
+    })
+}
+
+/// Each joint, every two of them, all.
+fn sign_sets(n: usize) -> Vec<Vec<usize>> {
+    let mut sets: Vec<Vec<usize>> = (0..n).map(|j| vec![j]).collect();
+    sets.extend((0..n).flat_map(|j| (j + 1..n).map(move |k| vec![j, k])));
+    if n > 2 {
+        sets.push((0..n).collect());
+    }
+    sets
+}
+
+/// Orders other than the given one: all of few joints; of many the exchanges of two, the reverse, and the alphabetical
+/// slip by one place either way.
+fn orders(n: usize) -> Vec<Vec<usize>> {
+    let same: Vec<usize> = (0..n).collect();
+    let rotated = |by: usize| -> Vec<usize> { (0..n).map(|j| (j + by) % n).collect() };
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for j in 0..n {
+        for k in j + 1..n {
+            let mut order = same.clone();
+            order.swap(j, k);
+            all.push(order);
+        }
+    }
+    if n >= FEW {
+        all.push(rotated(1));
+        all.push(rotated(n - 1));
+        all.push(same.iter().rev().copied().collect());
+    }
+    let mut once: Vec<Vec<usize>> = Vec::new();
+    for order in all {
+        if order != same && !once.contains(&order) {
+            once.push(order);
+        }
+    }
+    once
+}
+
+pub fn scale(d: &mut Dwell, j: usize, factor: f64) {
+    d.joint_rad[j] *= factor;
+    d.joint_sigma_rad[j] *= factor.abs();
+    d.joint_spread_rad[j] *= factor.abs();
+    d.path_memory_rad[j].iter_mut().for_each(|q| *q *= factor);
+    d.moved_rad.iter_mut().for_each(|moved| moved[j] *= factor);
+    if factor < 0.0 {
+        d.arrival[j] = match d.arrival[j] {
+            Arrival::Positive => Arrival::Negative,
+            Arrival::Negative => Arrival::Positive,
+            Arrival::Unknown => Arrival::Unknown,
+        };
+    }
+}
+
+pub fn shift(d: &mut Dwell, j: usize, by_rad: f64) {
+    d.joint_rad[j] += by_rad;
+    d.path_memory_rad[j].iter_mut().for_each(|q| *q += by_rad);
+}
+
+/// Reads joint `j` where `order[j]` was read.
+fn reorder(d: &mut Dwell, order: &[usize]) {
+    fn by<T: Clone>(values: &mut Vec<T>, order: &[usize]) {
+        *values = order.iter().map(|&from| values[from].clone()).collect();
+    }
+    by(&mut d.joint_rad, order);
+    by(&mut d.joint_sigma_rad, order);
+    by(&mut d.joint_spread_rad, order);
+    by(&mut d.path_memory_rad, order);
+    d.moved_rad.iter_mut().for_each(|moved| by(moved, order));
+    by(&mut d.arrival, order);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_three_joints_every_order_is_tried_and_every_set_of_signs() {
+        assert_eq!(orders(3).len(), 5);
+        assert_eq!(sign_sets(3).len(), 7);
+        assert_eq!(orders(6).len(), 15 + 3);
+        assert!(orders(1).is_empty());
+    }
+}
