@@ -119,6 +119,13 @@ fn settled(
         judged = room.judge(first, config);
         grade = judged.grade(config).max(Grade::OrUnlisted);
     }
+    // One step, far from where the fit ends, may promise what no refit keeps.
+    if let Some((_, score)) = refits.iter().find(|(k, _)| *k == first) {
+        judged.refitted(score.clone(), &nothing);
+        if judged.is_refuted(config) {
+            return None;
+        }
+    }
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);

@@ -3,6 +3,7 @@
 //! Rarer than a sign or an order: tried where none of those explains the errors.
 
 use super::joints::{scale, shift};
+use super::model::{WIDER, widened};
 use super::{Estimated, Freedom, Hypothesis};
 use armcal_core::{Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
@@ -99,9 +100,9 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         .collect();
     if !estimated.is_empty() {
         let names: Vec<String> = estimated.iter().map(|own| own.parameter.clone()).collect();
-        let change = "the priors and bounds of the model's parameters thirty times as wide";
+        let change = format!("the priors and bounds of the model's parameters {WIDER} times as wide");
         let hypothesis = Hypothesis::new("parameter-bound", "the model", change, PRIORS, move |i| {
-            i.changes.extend(names.iter().map(|name| super::model::widened(name)));
+            i.changes.extend(names.iter().map(|name| widened(name)));
         });
         all.push(hypothesis.estimating(Freedom::Frame, estimated));
     }

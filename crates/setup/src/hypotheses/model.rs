@@ -10,8 +10,8 @@ use armcal_recording::Streams;
 use armcal_stages::{Change, Inputs};
 
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
-/// A parameter on its bound is let go this many times as far.
-const WIDER: f64 = 30.0;
+/// A parameter on its bound is let go this many times as far: from one arm of a make to the next larger one.
+pub const WIDER: f64 = 60.0;
 /// Sizes of the model that are tried, the first and the last only as neighbours, and what no tolerance reaches.
 const SIZES: [f64; 11] = [0.4, 0.55, 0.65, 0.75, 0.87, 1.0, 1.15, 1.3, 1.45, 1.6, 2.0];
 const FAR_SIZE: f64 = 0.05;
