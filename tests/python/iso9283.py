@@ -139,23 +139,6 @@ for path in evidence["paths"]:
     name = path["name"]
     points = np.array([position(p) for p in path["commanded"]])
     legs = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if path["weave"]:
-        aside = {"stroke": [], "frequency": []}
-        for run in path["runs"]:
-            t = np.array([s["time_ns"] for s in run]) * 1e-9
-            x = np.array([position(s["pose"]) for s in run])
-            along = (points[-1] - points[0]) / legs.sum()
-            lateral = x - np.outer(x @ along, along)
-            lateral = lateral - lateral.mean(axis=0)
-            signal = lateral @ np.linalg.svd(lateral, full_matrices=False)[2][0]
-            cross = np.flatnonzero(np.sign(signal[:-1]) != np.sign(signal[1:]))
-            when = t[cross] + (t[cross + 1] - t[cross]) * signal[cross] / (signal[cross] - signal[cross + 1])
-            peaks = [signal[a + 1:b + 1][np.abs(signal[a + 1:b + 1]).argmax()] for a, b in zip(cross, cross[1:])]
-            aside["stroke"].append(np.abs(np.diff(peaks)).mean())
-            aside["frequency"].append((len(when) - 1) / 2 / (when[-1] - when[0]))
-        put("11", "WS", name, [""], np.mean(aside["stroke"]) / path["weave"]["stroke_m"] - 1)
-        put("11", "WF", name, [""], np.mean(aside["frequency"]) / path["weave"]["frequency_hz"] - 1)
-        continue
     ends = np.concatenate([[0], np.cumsum(legs)])
     hits = []
     for run in path["runs"]:

@@ -323,7 +323,6 @@ pub fn reads() -> Vec<Reads> {
         whole(["batch", "pipeline"], &["normal.mcap", "--pipeline", INPUT], "toml"),
         recording(["batch", "inputs"], &[INPUT, "--pipeline", "p.toml"]),
         whole(["map", "manifest"], &[&map[..], &["p.toml", "--manifest", INPUT]].concat(), "txt"),
-        whole(["map", "pool"], &[&map[..], &["p.toml", "--pool", INPUT]].concat(), "json"),
         whole(["map", "pipeline"], &[&map[..], &[INPUT, "--manifest", "manifest.txt"]].concat(), "toml"),
         recording(["compare", "before"], &[INPUT, "result"]),
         recording(["compare", "after"], &["result", INPUT]),

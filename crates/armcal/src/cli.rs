@@ -116,23 +116,18 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// One share of a batch or of a pool, for a cluster: any number of them, on any machines that see the folder; then `armcal
-    /// reduce`.
+    /// One share of a batch, for a cluster: any number of them, on any machines that see the folder; then `armcal reduce`.
     Map {
-        /// Manifest file of a batch: TOML with [[recordings]], or a path a line.
-        #[arg(long, value_name = "FILE", required_unless_present = "pool")]
-        manifest: Option<PathBuf>,
-        /// Folders with results of `armcal run`, for a pool instead of a batch: answers what its open round asks about the
-        /// share's results.
-        #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["manifest", "full", "jobs"], requires = "pipeline")]
-        pool: Vec<PathBuf>,
+        /// Manifest file: TOML with [[recordings]], or a path a line.
+        #[arg(long, value_name = "FILE")]
+        manifest: PathBuf,
         /// Which share, such as 2/17; from the environment of a Slurm job array when absent.
         #[arg(long, value_name = "I/N")]
         shard: Option<String>,
         /// Pipeline file; the manifest's when absent.
         #[arg(long, value_name = "FILE")]
         pipeline: Option<PathBuf>,
-        /// Folder of the campaign or pool, the same for all shares.
+        /// Folder of the campaign, the same for all shares.
         #[arg(long, default_value = "campaign", value_name = "DIR")]
         out: PathBuf,
         /// Write everything for each recording that `armcal run` does.
@@ -143,15 +138,11 @@ pub enum Command {
         jobs: Option<usize>,
     },
     /// Puts the shares of `armcal map` together, to the bytes that `armcal batch` writes; missing shares fail by name.
-    ///
-    /// Of a pool: goes on with its fit as far as the answers reach. Exit code 4: every share is asked more, map all of them
-    /// again, then reduce again. 0 or 3: done, to the numbers of `armcal pool`, without page, diagnosis and tables, which need
-    /// the observations themselves.
     Reduce {
-        /// Folder of the campaign or pool.
+        /// Folder of the campaign.
         #[arg(default_value = "campaign")]
         out: PathBuf,
-        /// Print campaign.json or pool.json instead of the tables.
+        /// Print campaign.json instead of the tables.
         #[arg(long)]
         json: bool,
     },

@@ -12,7 +12,6 @@ use crate::transfer::Asked;
 use armcal_recording::losses;
 use armcal_report::Detail;
 use clap::CommandFactory as _;
-use std::path::Path;
 
 /// Runs the command a user typed. None ends as if all was well where a recording lost data.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
@@ -51,15 +50,11 @@ fn command(cli: &Cli) -> Result<Outcome, Error> {
                 *json,
             )
         }
-        Command::Map { pool: results, shard, pipeline, out, .. } if !results.is_empty() => {
-            pool::map(pipeline.as_deref(), results, out, shard.as_deref())
-        }
-        Command::Map { manifest, shard, pipeline, out, full, jobs, .. } => {
-            let manifest = Manifest::read(manifest.as_deref().unwrap_or(Path::new("")))?;
+        Command::Map { manifest, shard, pipeline, out, full, jobs } => {
+            let manifest = Manifest::read(manifest)?;
             let job = batch::Job { manifest, pipeline: pipeline.as_deref(), out, full: *full, jobs: *jobs };
             batch::map(&job, shard.as_deref())
         }
-        Command::Reduce { out, json } if crate::pool::is_in_shards(out) => pool::reduce(out, *json),
         Command::Reduce { out, json } => batch::reduce(out, *json),
         Command::Compare { before, after, html, json } => compare::run(before, after, html.as_deref(), *json),
         Command::Compensate(asked) => compensate::run(asked),

@@ -22,9 +22,6 @@ pub enum Error {
     /// A file in a campaign's folder that is not what it should be.
     #[error("campaign {}: {why}", path.display())]
     Campaign { path: PathBuf, why: String },
-    /// A file of a pool in shards, or none where there should be one.
-    #[error("pool in shards: {} {why}", path.display())]
-    Pool { path: PathBuf, why: String },
     /// A share that is none.
     #[error("--shard: {0}")]
     Shard(String),

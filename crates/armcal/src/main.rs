@@ -1,5 +1,5 @@
 //! Outcome to exit code: 0 done, 1 failed or a limit is broken, 2 usage, 3 finished but data were lost or the model is
-//! inadequate, 4 a pool in shards needs another round.
+//! inadequate.
 
 use armcal::cli::Cli;
 use armcal::commands::Outcome;
@@ -27,7 +27,6 @@ fn ended(result: Result<Outcome, Error>) -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Doubtful) => ExitCode::from(3),
         Ok(Outcome::Broken) => ExitCode::FAILURE,
-        Ok(Outcome::Again) => ExitCode::from(4),
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
             let _ = writeln!(

@@ -8,7 +8,6 @@
 use crate::FitConfig;
 use crate::frames::{frame_names, is_free, tips_at};
 use crate::model_problem::ModelProblem;
-use crate::problem::Problem as _;
 use crate::rigid_fit::{Pair, nearest_rotation, rigid_fit, weights_of};
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose};
 use armcal_model::Model;
@@ -22,25 +21,6 @@ const SETTLED: f64 = 1e-3;
 
 /// The alternation on all observations; what a recording has copies of then on its own ones.
 pub(crate) fn aligned(
-    problem: &ModelProblem<'_>,
-    config: &FitConfig,
-    start: Vec<f64>,
-    which: &dyn Fn(&Parameter) -> bool,
-) -> Vec<f64> {
-    let chosen = |p: &Parameter| f64::from(u8::from(is_free(p) && which(p)));
-    let chosen: Vec<f64> = problem.parameters().iter().map(chosen).collect();
-    let key = problem.elsewhere().map(|away| (away, away.key("aligned", &[&start, &chosen])));
-    if let Some(found) = key.as_ref().and_then(|(away, key)| away.found(key)) {
-        return found;
-    }
-    let p = aligned_anew(problem, config, start, which);
-    if let Some((away, key)) = key {
-        away.keep(key, &p);
-    }
-    p
-}
-
-fn aligned_anew(
     problem: &ModelProblem<'_>,
     config: &FitConfig,
     start: Vec<f64>,

@@ -11,14 +11,11 @@
 //! **Nominal errors** are those of nominal robot parameters after fitting only the frames that nobody could know
 //! ([`armcal_core::Role::EstimatedFrame`]), on the same sides.
 
-use crate::elsewhere::{Elsewhere, errors as errors_elsewhere};
 use crate::fit::{Near, fit_near, fit_where_priors};
 use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
-use crate::model_problem::{
-    ModelProblem, describe, not_recording_by_recording, position_covariance_m2, whitened,
-};
+use crate::model_problem::{ModelProblem, describe, position_covariance_m2, whitened};
 use crate::noise::expected_norm_m;
 use crate::nominal::{self, Nominal, Start};
 use crate::outcome::{Calibration, Fit, Residual, SideErrors};
@@ -30,7 +27,6 @@ use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, War
 use armcal_model::{Model, ModelResidual};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
@@ -55,35 +51,12 @@ pub fn calibrate_beside(
     holdout: &HoldoutConfig,
 ) -> Result<Calibration, CalibrateError> {
     let nominal = other.and_then(|other| nominal::of_turns(other, model)).unwrap_or_default();
-    calibrated(&Judge { model, observations, config, nominal, elsewhere: None }, holdout)
-}
-
-/// [`calibrate`] on observations that somebody else holds: of each is known here who it is, where the arm stood and what was
-/// measured, but neither its noise nor how the joints came there. The result is the same, to the last bit.
-///
-/// # Errors
-/// [`CalibrateError::Unanswered`] as long as questions about them are open, each put to [`Elsewhere::ask`]; or those of a
-/// calibration.
-pub fn calibrate_elsewhere(
-    model: &Model,
-    observations: &[Observation],
-    config: &FitConfig,
-    holdout: &HoldoutConfig,
-    elsewhere: &dyn Elsewhere,
-) -> Result<Calibration, CalibrateError> {
-    if config.objective == Objective::Paper {
-        return Err(not_recording_by_recording());
-    }
-    let nominal = Nominal::default();
-    calibrated(&Judge { model, observations, config, nominal, elsewhere: Some(elsewhere) }, holdout)
-}
-
-fn calibrated(judge: &Judge<'_>, holdout: &HoldoutConfig) -> Result<Calibration, CalibrateError> {
-    judge.config.check()?;
-    if judge.observations.is_empty() {
+    config.check()?;
+    if observations.is_empty() {
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
-    judged(judge, &holdout::resolve(holdout, judge.observations, &frames::board_names(judge.model))?)
+    let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
+    judged(&Judge { model, observations, config, nominal }, &holdout)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -166,16 +139,15 @@ fn gathered(
     let all: Vec<usize> = (0..judge.observations.len()).collect();
     let held: BTreeSet<usize> = holdout.turns.iter().flatten().copied().collect();
     let seen: Vec<usize> = all.iter().copied().filter(|i| !held.contains(i)).collect();
-    let by_turns = holdout.turns.iter().zip(turns).map(|(held, turn)| judge.residuals(held, turn, true));
-    let mut parts: Vec<_> = by_turns.chain([judge.residuals(&seen, &last, false)]).collect();
-    // In turns, everything is training for the last fit.
-    parts.push(if holdout.in_turn { judge.residuals(&all, &last, false) } else { Ok(Vec::new()) });
-    let mut parts = parts.into_iter().collect::<Result<Vec<Vec<Residual>>, _>>()?;
-    let train = parts.pop().unwrap_or_default();
-    let places = holdout.turns.iter().chain([&seen]).flatten();
-    let mut placed: Vec<(&usize, Residual)> = places.zip(parts.into_iter().flatten()).collect();
+    let mut placed: Vec<(&usize, Residual)> =
+        seen.iter().zip(judge.residuals(&seen, &last, false)?).collect();
+    for (held, turn) in holdout.turns.iter().zip(turns) {
+        placed.extend(held.iter().zip(judge.residuals(held, turn, true)?));
+    }
     placed.sort_by_key(|(place, _)| **place);
     let residuals: Vec<Residual> = placed.into_iter().map(|(_, residual)| residual).collect();
+    // In turns, everything is training for the last fit.
+    let train = if holdout.in_turn { judge.residuals(&all, &last, false)? } else { Vec::new() };
     let held: Vec<&Residual> = residuals.iter().filter(|r| r.held_out).collect();
     let seen: Vec<&Residual> =
         train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
@@ -234,8 +206,6 @@ struct Judge<'a> {
     observations: &'a [Observation],
     config: &'a FitConfig,
     nominal: Nominal,
-    /// Who holds the observations, where what is here of them is not all.
-    elsewhere: Option<&'a dyn Elsewhere>,
 }
 
 impl Judge<'_> {
@@ -252,12 +222,7 @@ impl Judge<'_> {
         };
         let side = |places: &[usize]| {
             let chosen = places.iter().map(|&i| &self.observations[i]);
-            match self.elsewhere {
-                None => ModelProblem::new(self.model, chosen, self.config),
-                Some(who) => {
-                    Ok(ModelProblem::elsewhere(self.model, chosen.collect(), places, who, self.config))
-                }
-            }
+            ModelProblem::new(self.model, chosen, self.config)
         };
         let seen = places(false);
         let (train, test) = (side(&seen)?, side(&places(true))?);
@@ -303,61 +268,30 @@ impl Judge<'_> {
 
     /// These observations as a turn predicts them.
     fn residuals(&self, of: &[usize], turn: &Turn, held_out: bool) -> Result<Vec<Residual>, CalibrateError> {
-        let (values, nominal_values) = (&turn.values, &turn.nominal_values);
-        let here = || of.iter().map(|i| &self.observations[*i]).collect::<Vec<_>>();
-        let predicted = match self.elsewhere {
-            None => Predicted::all(self.model, &here(), values, nominal_values)?,
-            Some(who) => errors_elsewhere(who, of, values, nominal_values)?,
-        };
-        let residual =
-            |(&i, Predicted { nominal_m, fitted_m, whitened, expected_norm_m }): (&usize, Predicted)| {
-                let weight = if held_out { 1.0 } else { turn.weight(i) };
-                let dwell = self.observations[i].dwell;
-                Residual { dwell, held_out, nominal_m, fitted_m, whitened, weight, expected_norm_m }
-            };
-        Ok(of.iter().zip(predicted).map(residual).collect())
-    }
-}
-
-/// One observation as parameters predict it: what a [`Residual`] says of it alone.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Predicted {
-    nominal_m: Vector3<f64>,
-    fitted_m: Vector3<f64>,
-    whitened: Vector3<f64>,
-    expected_norm_m: f64,
-}
-
-impl Predicted {
-    /// Of every one of these observations, in their order.
-    pub fn all(
-        model: &Model,
-        observations: &[&Observation],
-        values: &[f64],
-        nominal_values: &[f64],
-    ) -> Result<Vec<Predicted>, CalibrateError> {
-        let residuals = |p: &[f64]| {
-            let mut all = Vec::with_capacity(observations.len());
-            model.residuals(p, observations, false, &mut |_, residual| all.push(residual));
+        let observations: Vec<&Observation> = of.iter().map(|i| &self.observations[*i]).collect();
+        let at = |p: &[f64]| {
+            let mut all = Vec::with_capacity(of.len());
+            self.model.residuals(p, &observations, false, &mut |_, residual| all.push(residual));
             all
         };
-        let both = residuals(values).into_iter().zip(residuals(nominal_values));
-        let one = |(o, (fitted, nominal)): (&&Observation, (ModelResidual, ModelResidual))| {
-            let covariance = position_covariance_m2(model, values, o);
+        let one = |((&i, fitted), nominal): ((&usize, ModelResidual), ModelResidual)| {
+            let o = &self.observations[i];
+            let covariance = position_covariance_m2(self.model, &turn.values, o);
             let whitened = whitened(&fitted, &covariance)
                 .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
-            Ok(Predicted {
+            Ok(Residual {
+                dwell: o.dwell,
+                held_out,
                 nominal_m: nominal.position_m,
                 fitted_m: fitted.position_m,
                 whitened,
+                weight: if held_out { 1.0 } else { turn.weight(i) },
                 expected_norm_m: expected_norm_m(&covariance),
             })
         };
-        observations.iter().zip(both).map(one).collect()
+        of.iter().zip(at(&turn.values)).zip(at(&turn.nominal_values)).map(one).collect()
     }
-}
 
-impl Judge<'_> {
     /// Where a fit ended, as a start; what the turn must not know of is at nominal.
     fn near(&self, fit: &Fit, nominal_values: &[f64], unseen: &dyn Fn(&Parameter) -> bool) -> Near {
         let values = self.without(unseen, &fit.values(), nominal_values);
@@ -378,7 +312,7 @@ impl Judge<'_> {
 
     /// All observations where the fit to them ended, as turns that begin there will ask of it.
     fn look<'t>(&self, last: &'t Turn, turns: usize) -> Result<All<'t>, CalibrateError> {
-        if turns < 2 || self.elsewhere.is_some() {
+        if turns < 2 {
             return Ok(All { last, looked: None, frames: None });
         }
         let problem = ModelProblem::new(self.model, self.observations, self.config)?;

@@ -57,8 +57,8 @@ pub struct FitConfig {
     /// Mean error [m] of the nominal arm, its frames placed, above which a fit is given up; not set by files, default: none.
     #[serde(skip)]
     pub give_up_above_m: Option<f64>,
-    /// Whether the last step of a fit is evaluated however small it is, as it is where observations are elsewhere: then both
-    /// ways end at the same bits. Not set by files, default: false.
+    /// Whether the last step of a fit is evaluated however small it is, and no derivative is taken from another fit. Not set by
+    /// files, default: false.
     #[serde(skip)]
     pub every_step: bool,
     /// By which whoever asked says that nobody waits any more. Not set by files, default: never.

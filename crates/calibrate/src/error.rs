@@ -114,18 +114,9 @@ pub enum CalibrateError {
         /// Status of the solver.
         status: String,
     },
-    /// Observations are elsewhere, and what was asked about them is not answered yet.
-    #[error("what was asked about observations that are elsewhere is not answered yet")]
-    Unanswered,
     /// Whoever asked wants no answer any more.
     #[error("nobody waits for this calibration any more, so it was stopped")]
     Stopped,
-    /// Answers about observations that are elsewhere cannot be had.
-    #[error("{0}")]
-    Unreachable(String),
-    /// What whoever holds observations answered instead of numbers.
-    #[error("{0}")]
-    Elsewhere(String),
     /// A linear system that should be positive definite is not.
     #[error(
         "{doing}: the normal equations are not positive definite; give `{worst}` a smaller prior_sigma or fix it"

@@ -86,12 +86,12 @@ impl WhitenedProblem<'_> {
 
     /// f(x): whitened rows of the observations, then one row for each prior.
     pub fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, CalibrateError> {
-        Ok(self.evaluate(&self.white.at(x.clone(), None)?).0)
+        Ok(self.evaluate(&self.white.at(x.clone())?).0)
     }
 
     /// df/dx.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, CalibrateError> {
-        Ok(self.evaluate(&self.white.at(x.clone(), None)?).1)
+        Ok(self.evaluate(&self.white.at(x.clone())?).1)
     }
 
     fn evaluate(&self, point: &Point) -> (DVector<f64>, DMatrix<f64>) {

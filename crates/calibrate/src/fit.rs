@@ -1,14 +1,13 @@
 //! One fit: from start values to estimates with intervals.
 
 use crate::covariance::Covariance;
-use crate::elsewhere::Weighting;
 use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
 use crate::priors::PriorScales;
 use crate::problem::Problem;
 use crate::remembered::{Looked, Remembered, look};
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
-use crate::solver::{self, Cost as _, Curvature, Settings};
+use crate::solver::{self, Curvature, Settings};
 use crate::statistics::{self, Uncertainty};
 use crate::whitened::{Point, Whitened};
 use crate::{
@@ -136,16 +135,16 @@ fn fit_from(
     let said: Vec<Warning> = learnt.iter().flat_map(of_learnt).collect();
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
     let (white, solved) = learnt.unwrap_or((declared, solved));
-    let (at, squares) = (&solved.at, white.squares(&solved.at)?);
+    let (at, squares) = (&solved.at, white.squares(&solved.at));
     let cost = solved.cost(&white, config);
     let name = |index: usize| problem.parameters()[index].name.clone();
     let mut uncertainty = statistics::uncertainty(&cost, at, &squares, &name)?;
     if let (Some(values), None) = (values, near) {
         // What the data determine is asked of them alone: a narrow prior that they taught is no reason to doubt them.
         let wide = Whitened::new(Box::new(problem), &values, free, config)?;
-        let at = wide.at(wide.start(), Some(Weighting::PLAIN))?;
+        let at = wide.at(wide.start())?;
         let cost = RobustCost::new(&wide, config, solved.sigma_scale);
-        let of_data = statistics::uncertainty(&cost, &at, &wide.squares(&at)?, &name)?;
+        let of_data = statistics::uncertainty(&cost, &at, &wide.squares(&at), &name)?;
         let Uncertainty { determined, rank, undetermined, .. } = of_data;
         uncertainty = Uncertainty { determined, rank, undetermined, ..uncertainty };
     }
@@ -224,7 +223,7 @@ pub(crate) struct Solved {
 impl Solved {
     /// Where the problem starts.
     fn unmoved(white: &Whitened<'_>, sigma_scale: f64) -> Result<Solved, CalibrateError> {
-        let at = white.at(white.start(), Some(Weighting::PLAIN))?;
+        let at = white.at(white.start())?;
         let status = Status::Converged;
         Ok(Solved { at, sigma_scale, paper: None, status, iterations: 0, curvature: None })
     }
@@ -246,11 +245,11 @@ pub(crate) fn solve(
     config: &FitConfig,
 ) -> Result<Solved, CalibrateError> {
     if config.objective != Objective::Paper {
-        return once(white, sigma_scale, config);
+        return solve_robust(white, sigma_scale, config);
     }
     let solution = paper::minimise(white, config)?;
     let mut solved = Solved {
-        at: white.at(solution.x, None)?,
+        at: white.at(solution.x)?,
         sigma_scale: 1.0,
         paper: Some(solution.objective),
         status: solution.status,
@@ -259,35 +258,6 @@ pub(crate) fn solve(
     };
     let cost = solved.cost(white, config);
     solved.sigma_scale = proposal2_scale(&cost, &solved.at, white.axes.len() as f64).max(1.0);
-    Ok(solved)
-}
-
-/// [`solve_robust`]; of observations that are elsewhere, only until its end is known.
-fn once(white: &Whitened<'_>, known: Option<f64>, config: &FitConfig) -> Result<Solved, CalibrateError> {
-    let Some(away) = white.problem.elsewhere() else { return solve_robust(white, known, config) };
-    let axes: Vec<f64> = white
-        .axes
-        .iter()
-        .flat_map(|a| [a.index as f64, a.centre, a.scale, a.precision, a.lower, a.upper])
-        .collect();
-    let key = away.key("solve", &[&white.start, &axes, known.as_slice()]);
-    if let Some([sigma_scale, iterations, converged, x @ ..]) = away.found(&key).as_deref() {
-        let cost = RobustCost::new(white, config, *sigma_scale);
-        let at = cost.at(DVector::from_column_slice(x))?;
-        let status = if *converged > 0.0 { Status::Converged } else { Status::IterationLimit };
-        return Ok(Solved {
-            at,
-            sigma_scale: *sigma_scale,
-            paper: None,
-            status,
-            iterations: *iterations as usize,
-            curvature: None,
-        });
-    }
-    let solved = solve_robust(white, known, config)?;
-    let converged = f64::from(u8::from(solved.status == Status::Converged));
-    let head = [solved.sigma_scale, solved.iterations as f64, converged];
-    away.keep(key, &head.into_iter().chain(solved.at.x.iter().copied()).collect::<Vec<f64>>());
     Ok(solved)
 }
 
@@ -301,8 +271,7 @@ fn solve_robust(
 ) -> Result<Solved, CalibrateError> {
     let estimated = config.objective == Objective::Robust && config.scale == Scale::Estimated;
     let fixed = if estimated { known.map(|scale| scale.max(1.0)) } else { Some(1.0) };
-    let first = fixed.map(|scale| RobustCost::new(white, config, scale).weighting());
-    let mut at = white.at(white.start(), first)?;
+    let mut at = white.at(white.start())?;
     let mut sigma_scale = fixed.unwrap_or_else(|| (GENEROUS * median_scale(white, &at)).max(1.0));
     let mut iterations = 0;
     let mut round = if known.is_some() { ROUGH_ROUNDS } else { 0 };

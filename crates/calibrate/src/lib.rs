@@ -21,7 +21,6 @@
 //!   in which dwells errors are largest, `error_places`; what each dwell says about each joint, for the eye, `implied`;
 //! * many recordings of one arm, each with parameters of its own ([`armcal_model::Model::with_own`]): their columns are eliminated
 //!   recording by recording ([`problem::Problem::known`]), so that work and memory grow with the number of recordings;
-//! * observations that shards hold, each asked for the sums of its recordings: `elsewhere`, [`calibrate_elsewhere`];
 //! * two arms whose tips are joined, each the other's reference: what their angles leave open, `joined`.
 
 mod alignment;
@@ -30,7 +29,6 @@ mod calibration;
 mod compare;
 mod config;
 mod covariance;
-mod elsewhere;
 mod ended;
 mod error;
 mod error_places;
@@ -75,11 +73,10 @@ mod words;
 mod tests;
 
 pub use alike::AlikePoses;
-pub use calibration::{calibrate, calibrate_beside, calibrate_elsewhere, holdout_turns};
+pub use calibration::{calibrate, calibrate_beside, holdout_turns};
 pub use compare::{compare_errors, compare_heldout, held_out_errors_m, mean_by_dwell};
 pub use config::{FitConfig, HoldoutConfig, Objective, RecordingKey, Scale, Stop};
 pub use covariance::Covariance;
-pub use elsewhere::{Answer, Away, Elsewhere, Request, answer};
 pub use ended::{Ended, fitted_values};
 pub use error::CalibrateError;
 pub use error_places::{DwellError, ErrorPlace, error_places, single_dwells};

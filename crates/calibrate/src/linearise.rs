@@ -64,7 +64,7 @@ pub fn linearise(
     let to_metres = (0..observations.len()).map(|i| problem.to_metres(i, values)).collect();
     let runs = problem.runs().to_vec();
     let white = Whitened::new(Box::new(problem), values, &|p| p.free, config)?;
-    let at = white.at(white.start(), None)?;
+    let at = white.at(white.start())?;
     let pose = |(observations, whitener): (Range<usize>, DMatrix<f64>)| {
         let rows = rows[observations.start].start..rows[observations.end - 1].end;
         LinearPose { observations, rows, whitener }
@@ -108,6 +108,6 @@ pub fn linearise_more(
     let whitener = shorter.poses.iter().map(|pose| pose.whitener.clone()).collect();
     let free = |p: &Parameter| more.contains(p.name.as_str());
     let white = Whitened::in_noise(Box::new(problem), values, &free, whitener, config)?;
-    let at = white.at(white.start(), None)?;
+    let at = white.at(white.start())?;
     Ok((axes(&white, &at), white.jacobian(&at)))
 }

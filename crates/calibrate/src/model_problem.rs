@@ -5,7 +5,6 @@
 //! joints that rest anywhere in their gaps. Cross-covariance between position and orientation, and between the features that
 //! were measured in one dwell, enters through the encoders only: a block is all that was measured in a dwell.
 
-use crate::elsewhere::{Away, Elsewhere};
 use crate::joined::scale;
 use crate::poses::measured_together;
 use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
@@ -97,7 +96,6 @@ pub struct ModelProblem<'a> {
     /// The observations of each block: those of one dwell that stand behind each other, each of another feature.
     blocks: Vec<Range<usize>>,
     use_orientation: bool,
-    away: Option<Away<'a>>,
 }
 
 impl<'a> ModelProblem<'a> {
@@ -121,26 +119,7 @@ impl<'a> ModelProblem<'a> {
             Objective::Paper => (0..observations.len()).map(|i| i..i + 1).collect(),
             _ => measured_together(&observations),
         };
-        Ok(ModelProblem { model, observations, blocks, use_orientation: config.use_orientation, away: None })
-    }
-
-    /// Of observations that `who` holds, at these places among all; what is known of them here is who they are, where the
-    /// arm stood and what was measured.
-    pub(crate) fn elsewhere(
-        model: &'a Model,
-        observations: Vec<&'a Observation>,
-        places: &[usize],
-        who: &'a dyn Elsewhere,
-        config: &FitConfig,
-    ) -> ModelProblem<'a> {
-        let blocks = measured_together(&observations);
-        let use_orientation = config.use_orientation;
-        let mut problem = ModelProblem { model, observations, blocks, use_orientation, away: None };
-        let rows =
-            |block: &Range<usize>| problem.observations[block.clone()].iter().map(|o| problem.rows(o)).sum();
-        let rows = problem.blocks.iter().map(rows).collect();
-        problem.away = Some(Away::new(who, places, rows));
-        problem
+        Ok(ModelProblem { model, observations, blocks, use_orientation: config.use_orientation })
     }
 
     /// The observations, in the order of the blocks.
@@ -361,10 +340,6 @@ impl Problem for ModelProblem<'_> {
         self.model.has_gaps()
     }
 
-    fn elsewhere(&self) -> Option<&Away<'_>> {
-        self.away.as_ref()
-    }
-
     fn symmetries(&self, p: &[f64]) -> Vec<Symmetry> {
         if self.observations.iter().any(|o| o.against().is_none()) {
             return Vec::new();
@@ -407,7 +382,7 @@ fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
     Ok(())
 }
 
-pub(crate) fn not_recording_by_recording() -> CalibrateError {
+fn not_recording_by_recording() -> CalibrateError {
     CalibrateError::BadConfig {
         key: "fit.objective",
         value: "\"paper\"".into(),

@@ -144,7 +144,7 @@ fn rescaled(
     let parameters = white.problem.parameters();
     let name = |index: usize| parameters[index].name.clone();
     let data = solved.sigma_scale.powi(-2);
-    let variances = posterior(&white.squares(&solved.at)?, &white.axes, data, &name)?.variances();
+    let variances = posterior(&white.squares(&solved.at), &white.axes, data, &name)?.variances();
     // Of each kind: how many, those known, and squares of offsets and of standard deviations.
     let mut sums: BTreeMap<ParameterKind, [f64; 4]> = BTreeMap::new();
     for ((axis, x), variance) in white.axes.iter().zip(solved.at.x.iter()).zip(variances.iter()) {

@@ -1,7 +1,6 @@
 //! What a solver needs to know about a calibration, and nothing about robots: blocks of residual rows (one block an
 //! observation), their exact derivatives, their covariance, and the parameters.
 
-use crate::elsewhere::Away;
 use crate::rows::Kept;
 use armcal_core::Parameter;
 use armcal_model::Asked;
@@ -84,10 +83,6 @@ pub trait Problem: Sync {
     fn known(&self) -> Vec<Known> {
         Vec::new()
     }
-    /// Who holds the observations, where they are not at hand: then neither residuals nor covariances are known here.
-    fn elsewhere(&self) -> Option<&Away<'_>> {
-        None
-    }
     /// What the problem is known to leave open at parameters `p`. One that the data do see after all (because a parameter
     /// in it is fixed) is dropped when what is undetermined is put into words.
     fn symmetries(&self, _p: &[f64]) -> Vec<Symmetry> {
@@ -137,10 +132,6 @@ macro_rules! as_beneath {
 
         fn known(&$self) -> Vec<$crate::problem::Known> {
             $beneath.known()
-        }
-
-        fn elsewhere(&$self) -> Option<&$crate::elsewhere::Away<'_>> {
-            $beneath.elsewhere()
         }
 
         fn symmetries(&$self, p: &[f64]) -> Vec<$crate::problem::Symmetry> {

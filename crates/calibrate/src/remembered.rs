@@ -81,7 +81,7 @@ pub(crate) fn look(
 ) -> Result<Arc<Looked>, CalibrateError> {
     let remembered = Remembered::new(problem, None);
     let white = Whitened::new(Box::new(&remembered), p, free, config)?;
-    white.at(white.start(), None)?;
+    white.at(white.start())?;
     Ok(remembered.at(&white.start))
 }
 

@@ -3,7 +3,6 @@
 //! `F(x) = sum_j rho(|e_j| / s) + 1/2 sum_k w_k x_k^2` with e_j the whitened residual of observation j, s the scale of
 //! the residuals in units of the declared noise, and w the prior precision (1 in units of its own standard deviation).
 
-use crate::elsewhere::{Part, Weighting};
 use crate::loss::{Loss, chi_median};
 use crate::products::gram;
 use crate::rows::{Derivative, Rows};
@@ -33,19 +32,12 @@ pub(crate) struct RobustCost<'a, 'p> {
 impl<'a, 'p> RobustCost<'a, 'p> {
     pub fn new(white: &'a Whitened<'p>, config: &FitConfig, sigma_scale: f64) -> RobustCost<'a, 'p> {
         let huber_c = (config.objective == Objective::Robust).then_some(config.huber_c);
-        let ends_straight = !config.every_step && white.problem.elsewhere().is_none();
-        RobustCost { white, huber_c, sigma_scale, exact_curvature: true, ends_straight }
+        RobustCost { white, huber_c, sigma_scale, exact_curvature: true, ends_straight: !config.every_step }
     }
 
-    pub fn weighted(white: &'a Whitened<'p>, by: Weighting) -> RobustCost<'a, 'p> {
-        let Weighting { huber_c, sigma_scale, exact_curvature } = by;
-        RobustCost { white, huber_c, sigma_scale, exact_curvature, ends_straight: false }
-    }
-
-    /// How residuals weigh in it.
-    pub fn weighting(&self) -> Weighting {
-        let RobustCost { huber_c, sigma_scale, exact_curvature, .. } = *self;
-        Weighting { huber_c, sigma_scale, exact_curvature }
+    /// All rows alike: its model has the squares of the derivative.
+    pub fn plain(white: &'a Whitened<'p>) -> RobustCost<'a, 'p> {
+        RobustCost { white, huber_c: None, sigma_scale: 1.0, exact_curvature: false, ends_straight: false }
     }
 
     pub fn loss(&self, block: usize) -> Loss {
@@ -66,7 +58,7 @@ impl<'a, 'p> RobustCost<'a, 'p> {
 
 impl Cost for RobustCost<'_, '_> {
     fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
-        self.white.at(x, Some(self.weighting()))
+        self.white.at(x)
     }
 
     fn ends_straight(&self) -> bool {
@@ -86,11 +78,11 @@ impl Cost for RobustCost<'_, '_> {
 
     /// Gauss-Newton in the model, exact in the loss: for an outlier `w (I - u u')` instead of `w I`, because Huber's
     /// loss has no curvature along the residual (Triggs et al. 2000, section 4.3, with rho'' from the table).
-    fn model(&self, at: &Point) -> Result<Quadratic, CalibrateError> {
+    fn model(&self, at: &Point) -> Quadratic {
         let (x, structure) = (&at.x, &self.white.structure);
         let precision =
             DVector::from_iterator(self.white.axes.len(), self.white.axes.iter().map(|a| a.precision));
-        let parts = self.parts(at)?;
+        let parts = self.parts(at);
         let (mut gradient, mut damping) = (DVector::zeros(x.len()), DVector::zeros(x.len()));
         for (group, part) in parts.iter().enumerate() {
             for (k, axis) in structure.axes(group).enumerate() {
@@ -101,7 +93,7 @@ impl Cost for RobustCost<'_, '_> {
         gradient += precision.component_mul(x);
         damping += &precision;
         let hessian = curvature(structure, parts, precision);
-        Ok(Quadratic { value: self.value(at), gradient, hessian, damping })
+        Quadratic { value: self.value(at), gradient, hessian, damping }
     }
 
     fn lower(&self) -> DVector<f64> {
@@ -128,29 +120,22 @@ pub(crate) fn curvature(structure: &Arc<Structure>, parts: Vec<Part>, diagonal: 
     }
 }
 
-impl Part {
-    /// What a group without blocks adds.
-    pub fn nothing(columns: usize) -> Part {
-        let zeros = DVector::zeros(columns);
-        Part { gradient: zeros.clone(), squares: zeros, curvature: DMatrix::zeros(0, columns) }
-    }
+/// What the blocks of one group add to the model, over the group's columns.
+pub(crate) struct Part {
+    gradient: DVector<f64>,
+    /// Diagonal of the curvature, without what outliers take from it.
+    squares: DVector<f64>,
+    /// The matrix itself where the structure is dense, otherwise the triangle that has it as its square.
+    curvature: DMatrix<f64>,
 }
 
 impl RobustCost<'_, '_> {
-    /// What every group adds to the model: the one thing that is asked of observations, wherever they are.
-    pub fn parts(&self, at: &Point) -> Result<Vec<Part>, CalibrateError> {
-        if self.white.problem.elsewhere().is_none() {
-            return Ok(self.white.each_group(|group| self.part(group, &at.groups[group])));
-        }
-        let by = self.weighting();
-        match &at.parts {
-            Some((as_asked, parts)) if *as_asked == by => Ok(parts.clone()),
-            _ => Ok(self.white.at(at.x.clone(), Some(by))?.parts.map_or_else(Vec::new, |(_, parts)| parts)),
-        }
+    /// What every group adds to the model.
+    pub fn parts(&self, at: &Point) -> Vec<Part> {
+        self.white.each_group(|group| self.part(group, &at.groups[group]))
     }
 
-    /// What the blocks of one group add to the model, over the group's columns.
-    pub fn part(&self, group: usize, rows: &Rows) -> Part {
+    fn part(&self, group: usize, rows: &Rows) -> Part {
         let structure = &self.white.structure;
         let blocks = structure.groups[group].blocks.clone();
         let first = self.white.offsets[blocks.start];

@@ -200,8 +200,7 @@ mod tests {
             // Four shared axes, then three groups of two, of which some directions are barely seen.
             let own = |k: usize| vec![4 + 2 * k, 5 + 2 * k];
             let group = |k: usize| Group { blocks: k..k + 1, own: own(k), columns: vec![None; 6] };
-            let structure =
-                Structure { groups: (0..3).map(group).collect(), shared: (0..4).collect(), dense: false };
+            let structure = Structure { groups: (0..3).map(group).collect(), shared: (0..4).collect() };
             let triangles = (0..3).map(|_| {
                 let sizes = DVector::from_fn(6, |_, _| 10_f64.powf(rng.random_range(-2.0..2.0)));
                 let rows = DMatrix::from_fn(rng.random_range(1..9), 6, |_, _| rng.random_range(-1.0..1.0));

@@ -14,8 +14,6 @@ use std::ops::Range;
 pub(crate) struct Structure {
     pub groups: Vec<Group>,
     pub shared: Vec<usize>,
-    /// Whether all parameters are shared by one group.
-    pub dense: bool,
 }
 
 /// Observations that know the same parameters.
@@ -38,7 +36,7 @@ impl Structure {
                 parameters: (0..problem.parameters().len()).collect(),
             };
             let known = if known.is_empty() { vec![all()] } else { known };
-            return Structure::over(known, axes, (0..axes.len()).collect(), true);
+            return Structure::over(known, axes, (0..axes.len()).collect());
         }
         let mut knowers = vec![Knowers::None; problem.parameters().len()];
         for (group, known) in known.iter().enumerate() {
@@ -48,7 +46,7 @@ impl Structure {
             (0..axes.len()).filter(|&axis| knowers[axes[axis].index] == wanted).collect::<Vec<usize>>()
         };
         let (shared, nobodys) = (is(Knowers::Several), is(Knowers::None));
-        let mut structure = Structure::over(known, axes, shared, false);
+        let mut structure = Structure::over(known, axes, shared);
         // Only its prior says anything about a parameter that no observation knows.
         let columns = vec![None; 1 + structure.shared.len()];
         let alone = |axis| Group { blocks: 0..0, own: vec![axis], columns: columns.clone() };
@@ -56,8 +54,8 @@ impl Structure {
         structure
     }
 
-    /// Of groups, all there are or some of them, that share these axes; what else one of them knows is its own.
-    pub fn over(known: Vec<Known>, axes: &[Axis], shared: Vec<usize>, dense: bool) -> Structure {
+    /// Of groups that share these axes; what else one of them knows is its own.
+    fn over(known: Vec<Known>, axes: &[Axis], shared: Vec<usize>) -> Structure {
         let axis_of: BTreeMap<usize, usize> =
             axes.iter().enumerate().map(|(axis, a)| (a.index, axis)).collect();
         let group = |known: Known| {
@@ -68,12 +66,12 @@ impl Structure {
             let columns = own.iter().chain(&shared).map(|&axis| at.get(&axes[axis].index).copied());
             Group { blocks: known.blocks, columns: columns.collect(), own }
         };
-        Structure { groups: known.into_iter().map(group).collect(), shared, dense }
+        Structure { groups: known.into_iter().map(group).collect(), shared }
     }
 
     /// Whether all parameters are shared by one group.
     pub fn is_dense(&self) -> bool {
-        self.dense
+        self.groups.len() == 1 && self.groups[0].own.is_empty()
     }
 
     /// Number of axes.

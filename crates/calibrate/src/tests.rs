@@ -3,7 +3,6 @@
 mod against; // do a ballbar, a gauge and a point without a camera recover what is planted?
 mod covariance; // is a covariance kept in parts the dense one?
 mod coverage; // do 95 % intervals hold 95 % of planted truths, and are parallel axes reported?
-mod elsewhere; // is a calibration whose observations are with shards that of one process, to the last bit?
 mod frames; // are frames metres and half turns off found?
 mod holdout; // does the fit never see what is held out?
 mod holdout_turns; // which observations does each kind of hold-out mean?

@@ -6,7 +6,6 @@
 //! (or a ridge of 1 m, 1 rad), wide enough not to be felt by anything the data see at all, and keeps directions that
 //! nothing determines where they started.
 
-use crate::elsewhere::{Part, Weighting};
 use crate::problem::{Linearised, Problem};
 use crate::robust::{RobustCost, curvature};
 use crate::rows::{ByParameter, Derivative, Rows};
@@ -44,11 +43,6 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// One of which nothing but its unit counts.
-    pub fn scaled(index: usize, scale: f64) -> Axis {
-        Axis { index, centre: 0.0, scale, precision: 0.0, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
-    }
-
     /// A value, or the bound that it is beyond.
     pub fn bounded(&self, value: f64) -> f64 {
         let x = (value - self.centre) / self.scale;
@@ -67,7 +61,7 @@ pub(crate) struct Whitened<'a> {
     pub axes: Vec<Axis>,
     /// Full parameter vector at the start; fixed parameters stay there.
     pub start: Vec<f64>,
-    /// Inverse Cholesky factor of each block's covariance; none of observations that are elsewhere.
+    /// Inverse Cholesky factor of each block's covariance.
     whitener: Vec<DMatrix<f64>>,
     /// First row of each block in the stacked residual, and one past the last.
     pub offsets: Vec<usize>,
@@ -81,12 +75,10 @@ pub(crate) struct Point {
     pub x: DVector<f64>,
     /// Norm of the whitened residual of each block.
     pub norms: Vec<f64>,
-    /// Whitened residuals of all blocks, stacked; none of observations that are elsewhere.
+    /// Whitened residuals of all blocks, stacked.
     pub residual: DVector<f64>,
-    /// Rows and derivative of each group, over its columns; none of observations that are elsewhere.
+    /// Rows and derivative of each group, over its columns.
     pub groups: Vec<Rows>,
-    /// Of observations that are elsewhere: what they add to a cost with this weighting, where that was asked for.
-    pub parts: Option<(Weighting, Vec<Part>)>,
 }
 
 impl<'a> Whitened<'a> {
@@ -98,8 +90,12 @@ impl<'a> Whitened<'a> {
         config: &FitConfig,
     ) -> Result<Whitened<'a>, CalibrateError> {
         let (axes, start) = axes_and_start(problem.as_ref(), start, free, config)?;
-        let structure = Structure::of(problem.as_ref(), &axes);
-        Whitened::over(problem, axes, start, structure)
+        let inverse = |block| {
+            inverse_cholesky(problem.covariance(block, &start))
+                .ok_or_else(|| CalibrateError::BadCovariance { observation: problem.name(block) })
+        };
+        let whitener = (0..problem.blocks()).map(inverse).collect::<Result<_, _>>()?;
+        Ok(Whitened::over(problem, axes, start, whitener))
     }
 
     /// The same where the inverse Cholesky factor of each block's covariance is known.
@@ -111,30 +107,18 @@ impl<'a> Whitened<'a> {
         config: &FitConfig,
     ) -> Result<Whitened<'a>, CalibrateError> {
         let (axes, start) = axes_and_start(problem.as_ref(), start, free, config)?;
-        let structure = Structure::of(problem.as_ref(), &axes);
-        let rows: Vec<usize> = whitener.iter().map(DMatrix::nrows).collect();
-        Ok(Whitened { offsets: offsets(&rows), problem, axes, start, whitener, structure: structure.into() })
+        Ok(Whitened::over(problem, axes, start, whitener))
     }
 
     /// The same over these axes, whose start is within their bounds.
-    pub fn over(
+    fn over(
         problem: Box<dyn Problem + 'a>,
         axes: Vec<Axis>,
         start: Vec<f64>,
-        structure: Structure,
-    ) -> Result<Whitened<'a>, CalibrateError> {
-        let mut whitener = Vec::with_capacity(problem.blocks());
-        let blocks = if problem.elsewhere().is_some() { 0 } else { problem.blocks() };
-        for block in 0..blocks {
-            let inverse = inverse_cholesky(problem.covariance(block, &start))
-                .ok_or_else(|| CalibrateError::BadCovariance { observation: problem.name(block) })?;
-            whitener.push(inverse);
-        }
-        let rows = match problem.elsewhere() {
-            Some(away) => away.rows.clone(),
-            None => whitener.iter().map(DMatrix::nrows).collect(),
-        };
-        Ok(Whitened { offsets: offsets(&rows), problem, axes, start, whitener, structure: structure.into() })
+        whitener: Vec<DMatrix<f64>>,
+    ) -> Whitened<'a> {
+        let structure = Structure::of(problem.as_ref(), &axes).into();
+        Whitened { offsets: offsets(&whitener), problem, axes, start, whitener, structure }
     }
 
     /// Inverse Cholesky factor of each block's covariance.
@@ -179,20 +163,10 @@ impl<'a> Whitened<'a> {
         p
     }
 
-    /// Linearises at x. Observations that are elsewhere are asked for what a cost with this weighting will need.
-    pub fn at(&self, x: DVector<f64>, by: Option<Weighting>) -> Result<Point, CalibrateError> {
+    /// Linearises at x.
+    pub fn at(&self, x: DVector<f64>) -> Result<Point, CalibrateError> {
         let p = self.parameters_at(&x);
-        let Some(away) = self.problem.elsewhere() else { return self.at_parameters(x, &p) };
-        let (norms, mut parts) = away.sums(self, p, by)?;
-        let without = self.structure.groups[parts.len()..].iter();
-        parts.extend(without.map(|group| Part::nothing(group.columns.len())));
-        let parts = by.map(|by| (by, parts));
-        Ok(Point { x, norms, residual: DVector::zeros(0), groups: Vec::new(), parts })
-    }
-
-    /// Linearises at all parameters `p`.
-    pub fn at_parameters(&self, x: DVector<f64>, p: &[f64]) -> Result<Point, CalibrateError> {
-        let groups = self.each_group(|group| self.linearised_group(p, group));
+        let groups = self.each_group(|group| self.linearised_group(&p, group));
         let groups = groups.into_iter().collect::<Result<Vec<_>, _>>()?;
         Ok(self.point(x, groups))
     }
@@ -203,7 +177,7 @@ impl<'a> Whitened<'a> {
         let residual = DVector::from_iterator(self.rows(), rows);
         let norm = |block| residual.rows(self.offsets[block], self.dimension(block)).norm();
         let norms = (0..self.blocks()).map(norm).collect();
-        Point { x, norms, residual, groups, parts: None }
+        Point { x, norms, residual, groups }
     }
 
     /// A point moved to x along its linearisation.
@@ -263,9 +237,9 @@ impl<'a> Whitened<'a> {
     }
 
     /// `J'J` of that derivative.
-    pub fn squares(&self, at: &Point) -> Result<Curvature, CalibrateError> {
-        let parts = RobustCost::weighted(self, Weighting::PLAIN).parts(at)?;
-        Ok(curvature(&self.structure, parts, DVector::zeros(self.axes.len())))
+    pub fn squares(&self, at: &Point) -> Curvature {
+        let parts = RobustCost::plain(self).parts(at);
+        curvature(&self.structure, parts, DVector::zeros(self.axes.len()))
     }
 
     /// The rows of one group at parameters `p`, with the columns of its own axes, then those of the shared ones.
@@ -401,9 +375,9 @@ fn axes_and_start(
 }
 
 /// First row of each block, and one past the last.
-fn offsets(rows: &[usize]) -> Vec<usize> {
+fn offsets(whitener: &[DMatrix<f64>]) -> Vec<usize> {
     let mut offsets = vec![0];
-    rows.iter().for_each(|rows| offsets.push(offsets[offsets.len() - 1] + rows));
+    whitener.iter().for_each(|block| offsets.push(offsets[offsets.len() - 1] + block.nrows()));
     offsets
 }
 

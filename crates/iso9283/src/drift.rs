@@ -1,11 +1,9 @@
-//! Clauses 7.6 and 7.7: how poses change with time (dAP, dRP), and from robot to robot (E).
+//! Clause 7.6: how poses change with time (dAP, dRP).
 
 use crate::IsoError;
 use crate::error::at_least;
 use crate::pose::{Deviation, pose_accuracy, pose_repeatability};
-use crate::stats::largest;
-use crate::tip_pose::{TipPose, barycentre, check};
-use nalgebra::Vector3;
+use crate::tip_pose::TipPose;
 
 /// Drift of pose accuracy `dAP = max_T |AP(t = 0) - AP(t = T)|`, for the position and each angle (ISO 9283:1998,
 /// 7.6). `blocks[k]` are the poses attained about time k, ten cycles each in the standard.
@@ -33,18 +31,4 @@ fn largest_change(what: &'static str, blocks: &[Deviation]) -> Result<Deviation,
         angles_rad: block.angles_rad.zip(blocks[0].angles_rad).map(|(angles, first)| angles - first),
     };
     Ok(Deviation::largest(&blocks[1..].iter().map(change).collect::<Vec<_>>()))
-}
-
-/// Exchangeability E [m]: the largest distance between the barycentres that two robots of one kind attain for the
-/// same command in the same programme (ISO 9283:1998, 7.7; it asks for five robots). `robots[h]` are the poses that
-/// robot h attained.
-///
-/// Fails with fewer than two robots, with a robot without poses, or where a pose is not finite.
-pub fn exchangeability_m(robots: &[Vec<TipPose>]) -> Result<f64, IsoError> {
-    const WHAT: &str = "exchangeability";
-    at_least(2, "robots of one kind", robots.len(), WHAT)?;
-    robots.iter().try_for_each(|poses| check(WHAT, poses, 1))?;
-    let centres_m: Vec<Vector3<f64>> = robots.iter().map(|poses| barycentre(poses).position_m).collect();
-    let pairs = centres_m.iter().enumerate().flat_map(|(h, a)| centres_m[..h].iter().map(move |b| (a, b)));
-    Ok(largest(pairs.map(|(a, b)| (a - b).norm())))
 }

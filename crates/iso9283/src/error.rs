@@ -56,11 +56,6 @@ pub enum IsoError {
     /// A path without length.
     #[error("the command path has no length: give at least two points that differ")]
     NoLength,
-    /// The attained motion does not weave.
-    #[error(
-        "the attained path does not go four times to a side by an eighth of the commanded stroke of {stroke_mm:.3} mm"
-    )]
-    NoWeave { stroke_mm: f64 },
 }
 
 /// Fails with fewer than `needed`.

@@ -1,11 +1,9 @@
-//! What an assessment is made from: visits to commanded poses, commanded and attained paths, static loads.
+//! What an assessment is made from: visits to commanded poses, commanded and attained paths.
 
 use crate::IsoError;
 use crate::command::CommandPath;
-use crate::compliance::LoadStep;
 use crate::settling::check_run;
 use crate::tip_pose::{TimedPose, TipPose};
-use crate::weaving::Weave;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -36,14 +34,12 @@ pub struct Visit {
 pub struct PathTest {
     /// Its name.
     pub name: String,
-    /// The command path as a polyline, dense where it is curved; for a weaving motion its centre line.
+    /// The command path as a polyline, dense where it is curved.
     pub commanded: Vec<TipPose>,
     /// What was attained, one run a cycle.
     pub runs: Vec<Vec<TimedPose>>,
     /// Commanded speed [m/s], where it is constant.
     pub speed_m_s: Option<f64>,
-    /// The commanded weave, where the path is one.
-    pub weave: Option<Weave>,
 }
 
 /// Everything a recording, or several, can say about a robot.
@@ -53,8 +49,6 @@ pub struct Evidence {
     pub visits: Vec<Visit>,
     /// Paths.
     pub paths: Vec<PathTest>,
-    /// Static loads on the resting arm.
-    pub loads: Vec<LoadStep>,
 }
 
 /// How evidence is read.

@@ -88,4 +88,4 @@ pub use verification::{
     IsoReport, PathSample, Told, Verification, VerifiedRecording, verification_files, verification_json,
     verification_paths, verification_text,
 };
-pub use write::{pool_files, run_files, write_all, write_brief, write_pool_brief};
+pub use write::{pool_files, run_files, write_all, write_brief};

@@ -78,8 +78,6 @@ pub enum Undiagnosed {
         /// How many may be.
         most: usize,
     },
-    /// The observations are with the shares of a pool, and the search needs them.
-    InShards,
     /// It could not be made; a warning says why.
     Failed,
 }
@@ -206,11 +204,6 @@ impl Run {
                 "What is missing was not looked for: that search works on all free parameters at once, here {free}, and {most} \
                  are the most; pool fewer recordings for it."
             ),
-            Some(Undiagnosed::InShards) => {
-                "What is missing was not looked for: that search needs the observations, which stay with the shares of the pool; \
-                 `armcal pool` looks for it in one process."
-                    .to_owned()
-            }
             Some(Undiagnosed::NotAsked) | None => {
                 "What is missing was not looked for ([diagnosis] enabled = false).".to_owned()
             }

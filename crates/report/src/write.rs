@@ -149,23 +149,6 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     Ok(())
 }
 
-/// Writes what a pool tells without the rows of its observations: `summary.json`, `pool.json`, `parameters.toml` and the
-/// calibrated model, all or none; returns their paths.
-///
-/// # Errors
-/// As [`write_all`].
-pub fn write_pool_brief(run: &Run, out_dir: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let texts = [
-        (SUMMARY.to_owned(), summary_json(run)),
-        (pool_json::FILE.to_owned(), pool_json(run)),
-        (PARAMETERS.to_owned(), parameters_toml(run)?),
-        (armcal_model_file::FILE.to_owned(), past_model::of_run(run)?.json().map_err(ReportError::Page)?),
-    ];
-    let models = model_files(run)?.into_iter().map(|model| (model.name, model.text));
-    let stage = |(name, text): (String, String)| stage(&out_dir.join(name), text.as_bytes());
-    commit_all(texts.into_iter().chain(models).map(stage).collect::<Result<_, _>>()?)
-}
-
 /// A complete file that has no name yet.
 pub(crate) fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
     stage_pieces(path, |out| out.write_all(bytes))

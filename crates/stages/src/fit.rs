@@ -147,11 +147,7 @@ pub fn with_effects(
     effects: &[EffectSpec],
     observations: &[Observation],
 ) -> Result<Model, RunError> {
-    with_session(geometry, effects, &frames::session(pipeline, observations))
-}
-
-/// The same of observations of which this is known.
-pub fn with_session(geometry: &Model, effects: &[EffectSpec], session: &Session) -> Result<Model, RunError> {
-    geometry.check_declared(session)?;
-    Ok(geometry.with_effects(effects, session)?)
+    let session = frames::session(pipeline, observations);
+    geometry.check_declared(&session)?;
+    Ok(geometry.with_effects(effects, &session)?)
 }

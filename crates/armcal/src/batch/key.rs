@@ -23,7 +23,7 @@ const NOTE_BYTES: u64 = 64 << 10;
 const SEEN: &str = ".inputs";
 
 /// Makes the keys of a campaign's recordings.
-pub(crate) struct Keys {
+pub(super) struct Keys {
     /// Hash of everything that is the same for all recordings.
     common: String,
     /// Folder of the campaign.
@@ -56,11 +56,6 @@ impl Keys {
             parts.push(text.map_err(|source| ConfigError::ReadFile { what, path, source })?);
         }
         Ok(Keys { common: hash(parts), out: out.to_owned() })
-    }
-
-    /// The key of something else made from the same settings and these parts.
-    pub fn of(&self, what: &str, parts: impl IntoIterator<Item = String>) -> String {
-        hash([self.common.clone(), what.to_owned()].into_iter().chain(parts))
     }
 
     /// The key of one recording.

@@ -16,15 +16,14 @@ mod store;
 mod work;
 mod workers;
 
-pub(crate) use key::Keys;
 pub use manifest::{Manifest, recordings_below};
 pub use shard::Shard;
-pub(crate) use store::write_one;
 
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_report::{Campaign, FailedRecording, write_campaign};
+use key::Keys;
 use shard::{Done, Receipt};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

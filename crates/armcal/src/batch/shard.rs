@@ -25,26 +25,6 @@ impl Shard {
     /// All of it.
     pub const WHOLE: Shard = Shard { number: 1, of: 1 };
 
-    /// All shares of so many.
-    pub fn all(of: usize) -> Vec<Shard> {
-        (1..=of).map(|number| Shard { number, of }).collect()
-    }
-
-    /// Of how many it is one.
-    pub fn of(self) -> usize {
-        self.of
-    }
-
-    /// The name of its files, such as `2-of-17`.
-    pub fn file_stem(self) -> String {
-        format!("{}-of-{}", self.number, self.of)
-    }
-
-    /// The share whose files have this name.
-    pub fn of_file_stem(name: &str) -> Option<Shard> {
-        name.replacen("-of-", "/", 1).parse().ok().filter(|shard: &Shard| shard.file_stem() == name)
-    }
-
     /// Whether a recording of the manifest belongs to it.
     pub fn has(self, index: usize) -> bool {
         index % self.of == self.number - 1
@@ -151,7 +131,7 @@ impl Receipt {
 
     /// The receipt of a share in a campaign's folder.
     pub(super) fn file(shard: Shard, out: &Path) -> PathBuf {
-        out.join(RECEIPTS).join(format!("{}.json", shard.file_stem()))
+        out.join(RECEIPTS).join(format!("{}-of-{}.json", shard.number, shard.of))
     }
 
     pub(super) fn write(&self, out: &Path) -> Result<(), Error> {
@@ -209,7 +189,7 @@ pub(super) fn together(receipts: Vec<Receipt>, out: &Path) -> Result<(String, Ve
             return Err(bad(format!("share {} is there twice", twice.shard)));
         }
     }
-    let wanted = Shard::all(of).into_iter();
+    let wanted = (1..=of).map(|number| Shard { number, of });
     let missing: Vec<String> = wanted.filter(|s| !by_shard.contains_key(s)).map(|s| s.to_string()).collect();
     if !missing.is_empty() {
         return Err(bad(format!("share {} is missing: map it, then reduce again", missing.join(", "))));

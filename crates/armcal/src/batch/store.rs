@@ -148,7 +148,7 @@ pub(super) fn relative(folder: &str) -> String {
 }
 
 /// Writes a file whole or not at all.
-pub(crate) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let failed = |source| ReportError::Write { path: path.to_owned(), source: Box::new(source) };
     Ok(atomic::write(path, bytes).map_err(failed)?)
 }

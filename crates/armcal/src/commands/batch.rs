@@ -64,7 +64,7 @@ pub(crate) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
 }
 
 /// The share that was asked for, or that of this task of a Slurm job array.
-pub(crate) fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
+fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
     match (shard, Shard::of_slurm()) {
         (Some(text), _) => text.parse().map_err(Error::Shard),
         (None, Some(of_slurm)) => of_slurm.map_err(Error::Shard),

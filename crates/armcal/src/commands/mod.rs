@@ -37,8 +37,6 @@ pub enum Outcome {
     Doubtful,
     /// Done, and the result breaks a limit.
     Broken,
-    /// This much is done, and the same is to be done again.
-    Again,
 }
 
 /// What recordings lost, in the JSON of a result, where anything was.

@@ -11,7 +11,6 @@ use armcal_report::{
 };
 use armcal_stages::RunError;
 use armcal_table::{Assignment, Association, Board, Place};
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -35,45 +34,12 @@ pub struct CollectedRecording {
     pub base: Pose,
     /// Where its board started (world_from_board).
     pub board: Option<Pose>,
-    /// Its place in the file of its result.
-    pub number: usize,
-}
-
-/// Where the frames of a recording started.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Start {
-    /// Name of the recording.
-    pub name: String,
-    /// Its base (world_from_base).
-    pub base: Pose,
-    /// Its board (world_from_board).
-    pub board: Option<Pose>,
-}
-
-impl CollectedRecording {
-    pub(super) fn start(&self) -> Start {
-        Start { name: self.run.name.clone(), base: self.base, board: self.board }
-    }
 }
 
 /// A recording, and the file it was found in.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Found {
+struct Found {
     result: PathBuf,
-    /// Its place in the file.
-    number: usize,
     recording: ObservedRecording,
-}
-
-impl Found {
-    /// Where it was found: the file, and its place in it.
-    pub fn place(&self) -> (&Path, usize) {
-        (&self.result, self.number)
-    }
-
-    pub fn observations_mut(&mut self) -> &mut [Observation] {
-        &mut self.recording.observations
-    }
 }
 
 /// Reads every `observations.json` in `folders` and below.
@@ -86,31 +52,21 @@ pub fn collect(
     board: Option<&Board>,
     folders: &[PathBuf],
 ) -> Result<Collected, Error> {
-    together(contained(pipeline, model_text, board, results(folders)?)?)
-}
-
-/// The recordings in these files.
-pub(super) fn contained(
-    pipeline: &Pipeline,
-    model_text: &str,
-    board: Option<&Board>,
-    results: impl IntoIterator<Item = PathBuf>,
-) -> Result<Vec<Found>, Error> {
     let facts = board.map(BoardFacts::of);
     let mut found = Vec::new();
-    for result in results {
+    for result in results(folders)? {
         let past = PastObservations::open(&result)?;
         if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
             return Err(Error::Result { path: result, problem: format!("cannot be pooled: {problem}") });
         }
-        let numbered = past.recordings.into_iter().enumerate();
-        found.extend(numbered.map(|(number, recording)| Found { result: result.clone(), number, recording }));
+        let recordings = past.recordings.into_iter();
+        found.extend(recordings.map(|recording| Found { result: result.clone(), recording }));
     }
-    Ok(found)
+    together(found)
 }
 
 /// All of them in the order of time, each under a name of its own; what two hold counts once.
-pub(super) fn together(mut found: Vec<Found>) -> Result<Collected, Error> {
+fn together(mut found: Vec<Found>) -> Result<Collected, Error> {
     let mut warnings = Vec::new();
     found.retain(|f| {
         let empty = f.recording.observations.is_empty();
@@ -150,7 +106,6 @@ fn joined(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
             run: RecordingRun { warnings, ..recording_run(name, earlier, board, &observations) },
             base: base.pose(),
             board,
-            number: f.number,
         });
         collected.observations.extend(observations);
     }
@@ -215,7 +170,7 @@ fn dwell(o: &Observation) -> Dwell {
 }
 
 /// Every file of observations in the folders and below, each once, in the order of the paths.
-pub(super) fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
+fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
     let mut all = BTreeSet::new();
     for folder in folders {
         let mut here = BTreeSet::new();

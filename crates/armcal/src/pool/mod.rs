@@ -1,25 +1,16 @@
 //! `armcal pool`: one calibration of the results of many runs, without their recordings.
 //!
-//! results -> [`collect`] -> one model with what each recording has for itself -> calibration -> diagnosis -> [`Run`]. Where
-//! the results are those of a cluster, shares of them answer what the calibration asks: [`map`], [`reduce`].
+//! results -> [`collect`] -> one model with what each recording has for itself -> calibration -> diagnosis -> [`Run`].
 
 mod collect;
-mod rounds;
-mod shards;
 
-pub use collect::{Collected, CollectedRecording, Start, collect};
-pub use shards::{Mapped, Reduced, map, reduce};
-
-/// Whether `out` is that of a pool in shards.
-pub fn is_in_shards(out: &std::path::Path) -> bool {
-    rounds::Rounds::are_in(out)
-}
+pub use collect::{Collected, CollectedRecording, collect};
 
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_calibrate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, align_frames, calibrate};
+use armcal_calibrate::{FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_config::{BoardPose, FramePose, Pipeline};
-use armcal_core::{Observation, Pose};
+use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_pipeline as story;
 use armcal_report::{Run, Undiagnosed};
@@ -45,15 +36,34 @@ pub struct Pooled {
 /// go wrong in a fit.
 pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<Pooled, Error> {
     progress.step("reading results");
-    let (model_texts, _) = frames::nominal_chain(pipeline)?;
+    let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
     let collected = collect(pipeline, &model_texts.concat(), board.as_ref(), folders)?;
-    let fit = |model: &Model, observations: &[Observation], holdout: &HoldoutConfig| {
-        // Shards end at the same bits.
-        let config = FitConfig { every_step: true, ..pipeline.fit.clone() };
-        calibrate(model, observations, &config, holdout)
+    let geometry = geometry(pipeline, chain, &collected)?;
+    let effects = frames::effect_specs(pipeline, &geometry)?;
+    let observations = collected.observations;
+    let model = armcal_stages::with_effects(pipeline, &geometry, &effects, &observations)?;
+
+    // Shorter ways end as near, but not at the bits that pools have ended at so far.
+    let config = FitConfig { every_step: true, ..pipeline.fit.clone() };
+    progress.step(&format!("calibrating {} recordings", collected.recordings.len()));
+    let calibration = calibrate(&model, &observations, &config, &pipeline.holdout)?;
+    let turns = pipeline.pool.turns.min(collected.recordings.len());
+    let transfer = if turns > 1 {
+        progress.step(&format!("holding recordings out in {turns} turns"));
+        let holdout = HoldoutConfig::RecordingFolds { k: turns };
+        Some(calibrate(&model, &observations, &config, &holdout)?)
+    } else {
+        None
     };
-    let (mut run, geometry) = joint_run(pipeline, collected, &fit, progress)?;
+    let session = frames::session(pipeline, &observations);
+    let mut run = Run {
+        recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
+        board,
+        transfer,
+        warnings: collected.warnings,
+        ..story::run_of(pipeline, model_texts, model, (observations, session), calibration)
+    };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
     if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {
         run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
@@ -64,82 +74,36 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
     Ok(Pooled { run, geometry })
 }
 
-/// How a model is calibrated to observations, here or elsewhere.
-type Calibrate<'a> =
-    dyn Fn(&Model, &[Observation], &HoldoutConfig) -> Result<Calibration, CalibrateError> + 'a;
-
-/// The joint calibration, with the hold-out of the pipeline and with recordings held out in turn, and the nominal arm.
-fn joint_run(
-    pipeline: &Pipeline,
-    collected: Collected,
-    calibrate: &Calibrate<'_>,
-    progress: &Progress,
-) -> Result<(Run, Model), Error> {
-    let (model_texts, chain) = frames::nominal_chain(pipeline)?;
-    let geometry = geometry(pipeline, chain, &collected)?;
-    let effects = frames::effect_specs(pipeline, &geometry)?;
-    let observations = collected.observations;
-    let model = armcal_stages::with_effects(pipeline, &geometry, &effects, &observations)?;
-
-    progress.step(&format!("calibrating {} recordings", collected.recordings.len()));
-    let calibration = calibrate(&model, &observations, &pipeline.holdout);
-    let turns = pipeline.pool.turns.min(collected.recordings.len());
-    // Where observations are elsewhere, both are asked for in one round.
-    let goes_on = matches!(calibration, Ok(_) | Err(CalibrateError::Unanswered));
-    let transfer = if turns > 1 && goes_on {
-        progress.step(&format!("holding recordings out in {turns} turns"));
-        Some(calibrate(&model, &observations, &HoldoutConfig::RecordingFolds { k: turns }))
-    } else {
-        None
-    };
-    let (calibration, transfer) = (calibration?, transfer.transpose()?);
-    let session = frames::session(pipeline, &observations);
-    let run = Run {
-        recordings: collected.recordings.into_iter().map(|r| r.run).collect(),
-        board: frames::board(pipeline)?,
-        transfer,
-        warnings: collected.warnings,
-        ..story::run_of(pipeline, model_texts, model, (observations, session), calibration)
-    };
-    Ok((run, geometry))
-}
-
 /// The nominal arm among the frames of all recordings, as one run of them together would have it.
 fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, Error> {
-    let starts: Vec<Start> = collected.recordings.iter().map(CollectedRecording::start).collect();
-    if pipeline.closed_chain.is_none() {
-        return geometry_of(pipeline, chain, &starts.iter().collect::<Vec<_>>());
+    let own =
+        |r: &CollectedRecording, base_in_world| RecordingStart { name: r.run.name.clone(), base_in_world };
+    let recordings = &collected.recordings;
+    if pipeline.closed_chain.is_some() {
+        let mut model = frames::nominal_model(pipeline, &chain, None, &[])?;
+        let aligned = align_frames(&model, &collected.observations, &pipeline.fit)?;
+        place_bases(&mut model, &aligned);
+        let own = recordings.iter().map(|r| own(r, None)).collect();
+        model.ask_own(own, pipeline.pool.per_recording.clone());
+        return Ok(model);
     }
-    let mut model = frames::nominal_model(pipeline, &chain, None, &[])?;
-    let aligned = align_frames(&model, &collected.observations, &pipeline.fit)?;
-    place_bases(&mut model, &aligned);
-    let own = |start: Start| RecordingStart { name: start.name, base_in_world: None };
-    model.ask_own(starts.into_iter().map(own).collect(), pipeline.pool.per_recording.clone());
-    Ok(model)
-}
-
-/// The same of one arm, from where the frames of each recording started.
-fn geometry_of(pipeline: &Pipeline, chain: Chain, starts: &[&Start]) -> Result<Model, Error> {
     let measured = pipeline.frames.base.pose == FramePose::Measured;
-    let bases: Vec<Pose> = starts.iter().filter(|_| measured).map(|start| start.base).collect();
+    let bases: Vec<Pose> = recordings.iter().filter(|_| measured).map(|r| r.base).collect();
     let base = frames::base_frame(&pipeline.frames.base, &bases);
     let knowledge = pipeline.table.as_ref().map_or(Knowledge::Given, |table| match table.pose {
         BoardPose::Estimated => Knowledge::Estimated,
         BoardPose::Measured | BoardPose::Given => armcal_config::measured(table.sigma_mm, table.sigma_deg),
     });
-    let board = |start: &&Start| {
-        let name = format!("board.{}", start.name);
-        start.board.map(|pose| Frame { name, pose, knowledge, free_rotation: true })
+    let board = |r: &CollectedRecording| {
+        let name = format!("board.{}", r.run.name);
+        r.board.map(|pose| Frame { name, pose, knowledge, free_rotation: true })
     };
     let tip = pipeline.frames.tip.frame("tip", pipeline.fit.use_orientation);
-    let boards = starts.iter().filter_map(board).collect();
+    let boards = recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
     armcal_stages::declare(&mut model, pipeline)?;
-    let own = |start: &&Start| {
-        let base_in_world = measured.then_some(start.base);
-        RecordingStart { name: start.name.clone(), base_in_world }
-    };
     // Each recording knows its own board alone, so that work grows with their number and no faster.
-    model.ask_own(starts.iter().map(own).collect(), pipeline.pool.per_recording.clone());
+    let own = recordings.iter().map(|r| own(r, measured.then_some(r.base))).collect();
+    model.ask_own(own, pipeline.pool.per_recording.clone());
     Ok(model)
 }

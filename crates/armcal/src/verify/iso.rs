@@ -61,7 +61,7 @@ impl Shown<'_> {
         let mut times: BTreeMap<String, usize> = BTreeMap::new();
         visits.iter().for_each(|v: &Visit| *times.entry(v.pose.clone()).or_default() += 1);
         visits.retain(|v| times[&v.pose] > 1);
-        Evidence { visits, paths: self.paths(side), loads: Vec::new() }
+        Evidence { visits, paths: self.paths(side) }
     }
 
     /// One stop at which the sensor saw the tip.
@@ -146,8 +146,7 @@ impl Shown<'_> {
                         let name = format!("path {}", tests.len() + 1);
                         let corners = path.simplified(JITTER_M);
                         let commanded = corners.points_m().iter().map(|m| TipPose::at(*m)).collect();
-                        let test =
-                            PathTest { name, commanded, runs: vec![run], speed_m_s: None, weave: None };
+                        let test = PathTest { name, commanded, runs: vec![run], speed_m_s: None };
                         tests.push((path.clone(), test));
                     }
                 }

@@ -36,8 +36,8 @@ pub(crate) struct Solution {
 /// Marquardt's scaling by the largest curvature seen; damping by the ratio of actual to predicted decrease (Madsen,
 /// Nielsen and Tingleff 2004, with a factor of ten instead of three on the way down). The test of convergence has no
 /// unit: the step in the metric of the Hessian, that is, in standard deviations of the estimate. A trial point at
-/// which the cost is not finite counts as a failed step; the start is evaluated by the caller. An error is one of
-/// observations that are elsewhere.
+/// which the cost is not finite counts as a failed step; the start is evaluated by the caller. An error says that nobody waits
+/// any more.
 pub(crate) fn minimise(
     cost: &dyn Cost,
     start: Point,
@@ -45,7 +45,7 @@ pub(crate) fn minimise(
 ) -> Result<Solution, CalibrateError> {
     let (lower, upper) = (cost.lower(), cost.upper());
     let mut at = start;
-    let mut model = cost.model(&at)?;
+    let mut model = cost.model(&at);
     let mut damping = model.damping.clone();
     let (mut mu, mut growth) = (1e-8, 10.0);
     for iterations in 0..settings.max_iterations {
@@ -69,10 +69,7 @@ pub(crate) fn minimise(
             if done && curvature.sqrt() <= NEGLIGIBLE && cost.ends_straight() {
                 return Ok(stopped(cost.moved(at, x), model, Status::Converged, iterations + 1));
             }
-            let trial = match cost.at(x) {
-                Err(e @ (CalibrateError::Unanswered | CalibrateError::Unreachable(_))) => return Err(e),
-                trial => trial.ok(),
-            };
+            let trial = cost.at(x).ok();
             let value = trial.as_ref().map_or(f64::INFINITY, |trial| cost.value(trial));
             let gain = (model.value - value) / predicted;
             if done {
@@ -94,7 +91,7 @@ pub(crate) fn minimise(
                 return Ok(stopped(at, model, Status::IterationLimit, iterations));
             }
         }
-        model = cost.model(&at)?;
+        model = cost.model(&at);
     }
     Ok(stopped(at, model, Status::IterationLimit, settings.max_iterations))
 }

@@ -35,7 +35,7 @@ pub(crate) trait Cost {
     /// Value there.
     fn value(&self, at: &Point) -> f64;
     /// Value, gradient and a positive semidefinite approximation of the Hessian there.
-    fn model(&self, at: &Point) -> Result<Quadratic, CalibrateError>;
+    fn model(&self, at: &Point) -> Quadratic;
     /// Lower bound of every x.
     fn lower(&self) -> DVector<f64>;
     /// Upper bound of every x.

@@ -7,9 +7,8 @@ mod paths;
 mod poses;
 
 use crate::IsoError;
-use crate::catalogue::{EXCHANGEABILITY, STATIC_COMPLIANCE};
-use crate::compliance::static_compliance_m_n;
-use crate::criterion::{Assessment, Findings, Place};
+use crate::catalogue::EXCHANGEABILITY;
+use crate::criterion::{Assessment, Findings};
 use crate::evidence::{Evidence, Settings};
 
 /// Computes every criterion of ISO 9283:1998 that `evidence` supports.
@@ -26,7 +25,6 @@ pub fn assess(evidence: &Evidence, settings: &Settings) -> Result<Assessment, Is
     for path in &evidence.paths {
         paths::assess(path, settings, &mut findings)?;
     }
-    assess_loads(evidence, &mut findings);
     findings.lack(&EXCHANGEABILITY, "one recorded robot", EXCHANGEABILITY.needs);
     Ok(findings.finish(notes(cycles::by_pose(&cycles).len())))
 }
@@ -40,14 +38,4 @@ fn notes(poses: usize) -> Vec<String> {
     let unknown = "the standard asks for poses and paths in the largest cube within the most used part of the \
                    working space, at rated load and velocity: not checked here";
     few.into_iter().chain([unknown.to_owned()]).collect()
-}
-
-fn assess_loads(evidence: &Evidence, findings: &mut Findings) {
-    if evidence.loads.is_empty() {
-        return;
-    }
-    let same = |force| evidence.loads.iter().filter(|load| load.force_n == force).count();
-    let n = evidence.loads.iter().map(|load| same(load.force_n)).min().unwrap_or(0);
-    let place = Place { at: "the loaded pose", n, notes: &[] };
-    findings.tell(&STATIC_COMPLIANCE, static_compliance_m_n(&evidence.loads), &place);
 }

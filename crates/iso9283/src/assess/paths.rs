@@ -1,8 +1,8 @@
-//! Clauses 8 and 11 from a commanded path and what was attained.
+//! Clause 8 from a commanded path and what was attained.
 
 use crate::catalogue::{
-    CORNER_OVERSHOOT, Component, FREQUENCY_ERROR, PATH_ACCURACY, PATH_REPEATABILITY, REORIENTATION,
-    ROUND_OFF, STROKE_ERROR, VELOCITY_ACCURACY, VELOCITY_FLUCTUATION, VELOCITY_REPEATABILITY,
+    CORNER_OVERSHOOT, Component, PATH_ACCURACY, PATH_REPEATABILITY, REORIENTATION, ROUND_OFF,
+    VELOCITY_ACCURACY, VELOCITY_FLUCTUATION, VELOCITY_REPEATABILITY,
 };
 use crate::command::{CommandPath, Plane};
 use crate::criterion::{Findings, Place};
@@ -12,7 +12,6 @@ use crate::planes::{Crossing, cross};
 use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
 use crate::velocity::{velocity_accuracy, velocity_fluctuation_m_s, velocity_repeatability};
-use crate::weaving::{frequency_error, stroke_error, weave_of};
 use crate::{IsoError, cornering};
 use nalgebra::Vector3;
 
@@ -22,10 +21,6 @@ const REACH: f64 = 0.3;
 
 pub(super) fn assess(path: &PathTest, settings: &Settings, findings: &mut Findings) -> Result<(), IsoError> {
     let command = CommandPath::new(&path.commanded)?;
-    if path.weave.is_some() {
-        assess_weave(path, &command, findings);
-        return Ok(());
-    }
     let planes = command.planes(settings.planes);
     let reach_m = REACH * command.length_m();
     let runs: Vec<Vec<Option<Crossing>>> = path.runs.iter().map(|run| cross(&planes, run, reach_m)).collect();
@@ -107,14 +102,4 @@ fn speeds_m_s(crossings: &[Option<Crossing>]) -> Vec<f64> {
             (to.pose.position_m - from.pose.position_m).norm() / elapsed_s(from.time_ns, to.time_ns)
         })
         .collect()
-}
-
-fn assess_weave(path: &PathTest, centre: &CommandPath, findings: &mut Findings) {
-    let Some(commanded) = path.weave else { return };
-    let attained =
-        path.runs.iter().map(|run| weave_of(centre, run, commanded.stroke_m)).collect::<Result<Vec<_>, _>>();
-    let place = Place { at: &path.name, n: path.runs.len(), notes: &[] };
-    let stroke = attained.clone().and_then(|weaves| stroke_error(&commanded, &weaves));
-    findings.tell(&STROKE_ERROR, stroke, &place);
-    findings.tell(&FREQUENCY_ERROR, attained.and_then(|weaves| frequency_error(&commanded, &weaves)), &place);
 }

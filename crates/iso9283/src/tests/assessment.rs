@@ -2,8 +2,6 @@
 
 use super::{close, mm, sampled, turned};
 use crate::catalogue::CHARACTERISTICS;
-use crate::compliance::LoadStep;
-use crate::weaving::Weave;
 use crate::{Assessment, Evidence, IsoError, PathTest, Settings, TipPose, Visit, assess};
 use nalgebra::Vector3;
 
@@ -223,7 +221,6 @@ fn speed_is_that_of_the_middle_half() {
         commanded: vec![mm(0.0, 0.0, 0.0), mm(400.0, 0.0, 0.0)],
         runs: vec![sampled(0.01, 2.4, |t| mm(x_mm(t), 0.0, 0.0))],
         speed_m_s: Some(0.3),
-        weave: None,
     };
     let assessment =
         assess(&Evidence { paths: vec![path], ..Evidence::default() }, &Settings::default()).unwrap();
@@ -274,14 +271,12 @@ fn paths_give_accuracy_corners_speed_and_reorientation() {
         commanded,
         runs: (0..10).map(|_| run(1.02)).collect(),
         speed_m_s: Some(0.3),
-        weave: None,
     };
     let corner = PathTest {
         name: "L".into(),
         commanded: vec![mm(0.0, 0.0, 0.0), mm(100.0, 0.0, 0.0), mm(100.0, 100.0, 0.0)],
         runs: vec![sampled(0.01, 2.0, |t| mm((100.0 * t).min(98.0), (100.0 * t - 98.0).max(0.0), 0.0))],
         speed_m_s: None,
-        weave: None,
     };
     let evidence = Evidence { paths: vec![turning, corner], ..Evidence::default() };
     let assessment = assess(&evidence, &Settings::default()).unwrap();
@@ -305,26 +300,6 @@ fn paths_give_accuracy_corners_speed_and_reorientation() {
     close(value(&assessment, "CO", "L corner 1"), 0.0, 1e-12);
     let missed = &find("8.2", "L").notes;
     assert!(missed.iter().any(|note| note.ends_with("of 100 planes not crossed by every run")), "{missed:?}");
-}
-
-#[test]
-fn loads_and_weaves_are_assessed_where_there_are_some() {
-    let weave = PathTest {
-        name: "seam".into(),
-        commanded: vec![mm(0.0, 0.0, 0.0), mm(100.0, 0.0, 0.0)],
-        runs: vec![sampled(5e-3, 5.0, |t| {
-            mm(20.0 * t, 6.0 * (std::f64::consts::TAU * 2.0 * t + 0.1).sin(), 0.0)
-        })],
-        speed_m_s: Some(0.02),
-        weave: Some(Weave { stroke_m: 10e-3, frequency_hz: 2.0 }),
-    };
-    let load = LoadStep { force_n: Vector3::z() * -50.0, displacement_m: Vector3::z() * -1e-3 };
-    let evidence = Evidence { paths: vec![weave], loads: vec![load], visits: Vec::new() };
-    let assessment = assess(&evidence, &Settings::default()).unwrap();
-    close(value(&assessment, "WS", "seam"), 0.2, 1e-2);
-    close(value(&assessment, "WF", "seam"), 0.0, 1e-3);
-    close(assessment.criteria.iter().find(|c| c.clause == "10").unwrap().value, 2e-5, 1e-15);
-    assert!(reason(&assessment, "8.2", "path accuracy, position").starts_with("needs a commanded path"));
 }
 
 #[test]
@@ -353,7 +328,6 @@ fn wrong_evidence_is_refused_by_name() {
         commanded: vec![mm(0.0, 0.0, 0.0)],
         runs: Vec::new(),
         speed_m_s: None,
-        weave: None,
     };
     let stub = Evidence { paths: vec![path], ..Evidence::default() };
     assert_eq!(assess(&stub, &Settings::default()), Err(IsoError::NoLength));

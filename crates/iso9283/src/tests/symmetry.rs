@@ -2,8 +2,6 @@
 //! change nothing; lengths scale; rubbish is refused and never panics.
 
 use super::{mm, sampled, turned};
-use crate::compliance::LoadStep;
-use crate::weaving::Weave;
 use crate::{Assessment, Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_core::Pose;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -71,12 +69,11 @@ fn path() -> impl Strategy<Value = PathTest> {
             })
             .collect(),
         speed_m_s: Some(0.2),
-        weave: None,
     })
 }
 
 fn evidence() -> impl Strategy<Value = Evidence> {
-    (visits(), path()).prop_map(|(visits, path)| Evidence { visits, paths: vec![path], loads: Vec::new() })
+    (visits(), path()).prop_map(|(visits, path)| Evidence { visits, paths: vec![path] })
 }
 
 fn moved(evidence: &Evidence, by: &Pose) -> Evidence {
@@ -96,7 +93,6 @@ fn moved(evidence: &Evidence, by: &Pose) -> Evidence {
     Evidence {
         visits: evidence.visits.iter().map(visit).collect(),
         paths: evidence.paths.iter().map(path).collect(),
-        loads: evidence.loads.clone(),
     }
 }
 
@@ -178,18 +174,14 @@ proptest! {
         let mut sorted = run.clone();
         sorted.sort_by_key(|s| s.time_ns);
         sorted.dedup_by_key(|s| s.time_ns);
-        let test = |weave| PathTest {
+        let test = PathTest {
             name: "path".into(), commanded: (0..8).map(at).collect(),
-            runs: vec![sorted.clone(), run.clone(), Vec::new()], speed_m_s: Some(numbers[0]), weave,
+            runs: vec![sorted.clone(), run.clone(), Vec::new()], speed_m_s: Some(numbers[0]),
         };
-        let weave = Some(Weave { stroke_m: numbers[1], frequency_hz: numbers[2] });
-        let evidence = Evidence {
-            visits: (0..9).map(visit).collect(), paths: vec![test(None), test(weave)],
-            loads: vec![LoadStep { force_n: at(3).position_m, displacement_m: at(4).position_m }],
-        };
+        let evidence = Evidence { visits: (0..9).map(visit).collect(), paths: vec![test.clone()] };
         let settings = Settings { planes, limit_band_m: Some(numbers[3]), ..Settings::default() };
         let _ = assess(&evidence, &settings);
-        let path = PathTest { runs: vec![sorted.clone()], ..test(None) };
+        let path = PathTest { runs: vec![sorted], ..test };
         let only_paths = Evidence { paths: vec![path], ..Evidence::default() };
         let _ = assess(&only_paths, &settings);
     }
