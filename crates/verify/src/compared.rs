@@ -70,11 +70,6 @@ impl Compared {
             improvement: 1.0 - after.mean_m / before.mean_m,
         })
     }
-
-    /// Whether the error fell by more than chance explains.
-    pub fn fell(&self) -> bool {
-        self.difference_ci95_m.is_some_and(|[_, high]| high < 0.0)
-    }
 }
 
 fn estimate(errors: &[Error<'_>], value: fn(&Error<'_>) -> f64) -> Estimate {
@@ -120,14 +115,14 @@ mod tests {
         let [low, high] = c.before.ci95_m.expect("five groups");
         assert!((low - 1.5612).abs() < 1e-3 && (high - 2.4788).abs() < 1e-3, "{low} {high}");
         assert!((c.improvement - 0.5).abs() < 1e-12);
-        assert!(c.fell());
+        assert!(c.difference_ci95_m.is_some_and(|[_, high]| high < 0.0));
     }
 
     #[test]
     fn one_group_has_no_interval() {
         let errors = [1.0, 2.0].map(|m| Error { group: "a", before_m: m, after_m: m });
         let c = Compared::of(&errors).expect("errors");
-        assert_eq!((c.groups, c.before.ci95_m, c.fell()), (1, None, false));
+        assert_eq!((c.groups, c.before.ci95_m, c.difference_ci95_m), (1, None, None));
         assert!(Compared::of(&[]).is_none());
     }
 }
