@@ -95,8 +95,9 @@ fn messages(file: &RecordingFile, survey: &FileSurvey) -> Option<BTreeMap<String
         return None;
     }
     let mut topics = BTreeMap::new();
-    for (id, channel) in &file.channels {
-        *topics.entry(channel.topic.clone()).or_default() += survey.tallies.get(id).map_or(0, |t| t.messages);
+    for (id, channel) in file.channels() {
+        *topics.entry(channel.topic.clone()).or_default() +=
+            survey.tallies.get(&id).map_or(0, |t| t.messages);
     }
     Some(topics)
 }
